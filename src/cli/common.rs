@@ -1,0 +1,161 @@
+//! What every verb shares: printing, exit codes, and finding machines.
+
+use crate::diag::{Failure, Finding, Findings, Result, source};
+use crate::files;
+use crate::machine::{self, Machine};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What a verb answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// Exit code 0.
+    Done,
+    /// Exit code 1: the answer is "no".
+    No,
+}
+
+/// How to print.
+#[derive(Debug, Clone, Copy)]
+pub struct Io {
+    /// One JSON object on stdout, messages on stderr.
+    pub json: bool,
+}
+
+impl Io {
+    /// For a call with or without `--json`.
+    #[must_use]
+    pub fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// A line for the person: stdout, or nothing when JSON was asked for. A closed pipe is no error.
+    pub fn say(&self, text: impl AsRef<str>) {
+        if !self.json {
+            let _ = writeln!(std::io::stdout(), "{}", text.as_ref());
+        }
+    }
+
+    /// The answer as one JSON object, when it was asked for.
+    pub fn answer(&self, value: &impl serde::Serialize) {
+        if self.json {
+            let text = serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"));
+            let _ = writeln!(std::io::stdout(), "{text}");
+        }
+    }
+
+    /// Findings to stderr, each with its place and remedy.
+    pub fn report(&self, findings: &[Finding]) {
+        for finding in findings {
+            let place = finding.place().map(|p| format!("{p}: ")).unwrap_or_default();
+            let word = match finding.severity {
+                crate::diag::Severity::Error => "error",
+                crate::diag::Severity::Warning => "warning",
+                crate::diag::Severity::Info => "note",
+            };
+            let mut err = std::io::stderr();
+            // one line that tools can read (file:line:column), then the picture for the person
+            let _ = writeln!(err, "{place}{word}: {}", finding.message);
+            if finding.source.is_some() && finding.span.as_ref().is_some_and(|s| !s.is_empty()) {
+                let mut text = String::new();
+                let handler = miette::NarratableReportHandler::new();
+                let graphical = miette::GraphicalReportHandler::new().with_width(100);
+                let drawn = if std::env::var_os("NO_COLOR").is_some() || !std::io::IsTerminal::is_terminal(&err) {
+                    handler.render_report(&mut text, &Bare(finding))
+                } else {
+                    graphical.render_report(&mut text, &Bare(finding))
+                };
+                if drawn.is_ok() && std::io::IsTerminal::is_terminal(&err) {
+                    let _ = write!(err, "{text}");
+                }
+            }
+            if let Some(help) = &finding.help {
+                let _ = writeln!(err, "  help: {help}");
+            }
+        }
+    }
+
+    /// Prints what failed and gives the exit code.
+    #[must_use]
+    pub fn finish(&self, answer: Result<Answer>) -> ExitCode {
+        match answer {
+            Ok(Answer::Done) => ExitCode::SUCCESS,
+            Ok(Answer::No) => ExitCode::from(1),
+            Err(Failure(findings)) => {
+                self.report(&findings);
+                ExitCode::from(2)
+            }
+        }
+    }
+}
+
+/// A finding without its help: that is printed on its own line.
+#[derive(Debug)]
+struct Bare<'a>(&'a Finding);
+
+impl std::fmt::Display for Bare<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.0.message)
+    }
+}
+impl std::error::Error for Bare<'_> {}
+impl miette::Diagnostic for Bare<'_> {
+    fn severity(&self) -> Option<miette::Severity> {
+        self.0.severity()
+    }
+    fn source_code(&self) -> Option<&dyn miette::SourceCode> {
+        self.0.source_code()
+    }
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = miette::LabeledSpan> + '_>> {
+        self.0.labels()
+    }
+}
+
+/// The machines of a file, or the built-in ones; warnings are printed.
+///
+/// # Errors
+/// When the file is unusable.
+pub fn load_machines(path: Option<&Path>, io: &Io) -> Result<Vec<Machine>> {
+    let src = match path {
+        Some(path) => source(path.display().to_string(), files::read_text(path)?),
+        None => source("machines.toml (built in)", machine::BUILT_IN),
+    };
+    let (machines, Findings(findings)) = machine::load(&src)?;
+    io.report(&findings);
+    Ok(machines)
+}
+
+/// One machine by name.
+///
+/// # Errors
+/// When there is none of that name; the message lists those that exist.
+pub fn load_machine(name: &str, path: Option<&Path>, io: &Io) -> Result<Machine> {
+    let machines = load_machines(path, io)?;
+    let names: Vec<String> = machines.iter().map(|m| m.name.clone()).collect();
+    machines.into_iter().find(|m| m.name == name).ok_or_else(|| {
+        Failure::new("machine::unknown", format!("no machine is called {name:?}"))
+            .help(format!("there are: {}; a file of your own goes with --machines FILE", names.join(", ")))
+    })
+}
+
+/// `--machines FILE`, shared by every verb that names a machine.
+#[derive(Debug, Clone, clap::Args)]
+pub struct MachineArgs {
+    /// Name of the machine (`axiscal machines` lists them)
+    #[arg(long, short)]
+    pub machine: String,
+    /// A machines.toml of your own (default: the one built in)
+    #[arg(long, value_name = "FILE")]
+    pub machines: Option<PathBuf>,
+}
+
+impl MachineArgs {
+    /// The machine that is meant.
+    ///
+    /// # Errors
+    /// When the file is unusable or has no machine of that name.
+    pub fn load(&self, io: &Io) -> Result<Machine> {
+        load_machine(&self.machine, self.machines.as_deref(), io)
+    }
+}

@@ -1,0 +1,16 @@
+//! `axiscal export`
+
+use super::{Answer, Io};
+use crate::diag::{Failure, Result};
+
+/// Arguments of `export`.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Runs `export`.
+///
+/// # Errors
+/// When the input is unusable.
+pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
+    Err(Failure::new("cli::missing", "export"))
+}

@@ -1,0 +1,16 @@
+//! `axiscal generate`
+
+use super::{Answer, Io};
+use crate::diag::{Failure, Result};
+
+/// Arguments of `generate`.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Runs `generate`.
+///
+/// # Errors
+/// When the input is unusable.
+pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
+    Err(Failure::new("cli::missing", "generate"))
+}

@@ -1,0 +1,92 @@
+//! The verbs: arguments as typed → records → the rooms' functions → what is printed. A file per verb.
+//!
+//! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
+//! "no", 2 the input or the call was unusable.
+
+mod common;
+mod controllers;
+mod demo;
+mod effects;
+mod export;
+mod generate;
+mod identify;
+mod machines;
+mod new;
+mod parse;
+mod programs;
+mod reproduce;
+mod schema;
+mod simulate;
+
+pub use common::{Answer, Io};
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// A five-axis machine measures itself with its own touch probe, learns what is wrong with it, and is put right.
+#[derive(Debug, Parser)]
+#[command(name = "axiscal", version, about, propagate_version = true, arg_required_else_help = true)]
+struct Cli {
+    /// One JSON object on stdout, messages on stderr
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// The whole loop on built-in data: programs, virtual machine, logs, fit, tables
+    Demo(demo::Args),
+    /// List the machines that are built in or found, or show one
+    Machines(machines::Args),
+    /// List the effects that are built in or found, or show one
+    Effects(effects::Args),
+    /// List the controllers that are built in or found, or show one
+    Controllers(controllers::Args),
+    /// List the probing programs that are built in or found, or show one
+    Programs(programs::Args),
+    /// Write an NC probing program and its plan
+    Generate(generate::Args),
+    /// The virtual machine: write the log that the controller would have written
+    Simulate(simulate::Args),
+    /// Read a controller's log into a touches CSV
+    Parse(parse::Args),
+    /// The paper's tables: given, identified, deviation
+    Reproduce(reproduce::Args),
+    /// Write a study: which runs were measured and what the model holds
+    New(new::Args),
+    /// Identify the machine's errors from a study
+    Identify(identify::Args),
+    /// Write the compensation as the controller's own tables
+    Export(export::Args),
+    /// Print the JSON schema of a file, for editors
+    Schema(schema::Args),
+}
+
+/// Runs the program with the arguments of the process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // clap exits with 2 for a bad call and 0 for --help and --version, which is the contract's too
+        Err(e) => e.exit(),
+    };
+    let io = Io::new(cli.json);
+    let answer = match cli.verb {
+        Verb::Demo(args) => demo::run(&args, &io),
+        Verb::Machines(args) => machines::run(&args, &io),
+        Verb::Effects(args) => effects::run(&args, &io),
+        Verb::Controllers(args) => controllers::run(&args, &io),
+        Verb::Programs(args) => programs::run(&args, &io),
+        Verb::Generate(args) => generate::run(&args, &io),
+        Verb::Simulate(args) => simulate::run(&args, &io),
+        Verb::Parse(args) => parse::run(&args, &io),
+        Verb::Reproduce(args) => reproduce::run(&args, &io),
+        Verb::New(args) => new::run(&args, &io),
+        Verb::Identify(args) => identify::run(&args, &io),
+        Verb::Export(args) => export::run(&args, &io),
+        Verb::Schema(args) => schema::run(&args, &io),
+    };
+    io.finish(answer)
+}

@@ -1,0 +1,16 @@
+//! `axiscal new`
+
+use super::{Answer, Io};
+use crate::diag::{Failure, Result};
+
+/// Arguments of `new`.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Runs `new`.
+///
+/// # Errors
+/// When the input is unusable.
+pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
+    Err(Failure::new("cli::missing", "new"))
+}

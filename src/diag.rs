@@ -1,0 +1,219 @@
+//! What went wrong, where, and what to do: findings about a file, many per run.
+//!
+//! Severities: *error* = unusable; *warning* = something that was written is not being used, or may not mean what was
+//! intended; *info* = a default was taken. All findings of a file are reported at once. Only `cli` prints them.
+
+use miette::{Diagnostic, LabeledSpan, SourceCode};
+use std::{fmt, ops::Range, sync::Arc};
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// A default was taken.
+    Info,
+    /// Something that was written is not being used.
+    Warning,
+    /// Unusable.
+    Error,
+}
+
+/// A text in which findings have their place: its name (path) and contents.
+pub type Source = Arc<miette::NamedSource<String>>;
+
+/// Makes a [`Source`].
+#[must_use]
+pub fn source(name: impl AsRef<str>, text: impl Into<String>) -> Source {
+    Arc::new(miette::NamedSource::new(name, text.into()))
+}
+
+/// One finding: message, place, remedy.
+#[derive(Debug, Clone)]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// Stable code, e.g. `machine::no_parent`.
+    pub code: &'static str,
+    /// What is wrong: expected and found, lower case, no full stop.
+    pub message: String,
+    /// What to do.
+    pub help: Option<String>,
+    /// Byte range in the source.
+    pub span: Option<Range<usize>>,
+    /// The text that `span` points into.
+    pub source: Option<Source>,
+}
+
+impl Finding {
+    /// An error.
+    #[must_use]
+    pub fn error(code: &'static str, message: impl Into<String>) -> Self {
+        Self { severity: Severity::Error, code, message: message.into(), help: None, span: None, source: None }
+    }
+
+    /// A warning.
+    #[must_use]
+    pub fn warning(code: &'static str, message: impl Into<String>) -> Self {
+        Self { severity: Severity::Warning, ..Self::error(code, message) }
+    }
+
+    /// A note on a default.
+    #[must_use]
+    pub fn info(code: &'static str, message: impl Into<String>) -> Self {
+        Self { severity: Severity::Info, ..Self::error(code, message) }
+    }
+
+    /// With a remedy.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// With its place.
+    #[must_use]
+    pub fn at(mut self, source: &Source, span: Range<usize>) -> Self {
+        // a label past the end would make the printer fail instead of the reader understand
+        let len = source.inner().len();
+        self.span = Some(span.start.min(len)..span.end.min(len));
+        self.source = Some(source.clone());
+        self
+    }
+
+    /// `file:line:column`, 1-based, when the place is known.
+    #[must_use]
+    pub fn place(&self) -> Option<String> {
+        let (source, span) = (self.source.as_ref()?, self.span.as_ref()?);
+        let before = &source.inner().as_bytes()[..span.start];
+        let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
+        let column = before.iter().rev().take_while(|&&b| b != b'\n').count() + 1;
+        Some(format!("{}:{line}:{column}", source.name()))
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(place) = self.place() {
+            write!(f, "{place}: ")?;
+        }
+        write!(f, "{}", self.message)
+    }
+}
+
+impl std::error::Error for Finding {}
+
+impl Diagnostic for Finding {
+    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new(self.code))
+    }
+    fn severity(&self) -> Option<miette::Severity> {
+        Some(match self.severity {
+            Severity::Info => miette::Severity::Advice,
+            Severity::Warning => miette::Severity::Warning,
+            Severity::Error => miette::Severity::Error,
+        })
+    }
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|h| Box::new(h) as Box<dyn fmt::Display>)
+    }
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.source.as_ref().map(|s| s.as_ref() as &dyn SourceCode)
+    }
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = self.span.clone()?;
+        Some(Box::new(std::iter::once(LabeledSpan::new(Some("here".to_owned()), span.start, span.len()))))
+    }
+}
+
+/// Why something is unusable: one or more findings, at least one of them an error.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{}", .0.iter().find(|f| f.severity == Severity::Error).map_or_else(String::new, ToString::to_string))]
+pub struct Failure(pub Vec<Finding>);
+
+impl From<Finding> for Failure {
+    fn from(finding: Finding) -> Self {
+        Self(vec![finding])
+    }
+}
+
+impl Failure {
+    /// A failure of one error without a place.
+    #[must_use]
+    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
+        Finding::error(code, message).into()
+    }
+
+    /// With a remedy on its last finding.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        if let Some(last) = self.0.last_mut() {
+            last.help = Some(help.into());
+        }
+        self
+    }
+}
+
+/// Result of everything that can find its input unusable.
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
+
+/// Findings as they are collected.
+#[derive(Debug, Clone, Default)]
+pub struct Findings(pub Vec<Finding>);
+
+impl Findings {
+    /// Adds one.
+    pub fn push(&mut self, finding: Finding) {
+        self.0.push(finding);
+    }
+
+    /// True when at least one is an error.
+    #[must_use]
+    pub fn has_errors(&self) -> bool {
+        self.0.iter().any(|f| f.severity == Severity::Error)
+    }
+
+    /// The value with the findings, or the failure when one of them is an error.
+    ///
+    /// # Errors
+    /// When a finding is an error; all findings are in it.
+    pub fn finish<T>(self, value: T) -> Result<(T, Self)> {
+        if self.has_errors() { Err(Failure(self.0)) } else { Ok((value, self)) }
+    }
+}
+
+/// A TOML error of the parser as a finding with its place.
+#[must_use]
+pub fn from_toml(error: &toml::de::Error, source: &Source, code: &'static str) -> Finding {
+    let finding = Finding::error(code, error.message().to_owned());
+    match error.span() {
+        Some(span) => finding.at(source, span),
+        None => finding.at(source, 0..0),
+    }
+}
+
+/// A JSON error of the parser as a finding with its place.
+#[must_use]
+pub fn from_json(error: &serde_json::Error, source: &Source, code: &'static str) -> Finding {
+    let text = source.inner();
+    let line_start: usize = text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum();
+    let at = (line_start + error.column().saturating_sub(1)).min(text.len());
+    Finding::error(code, error.to_string()).at(source, at..at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finding_names_line_and_column() {
+        let src = source("m.toml", "a = 1\nbb = 2\n");
+        let finding = Finding::error("t::t", "wrong").at(&src, 9..10);
+        assert_eq!(finding.place().unwrap(), "m.toml:2:4");
+        assert_eq!(finding.to_string(), "m.toml:2:4: wrong");
+    }
+
+    #[test]
+    fn a_place_past_the_end_is_kept_inside() {
+        let src = source("m.toml", "a");
+        assert_eq!(Finding::error("t::t", "wrong").at(&src, 5..9).place().unwrap(), "m.toml:1:2");
+    }
+}

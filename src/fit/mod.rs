@@ -1,0 +1,3 @@
+//! Identification: weighted nonlinear least squares over the model, with rank, covariance and what cannot be told.
+
+pub mod outcome;

@@ -1,0 +1,19 @@
+//! axiscal: a five-axis machine measures itself with its own touch probe, learns what is wrong with it, and is put right.
+//!
+//! One direction of flow: machine → program → log → model → fit → diagnosis → tables. The map of the rooms and the
+//! invariants are in `ARCHITECTURE.md`; frames and signs in `docs/conventions.md`.
+
+// tests may unwrap: a panic there is a failure with its place
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod axes;
+pub mod diag;
+pub mod files;
+pub mod geometry;
+pub mod units;
+
+pub mod cli;
+pub mod fit;
+pub mod log;
+pub mod machine;
+pub mod program;

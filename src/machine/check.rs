@@ -1,0 +1,674 @@
+//! From `machines.toml` as written to machines that can be relied on; all findings at once.
+
+use super::as_written::{self as w, AxisKind};
+use super::{Axis, Block, Carrier, Machine, Mounting, Reference, Shape, Side, Solid, Tool};
+use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use nalgebra::{Unit, Vector3};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+const FORMAT: &str = "axiscal-machines/1";
+
+/// Reads and checks a machines file.
+///
+/// # Errors
+/// When the text is not TOML of this form or a machine cannot work; every finding has its place and remedy.
+pub fn load(source: &Source) -> Result<(Vec<Machine>, Findings)> {
+    let text = source.inner();
+    let file: w::File = toml::from_str(text).map_err(|e| {
+        from_toml(&e, source, "machine::not_toml")
+            .help("`axiscal schema machines` prints the form; docs/guide/machines.md explains it")
+    })?;
+    let mut check = Check { source, findings: Findings::default() };
+    if file.format.get_ref() != FORMAT {
+        check.error(
+            &file.format.span(),
+            "machine::format",
+            format!("format is {:?}, expected {FORMAT:?}", file.format.get_ref()),
+            "write the format line of this version",
+        );
+    }
+    if file.machine.is_empty() {
+        check.error(&(0..0), "machine::none", "no machine in the file", "add a [[machine]] table");
+    }
+    let mut seen = BTreeMap::new();
+    let mut machines = Vec::new();
+    for written in &file.machine {
+        if seen.insert(written.name.get_ref().clone(), ()).is_some() {
+            check.error(
+                &written.name.span(),
+                "machine::twice",
+                format!("machine {:?} stands twice", written.name.get_ref()),
+                "give each machine a name of its own",
+            );
+        }
+        if let Some(machine) = check.machine(written) {
+            machines.push(machine);
+        }
+    }
+    check.findings.finish(machines)
+}
+
+struct Check<'a> {
+    source: &'a Source,
+    findings: Findings,
+}
+
+/// An axis whose own fields are good, its place in the chain not yet known.
+struct Loose {
+    axis: Axis,
+    parent: String,
+    span: Range<usize>,
+}
+
+impl Check<'_> {
+    fn error(&mut self, span: &Range<usize>, code: &'static str, message: impl Into<String>, help: impl Into<String>) {
+        self.findings.push(Finding::error(code, message).help(help).at(self.source, span.clone()));
+    }
+
+    fn machine(&mut self, m: &w::Machine) -> Option<Machine> {
+        let before = self.findings.0.len();
+        let name = m.name.get_ref();
+        let here = m.name.span();
+        let loose: Vec<Loose> = m.axis.iter().filter_map(|a| self.axis(name, a)).collect();
+        for (i, a) in loose.iter().enumerate() {
+            if loose[..i].iter().any(|b| b.axis.name == a.axis.name) {
+                self.error(
+                    &a.span,
+                    "machine::axis_twice",
+                    format!("axis {} stands twice in {name:?}", a.axis.name),
+                    "each letter names one axis",
+                );
+            }
+        }
+        let workpiece = self.exactly_one(&here, name, "workpiece", m.workpiece.all());
+        let tool = self.exactly_one(&here, name, "tool", m.tool.all());
+        let mut axes = Vec::new();
+        if let Some(workpiece) = workpiece {
+            axes.extend(self.chain(name, &loose, &workpiece.parent, Side::Workpiece));
+        }
+        if let Some(tool) = tool {
+            let tool_side = self.chain(name, &loose, &tool.parent, Side::Tool);
+            for a in &tool_side {
+                if axes.iter().any(|b: &Axis| b.name == a.name) {
+                    self.error(
+                        &here,
+                        "machine::shared_axis",
+                        format!("axis {} of {name:?} bears both workpiece and tool", a.name),
+                        "an axis stands on one side only: check the parents",
+                    );
+                }
+            }
+            axes.extend(tool_side);
+        }
+        if workpiece.is_some() && tool.is_some() && m.axis.len() == loose.len() {
+            for a in &loose {
+                if !axes.iter().any(|b| b.name == a.axis.name) {
+                    self.error(
+                        &a.span,
+                        "machine::idle_axis",
+                        format!("axis {} of {name:?} bears neither workpiece nor tool", a.axis.name),
+                        "name it as the parent of an axis, of the workpiece or of the tool, or take it out",
+                    );
+                }
+            }
+            self.linear_axes_span_space(&here, name, &axes);
+            let n_rotary = axes.iter().filter(|a| a.name.is_rotary()).count();
+            if n_rotary == 0 || n_rotary > 2 {
+                self.error(
+                    &here,
+                    "machine::rotary_count",
+                    format!("{name:?} has {n_rotary} rotary axes in its chain"),
+                    "a five-axis machine has two (one is allowed)",
+                );
+            }
+        }
+        for (axis, _) in m.origin.iter() {
+            if !axes.iter().any(|a| a.name == axis) && self.findings.0.len() == before {
+                self.error(
+                    &here,
+                    "machine::origin",
+                    format!("origin of {name:?} names axis {axis}, which the machine lacks"),
+                    "take it out",
+                );
+            }
+        }
+        let Some(probe) = &m.probe else {
+            self.error(
+                &here,
+                "machine::no_probe",
+                format!("{name:?} has no probe"),
+                "add a [machine.probe] table: it decides which moves are safe",
+            );
+            return None;
+        };
+        self.probe(name, &probe.0);
+        let Some(reference) = m.reference else {
+            self.error(
+                &here,
+                "machine::no_reference",
+                format!("{name:?} has no [machine.reference]"),
+                "say where location errors are stated: pivot, ball and table",
+            );
+            return None;
+        };
+        let tool = self.tool(name, tool?)?;
+        let carriers = |word: &str| -> Option<Carrier> {
+            match word {
+                "base" => Some(Carrier::Base),
+                "table" => Some(Carrier::Table),
+                _ => axes
+                    .iter()
+                    .find(|a| a.side == Side::Workpiece && a.name.to_string() == word)
+                    .map(|a| Carrier::Axis(a.name)),
+            }
+        };
+        let solids = m.solid.iter().filter_map(|s| self.solid(name, s, &carriers)).collect();
+        let mountings: Vec<Mounting> = m.mounting.iter().filter_map(|x| self.mounting(name, x, &carriers)).collect();
+        for (i, x) in m.mounting.iter().enumerate() {
+            if m.mounting[..i].iter().any(|y| y.name.get_ref() == x.name.get_ref()) {
+                self.error(
+                    &x.name.span(),
+                    "machine::mounting_twice",
+                    format!("mounting {:?} stands twice in {name:?}", x.name.get_ref()),
+                    "give each mounting a name of its own",
+                );
+            }
+        }
+        // the probe must fit between ball and pivot, else the collision check looks at nothing
+        let p = probe.0.get_ref();
+        if p.stem_length + p.body_length > tool.length_mm {
+            self.error(
+                &probe.0.span(),
+                "machine::probe_too_long",
+                format!(
+                    "stem {} mm and body {} mm are longer than the tool length {} mm",
+                    p.stem_length, p.body_length, tool.length_mm
+                ),
+                "tool.length is measured from the pivot to the ball's centre",
+            );
+        }
+        if self.findings.0[before..].iter().any(|f| f.severity == crate::diag::Severity::Error) {
+            return None;
+        }
+        // identical for identical contents: the debug form of the record, not the bytes with their comments
+        let sha256 = format!(
+            "{:x}",
+            HexDigest(
+                Sha256::digest(
+                    format!("{:?}{:?}{:?}{:?}{:?}{:?}", axes, tool, p, mountings, reference, m.origin).as_bytes()
+                )
+                .to_vec()
+            )
+        );
+        Some(Machine {
+            name: name.clone(),
+            says: m.says.clone(),
+            origin: m.origin,
+            axes,
+            tool,
+            reference: Reference {
+                pivot: reference.pivot.into(),
+                ball: reference.ball.into(),
+                table: reference.table.into(),
+            },
+            probe: *p,
+            solids,
+            mountings,
+            sha256,
+        })
+    }
+
+    fn exactly_one<'m, T>(
+        &mut self,
+        here: &Range<usize>,
+        machine: &str,
+        what: &'static str,
+        all: &'m [T],
+    ) -> Option<&'m T> {
+        match all {
+            [one] => Some(one),
+            [] => {
+                self.error(
+                    here,
+                    "machine::missing_end",
+                    format!("{machine:?} has no {what}"),
+                    format!("add a [machine.{what}] table with its parent"),
+                );
+                None
+            }
+            several => {
+                self.error(
+                    here,
+                    "machine::two_ends",
+                    format!("{machine:?} has {} {what}s, expected one", several.len()),
+                    "a chain has one workpiece and one tool: describe a second spindle as a machine of its own",
+                );
+                None
+            }
+        }
+    }
+
+    fn axis(&mut self, machine: &str, a: &w::Axis) -> Option<Loose> {
+        let name = *a.name.get_ref();
+        let span = a.name.span();
+        let expected = if name.is_rotary() { AxisKind::Rotary } else { AxisKind::Linear };
+        match a.kind {
+            None => self.error(
+                &span,
+                "machine::no_kind",
+                format!("axis {name} of {machine:?} has no kind"),
+                "write kind = \"linear\" or \"rotary\"",
+            ),
+            Some(kind) if kind != expected => self.error(
+                &span,
+                "machine::kind",
+                format!("axis {name} of {machine:?} is {kind:?}, but X Y Z are linear and A B C rotary"),
+                "name axes by ISO 841",
+            ),
+            Some(_) => {}
+        }
+        let parent = a.parent.as_ref().map(|p| p.get_ref().clone());
+        if parent.is_none() {
+            self.error(
+                &span,
+                "machine::no_parent",
+                format!("axis {name} of {machine:?} has no parent"),
+                "write parent = \"base\" or the letter of the axis that bears it",
+            );
+        }
+        let direction = match &a.direction {
+            None => {
+                self.error(
+                    &span,
+                    "machine::no_direction",
+                    format!("axis {name} of {machine:?} has no direction"),
+                    "write direction = [x, y, z] in frame R",
+                );
+                None
+            }
+            Some(d) => self.direction(&d.span(), &format!("direction of axis {name}"), *d.get_ref()),
+        };
+        let point = match (&a.point, name.is_rotary()) {
+            (Some(p), true) => self.finite3(&p.span(), &format!("point of axis {name}"), *p.get_ref()),
+            (None, true) => {
+                self.error(
+                    &span,
+                    "machine::no_point",
+                    format!("rotary axis {name} of {machine:?} has no point"),
+                    "write point = [x, y, z]: any point on the axis, in R at zero",
+                );
+                None
+            }
+            (Some(p), false) => {
+                self.findings.push(
+                    Finding::warning("machine::unused", format!("point of linear axis {name} has no meaning"))
+                        .help("take it out")
+                        .at(self.source, p.span()),
+                );
+                Some(Vector3::zeros())
+            }
+            (None, false) => Some(Vector3::zeros()),
+        };
+        let sense = match &a.sense {
+            None => 1.0,
+            Some(s) if s.get_ref().abs() == 1 => *s.get_ref() as f64,
+            Some(s) => {
+                self.error(
+                    &s.span(),
+                    "machine::sense",
+                    format!("sense of axis {name} is {}, expected 1 or -1", s.get_ref()),
+                    "1: a positive angle turns what it carries right-handed about direction",
+                );
+                1.0
+            }
+        };
+        if sense < 0.0 && !name.is_rotary() {
+            self.error(
+                &span,
+                "machine::sense",
+                format!("linear axis {name} has a sense"),
+                "turn its direction instead",
+            );
+        }
+        let range = match &a.range {
+            None => {
+                self.error(
+                    &span,
+                    "machine::no_range",
+                    format!("axis {name} of {machine:?} has no range"),
+                    "write range = [lowest, highest]: no move can be proven safe without it",
+                );
+                None
+            }
+            Some(r) => {
+                let [low, high] = *r.get_ref();
+                if low.is_finite() && high.is_finite() && low < high {
+                    Some([low, high])
+                } else {
+                    self.error(
+                        &r.span(),
+                        "machine::range",
+                        format!("range of axis {name} is [{low}, {high}], expected lowest before highest"),
+                        "swap the two numbers",
+                    );
+                    None
+                }
+            }
+        };
+        let repeatability = a.indexing_repeatability_um.as_ref().map_or(0.0, |r| *r.get_ref());
+        if !(repeatability.is_finite() && repeatability >= 0.0) {
+            self.error(
+                &span,
+                "machine::repeatability",
+                format!("indexing repeatability of axis {name} is {repeatability} um"),
+                "it is a standard deviation: 0 or more",
+            );
+        }
+        Some(Loose {
+            axis: Axis {
+                name,
+                side: Side::Tool,
+                direction: direction?,
+                point: point?,
+                sense,
+                range: range?,
+                indexing_repeatability_mm: crate::units::mm_from_um(repeatability),
+            },
+            parent: parent?,
+            span,
+        })
+    }
+
+    /// From an end (workpiece or tool) down to the base; the answer begins at the base.
+    fn chain(&mut self, machine: &str, loose: &[Loose], end: &toml::Spanned<String>, side: Side) -> Vec<Axis> {
+        let mut out: Vec<Axis> = Vec::new();
+        let (mut word, mut span) = (end.get_ref().clone(), end.span());
+        while word != "base" {
+            let Some(found) = loose.iter().find(|l| l.axis.name.to_string() == word) else {
+                self.error(
+                    &span,
+                    "machine::unknown_parent",
+                    format!("parent {word:?} is no (usable) axis of {machine:?}"),
+                    "a parent is \"base\" or the letter of an axis of this machine",
+                );
+                break;
+            };
+            if out.iter().any(|a| a.name == found.axis.name) {
+                self.error(
+                    &found.span,
+                    "machine::cyclic",
+                    format!("axis {word} of {machine:?} bears itself: the chain is cyclic"),
+                    "follow the parents: one of them must be \"base\"",
+                );
+                break;
+            }
+            out.push(Axis { side, ..found.axis.clone() });
+            (word, span) = (found.parent.clone(), found.span.clone());
+        }
+        out.reverse();
+        out
+    }
+
+    fn linear_axes_span_space(&mut self, here: &Range<usize>, machine: &str, axes: &[Axis]) {
+        let linear: Vec<_> = axes.iter().filter(|a| !a.name.is_rotary()).map(|a| a.direction.into_inner()).collect();
+        let spans = linear.len() == 3 && nalgebra::Matrix3::from_columns(&linear).determinant().abs() > 0.1;
+        if !spans {
+            let names: Vec<String> = axes.iter().filter(|a| !a.name.is_rotary()).map(|a| a.name.to_string()).collect();
+            self.error(
+                here,
+                "machine::linear_axes",
+                format!("the linear axes of {machine:?} in the chain ({}) do not span space", names.join(" ")),
+                "X, Y and Z must be there, roughly square to each other",
+            );
+        }
+    }
+
+    fn finite3(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Vector3<f64>> {
+        if v.iter().all(|x| x.is_finite()) {
+            Some(v.into())
+        } else {
+            self.error(span, "machine::not_finite", format!("{what} is {v:?}"), "write three finite numbers");
+            None
+        }
+    }
+
+    fn direction(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Unit<Vector3<f64>>> {
+        let v = self.finite3(span, what, v)?;
+        let unit = Unit::try_new(v, 1e-9);
+        if unit.is_none() {
+            self.error(
+                span,
+                "machine::zero_direction",
+                format!("{what} is zero"),
+                "write a direction such as [0, 0, 1]",
+            );
+        }
+        unit
+    }
+
+    fn tool(&mut self, machine: &str, t: &w::Tool) -> Option<Tool> {
+        let direction = self.direction(&t.direction.span(), "direction of the tool", *t.direction.get_ref());
+        let pivot = self.finite3(&t.parent.span(), "pivot of the tool", t.pivot);
+        let length = *t.length.get_ref();
+        if !(length.is_finite() && length > 0.0) {
+            self.error(
+                &t.length.span(),
+                "machine::tool_length",
+                format!("tool length of {machine:?} is {length} mm"),
+                "from the pivot to the ball's centre, more than 0",
+            );
+        }
+        if t.spindle_sense.abs() != 1 {
+            self.error(
+                &t.parent.span(),
+                "machine::sense",
+                format!("spindle_sense is {}, expected 1 or -1", t.spindle_sense),
+                "1: M19 counts right-handed about direction",
+            );
+        }
+        Some(Tool { pivot: pivot?, direction: direction?, length_mm: length, spindle_sense: t.spindle_sense as f64 })
+    }
+
+    fn probe(&mut self, machine: &str, probe: &toml::Spanned<w::Probe>) {
+        let p = probe.get_ref();
+        let positive = [
+            ("ball_radius", p.ball_radius),
+            ("stem_radius", p.stem_radius),
+            ("stem_length", p.stem_length),
+            ("body_radius", p.body_radius),
+            ("body_length", p.body_length),
+            ("head_radius", p.head_radius),
+            ("repeatability_um", p.repeatability_um),
+            ("overtravel", p.overtravel),
+            ("approach", p.approach),
+            ("search", p.search),
+            ("clearance", p.clearance),
+            ("placement_tolerance", p.placement_tolerance),
+            ("fast_feed", p.fast_feed),
+            ("slow_feed", p.slow_feed),
+            ("position_feed", p.position_feed),
+            ("back_off", p.back_off),
+        ];
+        for (field, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                self.error(
+                    &probe.span(),
+                    "machine::probe",
+                    format!("{field} of the probe of {machine:?} is {value}"),
+                    "write a number greater than 0",
+                );
+            }
+        }
+        if p.stem_radius >= p.ball_radius {
+            self.error(
+                &probe.span(),
+                "machine::probe",
+                format!(
+                    "the stem of {machine:?} (radius {} mm) is not thinner than the ball ({} mm)",
+                    p.stem_radius, p.ball_radius
+                ),
+                "check the two radii: the ball must touch first",
+            );
+        }
+        if p.search > p.overtravel {
+            self.error(
+                &probe.span(),
+                "machine::overtravel",
+                format!(
+                    "a search ends {} mm past the nominal contact, the probe of {machine:?} can be pushed {} mm",
+                    p.search, p.overtravel
+                ),
+                "lower search, or correct overtravel from the probe's data sheet",
+            );
+        }
+        if p.placement_tolerance > p.approach.min(p.search) {
+            self.error(
+                &probe.span(),
+                "machine::placement_tolerance",
+                format!(
+                    "placement tolerance {} mm of {machine:?} is larger than approach or search",
+                    p.placement_tolerance
+                ),
+                "a block within the tolerance must be met by the search",
+            );
+        }
+        if p.back_off >= p.approach {
+            self.error(
+                &probe.span(),
+                "machine::back_off",
+                format!("back_off {} mm of {machine:?} is not less than approach {} mm", p.back_off, p.approach),
+                "the ball must stay within the cleared approach",
+            );
+        }
+        if p.slow_feed > p.fast_feed {
+            self.error(
+                &probe.span(),
+                "machine::feed",
+                format!("slow_feed {} is above fast_feed {}", p.slow_feed, p.fast_feed),
+                "swap the two feeds",
+            );
+        }
+    }
+
+    fn solid(&mut self, machine: &str, s: &w::Solid, carriers: &dyn Fn(&str) -> Option<Carrier>) -> Option<Solid> {
+        let name = s.name.get_ref();
+        let carrier = self.carrier(machine, name, &s.carrier, carriers);
+        let shape = match (s.cuboid, s.cylinder) {
+            (Some(b), None)
+                if b.size.iter().all(|x| x.is_finite() && *x > 0.0) && b.centre.iter().all(|x| x.is_finite()) =>
+            {
+                Some(Shape::Box { centre: b.centre.into(), size: b.size.into() })
+            }
+            (None, Some(c))
+                if c.radius > 0.0
+                    && c.height > 0.0
+                    && c.radius.is_finite()
+                    && c.height.is_finite()
+                    && c.foot.iter().all(|x| x.is_finite()) =>
+            {
+                self.direction(&s.name.span(), "direction of the cylinder", c.direction).map(|direction| {
+                    Shape::Cylinder { foot: c.foot.into(), direction, radius: c.radius, height: c.height }
+                })
+            }
+            _ => {
+                self.error(&s.name.span(), "machine::shape", format!("solid {name:?} of {machine:?} has no usable shape"), "give either box = { centre, size } or cylinder = { foot, direction, radius, height }, with positive sizes");
+                None
+            }
+        };
+        Some(Solid { name: name.clone(), carrier: carrier?, shape: shape? })
+    }
+
+    fn carrier(
+        &mut self,
+        machine: &str,
+        what: &str,
+        word: &toml::Spanned<String>,
+        carriers: &dyn Fn(&str) -> Option<Carrier>,
+    ) -> Option<Carrier> {
+        let found = carriers(word.get_ref());
+        if found.is_none() {
+            self.error(
+                &word.span(),
+                "machine::carrier",
+                format!(
+                    "{what:?} of {machine:?} is carried by {:?}, which is no part of the workpiece side",
+                    word.get_ref()
+                ),
+                "write \"base\", \"table\" or the letter of an axis on the workpiece side",
+            );
+        }
+        found
+    }
+
+    fn mounting(
+        &mut self,
+        machine: &str,
+        x: &w::Mounting,
+        carriers: &dyn Fn(&str) -> Option<Carrier>,
+    ) -> Option<Mounting> {
+        let name = x.name.get_ref();
+        let carrier = self.carrier(machine, name, &x.carrier, carriers)?;
+        let mut solids: Vec<Solid> = x.solid.iter().filter_map(|s| self.solid(machine, s, carriers)).collect();
+        let mut blocks: Vec<Block> = Vec::new();
+        for b in &x.block {
+            let block = b.name.get_ref();
+            if blocks.iter().any(|o| &o.name == block) {
+                self.error(
+                    &b.name.span(),
+                    "machine::block_twice",
+                    format!("block {block:?} stands twice in mounting {name:?}"),
+                    "give each block a name of its own",
+                );
+            }
+            let centre = self.finite3(&b.centre.span(), &format!("centre of block {block:?}"), *b.centre.get_ref())?;
+            let size = *b.size.get_ref();
+            if !size.iter().all(|s| s.is_finite() && *s > 0.0) {
+                self.error(
+                    &b.size.span(),
+                    "machine::block_size",
+                    format!("size of block {block:?} is {size:?}"),
+                    "write three edges in mm, more than 0",
+                );
+                continue;
+            }
+            let riser = b.riser.or(x.riser);
+            if let Some(r) = riser {
+                if !(r.height > 0.0 && r.size.iter().all(|s| *s > 0.0)) {
+                    self.error(
+                        &b.name.span(),
+                        "machine::riser",
+                        format!("riser of block {block:?} has no size"),
+                        "write height and size in mm, more than 0",
+                    );
+                }
+                let mut under = centre;
+                under.z -= size[2] / 2.0 + r.height / 2.0;
+                solids.push(Solid {
+                    name: format!("riser of {block}"),
+                    carrier,
+                    shape: Shape::Box { centre: under, size: Vector3::new(r.size[0], r.size[1], r.height) },
+                });
+            }
+            blocks.push(Block { name: block.clone(), centre, size: size.into(), riser });
+        }
+        if blocks.is_empty() {
+            self.error(
+                &x.name.span(),
+                "machine::no_block",
+                format!("mounting {name:?} of {machine:?} has no block"),
+                "add [[machine.mounting.block]] tables",
+            );
+        }
+        Some(Mounting { name: name.clone(), says: x.says.clone(), carrier, blocks, solids })
+    }
+}
+
+struct HexDigest(Vec<u8>);
+
+impl std::fmt::LowerHex for HexDigest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.iter().try_for_each(|b| write!(f, "{b:02x}"))
+    }
+}

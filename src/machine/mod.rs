@@ -1,0 +1,291 @@
+//! The machine as data: chain, limits, shapes, artefact, probe.
+//!
+//! [`load`] reads `machines.toml` and gives [`Machine`]s that cannot hold a parentless chain, a rotary axis without
+//! direction or a radius of zero; everything after it relies on that. Nothing here knows errors, programs or
+//! controllers.
+
+pub mod as_written;
+mod check;
+
+pub use check::load;
+
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::geometry::{Transform, apply, rotation_about, translation};
+use nalgebra::{Unit, Vector3};
+
+/// The machines that are built in.
+pub const BUILT_IN: &str = include_str!("../../machines.toml");
+
+/// Where an axis stands in the chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Between the base and the workpiece.
+    Workpiece,
+    /// Between the base and the tool.
+    Tool,
+}
+
+/// A checked axis. Lengths mm in R, angles rad, except `range` (mm or **deg**, machine coordinates less the origin).
+#[derive(Debug, Clone)]
+pub struct Axis {
+    /// Its letter.
+    pub name: AxisName,
+    /// Workpiece or tool side.
+    pub side: Side,
+    /// Linear: of the tool over the workpiece. Rotary: about which `sense * angle` is right-handed.
+    pub direction: Unit<Vector3<f64>>,
+    /// A point of a rotary axis (0 for a linear one), mm.
+    pub point: Vector3<f64>,
+    /// +1 or -1.
+    pub sense: f64,
+    /// Lowest and highest coordinate relative to R's origin, mm or deg.
+    pub range: [f64; 2],
+    /// Rotary: scatter of the ball's place per index, mm, 1 sigma.
+    pub indexing_repeatability_mm: f64,
+}
+
+impl Axis {
+    /// The motion of what the axis carries, in R.
+    #[must_use]
+    pub fn motion(&self, at: &Position) -> Transform {
+        let q = at.mm_or_rad(self.name);
+        if self.name.is_rotary() {
+            rotation_about(&self.point, &self.direction, self.sense * q)
+        } else {
+            // an NC coordinate says where the tool is over the workpiece: a table moves the other way
+            let sign = if self.side == Side::Workpiece { -1.0 } else { 1.0 };
+            translation(self.direction.into_inner() * (sign * q))
+        }
+    }
+}
+
+/// The spindle.
+#[derive(Debug, Clone)]
+pub struct Tool {
+    /// Where `length` is measured from, mm in R.
+    pub pivot: Vector3<f64>,
+    /// From the ball to the spindle.
+    pub direction: Unit<Vector3<f64>>,
+    /// Pivot to ball's centre, mm.
+    pub length_mm: f64,
+    /// Sense of the control's M19 about `direction`.
+    pub spindle_sense: f64,
+}
+
+impl Tool {
+    /// Ball's centre at zero for a stylus of another length, mm in R.
+    #[must_use]
+    pub fn ball_at_zero(&self, length_mm: f64) -> Vector3<f64> {
+        self.pivot - self.direction.into_inner() * length_mm
+    }
+}
+
+/// Shape of a solid, in the carrier's frame (R at zero), mm.
+#[derive(Debug, Clone, Copy)]
+pub enum Shape {
+    /// Along the axes of R: centre and full edges.
+    Box {
+        /// Its centre.
+        centre: Vector3<f64>,
+        /// Its full edges.
+        size: Vector3<f64>,
+    },
+    /// A cylinder.
+    Cylinder {
+        /// Centre of its lower end.
+        foot: Vector3<f64>,
+        /// From the foot to the other end.
+        direction: Unit<Vector3<f64>>,
+        /// Radius.
+        radius: f64,
+        /// Height.
+        height: f64,
+    },
+}
+
+/// The part of the machine that bears something on the workpiece side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Carrier {
+    /// The machine's base: does not move.
+    Base,
+    /// The linear axes' table: all linear axes of the workpiece side, no rotary one.
+    Table,
+    /// What this axis of the workpiece side carries.
+    Axis(AxisName),
+}
+
+impl std::fmt::Display for Carrier {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Base => write!(f, "base"),
+            Self::Table => write!(f, "table"),
+            Self::Axis(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// A solid that must not be hit.
+#[derive(Debug, Clone)]
+pub struct Solid {
+    /// For messages.
+    pub name: String,
+    /// What bears it.
+    pub carrier: Carrier,
+    /// Its shape.
+    pub shape: Shape,
+}
+
+/// A block of an artefact, mm in R at zero.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Short name.
+    pub name: String,
+    /// Its centre.
+    pub centre: Vector3<f64>,
+    /// Its full edges.
+    pub size: Vector3<f64>,
+    /// Height and edges of the box under it.
+    pub riser: Option<as_written::Riser>,
+}
+
+/// An artefact as it is mounted.
+#[derive(Debug, Clone)]
+pub struct Mounting {
+    /// Short name.
+    pub name: String,
+    /// What to do at the machine.
+    pub says: String,
+    /// What bears it.
+    pub carrier: Carrier,
+    /// Its blocks.
+    pub blocks: Vec<Block>,
+    /// Its other solids (the risers are among them).
+    pub solids: Vec<Solid>,
+}
+
+/// Points at which location errors can be stated, mm in R.
+#[derive(Debug, Clone, Copy)]
+pub struct Reference {
+    /// The default.
+    pub pivot: Vector3<f64>,
+    /// The ball's centre at zero.
+    pub ball: Vector3<f64>,
+    /// The table's face.
+    pub table: Vector3<f64>,
+}
+
+/// A checked machine.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// Short name.
+    pub name: String,
+    /// What it is.
+    pub says: String,
+    /// Machine coordinates at the origin of R, mm and deg.
+    pub origin: AxisMap,
+    /// The axes: workpiece side from the base on, then tool side from the base on.
+    pub axes: Vec<Axis>,
+    /// The spindle.
+    pub tool: Tool,
+    /// Points at which location errors can be stated.
+    pub reference: Reference,
+    /// The probe; `repeatability_um` in µm, lengths mm, feeds mm/min.
+    pub probe: as_written::Probe,
+    /// Solids that are always there.
+    pub solids: Vec<Solid>,
+    /// Artefacts as they can be mounted.
+    pub mountings: Vec<Mounting>,
+    /// SHA-256 of the description that this was read from, hexadecimal.
+    pub sha256: String,
+}
+
+impl Machine {
+    /// An axis by letter.
+    #[must_use]
+    pub fn axis(&self, name: AxisName) -> Option<&Axis> {
+        self.axes.iter().find(|a| a.name == name)
+    }
+
+    /// The axes of one side, from the base on.
+    pub fn side(&self, side: Side) -> impl Iterator<Item = &Axis> {
+        self.axes.iter().filter(move |a| a.side == side)
+    }
+
+    /// The rotary axes, workpiece side first.
+    pub fn rotary(&self) -> impl Iterator<Item = &Axis> {
+        self.axes.iter().filter(|a| a.name.is_rotary())
+    }
+
+    /// The axes between the base and a carrier, from the base on.
+    #[must_use]
+    pub fn carrier_chain(&self, carrier: Carrier) -> Vec<&Axis> {
+        let chain: Vec<&Axis> = self.side(Side::Workpiece).collect();
+        let end = match carrier {
+            Carrier::Base => 0,
+            // the linear axes' table is borne by the last linear axis before the first rotary one
+            Carrier::Table => chain.iter().take_while(|a| !a.name.is_rotary()).count(),
+            Carrier::Axis(name) => chain.iter().position(|a| a.name == name).map_or(0, |i| i + 1),
+        };
+        chain.into_iter().take(end).collect()
+    }
+
+    /// Frame of a carrier in R for an errorless machine.
+    #[must_use]
+    pub fn carrier_frame(&self, carrier: Carrier, at: &Position) -> Transform {
+        self.carrier_chain(carrier).iter().fold(Transform::identity(), |t, a| t * a.motion(at))
+    }
+
+    /// Frame of the tool in R for an errorless machine (R at zero).
+    #[must_use]
+    pub fn tool_frame(&self, at: &Position) -> Transform {
+        self.side(Side::Tool).fold(Transform::identity(), |t, a| t * a.motion(at))
+    }
+
+    /// Ball's centre in a carrier's frame for an errorless machine, mm.
+    #[must_use]
+    pub fn ball_in(&self, carrier: Carrier, at: &Position, length_mm: f64) -> Vector3<f64> {
+        let ball = apply(&self.tool_frame(at), &self.tool.ball_at_zero(length_mm));
+        apply(&self.carrier_frame(carrier, at).inverse(), &ball)
+    }
+
+    /// The linear axes' positions at which an errorless machine holds the ball at a place of a carrier.
+    ///
+    /// `pose` gives the rotary axes. The ball's place in a carrier's frame is affine in X, Y, Z for every serial chain,
+    /// so three unit steps give the exact answer. `None` when the linear axes do not span space.
+    #[must_use]
+    pub fn linear_for_ball(
+        &self,
+        carrier: Carrier,
+        pose: &Position,
+        ball: &Vector3<f64>,
+        length_mm: f64,
+    ) -> Option<Position> {
+        let at_zero = pose.with_xyz_mm(Vector3::zeros());
+        let p0 = self.ball_in(carrier, &at_zero, length_mm);
+        let columns = [Vector3::x(), Vector3::y(), Vector3::z()]
+            .map(|unit| self.ball_in(carrier, &pose.with_xyz_mm(unit), length_mm) - p0);
+        let inverse = nalgebra::Matrix3::from_columns(&columns).try_inverse()?;
+        Some(pose.with_xyz_mm(inverse * (ball - p0)))
+    }
+
+    /// A mounting by name.
+    #[must_use]
+    pub fn mounting(&self, name: &str) -> Option<&Mounting> {
+        self.mountings.iter().find(|m| m.name == name)
+    }
+
+    /// Reads `table`, `base` or an axis letter of the workpiece side.
+    #[must_use]
+    pub fn carrier(&self, word: &str) -> Option<Carrier> {
+        match word {
+            "base" => Some(Carrier::Base),
+            "table" => Some(Carrier::Table),
+            _ => {
+                let mut letters = word.chars();
+                let name = AxisName::from_letter(letters.next()?)?;
+                let known = letters.next().is_none() && self.axis(name)?.side == Side::Workpiece;
+                known.then_some(Carrier::Axis(name))
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The path: every move of a program in order, controller-neutral. A postprocessor spells it, `check` proves it.
+//!
+//! A [`Step`] says what the control must do and what it may rely on; nothing here knows a controller's language.
+
+use crate::axes::AxisMap;
+
+/// One step of a program. Positions are NC coordinates relative to R, mm and deg; feeds mm/min.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// A remark for the reader of the NC program.
+    Note(String),
+    /// A set-up begins: pose, number of the index visit, what a person reads about it.
+    Setup {
+        /// Running number from 1: a resume point.
+        number: u32,
+        /// What is touched in it.
+        says: String,
+    },
+    /// Spindle stopped and oriented, right-handed about the tool frame's +z, deg.
+    OrientSpindle {
+        /// Orientation.
+        deg: f64,
+    },
+    /// Rapid of linear axes: one axis, or several when the whole box that the move spans is proven clear.
+    Rapid {
+        /// The axes that move.
+        to: AxisMap,
+    },
+    /// Rotary axes move, at clearance only; the sense of each is forced.
+    Rotary {
+        /// Where to.
+        to: AxisMap,
+        /// +1 or -1 for each axis that moves.
+        sense: AxisMap,
+    },
+    /// Positioning near the blocks: straight, at a feed, stops the program if the probe trips.
+    Protected {
+        /// The axes that move.
+        to: AxisMap,
+        /// Feed.
+        feed: f64,
+    },
+    /// One touch: search from where the ball stands (the touch's `start`), back off, measure, log.
+    Touch(TouchStep),
+    /// Straight back from contact to the touch's start: the probe may still be deflected when it begins.
+    Retract {
+        /// The axes that move.
+        to: AxisMap,
+        /// Feed.
+        feed: f64,
+    },
+}
+
+/// What a postprocessor needs to spell a touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TouchStep {
+    /// Number in the plan.
+    pub id: u64,
+    /// For messages: block and face.
+    pub says: String,
+    /// Where the search begins (the ball stands there).
+    pub start: AxisMap,
+    /// Where an errorless machine triggers.
+    pub nominal: AxisMap,
+    /// Where the search gives up: inside the probe's mechanical overtravel.
+    pub end: AxisMap,
+    /// Rotary axes, deg.
+    pub pose: AxisMap,
+    /// True on the first touch of a block: the search runs at the slow feed and must trigger within `tolerance_mm`.
+    pub first: bool,
+    /// How far from `nominal` the first touch of a block may trigger.
+    pub tolerance_mm: f64,
+    /// Feed of the search.
+    pub search_feed: f64,
+    /// Feed of the measuring touch.
+    pub measure_feed: f64,
+    /// Way back between the two.
+    pub back_off_mm: f64,
+}
+
+/// The whole path.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Path {
+    /// What a person must know before pressing start: artefact, layout, settings. One line each.
+    pub head: Vec<String>,
+    /// The steps.
+    pub steps: Vec<Step>,
+    /// Predicted run time, s.
+    pub seconds: f64,
+}

@@ -1,0 +1,257 @@
+//! The plan: the touches of a program with their nominal places (`axiscal-plan/1`, contract section 4).
+
+use crate::axes::{AxisMap, Position};
+use crate::diag::{Finding, Findings, Result, Source, from_json};
+use serde::{Deserialize, Serialize};
+
+/// The format line of a plan.
+pub const FORMAT: &str = "axiscal-plan/1";
+
+/// A whole plan. Lengths mm, angles deg, times s; axis positions are NC coordinates relative to R.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// `axiscal-plan/1`
+    pub format: String,
+    /// Name of the machine.
+    pub machine: String,
+    /// SHA-256 of the machine's description when the plan was made.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub machine_sha256: String,
+    /// Name of the program.
+    pub program: String,
+    /// The artefact's mounting.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub mounting: String,
+    /// What the controller's coordinates mean: axis positions, or the place in the workpiece under its transformation.
+    #[serde(default, skip_serializing_if = "ControllerFrame::is_axes")]
+    pub controller_frame: ControllerFrame,
+    /// Radius of the ball.
+    pub ball_radius_mm: f64,
+    /// Pivot to ball's centre.
+    pub tool_length_mm: f64,
+    /// How far a block may stand from where it should.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placement_tolerance_mm: Option<f64>,
+    /// The blocks.
+    pub blocks: Vec<PlanBlock>,
+    /// The touches, in the order in which they are made.
+    pub touches: Vec<PlanTouch>,
+    /// Touches that the program asks for and that were left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped: Vec<Skipped>,
+    /// What was lost by leaving touches out, and other remarks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+}
+
+/// What the controller's coordinates mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ControllerFrame {
+    /// Axis positions (default).
+    #[default]
+    Axes,
+    /// The tool centre point in the workpiece, under the control's own transformation.
+    Tcp,
+}
+
+impl ControllerFrame {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+    fn is_axes(&self) -> bool {
+        *self == Self::Axes
+    }
+}
+
+/// A block as the plan knows it, in the carrier's frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlanBlock {
+    /// Short name.
+    pub name: String,
+    /// `table` or the letter of a rotary axis.
+    pub carrier: String,
+    /// Its mounting, where it differs from the plan's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mounting: Option<String>,
+    /// Its centre, mm.
+    pub centre: [f64; 3],
+    /// Its full edges, mm.
+    pub size: [f64; 3],
+}
+
+/// One touch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlanTouch {
+    /// Its number, unique in the plan.
+    pub id: u64,
+    /// Stage of the procedure, e.g. `head`.
+    pub stage: String,
+    /// Which repeat of the same point, from 1.
+    #[serde(default = "one")]
+    pub repeat: u32,
+    /// `table` or the letter of a rotary axis.
+    pub carrier: String,
+    /// The block's mounting, where it differs from the plan's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mounting: Option<String>,
+    /// The block's name.
+    pub block: String,
+    /// The block's own face at all axes 0.
+    pub face: String,
+    /// Nominal contact in the carrier's frame, mm.
+    pub point: [f64; 3],
+    /// Outward unit normal in the carrier's frame.
+    pub normal: [f64; 3],
+    /// Rotary axes, deg.
+    pub pose: AxisMap,
+    /// Where the search begins.
+    pub start: AxisMap,
+    /// Where an errorless machine triggers.
+    pub nominal: AxisMap,
+    /// Where the search gives up.
+    pub end: AxisMap,
+    /// Predicted time since the program began, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
+    /// Number of the index visit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visit: Option<u32>,
+    /// Feed of the measuring touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feed_mm_min: Option<f64>,
+    /// Orientation of the spindle, right-handed about the tool frame's +z.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spindle_deg: Option<f64>,
+    /// Where it differs from the plan's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_length_mm: Option<f64>,
+    /// Where it differs from the plan's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ball_radius_mm: Option<f64>,
+    /// The sense (+1, -1) in which a rotary axis came to the pose.
+    #[serde(default, skip_serializing_if = "AxisMap::is_empty")]
+    pub from: AxisMap,
+    /// True on the first touch of each block: a wide, slow search.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub first: bool,
+}
+
+fn one() -> u32 {
+    1
+}
+
+impl PlanTouch {
+    /// Full axis positions at the nominal trigger.
+    #[must_use]
+    pub fn nominal_position(&self) -> Position {
+        self.nominal.or(&self.pose).position()
+    }
+
+    /// Full axis positions at the beginning of the search.
+    #[must_use]
+    pub fn start_position(&self) -> Position {
+        self.start.or(&self.pose).position()
+    }
+
+    /// Full axis positions at the end of the search.
+    #[must_use]
+    pub fn end_position(&self) -> Position {
+        self.end.or(&self.pose).position()
+    }
+}
+
+/// A touch that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Skipped {
+    /// Stage of the procedure.
+    pub stage: String,
+    /// The block's name.
+    pub block: String,
+    /// The block's own face.
+    pub face: String,
+    /// Nominal contact in the carrier's frame, mm.
+    pub point: [f64; 3],
+    /// Rotary axes, deg.
+    pub pose: AxisMap,
+    /// Why.
+    pub reason: String,
+}
+
+impl Plan {
+    /// Reads a plan.
+    ///
+    /// # Errors
+    /// When the text is not JSON of this form, or a touch contradicts itself.
+    pub fn parse(source: &Source) -> Result<(Self, Findings)> {
+        let plan: Self = serde_json::from_str(source.inner()).map_err(|e| {
+            from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
+        })?;
+        let mut findings = Findings::default();
+        if plan.format != FORMAT {
+            findings.push(
+                Finding::error("plan::format", format!("format is {:?}, expected {FORMAT:?}", plan.format))
+                    .help("is this a plan? `axiscal generate` writes NAME.plan.json")
+                    .at(source, 0..0),
+            );
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        for touch in &plan.touches {
+            let mut bad = |code, message: String, help: &str| {
+                findings.push(Finding::error(code, message).help(help).at(source, 0..0));
+            };
+            if !seen.insert(touch.id) {
+                bad(
+                    "plan::id_twice",
+                    format!("touch {} stands twice in the plan", touch.id),
+                    "ids are unique: make the plan again",
+                );
+            }
+            if plan.block_of(touch).is_none() {
+                bad(
+                    "plan::no_block",
+                    format!("touch {} names block {:?}, which the plan lacks", touch.id, touch.block),
+                    "make the plan again",
+                );
+            }
+            let norm = touch.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if !((norm - 1.0).abs() < 1e-6) {
+                bad(
+                    "plan::normal",
+                    format!("normal of touch {} has length {norm}", touch.id),
+                    "an outward unit normal is expected",
+                );
+            }
+            if touch.point.iter().any(|x| !x.is_finite()) {
+                bad("plan::point", format!("point of touch {} is not finite", touch.id), "make the plan again");
+            }
+        }
+        findings.finish(plan)
+    }
+
+    /// The plan as JSON, the same bytes for the same plan.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // a plan holds only strings and finite numbers: serialisation cannot fail
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// The block of a touch.
+    #[must_use]
+    pub fn block_of(&self, touch: &PlanTouch) -> Option<&PlanBlock> {
+        self.blocks.iter().find(|b| {
+            b.name == touch.block
+                && b.carrier == touch.carrier
+                && b.mounting.as_deref().unwrap_or(&self.mounting)
+                    == touch.mounting.as_deref().unwrap_or(&self.mounting)
+        })
+    }
+
+    /// A touch by its number.
+    #[must_use]
+    pub fn touch(&self, id: u64) -> Option<&PlanTouch> {
+        // ids run from 1 in plans of our own: look there first
+        let guess = usize::try_from(id).ok().and_then(|i| i.checked_sub(1)).and_then(|i| self.touches.get(i));
+        guess.filter(|t| t.id == id).or_else(|| self.touches.iter().find(|t| t.id == id))
+    }
+}

@@ -1,0 +1,58 @@
+//! Units: the only place with π/180, 1000 and 3600.
+//!
+//! Files carry millimetres, degrees and micrometres where a name ends in `_um`; inside, everything is millimetres and
+//! radians. A conversion is written with one of these functions, so that a reader can search for each of them.
+
+/// Degrees to radians.
+#[must_use]
+pub fn rad_from_deg(deg: f64) -> f64 {
+    deg.to_radians()
+}
+
+/// Radians to degrees.
+#[must_use]
+pub fn deg_from_rad(rad: f64) -> f64 {
+    rad.to_degrees()
+}
+
+/// Micrometres to millimetres.
+#[must_use]
+pub fn mm_from_um(um: f64) -> f64 {
+    um * 1e-3
+}
+
+/// Millimetres to micrometres.
+#[must_use]
+pub fn um_from_mm(mm: f64) -> f64 {
+    mm * 1e3
+}
+
+/// Seconds to hours.
+#[must_use]
+pub fn hours_from_s(s: f64) -> f64 {
+    s / 3600.0
+}
+
+/// Micrometres per metre (or µrad) to a plain ratio (or rad).
+#[must_use]
+pub fn ratio_from_ppm(ppm: f64) -> f64 {
+    ppm * 1e-6
+}
+
+/// Inches to millimetres.
+#[must_use]
+pub fn mm_from_inch(inch: f64) -> f64 {
+    inch * 25.4
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conversions_are_their_own_inverses() {
+        assert_eq!(um_from_mm(mm_from_um(1.5)), 1.5);
+        assert!((deg_from_rad(rad_from_deg(33.0)) - 33.0).abs() < 1e-13);
+        assert_eq!(hours_from_s(1800.0), 0.5);
+    }
+}
