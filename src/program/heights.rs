@@ -97,7 +97,10 @@ impl Scene<'_> {
                 }
             }
         }
-        heights.over_blocks = heights.over_blocks.min(heights.over_all);
+        // up to the next tenth: nobody wants to read 11.300000000000011
+        let tenth_up = |height: f64| if height > f64::MIN { (height * 10.0 - 1e-6).ceil() / 10.0 } else { height };
+        heights.over_all = tenth_up(heights.over_all);
+        heights.over_blocks = tenth_up(heights.over_blocks).min(heights.over_all);
         heights
     }
 
@@ -144,8 +147,7 @@ impl Scene<'_> {
                 return false;
             }
             let frame = |at: &Position| self.machine.carrier_frame(*carrier, at);
-            let highest =
-                farthest(&chain, &obstacle.solid, &at, &frame, &up, window) + drift(Side::Workpiece);
+            let highest = farthest(&chain, &obstacle.solid, &at, &frame, &up, window) + drift(Side::Workpiece);
             let probe = &self.machine.probe;
             lowest - highest >= probe.clearance + probe.placement_tolerance
         })

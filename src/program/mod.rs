@@ -9,6 +9,7 @@ mod clock;
 mod head;
 pub mod heights;
 pub mod layout;
+mod library;
 pub mod path;
 pub mod plan;
 mod reach;
@@ -22,7 +23,8 @@ mod verify;
 mod tests;
 
 pub use head::{SkippedGroup, duration, pose_says, skipped_groups};
-pub use spec::{ProgramSpec, built_in, choose, load};
+pub use library::{built_in, choose};
+pub use spec::{ProgramSpec, load};
 pub use verify::{Violation, verify};
 
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -85,8 +87,11 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
     }
     if routed.touches.is_empty() {
         findings.push(
-            Finding::error("program::nothing_left", format!("nothing of {:?} can be touched on {}", spec.name, machine.name))
-                .help("higher risers, a longer stylus, or other poses: the reasons are above"),
+            Finding::error(
+                "program::nothing_left",
+                format!("nothing of {:?} can be touched on {}", spec.name, machine.name),
+            )
+            .help("higher risers, a longer stylus, or other poses: the reasons are above"),
         );
     }
     if findings.has_errors() {
