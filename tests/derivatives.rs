@@ -52,7 +52,7 @@ terms = [
 id = "own-a"
 at = "A"
 terms = [
-  { parameter = "v1", unit = "urad", dof = "rz", formula = "1", frame = "moving" },
+  { parameter = "v1", unit = "urad", dof = "rx", formula = "1", frame = "moving" },
   { parameter = "v2", unit = "urad", dof = "A", formula = "1", at = "reading" },
 ]
 "#;
@@ -124,7 +124,7 @@ fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_mach
                     .collect();
                 model.gap_and_row(&touch, &theta, &mut scratch, &mut row);
                 for j in 0..theta.len() {
-                    let step = 1e-3 * model.unknowns[j].typical;
+                    let step = 1e-4 * model.unknowns[j].typical;
                     let mut at = theta.clone();
                     at[j] += step;
                     let plus = model.gap(&touch, &at, &mut scratch);

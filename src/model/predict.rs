@@ -195,6 +195,8 @@ impl Model {
                 Some(axis) if axis.side == Side::Tool => axis.point,
                 _ => self.reference,
             },
+            // a tilt of the tool is one of the tool in its holder
+            Place::Tool => machine.tool.pivot,
             // a carriage's own coordinates are those of R at zero
             _ => Vector3::zeros(),
         };
@@ -312,7 +314,7 @@ impl Model {
         let reading = self.find(Place::Reading);
 
         // --- the ball from the tool's frame to R, remembering the point behind each place
-        let tool_slot = at_slot(self.find(Place::Tool), Some(touch.ball_at_zero));
+        let tool_slot = at_slot(self.find(Place::Tool), None);
         let mut point = touch.ball_at_zero;
         let mut behind: Vec<Vector3<f64>> = std::mem::take(&mut scratch.points);
         behind.clear();
