@@ -19,3 +19,5 @@ pub mod log;
 pub mod machine;
 pub mod model;
 pub mod program;
+pub mod report;
+pub mod study;
