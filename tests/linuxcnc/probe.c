@@ -119,6 +119,7 @@ typedef struct {
     vec direction, point;
     double sense, origin;    /* origin: machine coordinate at which this axis stands at 0 in R */
     double before[6], after[6];
+    double scale;            /* linear: what it carries stands scale * coordinate further along its direction */
 } axis_t;
 
 typedef struct {
@@ -217,7 +218,7 @@ static frame axis_motion(int i, const double *q) {
         move.r = rotation(a->direction, a->sense * q[i] * M_PI / 180);
         move = about(a->point, move);
     } else {
-        move = shifted(mul(a->on_tool_side ? q[i] : -q[i], a->direction));
+        move = shifted(mul((a->on_tool_side ? q[i] : -q[i]) + a->scale * q[i], a->direction));
     }
     frame f = compose(&before, &move);
     return compose(&f, &after);
@@ -450,6 +451,7 @@ static vec unit(vec a) { double l = length(a); return l > 0 ? mul(1 / l, a) : V(
  * letters come after the axes.
  *     axis L linear|rotary PARENT workpiece|tool  direction(3) point(3) sense origin
  *     before L dx dy dz a b c         after L ...                  (mm, rad)
+ *     scale L value                                                (linear axes)
  *     harmonic L OF dof k cos sin                                  (dof 0..5 = dx dy dz a b c)
  *     reference x y z
  *     tool L ball(3) up(3)            ball_radius r                stem radius length
@@ -482,6 +484,11 @@ static int read_line(char *p) {
     if (!strcmp(key, "before") || !strcmp(key, "after")) {
         if (!word(&p, name, NAME) || (i = axis_named(name)) < 0 || !numbers(&p, d, 6)) return 0;
         memcpy(key[0] == 'b' ? w.axis[i].before : w.axis[i].after, d, 6 * sizeof(double));
+        return 1;
+    }
+    if (!strcmp(key, "scale")) {
+        if (!word(&p, name, NAME) || (i = axis_named(name)) < 0 || w.axis[i].rotary || !numbers(&p, d, 1)) return 0;
+        w.axis[i].scale = d[0];
         return 1;
     }
     if (!strcmp(key, "harmonic")) {

@@ -76,9 +76,8 @@ class Machine:
         return float(self.data.get("origin", {}).get(letter, 0.0))
 
     def limits(self, letter):
-        """Travel in machine coordinates; `range` is read as places in R, like every other length of the file."""
-        low, high = self.axes[letter]["range"]
-        return low + self.origin(letter), high + self.origin(letter)
+        """Travel: `range` is written in machine coordinates, as the control displays it."""
+        return tuple(self.axes[letter]["range"])
 
     def carrier(self, name, where):
         """The axis letter (or `base`) that bears a block: `table` is the last linear axis below the workpiece."""
@@ -148,7 +147,7 @@ class Scenario:
     def __init__(self, data, machine, where):
         self.before = {a: [0.0] * 6 for a in machine.letters}
         self.after = {a: [0.0] * 6 for a in machine.letters}
-        self.pretravel, self.harmonics, self.blocks = 0.0, [], []
+        self.pretravel, self.harmonics, self.blocks, self.scales = 0.0, [], [], {}
         only(data, ("seed", "effects", "block", "noise", "harmonic"), where)
         self.seed = data.get("seed", 1)
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
@@ -182,6 +181,16 @@ class Scenario:
             # on the tool's side the offsets turn with the axis: they stand after its rotation
             on_tool = machine.side(axis) == "tool"
             places = {(axis, c): "after" if on_tool and c in "XYZ" else "before" for c in LOCATION[axis]}
+        elif m := re.fullmatch(r"zero-([abc])", effect):
+            axis = m[1].upper()
+            if axis not in machine.axes:
+                raise Unusable(f"{where}: {machine.name} has no axis {axis}")
+            places = {(axis, axis): "before"}
+        elif m := re.fullmatch(r"scale-([xyz])", effect):
+            axis = m[1].upper()
+            only(values, (f"E{axis}{axis}",), where)
+            self.scales[axis] = number(values.get(f"E{axis}{axis}", 0.0), where) * 1e-6
+            return
         elif effect in EFFECTS:
             places = EFFECTS[effect]
             for axis in {a for a, _ in places}:
@@ -189,7 +198,7 @@ class Scenario:
                     raise Unusable(f"{where}: {machine.name} has no axis {axis} on the {SIDE[effect]}'s side")
         else:
             raise Unusable(f"{where}: the rig does not know this effect (it knows {', '.join(EFFECTS)}, location-a, "
-                           "location-b, location-c, pretravel; [[harmonic]] for periodic errors)")
+                           "location-b, location-c, zero-a …, scale-x …, pretravel; [[harmonic]] for periodic errors)")
         for text, value in values.items():
             at = symbol(text)
             if at not in places:
@@ -275,6 +284,8 @@ def text_of(machine, plan, scenario, *, latch, report, solids=True, where="plan"
     for letter in machine.letters:
         out.append(row("before", letter, *scenario.before[letter]))
         out.append(row("after", letter, *scenario.after[letter]))
+    for axis, value in scenario.scales.items():
+        out.append(f"scale {axis} {value!r}")
     for axis, of, dof, k, c, s in scenario.harmonics:
         out.append(f"harmonic {axis} {of} {dof} {k} {c!r} {s!r}")
     out.append(row("tool", tool["parent"], *ball, *up))
