@@ -18,6 +18,8 @@ pub mod fit;
 pub mod log;
 pub mod machine;
 pub mod model;
+pub mod paper;
 pub mod program;
 pub mod report;
+pub mod simulate;
 pub mod study;
