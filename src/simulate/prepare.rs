@@ -70,8 +70,11 @@ pub fn bench<'a>(
     }
     if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
         findings.push(
-            Finding::warning("simulate::machine_changed", "the machine's description has changed since the plan was made")
-                .help("make the plan again if axes, blocks or the probe have changed"),
+            Finding::warning(
+                "simulate::machine_changed",
+                "the machine's description has changed since the plan was made",
+            )
+            .help("make the plan again if axes, blocks or the probe have changed"),
         );
     }
     let p = &machine.reference.pivot;
@@ -113,7 +116,8 @@ pub fn bench<'a>(
 fn times(plan: &Plan, scenario: &Scenario, needed: bool, findings: &mut Findings) -> Vec<(Option<f64>, f64)> {
     let untimed = plan.touches.iter().any(|t| t.time_s.is_none());
     if untimed && needed {
-        let message = format!("the plan has no times, but the scenario changes with time: {TOUCH_S} s per touch are taken");
+        let message =
+            format!("the plan has no times, but the scenario changes with time: {TOUCH_S} s per touch are taken");
         findings.push(Finding::warning("simulate::no_times", message).help("make the plan again: it predicts time_s"));
     }
     let mut last = 0.0;

@@ -55,13 +55,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn error(
-        &mut self,
-        span: Range<usize>,
-        code: &'static str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) {
+    fn error(&mut self, span: Range<usize>, code: &'static str, message: impl Into<String>, help: impl Into<String>) {
         self.findings.push(Finding::error(code, message).help(help).at(self.source, span));
     }
 
@@ -89,7 +83,12 @@ impl Reader<'_> {
         mut read: impl FnMut(&mut Self, &'t Table<'i>, Range<usize>),
     ) {
         let Some(rows) = node.get_ref().as_array() else {
-            self.error(node.span(), "scenario::table", format!("{name} is no list of tables"), format!("write [[{name}]]"));
+            self.error(
+                node.span(),
+                "scenario::table",
+                format!("{name} is no list of tables"),
+                format!("write [[{name}]]"),
+            );
             return;
         };
         for row in rows.iter() {
@@ -155,7 +154,12 @@ impl Reader<'_> {
     fn three(&mut self, node: &Node<'_>, name: &str) -> Vec3 {
         let array = node.get_ref().as_array().filter(|a| a.len() == 3);
         let Some(array) = array else {
-            self.error(node.span(), "scenario::three", format!("{name} is no list of three numbers"), "write [x, y, z]");
+            self.error(
+                node.span(),
+                "scenario::three",
+                format!("{name} is no list of three numbers"),
+                "write [x, y, z]",
+            );
             return [0.0; 3];
         };
         let mut out = [0.0; 3];
@@ -234,7 +238,12 @@ impl Reader<'_> {
             }
         }
         if value.is_none() {
-            self.error(node.span(), "scenario::value", format!("{name} has no value"), "write { value = 1.5, unit = \"um\" }");
+            self.error(
+                node.span(),
+                "scenario::value",
+                format!("{name} has no value"),
+                "write { value = 1.5, unit = \"um\" }",
+            );
         }
         value.map(|v| (v, unit))
     }
@@ -298,13 +307,23 @@ impl Reader<'_> {
                     axis = name.filter(|&a| a.is_rotary() && self.machine.axis(a).is_some());
                     if axis.is_none() {
                         let message = format!("axis is no rotary axis of {:?}", self.machine.name);
-                        self.error(node.span(), "scenario::axis", message, "write the letter of one, e.g. axis = \"C\"");
+                        self.error(
+                            node.span(),
+                            "scenario::axis",
+                            message,
+                            "write the letter of one, e.g. axis = \"C\"",
+                        );
                     }
                 }
                 "dof" => {
                     dof = self.word(node, "dof").and_then(|w| DOFS.iter().position(|d| *d == w));
                     if dof.is_none() {
-                        self.error(node.span(), "scenario::dof", "dof is not known", format!("there are: {}", DOFS.join(", ")));
+                        self.error(
+                            node.span(),
+                            "scenario::dof",
+                            "dof is not known",
+                            format!("there are: {}", DOFS.join(", ")),
+                        );
                     }
                 }
                 "k" => k = self.not_negative(node, "k"),
@@ -319,7 +338,12 @@ impl Reader<'_> {
         }
         let (Some(axis), Some(dof)) = (axis, dof) else {
             if !table.keys().any(|k| matches!(&**k.get_ref(), "axis" | "dof")) {
-                self.error(at, "scenario::harmonic", "a harmonic needs axis and dof", "write axis = \"C\", dof = \"dx\"");
+                self.error(
+                    at,
+                    "scenario::harmonic",
+                    "a harmonic needs axis and dof",
+                    "write axis = \"C\", dof = \"dx\"",
+                );
             }
             return;
         };
@@ -375,7 +399,8 @@ impl Reader<'_> {
                     out.temperature.extend(self.number(node, "constant_degC").map(|t| (0.0, t)));
                 }
                 "profile" => {
-                    let points: Vec<&Node<'_>> = node.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
+                    let points: Vec<&Node<'_>> =
+                        node.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
                     for point in points {
                         let pair: Vec<&Node<'_>> =
                             point.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
@@ -393,7 +418,12 @@ impl Reader<'_> {
                             continue;
                         };
                         if out.temperature.last().is_some_and(|last| h <= last.0) {
-                            self.error(hours.span(), "scenario::profile", "the profile runs back in time", "sort it by hours");
+                            self.error(
+                                hours.span(),
+                                "scenario::profile",
+                                "the profile runs back in time",
+                                "sort it by hours",
+                            );
                         }
                         out.temperature.push((h, t));
                     }

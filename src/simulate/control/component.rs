@@ -75,9 +75,9 @@ fn affine(chain: &Chain, shifts: &Shifts, pose: &Position, stylus: Stylus) -> (V
 fn add(known: &mut Shifts, term: &WrittenTerm, machine: &Machine) -> Result<(), String> {
     let mut letters = term.axis.chars();
     let axis = letters.next().and_then(AxisName::from_letter).filter(|_| letters.next().is_none());
-    let axis = axis.and_then(|a| machine.axis(a)).ok_or_else(|| {
-        format!("axis {:?} is no axis of {:?}", term.axis, machine.name)
-    })?;
+    let axis = axis
+        .and_then(|a| machine.axis(a))
+        .ok_or_else(|| format!("axis {:?} is no axis of {:?}", term.axis, machine.name))?;
     let dof = ["dx", "dy", "dz", "rx", "ry", "rz"].iter().position(|d| *d == term.dof);
     let dof = dof.ok_or_else(|| format!("dof {:?} is not known", term.dof))?;
     if !term.value.is_finite() {
