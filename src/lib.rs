@@ -16,4 +16,5 @@ pub mod cli;
 pub mod fit;
 pub mod log;
 pub mod machine;
+pub mod post;
 pub mod program;
