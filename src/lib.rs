@@ -19,6 +19,7 @@ pub mod log;
 pub mod machine;
 pub mod model;
 pub mod paper;
+pub mod post;
 pub mod program;
 pub mod report;
 pub mod simulate;
