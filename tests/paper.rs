@@ -269,8 +269,11 @@ fn without_compensating_the_head_the_table_is_wrong_by_the_heads_displacement() 
         let [_, _, dx, dy] = axiscal::paper::closed_form::table(&bench.readings(&touches), 0.0).unwrap();
         assert!((dx - g[3] - wrong[0]).abs() < 1e-4, "{}", dx - g[3]);
         assert!((dy - g[4] - wrong[1]).abs() < 1e-4, "{}", dy - g[4]);
-        // and the least squares over both B leave 0.04 … 0.12 mm, which the answer flags
+        // and the least squares over both B leave up to 0.04 … 0.12 mm, which the answer flags
         let fit = identify(&machine, &[(&plan, &touches)], &["paper-table"]);
-        assert!(fit.outcome.rms_um > 20.0 && !fit.outcome.warnings.is_empty());
+        let largest = fit.residual_mm.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+        println!("set with d_xCY {}: largest residual {largest} mm", g[3]);
+        assert!((0.035..0.125).contains(&largest), "{largest}");
+        assert!(fit.outcome.warnings.iter().any(|w| w.contains("miss the model")), "{:?}", fit.outcome.warnings);
     }
 }
