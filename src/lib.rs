@@ -17,3 +17,4 @@ pub mod fit;
 pub mod log;
 pub mod machine;
 pub mod program;
+pub mod tables;

@@ -134,6 +134,11 @@ impl Check<'_> {
                 );
             }
         }
+        // written as the control displays it; everything else counts from the origin of R
+        for axis in &mut axes {
+            let origin = m.origin.get(axis.name).unwrap_or(0.0);
+            axis.range = axis.range.map(|end| end - origin);
+        }
         let Some(probe) = &m.probe else {
             self.error(
                 &here,
@@ -670,5 +675,25 @@ struct HexDigest(Vec<u8>);
 impl std::fmt::LowerHex for HexDigest {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.0.iter().try_for_each(|b| write!(f, "{b:02x}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::axes::AxisName;
+    use crate::diag::source;
+
+    #[test]
+    fn the_built_in_machines_are_good() {
+        let (machines, findings) = super::load(&source("machines.toml", crate::machine::BUILT_IN)).unwrap();
+        assert_eq!(machines.len(), 4);
+        assert!(findings.0.is_empty());
+    }
+
+    #[test]
+    fn a_range_is_written_in_machine_coordinates_and_kept_relative_to_r() {
+        let text = crate::machine::BUILT_IN.replacen("origin = { X = 0.0", "origin = { X = 100.0", 1);
+        let (machines, _) = super::load(&source("machines.toml", text)).unwrap();
+        assert_eq!(machines[0].axis(AxisName::X).unwrap().range, [-550.0, 350.0]);
     }
 }
