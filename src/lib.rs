@@ -24,3 +24,4 @@ pub mod program;
 pub mod report;
 pub mod simulate;
 pub mod study;
+pub mod tables;
