@@ -5,6 +5,7 @@
 //! in [`sweep`].
 
 pub mod as_written;
+mod bare;
 mod clock;
 mod head;
 pub mod heights;
@@ -22,6 +23,7 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
+pub use bare::plan_without_path;
 pub use head::{SkippedGroup, duration, pose_says, skipped_groups};
 pub use library::{built_in, choose};
 pub use spec::{ProgramSpec, load};
