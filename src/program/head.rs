@@ -29,7 +29,10 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
         lines.extend(block_lines(machine, mounting, block));
     }
     lines.extend([
-        format!("  each block within {} mm of its place, its faces along the machine's axes", probe.placement_tolerance),
+        format!(
+            "  each block within {} mm of its place, its faces along the machine's axes",
+            probe.placement_tolerance
+        ),
         "  the first touch of each block stops the program where it stands outside of that".to_owned(),
         format!(
             "  probe with ball {} mm across, stem {} mm; {} mm from the pivot or gauge line to the ball's centre",
@@ -54,7 +57,9 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
     });
     if let Some((axis, top)) = first {
         let top = top + machine.origin.get(axis).unwrap_or(0.0);
-        lines.push(format!("  the first move takes {axis} straight to {top:.3} from where it stands: keep that way free"));
+        lines.push(format!(
+            "  the first move takes {axis} straight to {top:.3} from where it stands: keep that way free"
+        ));
     }
     for line in &mut lines {
         line.retain(|c| c.is_ascii() && !matches!(c, '(' | ')'));
@@ -66,10 +71,7 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
 fn block_lines(machine: &Machine, mounting: &Mounting, block: &Block) -> Vec<String> {
     let top = block.centre + Vector3::z() * (block.size.z / 2.0 + machine.probe.ball_radius);
     let at = machine.linear_for_ball(mounting.carrier, &Position::default(), &top, machine.tool.length_mm);
-    let mut line = format!(
-        "  block {}: {} x {} x {} mm",
-        block.name, block.size.x, block.size.y, block.size.z
-    );
+    let mut line = format!("  block {}: {} x {} x {} mm", block.name, block.size.x, block.size.y, block.size.z);
     if let Some(riser) = &block.riser {
         line.push_str(&format!(", on a riser {} mm high", riser.height));
     }
@@ -123,9 +125,8 @@ pub struct SkippedGroup {
 pub fn skipped_groups(skipped: &[Skipped]) -> Vec<SkippedGroup> {
     let mut groups: Vec<SkippedGroup> = Vec::new();
     for s in skipped {
-        let same = |g: &&mut SkippedGroup| {
-            (&g.stage, &g.block, &g.face) == (&s.stage, &s.block, &s.face) && g.pose == s.pose
-        };
+        let same =
+            |g: &&mut SkippedGroup| (&g.stage, &g.block, &g.face) == (&s.stage, &s.block, &s.face) && g.pose == s.pose;
         match groups.iter_mut().find(same) {
             Some(group) => group.points += 1,
             None => groups.push(SkippedGroup {
@@ -149,11 +150,8 @@ pub(super) fn losses(layout: &Layout, touches: &[PlanTouch], skipped: &[Skipped]
     let mut notes = Vec::new();
     for setup in &layout.setups {
         let here = |pose: &AxisMap, stage: &str| *pose == setup.pose && stage == setup.spec.stage;
-        let made: BTreeSet<(&str, &str)> = touches
-            .iter()
-            .filter(|t| here(&t.pose, &t.stage))
-            .map(|t| (t.block.as_str(), t.face.as_str()))
-            .collect();
+        let made: BTreeSet<(&str, &str)> =
+            touches.iter().filter(|t| here(&t.pose, &t.stage)).map(|t| (t.block.as_str(), t.face.as_str())).collect();
         notes.extend(losses_of(layout.mounting, setup, &made));
     }
     notes.dedup();
@@ -188,7 +186,9 @@ fn losses_of(mounting: &Mounting, setup: &Setup, made: &BTreeSet<(&str, &str)>) 
         let both_wanted = minus.0 && plus.0;
         match (minus.1, plus.1) {
             (true, true) => {}
-            (false, false) => notes.push(format!("{pose}: no face that looks along {letter} is touched; {letter} is lost here")),
+            (false, false) => {
+                notes.push(format!("{pose}: no face that looks along {letter} is touched; {letter} is lost here"))
+            }
             (minus_made, _) if both_wanted => {
                 let (lost, left) = if minus_made { ('+', '-') } else { ('-', '+') };
                 notes.push(format!(

@@ -144,8 +144,7 @@ impl Scene<'_> {
                 return false;
             }
             let frame = |at: &Position| self.machine.carrier_frame(*carrier, at);
-            let highest =
-                farthest(&chain, &obstacle.solid, &at, &frame, &up, window) + drift(Side::Workpiece);
+            let highest = farthest(&chain, &obstacle.solid, &at, &frame, &up, window) + drift(Side::Workpiece);
             let probe = &self.machine.probe;
             lowest - highest >= probe.clearance + probe.placement_tolerance
         })

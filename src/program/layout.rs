@@ -60,7 +60,10 @@ pub fn lay_out<'a>(machine: &'a Machine, spec: &'a ProgramSpec) -> Result<(Layou
         check.findings.push(
             Finding::warning(
                 "program::other_machine",
-                format!("program {:?} is written for {}, and is used for {}", spec.name, written_for.value, machine.name),
+                format!(
+                    "program {:?} is written for {}, and is used for {}",
+                    spec.name, written_for.value, machine.name
+                ),
             )
             .help("limits and collisions are checked for this machine; look at the poses all the same")
             .at(&spec.source, written_for.span.clone()),

@@ -87,8 +87,11 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
     }
     if routed.touches.is_empty() {
         findings.push(
-            Finding::error("program::nothing_left", format!("nothing of {:?} can be touched on {}", spec.name, machine.name))
-                .help("higher risers, a longer stylus, or other poses: the reasons are above"),
+            Finding::error(
+                "program::nothing_left",
+                format!("nothing of {:?} can be touched on {}", spec.name, machine.name),
+            )
+            .help("higher risers, a longer stylus, or other poses: the reasons are above"),
         );
     }
     if findings.has_errors() {

@@ -144,13 +144,7 @@ impl Router<'_, '_> {
     }
 
     /// Brings the rotary axes to a pose. The inner error is the reason why this set-up cannot be reached.
-    fn index(
-        &mut self,
-        number: u32,
-        setup: &Setup,
-        heights: Heights,
-        first: &Reached,
-    ) -> Result<Result<(), String>> {
+    fn index(&mut self, number: u32, setup: &Setup, heights: Heights, first: &Reached) -> Result<Result<(), String>> {
         let turns = match self.turns(setup) {
             Ok(turns) => turns,
             Err(reason) => return Ok(Err(reason)),
@@ -218,8 +212,10 @@ impl Router<'_, '_> {
                     "program::no_start",
                     format!("{} at the top of its range does not lift the probe over everything", lift.axis),
                 )
-                .help("a longer range, a lower artefact or a shorter stylus: the first moves must be clear wherever the \
-                       machine stands"));
+                .help(
+                    "a longer range, a lower artefact or a shorter stylus: the first moves must be clear wherever the \
+                       machine stands",
+                ));
             }
             self.out.path.start_near = Some(near);
         }
@@ -373,7 +369,12 @@ impl Router<'_, '_> {
     }
 
     /// Proves up, across and down through a height.
-    fn over(&self, at: &Position, start: &Position, height: f64) -> Result<(Position, Vec<AxisName>, Position), String> {
+    fn over(
+        &self,
+        at: &Position,
+        start: &Position,
+        height: f64,
+    ) -> Result<(Position, Vec<AxisName>, Position), String> {
         let [mut above_here, mut above_start] = [*at, *start];
         for above in [&mut above_here, &mut above_start] {
             above.set(self.lift.axis, self.lift.coordinate(height));

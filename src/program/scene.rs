@@ -227,9 +227,7 @@ impl<'m> Scene<'m> {
 
     /// True when a rotary axis moves this carrier of obstacles.
     pub(super) fn carries(&self, axis: AxisName, carrier: usize) -> bool {
-        self.carriers
-            .get(carrier)
-            .is_some_and(|c| self.machine.carrier_chain(*c).iter().any(|a| a.name == axis))
+        self.carriers.get(carrier).is_some_and(|c| self.machine.carrier_chain(*c).iter().any(|a| a.name == axis))
     }
 
     /// Upper bound of the distance from an axis's line of any point of a solid, mm.

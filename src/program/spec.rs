@@ -177,7 +177,10 @@ impl ProgramSpec {
 /// # Errors
 /// Never for a released program: the files are tested.
 pub fn built_in() -> Result<Vec<ProgramSpec>> {
-    BUILT_IN.iter().map(|(name, text)| load(&source(format!("{name} (built in)"), *text)).map(|(spec, _)| spec)).collect()
+    BUILT_IN
+        .iter()
+        .map(|(name, text)| load(&source(format!("{name} (built in)"), *text)).map(|(spec, _)| spec))
+        .collect()
 }
 
 /// Chooses the program of a name for a machine: the one that was written for it, else the only one that names no axis
@@ -193,8 +196,7 @@ pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &crate::machine::Mac
         return Err(Failure::new("program::unknown", format!("no program is called {name:?}"))
             .help(format!("there are: {}; a file of your own goes with --program FILE.toml", names.join(", "))));
     }
-    let written_for: Vec<String> =
-        named.iter().filter_map(|s| s.machine.as_ref().map(|m| m.value.clone())).collect();
+    let written_for: Vec<String> = named.iter().filter_map(|s| s.machine.as_ref().map(|m| m.value.clone())).collect();
     let written_for_it = |s: &ProgramSpec| s.machine.as_ref().is_none_or(|m| m.value == machine.name);
     let fits = |s: &ProgramSpec| {
         machine.mounting(&s.mounting.value).is_some()
@@ -210,7 +212,9 @@ pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &crate::machine::Mac
             "program::other_machine",
             format!("program {name:?} is written for {}, not for {}", written_for.join(", "), machine.name),
         )
-        .help("`axiscal programs` lists which program is for which machine; copy the nearest one and adapt it to yours")),
+        .help(
+            "`axiscal programs` lists which program is for which machine; copy the nearest one and adapt it to yours",
+        )),
     }
 }
 
@@ -269,7 +273,12 @@ impl Check<'_> {
         let repeats = self.repeats(f.repeats.as_ref()).unwrap_or(1);
         let mut setups = Vec::new();
         if f.stage.is_empty() {
-            self.error(f.name.span(), "program::empty", "the program has no stage", "add a [[stage]] table with set-ups");
+            self.error(
+                f.name.span(),
+                "program::empty",
+                "the program has no stage",
+                "add a [[stage]] table with set-ups",
+            );
         }
         for stage in &f.stage {
             let repeats = self.repeats(stage.repeats.as_ref()).unwrap_or(repeats);

@@ -94,7 +94,10 @@ impl Scene<'_> {
                 }
                 let line = Straight { scene: self, solid, obstacle, start: &start, way };
                 if let Err(gap_mm) = line.prove(needed) {
-                    keep_worst(&mut worst, Hit { part: *part, obstacle: obstacle.name.clone(), gap_mm, needed_mm: needed });
+                    keep_worst(
+                        &mut worst,
+                        Hit { part: *part, obstacle: obstacle.name.clone(), gap_mm, needed_mm: needed },
+                    );
                 }
             }
         }
@@ -167,7 +170,10 @@ impl Scene<'_> {
                 };
                 let turn = Turn { scene: self, solid, obstacle, from: at, axis, to_deg };
                 if let Err(gap_mm) = turn.prove(0.0, 1.0, radius * angle, needed) {
-                    keep_worst(&mut worst, Hit { part: *part, obstacle: obstacle.name.clone(), gap_mm, needed_mm: needed });
+                    keep_worst(
+                        &mut worst,
+                        Hit { part: *part, obstacle: obstacle.name.clone(), gap_mm, needed_mm: needed },
+                    );
                 }
             }
         }

@@ -194,7 +194,10 @@ impl Walk<'_, '_> {
         if protected || only.len() != 1 {
             self.violation(i, "from an unknown place one axis moves at a time".to_owned());
         } else if !at_top && only != [(lift.axis, lift.top)] {
-            self.violation(i, format!("the first move must take {} to its top: nobody knows where the machine stands", lift.axis));
+            self.violation(
+                i,
+                format!("the first move must take {} to its top: nobody knows where the machine stands", lift.axis),
+            );
         } else if at_top && !self.clear_anywhere() {
             self.violation(i, "the way from an unknown place is not proven clear".to_owned());
         }
@@ -228,7 +231,8 @@ impl Walk<'_, '_> {
                 Some(angle) => {
                     let way = target - angle;
                     if sense.get(axis) != Some(way.signum()) || way.abs() < SAME {
-                        let says = format!("{axis} goes from {angle} to {target}, and its sense says {:?}", sense.get(axis));
+                        let says =
+                            format!("{axis} goes from {angle} to {target}, and its sense says {:?}", sense.get(axis));
                         self.violation(i, says);
                     }
                 }
@@ -311,7 +315,10 @@ impl Walk<'_, '_> {
         need(same(&touch.nominal, &planned.nominal), "its nominal place is not the plan's");
         need(same(&touch.end, &planned.end), "its end is not the plan's");
         need(same(&touch.pose, &planned.pose), "its pose is not the plan's");
-        need(planned.from.iter().all(|(a, s)| self.senses.get(a) == Some(s)), "an axis came in another sense than planned");
+        need(
+            planned.from.iter().all(|(a, s)| self.senses.get(a) == Some(s)),
+            "an axis came in another sense than planned",
+        );
         // the geometry from the carrier's frame, not from the plan's own numbers
         let carrier = machine.carrier(&planned.carrier);
         let normal = Vector3::from(planned.normal);
@@ -328,7 +335,10 @@ impl Walk<'_, '_> {
         need(nominal.0.abs() < SAME, "the nominal place does not touch the face");
         need(start.0 > probe.placement_tolerance + probe.clearance, "it begins too near to the face");
         need(-end.0 >= probe.placement_tolerance, "it ends before a block at the placement tolerance would be met");
-        need(-end.0 + probe.placement_tolerance <= probe.overtravel + SAME, "it could push the probe past its overtravel");
+        need(
+            -end.0 + probe.placement_tolerance <= probe.overtravel + SAME,
+            "it could push the probe past its overtravel",
+        );
         need(touch.tolerance_mm <= probe.placement_tolerance + SAME, "its tolerance is wider than the probe's");
         need(touch.search_feed > 0.0 && touch.search_feed <= probe.fast_feed, "its search is faster than fast_feed");
         need(!touch.first || touch.search_feed <= probe.slow_feed, "the first touch of a block must search slowly");
