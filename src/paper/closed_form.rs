@@ -63,10 +63,18 @@ pub fn table(readings: &[Reading], z_c: f64) -> Option<[f64; 4]> {
     let turn: Vec<&Reading> = readings.iter().filter(|r| r.pose_deg[1].abs() < 1e-9).collect();
     let top = |k: usize, side: f64| {
         // the block's own place tells on which side of the table it stands
-        mean(turn.iter().filter(|r| along(r, 2) && r.point[k] * side > 0.0 && r.point[k].abs() > r.point[1 - k].abs()).map(|r| r.e))
+        mean(
+            turn.iter()
+                .filter(|r| along(r, 2) && r.point[k] * side > 0.0 && r.point[k].abs() > r.point[1 - k].abs())
+                .map(|r| r.e),
+        )
     };
     let arm = |k: usize, side: f64| {
-        mean(turn.iter().filter(|r| along(r, 2) && r.point[k] * side > 0.0 && r.point[k].abs() > r.point[1 - k].abs()).map(|r| r.point[k]))
+        mean(
+            turn.iter()
+                .filter(|r| along(r, 2) && r.point[k] * side > 0.0 && r.point[k].abs() > r.point[1 - k].abs())
+                .map(|r| r.point[k]),
+        )
     };
     let b = (top(0, -1.0)? - top(0, 1.0)?) / (arm(0, 1.0)? - arm(0, -1.0)?);
     let a = (top(1, 1.0)? - top(1, -1.0)?) / (arm(1, 1.0)? - arm(1, -1.0)?);

@@ -52,7 +52,9 @@ fn catalogue() -> Result<Catalogue> {
     let mut text = String::new();
     for (name, at, dof, frame) in UNKNOWNS {
         let frame = if frame.is_empty() { String::new() } else { format!(", frame = \"{frame}\"") };
-        text += &format!("[[effect]]\nid = \"{name}\"\nat = \"{at}\"\nterms = [{{ parameter = \"{name}\", unit = \"mm\", dof = \"{dof}\", formula = \"1\"{frame} }}]\n");
+        text += &format!(
+            "[[effect]]\nid = \"{name}\"\nat = \"{at}\"\nterms = [{{ parameter = \"{name}\", unit = \"mm\", dof = \"{dof}\", formula = \"1\"{frame} }}]\n"
+        );
     }
     let mut catalogue = Catalogue::default();
     catalogue.add_file(&source("the paper's unknowns", text))?;
@@ -65,7 +67,11 @@ type Measured = (f64, f64, usize);
 fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &[Measured]) -> Result<usize> {
     let effects: Vec<_> = unknowns
         .iter()
-        .map(|id| catalogue.get(id, machine).ok_or_else(|| Failure::new("paper::unknown", format!("{id} does not apply to {}", machine.name))))
+        .map(|id| {
+            catalogue
+                .get(id, machine)
+                .ok_or_else(|| Failure::new("paper::unknown", format!("{id} does not apply to {}", machine.name)))
+        })
         .collect::<Result<_>>()?;
     let set_up = SetUp { label: "datum".into(), carrier: Carrier::Table, centre: Vector3::zeros() };
     let model = Model::new(machine, &effects, std::slice::from_ref(&set_up), machine.reference.pivot);
@@ -105,7 +111,12 @@ fn xyz(poses: &[(f64, f64)]) -> Vec<Measured> {
 /// # Errors
 /// When a machine of the paper is missing.
 pub fn statements(machines: &[Machine]) -> Result<Vec<Statement>> {
-    let find = |name: &str| machines.iter().find(|m| m.name == name).ok_or_else(|| Failure::new("paper::machine", format!("machine {name:?} is missing")));
+    let find = |name: &str| {
+        machines
+            .iter()
+            .find(|m| m.name == name)
+            .ok_or_else(|| Failure::new("paper::machine", format!("machine {name:?} is missing")))
+    };
     let catalogue = catalogue()?;
     let mut out = Vec::new();
     let mut say = |machine: &Machine, unknowns: &str, ids: &[&str], poses: &str, measured: &[Measured]| -> Result<()> {
@@ -138,8 +149,15 @@ pub fn statements(machines: &[Machine]) -> Result<Vec<Statement>> {
     let eight = ["a_BZ", "b_BZ", "g_BZ", "dx_BZ", "dy_BZ", "dz_BZ", "a_BA", "dx_BA"];
     let ten = ["a_BZ", "b_BZ", "g_BZ", "dx_BZ", "dy_BZ", "dz_BZ", "a_BA", "dx_BA", "dz_BA", "g_BA"];
     let twelve: Vec<&str> = UNKNOWNS[..12].iter().map(|u| u.0).collect();
-    let sums: Vec<Measured> =
-        vec![(0.0, 0.0, 0), (0.0, 0.0, 1), (-90.0, 0.0, 0), (-90.0, 0.0, 1), (0.0, -90.0, 0), (0.0, -90.0, 1), (-30.0, 0.0, 0)];
+    let sums: Vec<Measured> = vec![
+        (0.0, 0.0, 0),
+        (0.0, 0.0, 1),
+        (-90.0, 0.0, 0),
+        (-90.0, 0.0, 1),
+        (0.0, -90.0, 0),
+        (0.0, -90.0, 1),
+        (-30.0, 0.0, 0),
+    ];
     say(double, "seven of the relations", &relations, "the seven printed sums", &sums)?;
     say(double, "eight of the table", &eight, "the seven printed sums", &sums)?;
     let printed = [(0.0, 0.0), (-90.0, 0.0), (0.0, -90.0), (-30.0, 0.0)];
@@ -175,9 +193,22 @@ mod tests {
         let ranks: Vec<(usize, usize)> = statements(&machines).unwrap().iter().map(|s| (s.number, s.rank)).collect();
         let head = [(5, 5), (6, 6), (7, 7), (9, 6), (7, 7), (12, 7), (5, 4)];
         let double = [
-            (7, 7), (8, 6), // the printed sums
-            (8, 8), (10, 9), (8, 8), (10, 10), (8, 8), (10, 10), (8, 8), (10, 10), (8, 8), (10, 9), (8, 8), (10, 10),
-            (12, 10), (14, 11),
+            (7, 7),
+            (8, 6), // the printed sums
+            (8, 8),
+            (10, 9),
+            (8, 8),
+            (10, 10),
+            (8, 8),
+            (10, 10),
+            (8, 8),
+            (10, 10),
+            (8, 8),
+            (10, 9),
+            (8, 8),
+            (10, 10),
+            (12, 10),
+            (14, 11),
         ];
         assert_eq!(ranks[..7], head);
         assert_eq!(ranks[7..], double);

@@ -93,7 +93,8 @@ impl Bench<'_> {
                 let pose = planned.pose.position();
                 let carrier = self.machine.carrier(&planned.carrier)?;
                 // the linear axes are square to each other and stand at R: the carrier's turn is all that is left
-                let turn = self.machine.carrier_frame(carrier, &pose.with_xyz_mm(Vector3::zeros())) * translation(Vector3::zeros());
+                let turn = self.machine.carrier_frame(carrier, &pose.with_xyz_mm(Vector3::zeros()))
+                    * translation(Vector3::zeros());
                 let normal = turn.rotation * Vector3::from(planned.normal);
                 let moved = t.position.xyz_mm() - planned.nominal_position().xyz_mm();
                 Some(Reading {
@@ -114,13 +115,28 @@ impl Bench<'_> {
         let settings = Settings { effects: vec![effect.into()], ..Settings::default() };
         let runs = [Run { plan: self.plan, touches, mounting: None, started_s: None }];
         let fit = fit::identify(self.machine, self.catalogue, &runs, &settings)?;
-        Ok(fit.outcome.parameters.iter().map(|p| (p.alias.clone().unwrap_or_else(|| p.name.clone()), p.value)).collect())
+        Ok(fit
+            .outcome
+            .parameters
+            .iter()
+            .map(|p| (p.alias.clone().unwrap_or_else(|| p.name.clone()), p.value))
+            .collect())
     }
 
-    fn table(&self, table: &str, set: usize, mode: Option<&str>, effects: (&str, &str), errors: &[(&str, f64)], closed: impl Fn(&[Reading]) -> Option<Vec<(&'static str, f64)>>) -> Result<Table> {
+    fn table(
+        &self,
+        table: &str,
+        set: usize,
+        mode: Option<&str>,
+        effects: (&str, &str),
+        errors: &[(&str, f64)],
+        closed: impl Fn(&[Reading]) -> Option<Vec<(&'static str, f64)>>,
+    ) -> Result<Table> {
         let (planted, fitted) = effects;
         let touches = self.touch(planted, errors)?;
-        let closed = closed(&self.readings(&touches)).ok_or_else(|| Failure::new("paper::faces", format!("the plan lacks faces that the closed form of table {table} needs")))?;
+        let closed = closed(&self.readings(&touches)).ok_or_else(|| {
+            Failure::new("paper::faces", format!("the plan lacks faces that the closed form of table {table} needs"))
+        })?;
         let least = self.fit(&touches, fitted)?;
         let rows = errors
             .iter()
@@ -142,7 +158,14 @@ impl Bench<'_> {
 
 fn matched(raw: &RawTouch) -> Result<Touch> {
     match (raw.id, raw.status) {
-        (Some(id), Status::Hit) => Ok(Touch { id, position: raw.position, status: raw.status, time_s: raw.time_s, temperature_deg_c: None, line: raw.line }),
+        (Some(id), Status::Hit) => Ok(Touch {
+            id,
+            position: raw.position,
+            status: raw.status,
+            time_s: raw.time_s,
+            temperature_deg_c: None,
+            line: raw.line,
+        }),
         _ => Err(Failure::new("paper::miss", format!("touch {} of the virtual machine missed", raw.line))),
     }
 }
@@ -158,7 +181,13 @@ pub fn all(head: Bench, table: Bench, double: Bench) -> Result<Vec<Table>> {
         let length = head.machine.tool.length_mm;
         out.push(head.table("4-1", i + 1, None, ("paper-head", "paper-head"), &errors, |r| {
             let [a, b, g, dx, dy] = closed_form::head(r, length)?;
-            Some(vec![("a_BZ", deg_from_rad(a)), ("b_BZ", deg_from_rad(b)), ("g_BZ", deg_from_rad(g)), ("d_xBZ", dx), ("d_yBZ", dy)])
+            Some(vec![
+                ("a_BZ", deg_from_rad(a)),
+                ("b_BZ", deg_from_rad(b)),
+                ("g_BZ", deg_from_rad(g)),
+                ("d_xBZ", dx),
+                ("d_yBZ", dy),
+            ])
         })?);
     }
     for (i, g) in GIVEN.iter().enumerate() {
@@ -185,7 +214,9 @@ pub fn all(head: Bench, table: Bench, double: Bench) -> Result<Vec<Table>> {
             ];
             let fitted = if mode == Mode::T { "paper-double-head" } else { "double-head-10" };
             let length = double.machine.tool.length_mm;
-            out.push(double.table("4-3", i + 1, Some(word), ("double-head-10", fitted), &errors, |r| closed_form::double_head(r, length, mode).map(|u| double_rows(&u)))?);
+            out.push(double.table("4-3", i + 1, Some(word), ("double-head-10", fitted), &errors, |r| {
+                closed_form::double_head(r, length, mode).map(|u| double_rows(&u))
+            })?);
         }
     }
     Ok(out)

@@ -74,7 +74,13 @@ impl Chain {
                     (true, Side::Tool) => point,
                 };
                 let sign = if backwards { -1.0 } else { a.sense };
-                Link { axis: a.name, direction: [a.direction.x, a.direction.y, a.direction.z], point, sign, error_point }
+                Link {
+                    axis: a.name,
+                    direction: [a.direction.x, a.direction.y, a.direction.z],
+                    point,
+                    sign,
+                    error_point,
+                }
             })
             .collect()
         };

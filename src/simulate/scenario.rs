@@ -212,7 +212,8 @@ impl Scenario {
     pub(super) fn temperature_at(&self, hours: f64) -> Option<f64> {
         let (first, last) = (self.temperature.first()?, self.temperature.last()?);
         let after = self.temperature.partition_point(|p| p.0 <= hours);
-        let (Some(a), Some(b)) = (after.checked_sub(1).and_then(|i| self.temperature.get(i)), self.temperature.get(after))
+        let (Some(a), Some(b)) =
+            (after.checked_sub(1).and_then(|i| self.temperature.get(i)), self.temperature.get(after))
         else {
             return Some(if after == 0 { first.1 } else { last.1 });
         };

@@ -135,10 +135,7 @@ impl Shape {
 
     /// Does it need the time of the touch?
     fn timed(&self) -> bool {
-        matches!(
-            self,
-            Self::Hours | Self::WarmUp(_) | Self::Warmth | Self::WarmthTimes(_) | Self::FromHour(_)
-        )
+        matches!(self, Self::Hours | Self::WarmUp(_) | Self::Warmth | Self::WarmthTimes(_) | Self::FromHour(_))
     }
 
     fn value(&self, touch: &TouchState, joints: &Position) -> f64 {

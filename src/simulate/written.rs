@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
 use std::ops::Range;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 
 type Table<'a> = DeTable<'a>;
 type Node<'a> = Spanned<DeValue<'a>>;
@@ -25,7 +25,7 @@ pub fn parse(source: &Source, machine: &Machine) -> Result<(Scenario, Findings)>
     })?;
     let mut reader = Reader { source, machine, findings: Findings::default() };
     let mut out = Scenario::default();
-    for (key, node) in document.get_ref() {
+    for (key, node) in in_order(document.get_ref()) {
         match &**key.get_ref() {
             "seed" => out.seed = reader.seed(node),
             "effects" => reader.effects(&mut out, node),
@@ -48,6 +48,13 @@ pub fn parse(source: &Source, machine: &Machine) -> Result<(Scenario, Findings)>
     reader.findings.finish(out)
 }
 
+/// The entries as they stand in the file, so that findings and sums do not depend on the alphabet.
+fn in_order<'t, 'i>(table: &'t Table<'i>) -> Vec<(&'t Spanned<DeString<'i>>, &'t Node<'i>)> {
+    let mut entries: Vec<_> = table.iter().collect();
+    entries.sort_by_key(|(key, _)| key.span().start);
+    entries
+}
+
 struct Reader<'a> {
     source: &'a Source,
     machine: &'a Machine,
@@ -55,13 +62,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn error(
-        &mut self,
-        span: Range<usize>,
-        code: &'static str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) {
+    fn error(&mut self, span: Range<usize>, code: &'static str, message: impl Into<String>, help: impl Into<String>) {
         self.findings.push(Finding::error(code, message).help(help).at(self.source, span));
     }
 
@@ -89,7 +90,12 @@ impl Reader<'_> {
         mut read: impl FnMut(&mut Self, &'t Table<'i>, Range<usize>),
     ) {
         let Some(rows) = node.get_ref().as_array() else {
-            self.error(node.span(), "scenario::table", format!("{name} is no list of tables"), format!("write [[{name}]]"));
+            self.error(
+                node.span(),
+                "scenario::table",
+                format!("{name} is no list of tables"),
+                format!("write [[{name}]]"),
+            );
             return;
         };
         for row in rows.iter() {
@@ -155,7 +161,12 @@ impl Reader<'_> {
     fn three(&mut self, node: &Node<'_>, name: &str) -> Vec3 {
         let array = node.get_ref().as_array().filter(|a| a.len() == 3);
         let Some(array) = array else {
-            self.error(node.span(), "scenario::three", format!("{name} is no list of three numbers"), "write [x, y, z]");
+            self.error(
+                node.span(),
+                "scenario::three",
+                format!("{name} is no list of three numbers"),
+                "write [x, y, z]",
+            );
             return [0.0; 3];
         };
         let mut out = [0.0; 3];
@@ -180,7 +191,7 @@ impl Reader<'_> {
 
     fn effects(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "effects") else { return };
-        for (id, node) in table {
+        for (id, node) in in_order(table) {
             if &**id.get_ref() == "block-setup" {
                 self.error(
                     id.span(),
@@ -194,7 +205,7 @@ impl Reader<'_> {
             let before = self.findings.0.len();
             let mut values = Vec::new();
             let mut spans = Vec::new();
-            for (name, node) in table {
+            for (name, node) in in_order(table) {
                 if let Some((value, unit)) = self.value(node, name.get_ref()) {
                     values.push(Value { name: &**name.get_ref(), value, unit });
                     spans.push(name.span().start..node.span().end);
@@ -218,7 +229,7 @@ impl Reader<'_> {
             return self.number(node, name).map(|v| (v, None));
         };
         let (mut value, mut unit) = (None, None);
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "value" => value = self.number(node, name),
                 "unit" => {
@@ -234,7 +245,12 @@ impl Reader<'_> {
             }
         }
         if value.is_none() {
-            self.error(node.span(), "scenario::value", format!("{name} has no value"), "write { value = 1.5, unit = \"um\" }");
+            self.error(
+                node.span(),
+                "scenario::value",
+                format!("{name} has no value"),
+                "write { value = 1.5, unit = \"um\" }",
+            );
         }
         value.map(|v| (v, unit))
     }
@@ -248,7 +264,7 @@ impl Reader<'_> {
             tilt_rad: [0.0; 3],
             size_mm: [0.0; 3],
         };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "mounting" => mounting = self.word(node, "mounting").map(|w| (w.to_owned(), node.span())),
                 "name" => name = self.word(node, "name").map(|w| (w.to_owned(), node.span())),
@@ -290,7 +306,7 @@ impl Reader<'_> {
         let (mut axis, mut dof, mut k) = (None, None, 1.0);
         // cosine and sine, as displacement (mm) and as turn (rad)
         let (mut um, mut urad) = (None, None);
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
                 "axis" => {
@@ -298,13 +314,23 @@ impl Reader<'_> {
                     axis = name.filter(|&a| a.is_rotary() && self.machine.axis(a).is_some());
                     if axis.is_none() {
                         let message = format!("axis is no rotary axis of {:?}", self.machine.name);
-                        self.error(node.span(), "scenario::axis", message, "write the letter of one, e.g. axis = \"C\"");
+                        self.error(
+                            node.span(),
+                            "scenario::axis",
+                            message,
+                            "write the letter of one, e.g. axis = \"C\"",
+                        );
                     }
                 }
                 "dof" => {
                     dof = self.word(node, "dof").and_then(|w| DOFS.iter().position(|d| *d == w));
                     if dof.is_none() {
-                        self.error(node.span(), "scenario::dof", "dof is not known", format!("there are: {}", DOFS.join(", ")));
+                        self.error(
+                            node.span(),
+                            "scenario::dof",
+                            "dof is not known",
+                            format!("there are: {}", DOFS.join(", ")),
+                        );
                     }
                 }
                 "k" => k = self.not_negative(node, "k"),
@@ -319,7 +345,12 @@ impl Reader<'_> {
         }
         let (Some(axis), Some(dof)) = (axis, dof) else {
             if !table.keys().any(|k| matches!(&**k.get_ref(), "axis" | "dof")) {
-                self.error(at, "scenario::harmonic", "a harmonic needs axis and dof", "write axis = \"C\", dof = \"dx\"");
+                self.error(
+                    at,
+                    "scenario::harmonic",
+                    "a harmonic needs axis and dof",
+                    "write axis = \"C\", dof = \"dx\"",
+                );
             }
             return;
         };
@@ -337,7 +368,7 @@ impl Reader<'_> {
 
     fn noise(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "noise") else { return };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
                 "touch_um" => out.noise.touch_mm = mm_from_um(self.not_negative(node, word)),
@@ -357,7 +388,7 @@ impl Reader<'_> {
 
     fn time(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "time") else { return };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
                 "started_s" => out.clock.started_s = self.number(node, word).unwrap_or(0.0),
@@ -369,13 +400,14 @@ impl Reader<'_> {
 
     fn temperature(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "temperature") else { return };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "constant_degC" => {
                     out.temperature.extend(self.number(node, "constant_degC").map(|t| (0.0, t)));
                 }
                 "profile" => {
-                    let points: Vec<&Node<'_>> = node.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
+                    let points: Vec<&Node<'_>> =
+                        node.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
                     for point in points {
                         let pair: Vec<&Node<'_>> =
                             point.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
@@ -393,7 +425,12 @@ impl Reader<'_> {
                             continue;
                         };
                         if out.temperature.last().is_some_and(|last| h <= last.0) {
-                            self.error(hours.span(), "scenario::profile", "the profile runs back in time", "sort it by hours");
+                            self.error(
+                                hours.span(),
+                                "scenario::profile",
+                                "the profile runs back in time",
+                                "sort it by hours",
+                            );
                         }
                         out.temperature.push((h, t));
                     }

@@ -75,9 +75,8 @@ fn table_load(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
     let Some(axis) = last else {
         return Err(Refusal::NotHere(format!("{:?} has no rotary table", machine.name)));
     };
-    let row = |name: &str, dof: usize| {
-        Parameter::at(name, Urad, Target::Axis { axis, after: true, dof }, Shape::Constant)
-    };
+    let row =
+        |name: &str, dof: usize| Parameter::at(name, Urad, Target::Axis { axis, after: true, dof }, Shape::Constant);
     Ok(vec![row("load_a", 3), row("load_b", 4)])
 }
 
@@ -97,9 +96,8 @@ fn slip(settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
         }
     };
     let names = ["dx", "dy", "dz", "rx", "ry", "rz"];
-    let mut rows: Vec<Parameter> = (0..6)
-        .map(|i| Parameter::at(names[i], if i < 3 { Um } else { Urad }, Target::Block(i), shape))
-        .collect();
+    let mut rows: Vec<Parameter> =
+        (0..6).map(|i| Parameter::at(names[i], if i < 3 { Um } else { Urad }, Target::Block(i), shape)).collect();
     rows.push(Parameter::setting("from_touch", One, None));
     rows.push(Parameter::setting("from_h", H, None));
     Ok(rows)

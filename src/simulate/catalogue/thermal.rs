@@ -43,9 +43,8 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         }
         "ambient-scale" => {
             let axes = machine.axes.iter().map(|a| a.name).filter(|a| !a.is_rotary());
-            let acts = axes.map(|axis| {
-                (Target::Axis { axis, after: true, dof: along(axis) }, Shape::WarmthTimes(axis), 1.0)
-            });
+            let acts =
+                axes.map(|axis| (Target::Axis { axis, after: true, dof: along(axis) }, Shape::WarmthTimes(axis), 1.0));
             vec![Parameter::new("expansion", PpmPerK, acts).alias("alpha")]
         }
         "centre-drift-c" => {

@@ -34,7 +34,9 @@ fn a_displaced_block_is_met_where_its_plane_is() {
 #[test]
 fn a_ball_that_misses_says_so_and_stops_at_the_end() {
     let (machine, plan) = top_plan(1);
-    for (shift, status, at_start) in [(-2.5, Status::Miss, false), (-1.5, Status::Hit, false), (2.5, Status::Miss, true)] {
+    for (shift, status, at_start) in
+        [(-2.5, Status::Miss, false), (-1.5, Status::Hit, false), (2.5, Status::Miss, true)]
+    {
         let scenario = Scenario::flawless().with_block("table", "x+", [0.0, 0.0, shift], [0.0; 3]);
         let (raw, findings) = run(&machine, &plan, &scenario, None).unwrap();
         assert_eq!(raw[0].status, status);
