@@ -164,7 +164,8 @@ pub fn read_log(
         io.report(&findings.0);
         raw
     } else {
-        let post = Postprocessor::load_built_in_or_file(controller)?;
+        let (post, findings) = Postprocessor::load_built_in_or_file(controller)?;
+        io.report(&findings);
         let (parsed, findings) = log::parse(bytes, &name, &post)?;
         io.report(&findings.0);
         parsed.touches

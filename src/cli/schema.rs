@@ -35,7 +35,7 @@ pub fn run(args: &Args, _io: &Io) -> Result<Answer> {
     let schema = match args.what {
         What::Machines => schemars::schema_for!(crate::machine::as_written::File),
         What::Programs => crate::program::schema(),
-        What::Postprocessors => crate::post::schema(),
+        What::Postprocessors => schemars::schema_for!(crate::post::as_written::File),
         What::Study => schemars::schema_for!(crate::study::AsWritten),
         What::Effects => schemars::schema_for!(crate::model::catalogue::File),
     };
