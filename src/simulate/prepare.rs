@@ -69,15 +69,6 @@ pub fn bench<'a>(
         )
         .help("name the plan's machine with --machine, or make the plan again"));
     }
-    if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
-        findings.push(
-            Finding::warning(
-                "simulate::machine_changed",
-                "the machine's description has changed since the plan was made",
-            )
-            .help("make the plan again if axes, blocks or the probe have changed"),
-        );
-    }
     let tcp = plan.controller_frame == ControllerFrame::Tcp;
     if let Some(Err(why)) = compensation.map(|c| c.acts_on(tcp)) {
         let finding = if tcp {
