@@ -1,0 +1,288 @@
+//! `postprocessors/*.toml` as a person wrote it, with the places of what can be wrong. Nothing is checked here.
+
+use crate::axes::AxisName;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use toml::Spanned;
+
+/// The whole file.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct File {
+    /// `axiscal-postprocessor/1`
+    #[schemars(with = "String")]
+    pub format: Spanned<String>,
+    /// Short name, used on the command line.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// What it is, in one line.
+    pub says: String,
+    /// The program file.
+    pub file: ProgramFile,
+    /// How numbers and axis words are written.
+    pub number: Number,
+    /// How remarks and messages are written.
+    pub comment: Comment,
+    /// Texts and numbers that the templates use as `settings.NAME`; a user changes them for a machine.
+    #[serde(default)]
+    pub settings: BTreeMap<String, String>,
+    /// Where the control keeps the result of a probing move.
+    pub result: ResultPlaces,
+    /// The templates.
+    pub write: Write,
+    /// Programs under the control's own transformation (`--tcp`); absent: the control has none.
+    pub tcp: Option<Tcp>,
+    /// The log: how it is called and how it is read.
+    pub log: Log,
+}
+
+/// The program file.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProgramFile {
+    /// Without the dot.
+    #[schemars(with = "String")]
+    pub extension: Spanned<String>,
+    /// What ends a line.
+    pub end_of_line: EndOfLine,
+    /// The longest line that the control takes, characters.
+    #[schemars(with = "usize")]
+    pub line_length: Spanned<usize>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// What ends a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum EndOfLine {
+    /// LF
+    Lf,
+    /// CR LF
+    Crlf,
+    /// CR
+    Cr,
+}
+
+/// How numbers and axis words are written.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Number {
+    /// Digits after the decimal mark, coordinates in mm and deg.
+    #[schemars(with = "usize")]
+    pub decimals: Spanned<usize>,
+    /// `X10.500000` rather than `X10.5`.
+    #[serde(default)]
+    pub trailing_zeros: bool,
+    /// The decimal mark is written for whole numbers too: `X10.`
+    #[serde(default)]
+    pub always_mark: bool,
+    /// `+` before positive coordinates.
+    #[serde(default)]
+    pub plus: bool,
+    /// `.` or `,`
+    #[schemars(with = "String")]
+    pub decimal_mark: Spanned<String>,
+    /// An axis word, from `{axis}` and `{value}`.
+    #[schemars(with = "String")]
+    pub word: Spanned<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// How remarks and messages are written.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Comment {
+    /// Before the text.
+    pub open: String,
+    /// After it.
+    #[serde(default)]
+    pub close: String,
+    /// Longer remarks go on in the next line, characters.
+    #[schemars(with = "usize")]
+    pub width: Spanned<usize>,
+    /// Characters that must not stand in a remark, and what is written in their place.
+    #[serde(default)]
+    pub replace: BTreeMap<String, String>,
+    /// What is written for a character outside printable ASCII.
+    pub other: String,
+    /// All letters become capitals.
+    #[serde(default)]
+    pub capitals: bool,
+    /// First words that would make a remark do something.
+    #[serde(default)]
+    pub reserved: Vec<String>,
+    /// What is put before such a word.
+    #[serde(default)]
+    pub reserved_prefix: String,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// Where the control keeps the result of a probing move.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ResultPlaces {
+    /// Variable of the control, for each axis letter.
+    #[serde(rename = "X")]
+    pub x: Option<String>,
+    #[allow(missing_docs)]
+    #[serde(rename = "Y")]
+    pub y: Option<String>,
+    #[allow(missing_docs)]
+    #[serde(rename = "Z")]
+    pub z: Option<String>,
+    #[allow(missing_docs)]
+    #[serde(rename = "A")]
+    pub a: Option<String>,
+    #[allow(missing_docs)]
+    #[serde(rename = "B")]
+    pub b: Option<String>,
+    #[allow(missing_docs)]
+    #[serde(rename = "C")]
+    pub c: Option<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// One template with where it comes from.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// minijinja.
+    #[schemars(with = "String")]
+    pub template: Spanned<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// The templates, one per kind of step.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Write {
+    /// Everything before the first move.
+    pub start: Entry,
+    /// A remark.
+    pub note: Entry,
+    /// A set-up begins.
+    pub setup: Entry,
+    /// The way to where a set-up begins, when the program starts again there.
+    pub resume: Entry,
+    /// A set-up ends.
+    pub setup_end: Entry,
+    /// The spindle is oriented.
+    pub orient: Entry,
+    /// Rapid of linear axes.
+    pub rapid: Entry,
+    /// Rotary axes move.
+    pub rotary: Entry,
+    /// Positioning that stops when the probe triggers.
+    pub protected: Entry,
+    /// One touch.
+    pub touch: Entry,
+    /// Back from contact.
+    pub retract: Entry,
+    /// A message to the operator.
+    pub message: Entry,
+    /// Everything after the last move.
+    pub end: Entry,
+}
+
+/// Programs under the control's own transformation.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tcp {
+    /// Longest step of a rotary axis, deg: between two steps the linear axes leave the arc.
+    #[schemars(with = "f64")]
+    pub rotary_step: Spanned<f64>,
+    /// What must be switched on at the control.
+    pub says: String,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// The log.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Log {
+    /// Its name: a template that knows `program` and `machine`.
+    #[schemars(with = "String")]
+    pub file: Spanned<String>,
+    /// What may stand in its name.
+    pub characters: String,
+    /// Where a person finds it.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// Line ends that are as they should be; others are read too, and reported.
+    pub end_of_line: Vec<EndOfLine>,
+    /// Digits after the decimal mark.
+    #[schemars(with = "usize")]
+    pub decimals: Spanned<usize>,
+    /// Every number has exactly so many: another count means that it was cut or edited.
+    #[serde(default)]
+    pub exact_decimals: bool,
+    /// `.` or `,`
+    #[schemars(with = "String")]
+    pub decimal_mark: Spanned<String>,
+    /// Letter of the word with the sum of the axis positions, where the control can write one.
+    #[schemars(with = "Option<String>")]
+    pub check_word: Option<Spanned<String>>,
+    /// A file of nothing but columns, where the control has such a log of its own.
+    pub columns: Option<Columns>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// A log of nothing but columns.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Columns {
+    /// What each column holds: an axis letter (letters that no machine here has are read and left out).
+    #[schemars(with = "Vec<String>")]
+    pub axes: Spanned<Vec<String>>,
+    /// Digits after the decimal mark.
+    pub decimals: usize,
+    /// The lines of one touch, in order.
+    #[schemars(with = "Vec<Role>")]
+    pub per_touch: Spanned<Vec<Role>>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// What a line of a log of columns comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// The fast search.
+    Search,
+    /// The move off the face.
+    Release,
+    /// The slow touch that is measured.
+    Measure,
+}
+
+/// The axis of a letter, if axiscal knows it.
+#[must_use]
+pub fn axis_of(letter: &str) -> Option<AxisName> {
+    let mut characters = letter.chars();
+    let axis = AxisName::from_letter(characters.next()?)?;
+    characters.next().is_none().then_some(axis)
+}

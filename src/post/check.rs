@@ -1,0 +1,295 @@
+//! From a postprocessor file as written to a [`Postprocessor`] that can be relied on; all findings at once.
+
+use super::as_written::{self as w, Entry, axis_of};
+use super::{ColumnRule, CommentRule, LogRule, NumberRule, Postprocessor, Tcp};
+use crate::axes::AxisName;
+use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use minijinja::{Environment, State, UndefinedBehavior, context, syntax::SyntaxConfig};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::Spanned;
+
+const FORMAT: &str = "axiscal-postprocessor/1";
+
+/// Reads and checks a postprocessor file.
+///
+/// # Errors
+/// When the text is not TOML of this form, or a template does not compile; every finding has its place and remedy.
+pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
+    let text = source.inner();
+    let file: w::File = toml::from_str(text).map_err(|e| {
+        from_toml(&e, source, "post::not_toml")
+            .help("`axiscal schema postprocessors` prints the form; `axiscal controllers show linuxcnc` an example")
+    })?;
+    let mut check = Check { source, findings: Findings::default(), unverified: Vec::new() };
+    check.head(&file);
+    let number = check.number(&file.number);
+    let comment = check.comment(&file.comment);
+    let log = check.log(&file.log);
+    let result = check.result(&file.result);
+    let tcp = file.tcp.as_ref().map(|tcp| {
+        check.origin("tcp", &tcp.source, &tcp.unverified, &tcp.rotary_step.span());
+        let step = *tcp.rotary_step.get_ref();
+        if !(step > 0.0 && step <= 30.0) {
+            check.error(
+                &tcp.rotary_step.span(),
+                "post::rotary_step",
+                format!("rotary_step is {step} deg"),
+                "more than 0 and at most 30 deg: 2 is a good value",
+            );
+        }
+        Tcp { rotary_step_deg: step, says: tcp.says.clone() }
+    });
+    let templates = check.templates(&file, &comment);
+    let post = Postprocessor {
+        name: file.name.get_ref().clone(),
+        says: file.says.clone(),
+        extension: file.file.extension.get_ref().clone(),
+        end_of_line: file.file.end_of_line,
+        line_length: *file.file.line_length.get_ref(),
+        number,
+        comment,
+        settings: file.settings.clone(),
+        result,
+        tcp,
+        log,
+        unverified: std::mem::take(&mut check.unverified),
+        text: text.clone(),
+        templates,
+    };
+    check.findings.finish(post)
+}
+
+struct Check<'a> {
+    source: &'a Source,
+    findings: Findings,
+    unverified: Vec<(String, String)>,
+}
+
+impl Check<'_> {
+    fn error(&mut self, span: &Range<usize>, code: &'static str, message: String, help: &str) {
+        self.findings.push(Finding::error(code, message).help(help).at(self.source, span.clone()));
+    }
+
+    /// Every statement about a control says where it comes from.
+    fn origin(
+        &mut self,
+        entry: &str,
+        source: &Option<String>,
+        unverified: &Option<String>,
+        span: &Range<usize>,
+    ) {
+        match (source, unverified) {
+            (_, Some(why)) => self.unverified.push((entry.to_owned(), why.clone())),
+            (Some(from), None) if !from.trim().is_empty() => {}
+            _ => self.error(
+                span,
+                "post::no_source",
+                format!("[{entry}] does not say where it comes from"),
+                "write `source = \"manual, page\"`, or `unverified = \"why\"` where nobody has tried it",
+            ),
+        }
+    }
+
+    fn word(&mut self, what: &str, value: &Spanned<String>, good: impl Fn(&str) -> bool, help: &str) {
+        if !good(value.get_ref()) {
+            let message = format!("{what} is {:?}", value.get_ref());
+            self.error(&value.span(), "post::word", message, help);
+        }
+    }
+
+    fn head(&mut self, file: &w::File) {
+        if file.format.get_ref() != FORMAT {
+            let message = format!("format is {:?}, expected {FORMAT:?}", file.format.get_ref());
+            self.error(&file.format.span(), "post::format", message, "write the format line of this version");
+        }
+        let name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+        self.word("name", &file.name, name, "letters, digits and -");
+        self.word("extension", &file.file.extension, name, "letters and digits, without the dot");
+        if *file.file.line_length.get_ref() < 60 {
+            let span = file.file.line_length.span();
+            let message = format!("line_length is {}", file.file.line_length.get_ref());
+            self.error(&span, "post::line_length", message, "a program needs lines of at least 60 characters");
+        }
+        self.origin("file", &file.file.source, &file.file.unverified, &file.file.extension.span());
+    }
+
+    fn mark(&mut self, mark: &Spanned<String>) -> char {
+        self.word("decimal_mark", mark, |m| m == "." || m == ",", "\".\" or \",\"");
+        if mark.get_ref() == "," { ',' } else { '.' }
+    }
+
+    fn decimals(&mut self, decimals: &Spanned<usize>) -> usize {
+        let value = *decimals.get_ref();
+        if value > 9 {
+            self.error(&decimals.span(), "post::decimals", format!("decimals is {value}"), "0 to 9");
+        }
+        value.min(9)
+    }
+
+    fn number(&mut self, number: &w::Number) -> NumberRule {
+        self.origin("number", &number.source, &number.unverified, &number.decimals.span());
+        let both = |s: &str| s.contains("{axis}") && s.contains("{value}");
+        self.word("word", &number.word, both, "it holds {axis} and {value}");
+        NumberRule {
+            decimals: self.decimals(&number.decimals),
+            trailing_zeros: number.trailing_zeros,
+            always_mark: number.always_mark,
+            plus: number.plus,
+            mark: self.mark(&number.decimal_mark),
+            word: number.word.get_ref().clone(),
+        }
+    }
+
+    fn comment(&mut self, comment: &w::Comment) -> CommentRule {
+        self.origin("comment", &comment.source, &comment.unverified, &comment.width.span());
+        let mut replace = BTreeMap::new();
+        for (from, to) in &comment.replace {
+            let mut characters = from.chars();
+            match (characters.next(), characters.next()) {
+                (Some(only), None) => {
+                    replace.insert(only, to.clone());
+                }
+                _ => self.error(
+                    &comment.width.span(),
+                    "post::replace",
+                    format!("[comment] replace has {from:?} on the left"),
+                    "one character on the left, any text on the right",
+                ),
+            }
+        }
+        let width = *comment.width.get_ref();
+        if width < 20 {
+            self.error(&comment.width.span(), "post::width", format!("width is {width}"), "at least 20 characters");
+        }
+        CommentRule {
+            open: comment.open.clone(),
+            close: comment.close.clone(),
+            width: width.max(20),
+            replace,
+            other: comment.other.clone(),
+            capitals: comment.capitals,
+            reserved: comment.reserved.clone(),
+            reserved_prefix: comment.reserved_prefix.clone(),
+        }
+    }
+
+    fn result(&mut self, result: &w::ResultPlaces) -> BTreeMap<AxisName, String> {
+        self.origin("result", &result.source, &result.unverified, &(0..0));
+        let places = [&result.x, &result.y, &result.z, &result.a, &result.b, &result.c];
+        AxisName::ALL.into_iter().zip(places).filter_map(|(a, p)| p.clone().map(|p| (a, p))).collect()
+    }
+
+    fn log(&mut self, log: &w::Log) -> LogRule {
+        self.origin("log", &log.source, &log.unverified, &log.file.span());
+        if log.end_of_line.is_empty() {
+            let help = "name at least one of \"lf\", \"crlf\", \"cr\"";
+            self.error(&log.file.span(), "post::end_of_line", "[log] end_of_line is empty".into(), help);
+        }
+        let check_word = log.check_word.as_ref().and_then(|word| {
+            let free = |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
+            self.word("check_word", word, free, "one capital letter that is no axis and none of N S U H P E");
+            word.get_ref().bytes().next()
+        });
+        let columns = log.columns.as_ref().map(|columns| {
+            self.origin("log.columns", &columns.source, &columns.unverified, &columns.axes.span());
+            let axes: Vec<_> = columns.axes.get_ref().iter().map(|a| axis_of(a)).collect();
+            let linear = [AxisName::X, AxisName::Y, AxisName::Z];
+            if linear.iter().any(|a| axes.iter().filter(|b| **b == Some(*a)).count() != 1) {
+                let message = "[log.columns] axes must hold X, Y and Z once each".to_owned();
+                self.error(&columns.axes.span(), "post::columns", message, "name every column from left to right");
+            }
+            if columns.per_touch.get_ref().iter().filter(|r| **r == w::Role::Measure).count() != 1 {
+                let message = "[log.columns] per_touch must hold \"measure\" once".to_owned();
+                let help = "for example [\"search\", \"release\", \"measure\"]";
+                self.error(&columns.per_touch.span(), "post::per_touch", message, help);
+            }
+            ColumnRule { axes, decimals: columns.decimals, per_touch: columns.per_touch.get_ref().clone() }
+        });
+        LogRule {
+            characters: log.characters.clone(),
+            place: log.place.clone(),
+            end_of_line: log.end_of_line.clone(),
+            decimals: self.decimals(&log.decimals),
+            exact_decimals: log.exact_decimals,
+            mark: if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' },
+            check_word,
+            columns,
+        }
+    }
+
+    fn templates(&mut self, file: &w::File, comment: &CommentRule) -> Environment<'static> {
+        let mut env = environment(comment, *file.file.line_length.get_ref());
+        let write = &file.write;
+        let entries: [(&'static str, &Entry); 13] = [
+            ("start", &write.start),
+            ("note", &write.note),
+            ("setup", &write.setup),
+            ("resume", &write.resume),
+            ("setup_end", &write.setup_end),
+            ("orient", &write.orient),
+            ("rapid", &write.rapid),
+            ("rotary", &write.rotary),
+            ("protected", &write.protected),
+            ("touch", &write.touch),
+            ("retract", &write.retract),
+            ("message", &write.message),
+            ("end", &write.end),
+        ];
+        for (name, entry) in entries {
+            self.origin(&format!("write.{name}"), &entry.source, &entry.unverified, &entry.template.span());
+            self.template(&mut env, name, &entry.template);
+        }
+        self.template(&mut env, "log_file", &file.log.file);
+        env
+    }
+
+    fn template(&mut self, env: &mut Environment<'static>, name: &'static str, text: &Spanned<String>) {
+        if let Err(e) = env.add_template_owned(name, text.get_ref().clone()) {
+            let line = e.line().map(|l| format!(" (line {l} of the template)")).unwrap_or_default();
+            let detail = e.detail().unwrap_or("not a template");
+            let message = format!("template {name}: {detail}{line}");
+            let help = "the templates are minijinja (Jinja2): https://docs.rs/minijinja";
+            self.error(&text.span(), "post::template", message, help);
+        }
+    }
+}
+
+/// The templates' language: strict about unknown names, with the filters and functions that spell this control.
+fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static> {
+    let mut env = Environment::new();
+    // the delimiters are the default ones, so this cannot fail; the defaults would only leave more blank lines
+    if let Ok(syntax) = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build() {
+        env.set_syntax(syntax);
+    }
+    env.set_undefined_behavior(UndefinedBehavior::Strict);
+    env.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
+    let rule = comment.clone();
+    env.add_filter("note", move |text: String| rule.note(&text));
+    env.add_filter("words", |words: minijinja::Value| -> Result<String, minijinja::Error> {
+        let words: Result<Vec<String>, _> =
+            words.try_iter()?.map(|w| w.get_attr("word").map(|word| word.to_string())).collect();
+        Ok(words?.join(" "))
+    });
+    let rule = comment.clone();
+    env.add_function("message", move |state: &State, text: String, value: Option<String>| {
+        // `value` is the control's own expression: it must not be cleaned away
+        let mut clean = rule.clean(&text);
+        let template = state.env().get_template("message")?;
+        loop {
+            let filled = match &value {
+                Some(value) => clean.replace("{}", value),
+                None => clean.clone(),
+            };
+            let line = template.render(context! { text => filled })?;
+            let excess = line.lines().map(|l| l.chars().count().saturating_sub(line_length)).max().unwrap_or(0);
+            if excess == 0 || clean.is_empty() {
+                return Ok::<String, minijinja::Error>(line);
+            }
+            // a message that is too long loses its end rather than stopping the program's making
+            let keep = clean.chars().count().saturating_sub(excess);
+            clean = clean.chars().take(keep).collect();
+        }
+    });
+    env
+}

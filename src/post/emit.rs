@@ -1,0 +1,515 @@
+//! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
+
+use super::as_written::EndOfLine;
+use super::{Frame, Postprocessor, log_text};
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::machine::Machine;
+use crate::program::path::{Path, Step, TouchStep};
+use crate::program::plan::Plan;
+use minijinja::{Value, context};
+use std::collections::BTreeMap;
+
+/// A program as the control reads it.
+#[derive(Debug, Clone)]
+pub struct NcProgram {
+    /// The text; the same bytes for the same input.
+    pub text: String,
+    /// Of the file, without the dot.
+    pub extension: String,
+    /// What the person must be told.
+    pub findings: Findings,
+}
+
+/// Labels that one step may use.
+const LABELS_PER_STEP: usize = 10;
+
+impl Postprocessor {
+    /// The program of a path.
+    ///
+    /// # Errors
+    /// When the path does not hang together (a touch does not begin where the ball stands), the control has no
+    /// transformation and the plan asks for one, or a template fails.
+    pub fn program(&self, machine: &Machine, plan: &Plan, path: &Path) -> Result<NcProgram> {
+        let mut writer = Writer::new(self, machine, plan, path)?;
+        writer.start()?;
+        for (index, step) in path.steps.iter().enumerate() {
+            writer.index = index;
+            writer.step(step)?;
+        }
+        writer.end()?;
+        writer.finish()
+    }
+}
+
+/// Numbers and names of a touch, for messages.
+#[derive(Debug, Clone, Default)]
+struct Named {
+    id: u64,
+    says: String,
+}
+
+struct Writer<'a> {
+    post: &'a Postprocessor,
+    plan: &'a Plan,
+    machine: &'a Machine,
+    path: &'a Path,
+    frame: Frame<'a>,
+    axes: Vec<AxisName>,
+    text: String,
+    findings: Findings,
+    /// Step that is being written.
+    index: usize,
+    label: usize,
+    /// Where the axes stand, as far as the path has said, relative to R.
+    at: AxisMap,
+    /// True after a touch: the axes of the approach stand somewhere before `at`.
+    loose: bool,
+    /// Where every axis stood when the first set-up began: a run that starts again comes from there.
+    opening: Option<AxisMap>,
+    /// True until the first set-up begins.
+    in_opening: bool,
+    /// Label of the set-up that is open.
+    open_setup: Option<usize>,
+    last: Named,
+}
+
+impl<'a> Writer<'a> {
+    fn new(post: &'a Postprocessor, machine: &'a Machine, plan: &'a Plan, path: &'a Path) -> Result<Self> {
+        let frame = Frame::of(machine, plan);
+        let mut at = AxisMap::default();
+        if frame.is_tcp() {
+            if post.tcp.is_none() {
+                return Err(Failure::new(
+                    "post::no_tcp",
+                    format!("controller {} is not described with a transformation of its own", post.name),
+                )
+                .help("generate without --tcp, or describe it under [tcp] in the postprocessor file"));
+            }
+            // the start of the program checks that the rotary axes stand at 0
+            machine.rotary().for_each(|a| at.set(a.name, 0.0));
+        }
+        let axes = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();
+        let mut writer = Self {
+            post,
+            plan,
+            machine,
+            path,
+            frame,
+            axes,
+            text: String::new(),
+            findings: Findings::default(),
+            index: 0,
+            label: LABELS_PER_STEP,
+            at,
+            loose: false,
+            opening: None,
+            in_opening: true,
+            open_setup: None,
+            last: Named::default(),
+        };
+        writer.check_input()?;
+        Ok(writer)
+    }
+
+    fn check_input(&mut self) -> Result<()> {
+        if let Some(axis) = self.axes.iter().find(|a| !self.post.result.contains_key(a)) {
+            return Err(Failure::new(
+                "post::no_result",
+                format!("controller {} does not say where the result of axis {axis} stands", self.post.name),
+            )
+            .help("write it under [result] in the postprocessor file"));
+        }
+        for step in &self.path.steps {
+            if let Step::Touch(touch) = step
+                && touch.id == 0
+            {
+                return Err(Failure::new("post::touch_zero", "a touch has the number 0")
+                    .help("number the touches of the plan from 1: 0 means \"all is well\" at the control"));
+            }
+        }
+        for (entry, why) in &self.post.unverified {
+            self.findings.push(
+                Finding::warning(
+                    "post::unverified",
+                    format!("[{entry}] of controller {} was never tried on a real control: {why}", self.post.name),
+                )
+                .help("run the program in the control's simulation first, and with the feed override down"),
+            );
+        }
+        Ok(())
+    }
+
+    // ------------------------------------------------------------------------------------------------- words
+
+    fn number(&self, value: f64) -> String {
+        self.post.number.number(value)
+    }
+
+    /// Axis words of a template: `{ axis, value, word, rotary }`.
+    fn words(&self, to: &AxisMap) -> Result<Value> {
+        let mut words = Vec::new();
+        for (axis, value) in to.iter() {
+            if !value.is_finite() {
+                return Err(self.broken(format!("axis {axis} is sent to {value}")));
+            }
+            if self.machine.axis(axis).is_none() {
+                return Err(self.broken(format!("axis {axis} is moved, which machine {} lacks", self.machine.name)));
+            }
+            words.push(context! {
+                axis => axis.to_string(),
+                value => self.number(value),
+                word => self.post.number.axis_word(axis, value),
+                rotary => axis.is_rotary(),
+            });
+        }
+        Ok(Value::from(words))
+    }
+
+    /// The path is not what the template language can be trusted with.
+    fn broken(&self, what: String) -> Failure {
+        Failure::new("post::path", format!("step {} of the path: {what}", self.index + 1))
+            .help("this is a fault of the path, not of the postprocessor: report it with the plan")
+    }
+
+    /// The control's coordinates of a place; rotary axes that nothing has been said about stand at 0.
+    fn controller(&self, axes: &AxisMap) -> Position {
+        self.frame.controller_from_axes(&axes.position())
+    }
+
+    /// Words of a move of linear axes. Under a transformation every coordinate may change.
+    fn linear_words(&self, to: &AxisMap) -> Result<AxisMap> {
+        if !self.frame.is_tcp() {
+            return Ok(*to);
+        }
+        let target = to.or(&self.at);
+        let turned = self.machine.rotary().any(|a| self.at.get(a.name).is_none_or(|v| v != 0.0));
+        let linear = [AxisName::X, AxisName::Y, AxisName::Z];
+        if linear.iter().any(|a| target.get(*a).is_none()) {
+            // both frames are the same while the rotary axes stand at 0
+            return if turned {
+                Err(self.broken("under the transformation a linear axis moves whose position is not known".into()))
+            } else {
+                Ok(*to)
+            };
+        }
+        let (before, after) = (self.controller(&self.at), self.controller(&target));
+        let after = AxisMap::xyz(after.0[0], after.0[1], after.0[2]);
+        let known = !self.loose && linear.iter().all(|a| self.at.get(*a).is_some());
+        let before = if known { AxisMap::xyz(before.0[0], before.0[1], before.0[2]) } else { AxisMap::default() };
+        let mut moved = self.post.number.moved(&before, &after);
+        if moved.is_empty() {
+            moved = after;
+        }
+        Ok(moved)
+    }
+
+    /// The places between two rotary positions; one place without a transformation.
+    fn rotary_steps(&self, from: &AxisMap, to: &AxisMap) -> Result<Vec<AxisMap>> {
+        let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) else { return Ok(vec![*to]) };
+        if AxisName::ALL[..3].iter().any(|a| from.get(*a).is_none()) {
+            return Err(self.broken("under the transformation a rotary axis moves before X, Y, Z are known".into()));
+        }
+        let way = to.iter().map(|(a, v)| (v - from.get(a).unwrap_or(0.0)).abs()).fold(0.0, f64::max);
+        // at most 720 deg in steps of at least a small fraction of a degree
+        let steps = (way / tcp.rotary_step_deg).ceil().clamp(1.0, 1e5);
+        let mut words = Vec::new();
+        let mut k = 1.0;
+        while k <= steps {
+            let mut place = *from;
+            for (axis, value) in to.iter() {
+                let begin = from.get(axis).unwrap_or(0.0);
+                place.set(axis, if k < steps { begin + (value - begin) * (k / steps) } else { value });
+            }
+            let world = self.controller(&place);
+            let mut step = AxisMap::xyz(world.0[0], world.0[1], world.0[2]);
+            to.iter().for_each(|(axis, _)| step.set(axis, place.get(axis).unwrap_or(0.0)));
+            words.push(step);
+            k += 1.0;
+        }
+        Ok(words)
+    }
+
+    // ------------------------------------------------------------------------------------------------- rendering
+
+    fn render(&mut self, template: &str, context: Value) -> Result<()> {
+        let next = self.next_touch();
+        let names = |axes: &[AxisName]| axes.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let rotary: Vec<AxisName> = self.axes.iter().copied().filter(|a| a.is_rotary()).collect();
+        let common = context! {
+            label => self.label,
+            next => next.id,
+            next_says => next.says,
+            last => self.last.id,
+            last_says => self.last.says.clone(),
+            settings => map(self.post.settings.clone()),
+            result => map(self.post.result.iter().map(|(a, v)| (a.to_string(), v.clone()))),
+            axes => names(&self.axes),
+            rotary => names(&rotary),
+            tcp => self.frame.is_tcp(),
+            program => self.plan.program.clone(),
+            machine => self.machine.name.clone(),
+        };
+        let rendered = self.post.render(template, context! { ..context, ..common })?;
+        self.label += LABELS_PER_STEP;
+        if !rendered.is_empty() {
+            self.text.push_str(&rendered);
+            self.text.push('\n');
+        }
+        Ok(())
+    }
+
+    /// The touch that comes next, or the last one when none does.
+    fn next_touch(&self) -> Named {
+        let named = |t: &TouchStep| Named { id: t.id, says: t.says.clone() };
+        let touch = |s: &'a Step| if let Step::Touch(t) = s { Some(t) } else { None };
+        let (before, after) = self.path.steps.split_at(self.index.min(self.path.steps.len()));
+        after.iter().find_map(touch).or_else(|| before.iter().rev().find_map(touch)).map(named).unwrap_or_default()
+    }
+
+    fn start(&mut self) -> Result<()> {
+        let setups = self.path.steps.iter().filter(|s| matches!(s, Step::Setup { .. })).count();
+        let mut head = vec![format!(
+            "axiscal: probing program {} for machine {}, controller {}",
+            self.plan.program, self.machine.name, self.post.name
+        )];
+        head.extend(self.path.head.iter().cloned());
+        head.push(format!("log: {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
+        if let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) {
+            head.push(format!("coordinates are the tool's place in the workpiece: needs {}", tcp.says));
+            head.push("all rotary axes must stand at 0 when it starts".to_owned());
+        }
+        for (entry, why) in &self.post.unverified {
+            head.push(format!("NOT VERIFIED on a real control: {entry}: {why}"));
+        }
+        let origin = self.axes.iter().map(|a| (a.to_string(), self.number(self.machine.origin.get(*a).unwrap_or(0.0))));
+        let context = context! {
+            head => head,
+            setups => setups,
+            origin => map(origin),
+            slow_feed => self.number(self.machine.probe.slow_feed),
+            log_name => self.post.log_name(self.plan)?,
+            log_head => log_text::head(self.post, self.plan),
+        };
+        self.render("start", context)
+    }
+
+    fn end(&mut self) -> Result<()> {
+        self.close_setup()?;
+        self.render("end", context! { log_end => log_text::end(self.plan) })
+    }
+
+    fn close_setup(&mut self) -> Result<()> {
+        if let Some(label) = self.open_setup.take() {
+            self.render("setup_end", context! { label => label })?;
+        }
+        Ok(())
+    }
+
+    // ------------------------------------------------------------------------------------------------- steps
+
+    fn step(&mut self, step: &Step) -> Result<()> {
+        match step {
+            Step::Note(text) => self.render("note", context! { text => text.clone() }),
+            Step::Setup { number, says } => self.setup(*number, says),
+            Step::OrientSpindle { deg } => {
+                let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
+                self.render("orient", context! { deg => self.number(angle) })
+            }
+            Step::Rapid { to } => {
+                let words = self.words(&self.linear_words(to)?)?;
+                self.render("rapid", context! { to => words })?;
+                self.moved(to);
+                Ok(())
+            }
+            Step::Rotary { to, sense } => self.rotary(to, sense),
+            Step::Protected { to, feed } => {
+                // a probing move of no length does not move and leaves the result of the one before it
+                if !self.loose && self.post.number.moved(&self.at, to).is_empty() {
+                    return Ok(());
+                }
+                let words = self.words(&self.linear_words(to)?)?;
+                self.render("protected", context! { to => words, feed => self.feed(*feed)? })?;
+                self.moved(to);
+                Ok(())
+            }
+            Step::Touch(touch) => self.touch(touch),
+            Step::Retract { to, feed } => {
+                let words = self.words(&self.linear_words(to)?)?;
+                self.render("retract", context! { to => words, feed => self.feed(*feed)? })?;
+                self.moved(to);
+                Ok(())
+            }
+        }
+    }
+
+    fn moved(&mut self, to: &AxisMap) {
+        self.at = to.or(&self.at);
+        self.loose = false;
+    }
+
+    fn feed(&self, feed: f64) -> Result<String> {
+        if feed.is_finite() && feed > 0.0 { Ok(self.number(feed)) } else { Err(self.broken(format!("feed {feed}"))) }
+    }
+
+    fn setup(&mut self, number: u32, says: &str) -> Result<()> {
+        self.close_setup()?;
+        let known = self.axes.iter().all(|a| self.at.get(*a).is_some());
+        if std::mem::take(&mut self.in_opening) && known {
+            self.opening = Some(self.at);
+        }
+        self.open_setup = Some(self.label);
+        self.render("setup", context! { number => number, says => says })?;
+        let moves = match self.opening {
+            Some(opening) => Some(self.resume_moves(&opening)?),
+            None => None,
+        };
+        let possible = moves.is_some();
+        self.render("resume", context! { number, possible, moves => moves.unwrap_or_default() })
+    }
+
+    /// From where the opening of the program ends to where the present set-up begins: rotary axes first, then X and Y,
+    /// Z last when it goes down and first when it goes up. Both places are at clearance.
+    fn resume_moves(&self, opening: &AxisMap) -> Result<Vec<Value>> {
+        let mut places = Vec::new();
+        let mut turn = AxisMap::default();
+        for (axis, value) in self.at.iter().filter(|(a, _)| a.is_rotary()) {
+            if opening.get(axis) != Some(value) {
+                turn.set(axis, value);
+            }
+        }
+        if !turn.is_empty() {
+            places.extend(self.rotary_steps(opening, &turn)?);
+        }
+        let mut stands = turn.or(opening);
+        let goes_up = self.at.get(AxisName::Z) > opening.get(AxisName::Z);
+        let (x, y, z) = (AxisName::X, AxisName::Y, AxisName::Z);
+        let order = if goes_up { [z, x, y] } else { [x, y, z] };
+        for axis in order {
+            let Some(value) = self.at.get(axis).filter(|v| opening.get(axis) != Some(*v)) else { continue };
+            stands.set(axis, value);
+            if self.frame.is_tcp() {
+                let world = self.controller(&stands);
+                places.push(AxisMap::xyz(world.0[0], world.0[1], world.0[2]));
+            } else {
+                places.push(AxisMap::default().with(axis, value));
+            }
+        }
+        places.iter().map(|place| self.words(place)).collect()
+    }
+
+    fn rotary(&mut self, to: &AxisMap, sense: &AxisMap) -> Result<()> {
+        for (axis, value) in to.iter() {
+            let (Some(before), Some(wanted)) = (self.at.get(axis), sense.get(axis)) else { continue };
+            if (value - before) * wanted < 0.0 {
+                return Err(self.broken(format!(
+                    "axis {axis} is to go from {before} to {value} in the sense {wanted:+}, which is the other way"
+                )));
+            }
+        }
+        let sign = |s: f64| if s < 0.0 { "-" } else { "+" };
+        let senses = map(sense.iter().map(|(a, s)| (a.to_string(), sign(s).to_owned())));
+        for place in self.rotary_steps(&self.at, to)? {
+            let words = self.words(&place)?;
+            self.render("rotary", context! { to => words, sense => senses.clone() })?;
+        }
+        self.moved(to);
+        Ok(())
+    }
+
+    fn touch(&mut self, touch: &TouchStep) -> Result<()> {
+        let begins = touch.start.or(&touch.pose);
+        let wrong = begins.iter().find(|(a, v)| self.at.get(*a).is_some_and(|stands| (stands - v).abs() > 1e-6));
+        if let Some((axis, value)) = wrong.filter(|_| !self.loose) {
+            let stands = self.at.get(axis).unwrap_or(value);
+            return Err(self.broken(format!("touch {} begins at {axis} {value}, axis {axis} stands at {stands}", touch.id)));
+        }
+        self.last = Named { id: touch.id, says: touch.says.clone() };
+        let stands = begins.or(&self.at);
+        let place = |map: &AxisMap| self.controller(&map.or(&stands)).xyz_mm();
+        let (start, nominal, end) = (place(&touch.start), place(&touch.nominal), place(&touch.end));
+        let way = end - start;
+        let length = way.norm();
+        if !(length > 1e-3 && length.is_finite() && (nominal - start).norm().is_finite()) {
+            return Err(self.broken(format!("the search of touch {} has the length {length} mm", touch.id)));
+        }
+        let direction = way / length;
+        let target = self.post.number.moved(&xyz(&start), &xyz(&end));
+        let approach: Vec<Value> = target
+            .iter()
+            .map(|(axis, _)| {
+                let i = axis.index();
+                context! {
+                    axis => axis.to_string(),
+                    direction => self.number(direction[i]),
+                    start => self.number(start[i]),
+                    nominal => self.number(nominal[i]),
+                    back_off => self.number(direction[i] * touch.back_off_mm),
+                }
+            })
+            .collect();
+        let context = context! {
+            id => touch.id,
+            says => touch.says.clone(),
+            first => touch.first,
+            end => self.words(&target)?,
+            approach => approach,
+            way => self.number((nominal - start).norm()),
+            tolerance => self.number(touch.tolerance_mm),
+            search_feed => self.feed(touch.search_feed)?,
+            measure_feed => self.feed(touch.measure_feed)?,
+            back_off => self.number(touch.back_off_mm),
+            half_back_off => self.number(touch.back_off_mm / 2.0),
+        };
+        self.render("touch", context)?;
+        self.at = touch.end.or(&stands);
+        self.loose = true;
+        Ok(())
+    }
+
+    fn finish(self) -> Result<NcProgram> {
+        let longest = self.text.lines().enumerate().find(|(_, line)| line.chars().count() > self.post.line_length);
+        if let Some((index, line)) = longest {
+            return Err(Failure::new(
+                "post::line_length",
+                format!(
+                    "line {} of the program has {} characters, controller {} takes {}: {line}",
+                    index + 1,
+                    line.chars().count(),
+                    self.post.name,
+                    self.post.line_length
+                ),
+            )
+            .help("shorten the template, or the names of machine, program and blocks"));
+        }
+        let text = match self.post.end_of_line {
+            EndOfLine::Lf => self.text,
+            EndOfLine::Crlf => self.text.replace('\n', "\r\n"),
+            EndOfLine::Cr => self.text.replace('\n', "\r"),
+        };
+        Ok(NcProgram { text, extension: self.post.extension.clone(), findings: self.findings })
+    }
+}
+
+fn map(pairs: impl IntoIterator<Item = (String, String)>) -> Value {
+    Value::from(pairs.into_iter().collect::<BTreeMap<_, _>>())
+}
+
+fn xyz(v: &nalgebra::Vector3<f64>) -> AxisMap {
+    AxisMap::xyz(v.x, v.y, v.z)
+}
+
+impl Postprocessor {
+    /// Renders one template; a failure names the template and its line.
+    pub(super) fn render(&self, template: &str, context: Value) -> Result<String> {
+        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|e| {
+            let line = e.line().map(|l| format!(", line {l}")).unwrap_or_default();
+            let mut detail = e.detail().map_or_else(|| e.kind().to_string(), str::to_owned);
+            if e.kind() == minijinja::ErrorKind::UndefinedError {
+                detail = format!("a name is not known here ({detail})");
+            }
+            Failure::new("post::template", format!("controller {}: template {template}{line}: {detail}", self.name))
+                .help("docs/guide/controllers.md lists what each template is given")
+        })
+    }
+}

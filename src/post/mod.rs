@@ -1,0 +1,149 @@
+//! Postprocessors: a path → the text that one control runs; a touch → the line that it writes into its log.
+//!
+//! A controller is a file (`postprocessors/*.toml`), not code: [`Postprocessor`] is such a file, checked, with its
+//! templates compiled. Nothing here knows how to reach a face without harm: that is the path's business, and the path
+//! has been proven before it comes here. What a log means is read back in [`crate::log`], driven by the same file.
+
+pub mod as_written;
+mod check;
+mod emit;
+mod frame;
+mod log_text;
+mod spelling;
+
+pub use check::parse;
+pub use emit::NcProgram;
+pub use frame::Frame;
+pub use log_text::{LogRecord, digest};
+pub use spelling::{CommentRule, NumberRule};
+
+use crate::axes::AxisName;
+use crate::diag::{Failure, Finding, Result, source};
+use as_written::{EndOfLine, Role};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The postprocessors that are built in: file name, text.
+pub const BUILT_IN: [(&str, &str); 1] = [("linuxcnc.toml", include_str!("../../postprocessors/linuxcnc.toml"))];
+
+/// A checked postprocessor.
+#[derive(Debug, Clone)]
+pub struct Postprocessor {
+    /// Short name.
+    pub name: String,
+    /// What it is, in one line.
+    pub says: String,
+    /// Of the program file, without the dot.
+    pub extension: String,
+    /// What ends a line of the program.
+    pub end_of_line: EndOfLine,
+    /// The longest line that the control takes, characters.
+    pub line_length: usize,
+    /// Numbers and axis words.
+    pub number: NumberRule,
+    /// Remarks and messages.
+    pub comment: CommentRule,
+    /// What the templates use as `settings.NAME`.
+    pub settings: BTreeMap<String, String>,
+    /// Where the control keeps the result of a probing move.
+    pub result: BTreeMap<AxisName, String>,
+    /// The control's own transformation.
+    pub tcp: Option<Tcp>,
+    /// How its log is called and read.
+    pub log: LogRule,
+    /// Entries that nobody has verified: name of the entry, why.
+    pub unverified: Vec<(String, String)>,
+    /// The file as it was read.
+    pub text: String,
+    templates: minijinja::Environment<'static>,
+}
+
+/// The control's own transformation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tcp {
+    /// Longest step of a rotary axis, deg.
+    pub rotary_step_deg: f64,
+    /// What must be switched on at the control.
+    pub says: String,
+}
+
+/// How a log is called and read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogRule {
+    /// What may stand in its name.
+    pub characters: String,
+    /// Where a person finds it.
+    pub place: String,
+    /// Line ends that are as they should be.
+    pub end_of_line: Vec<EndOfLine>,
+    /// Digits after the decimal mark.
+    pub decimals: usize,
+    /// Every number has exactly so many.
+    pub exact_decimals: bool,
+    /// `.` or `,`
+    pub mark: u8,
+    /// Letter of the word with the sum of the axis positions.
+    pub check_word: Option<u8>,
+    /// A file of nothing but columns.
+    pub columns: Option<ColumnRule>,
+}
+
+/// A log of nothing but columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColumnRule {
+    /// What each column holds; `None` for a letter that no machine here has.
+    pub axes: Vec<Option<AxisName>>,
+    /// Digits after the decimal mark.
+    pub decimals: usize,
+    /// The lines of one touch, in order.
+    pub per_touch: Vec<Role>,
+}
+
+impl Postprocessor {
+    /// All postprocessors that are built in.
+    ///
+    /// # Errors
+    /// Never for the files that are shipped: a test reads them all.
+    pub fn built_in() -> Result<Vec<Self>> {
+        BUILT_IN
+            .iter()
+            .map(|(file, text)| parse(&source(format!("postprocessors/{file} (built in)"), *text)).map(|(post, _)| post))
+            .collect()
+    }
+
+    /// The postprocessor of a name, or of a file of the user's own when the word ends in `.toml` or holds a `/`.
+    ///
+    /// `read` fetches the text of a file: only `cli` touches files.
+    ///
+    /// # Errors
+    /// When there is none of that name, or the file is unusable; the message lists what there is.
+    pub fn load(word: &str, read: impl FnOnce(&Path) -> Result<String>) -> Result<(Self, Vec<Finding>)> {
+        if word.ends_with(".toml") || word.contains(['/', '\\']) {
+            let text = read(Path::new(word))?;
+            return parse(&source(word, text)).map(|(post, findings)| (post, findings.0));
+        }
+        let all = Self::built_in()?;
+        let names: Vec<String> = all.iter().map(|p| p.name.clone()).collect();
+        all.into_iter().find(|p| p.name == word).map(|post| (post, Vec::new())).ok_or_else(|| {
+            Failure::new("post::unknown", format!("no controller is called {word:?}"))
+                .help(format!("there are: {}; a file of your own goes with --controller FILE.toml", names.join(", ")))
+        })
+    }
+
+    /// A name of the built-in ones, or the path of a file of the user's own, which is read.
+    ///
+    /// # Errors
+    /// As for [`Self::load`].
+    pub fn load_built_in_or_file(word: &str) -> Result<(Self, Vec<Finding>)> {
+        Self::load(word, crate::files::read_text)
+    }
+
+    /// The JSON schema of a postprocessor file, for editors.
+    #[must_use]
+    pub fn schema() -> schemars::Schema {
+        schemars::schema_for!(as_written::File)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;
