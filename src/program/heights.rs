@@ -97,7 +97,10 @@ impl Scene<'_> {
                 }
             }
         }
-        heights.over_blocks = heights.over_blocks.min(heights.over_all);
+        // up to the next tenth: nobody wants to read 11.300000000000011
+        let tenth_up = |height: f64| if height > f64::MIN { (height * 10.0 - 1e-6).ceil() / 10.0 } else { height };
+        heights.over_all = tenth_up(heights.over_all);
+        heights.over_blocks = tenth_up(heights.over_blocks).min(heights.over_all);
         heights
     }
 

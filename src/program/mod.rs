@@ -10,6 +10,7 @@ mod clock;
 mod head;
 pub mod heights;
 pub mod layout;
+mod library;
 pub mod path;
 pub mod plan;
 mod reach;
@@ -24,7 +25,8 @@ mod tests;
 
 pub use bare::plan_without_path;
 pub use head::{SkippedGroup, duration, pose_says, skipped_groups};
-pub use spec::{ProgramSpec, built_in, choose, load};
+pub use library::{built_in, choose};
+pub use spec::{ProgramSpec, load};
 pub use verify::{Violation, verify};
 
 use crate::diag::{Failure, Finding, Findings, Result};

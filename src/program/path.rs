@@ -6,6 +6,7 @@ use crate::axes::AxisMap;
 
 /// One step of a program. Positions are NC coordinates relative to R, mm and deg; feeds mm/min.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant)] // most steps of a program belong to touches: boxing them would save nothing
 pub enum Step {
     /// A remark for the reader of the NC program.
     Note(String),

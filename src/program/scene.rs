@@ -5,7 +5,7 @@
 
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Result};
-use crate::geometry::{Transform, apply, rotation_about};
+use crate::geometry::{Transform, apply};
 use crate::machine::{Axis, Carrier, Machine, Mounting, Shape, Side};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
@@ -179,7 +179,7 @@ impl<'m> Scene<'m> {
         let lengths = scene.parts.iter().map(|(_, s)| s).chain(scene.obstacles.iter().map(|o| &o.solid));
         let axes = machine.axes.iter().flat_map(|a| [a.point.norm(), a.range[0].abs(), a.range[1].abs()]);
         let largest = lengths.map(|s| s.local.translation.vector.norm() + s.reach).chain(axes).fold(0.0, f64::max);
-        if !(largest < LARGEST_LENGTH_MM) {
+        if largest.is_nan() || largest >= LARGEST_LENGTH_MM {
             return Err(Failure::new(
                 "program::too_large",
                 format!("a place, size or range of {} reaches {largest:e} mm", machine.name),
@@ -234,11 +234,6 @@ impl<'m> Scene<'m> {
     pub(super) fn radius_about(line: &(Vector3<f64>, Vector3<f64>), solid: &Solid, body: &Transform) -> f64 {
         let from_line = solid.centre(body) - line.0;
         (from_line - line.1 * from_line.dot(&line.1)).norm() + solid.reach()
-    }
-
-    /// Turns a body's place about an axis line by an angle in rad: for bounds over whole ranges.
-    pub(super) fn turned(line: &(Vector3<f64>, Vector3<f64>), angle_rad: f64, body: &Transform) -> Transform {
-        rotation_about(&line.0, &Unit::new_normalize(line.1), angle_rad) * body
     }
 
     /// Which side an axis is on.

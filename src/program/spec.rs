@@ -4,7 +4,7 @@
 
 use super::as_written::{self as w, FacesIn};
 use crate::axes::{AxisMap, AxisName};
-use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml, source};
+use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -20,15 +20,6 @@ const MOST_REPEATS: i64 = 1000;
 
 /// More touches than this in one program would take days.
 pub(super) const MOST_TOUCHES: usize = 100_000;
-
-/// The programs that are built in: file name and text.
-const BUILT_IN: [(&str, &str); 5] = [
-    ("programs/head.toml", include_str!("../../programs/head.toml")),
-    ("programs/table.toml", include_str!("../../programs/table.toml")),
-    ("programs/double-head.toml", include_str!("../../programs/double-head.toml")),
-    ("programs/basic-trunnion.toml", include_str!("../../programs/basic-trunnion.toml")),
-    ("programs/basic-swivel-table-b.toml", include_str!("../../programs/basic-swivel-table-b.toml")),
-];
 
 /// A word or number with its place in the program's file.
 #[derive(Debug, Clone)]
@@ -169,52 +160,6 @@ impl ProgramSpec {
     #[must_use]
     pub(super) fn error(&self, span: &Range<usize>, code: &'static str, message: String, help: String) -> Finding {
         Finding::error(code, message).help(help).at(&self.source, span.clone())
-    }
-}
-
-/// The programs that are built in.
-///
-/// # Errors
-/// Never for a released program: the files are tested.
-pub fn built_in() -> Result<Vec<ProgramSpec>> {
-    BUILT_IN
-        .iter()
-        .map(|(name, text)| load(&source(format!("{name} (built in)"), *text)).map(|(spec, _)| spec))
-        .collect()
-}
-
-/// Chooses the program of a name for a machine: the one that was written for it, else the only one that names no axis
-/// which the machine lacks and whose mounting it has.
-///
-/// # Errors
-/// When there is none, or several fit; the message lists what there is.
-pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &crate::machine::Machine) -> Result<ProgramSpec> {
-    let mut names: Vec<String> = specs.iter().map(|s| s.name.clone()).collect();
-    names.dedup();
-    let named: Vec<ProgramSpec> = specs.into_iter().filter(|s| s.name == name).collect();
-    if named.is_empty() {
-        return Err(Failure::new("program::unknown", format!("no program is called {name:?}"))
-            .help(format!("there are: {}; a file of your own goes with --program FILE.toml", names.join(", "))));
-    }
-    let written_for: Vec<String> = named.iter().filter_map(|s| s.machine.as_ref().map(|m| m.value.clone())).collect();
-    let written_for_it = |s: &ProgramSpec| s.machine.as_ref().is_none_or(|m| m.value == machine.name);
-    let fits = |s: &ProgramSpec| {
-        machine.mounting(&s.mounting.value).is_some()
-            && s.setups.iter().all(|x| x.pose.value.iter().all(|(a, _)| machine.axis(a).is_some()))
-    };
-    if let Some(spec) = named.iter().find(|s| written_for_it(s)) {
-        return Ok(spec.clone());
-    }
-    let mut fitting = named.into_iter().filter(fits);
-    match (fitting.next(), fitting.next()) {
-        (Some(only), None) => Ok(only),
-        _ => Err(Failure::new(
-            "program::other_machine",
-            format!("program {name:?} is written for {}, not for {}", written_for.join(", "), machine.name),
-        )
-        .help(
-            "`axiscal programs` lists which program is for which machine; copy the nearest one and adapt it to yours",
-        )),
     }
 }
 
@@ -379,7 +324,7 @@ impl Check<'_> {
                 "write the feed of the measuring touch, more than 0",
             );
         }
-        if let Some(angle) = s.spindle_deg.as_ref().filter(|a| !(a.get_ref().abs() <= 360.0)) {
+        if let Some(angle) = s.spindle_deg.as_ref().filter(|a| !(-360.0..=360.0).contains(a.get_ref())) {
             self.error(
                 angle.span(),
                 "program::spindle",

@@ -180,14 +180,14 @@ impl Walk<'_, '_> {
                 };
                 self.moves.push(Move { step: i, from, to: end, how });
             }
-            None => self.from_unknown(i, to, feed.is_some()),
+            None => self.unknown_start(i, to, feed.is_some()),
         }
         self.at = to.or(&self.at);
         self.at_start_of = feed.and(Some(self.at));
     }
 
     /// A move while the place of some axis is not known: only up to the top, and then whatever is clear from anywhere.
-    fn from_unknown(&mut self, i: usize, to: &AxisMap, protected: bool) {
+    fn unknown_start(&mut self, i: usize, to: &AxisMap, protected: bool) {
         let Some(lift) = self.scene.lift() else { return };
         let at_top = self.at.get(lift.axis) == Some(lift.top);
         let only: Vec<(AxisName, f64)> = to.iter().collect();
