@@ -21,9 +21,10 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
         for target in &setup.targets {
             let at = |off_face: f64| -> Result<AxisMap> {
                 let ball = target.point + target.normal * (machine.probe.ball_radius + off_face);
-                let place: Position = machine.linear_for_ball(mounting.carrier, &pose, &ball, length_mm).ok_or_else(|| {
-                    Failure::new("program::linear_axes", "the linear axes do not span space in this pose")
-                })?;
+                let place: Position =
+                    machine.linear_for_ball(mounting.carrier, &pose, &ball, length_mm).ok_or_else(|| {
+                        Failure::new("program::linear_axes", "the linear axes do not span space in this pose")
+                    })?;
                 let xyz = place.xyz_mm();
                 Ok(AxisMap::xyz(xyz.x, xyz.y, xyz.z))
             };

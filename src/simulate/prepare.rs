@@ -9,7 +9,7 @@ use super::terms::{Shifts, Terms, TouchState};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Carrier, Machine};
-use crate::program::plan::{Plan, PlanTouch};
+use crate::program::plan::{ControllerFrame, Plan, PlanTouch};
 use crate::units::hours_from_s;
 use std::collections::BTreeMap;
 
@@ -18,10 +18,11 @@ const TOUCH_S: f64 = 12.0;
 
 /// The virtual machine with a program in it.
 pub struct Bench<'a> {
-    pub machine: &'a Machine,
     pub chain: Chain,
     pub terms: Terms,
     pub compensation: Option<&'a Compensation>,
+    /// Does the program command the tool centre point?
+    pub tcp: bool,
     pub dice: Dice,
     pub rounding_mm: f64,
     pub present: [bool; 6],
@@ -68,14 +69,14 @@ pub fn bench<'a>(
         )
         .help("name the plan's machine with --machine, or make the plan again"));
     }
-    if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
-        findings.push(
-            Finding::warning(
-                "simulate::machine_changed",
-                "the machine's description has changed since the plan was made",
-            )
-            .help("make the plan again if axes, blocks or the probe have changed"),
-        );
+    let tcp = plan.controller_frame == ControllerFrame::Tcp;
+    if let Some(Err(why)) = compensation.map(|c| c.acts_on(tcp)) {
+        let finding = if tcp {
+            Finding::error("simulate::frame", why).help("make the plan without --tcp")
+        } else {
+            Finding::warning("simulate::frame", why).help("make the plan with --tcp to see the pins at work")
+        };
+        findings.push(finding);
     }
     let p = &machine.reference.pivot;
     let chain = Chain::new(machine, [p.x, p.y, p.z]);
@@ -109,7 +110,7 @@ pub fn bench<'a>(
     }
     let dice = Dice::new(scenario, plan, compensation.is_some());
     let rounding_mm = scenario.noise.rounding_mm;
-    findings.finish(Bench { machine, chain, terms, compensation, dice, rounding_mm, present, touches })
+    findings.finish(Bench { chain, terms, compensation, tcp, dice, rounding_mm, present, touches })
 }
 
 /// Log time (s) and hours since the study's first touch of each touch.

@@ -45,15 +45,17 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
         },
         remark,
     };
+    let ends = (&ready.start, &ready.end);
     let mapping = match bench.compensation {
-        None => Ok(Mapping::Direct),
-        Some(compensation) => compensation.mapping(&bench.chain, &ready.start, ready.stylus),
+        None => Ok(Mapping::DIRECT),
+        Some(c) => c.mapping(&bench.chain, bench.tcp, ends, &ready.state.sense, ready.stylus),
     };
     let mapping = match mapping {
         Ok(mapping) => mapping,
         Err(why) => return log(ready.start, Status::Miss, Some(Remark::Unreachable(why))),
     };
-    let steady = bench.terms.during(&ready.state, &ready.start);
+    // errors depend on where the axes stand, not on what was commanded
+    let steady = bench.terms.during(&ready.state, &mapping.joints(&ready.start));
     let scatter = bench.dice.visit_mm(ready.visit);
     let (block, half) = real_block(bench, ready, &steady);
     let ball_in_block = |s: f64| -> Vec3 {

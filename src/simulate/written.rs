@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
 use std::ops::Range;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 
 type Table<'a> = DeTable<'a>;
 type Node<'a> = Spanned<DeValue<'a>>;
@@ -25,7 +25,7 @@ pub fn parse(source: &Source, machine: &Machine) -> Result<(Scenario, Findings)>
     })?;
     let mut reader = Reader { source, machine, findings: Findings::default() };
     let mut out = Scenario::default();
-    for (key, node) in document.get_ref() {
+    for (key, node) in in_order(document.get_ref()) {
         match &**key.get_ref() {
             "seed" => out.seed = reader.seed(node),
             "effects" => reader.effects(&mut out, node),
@@ -46,6 +46,13 @@ pub fn parse(source: &Source, machine: &Machine) -> Result<(Scenario, Findings)>
         }
     }
     reader.findings.finish(out)
+}
+
+/// The entries as they stand in the file, so that findings and sums do not depend on the alphabet.
+fn in_order<'t, 'i>(table: &'t Table<'i>) -> Vec<(&'t Spanned<DeString<'i>>, &'t Node<'i>)> {
+    let mut entries: Vec<_> = table.iter().collect();
+    entries.sort_by_key(|(key, _)| key.span().start);
+    entries
 }
 
 struct Reader<'a> {
@@ -184,7 +191,7 @@ impl Reader<'_> {
 
     fn effects(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "effects") else { return };
-        for (id, node) in table {
+        for (id, node) in in_order(table) {
             if &**id.get_ref() == "block-setup" {
                 self.error(
                     id.span(),
@@ -198,7 +205,7 @@ impl Reader<'_> {
             let before = self.findings.0.len();
             let mut values = Vec::new();
             let mut spans = Vec::new();
-            for (name, node) in table {
+            for (name, node) in in_order(table) {
                 if let Some((value, unit)) = self.value(node, name.get_ref()) {
                     values.push(Value { name: &**name.get_ref(), value, unit });
                     spans.push(name.span().start..node.span().end);
@@ -222,7 +229,7 @@ impl Reader<'_> {
             return self.number(node, name).map(|v| (v, None));
         };
         let (mut value, mut unit) = (None, None);
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "value" => value = self.number(node, name),
                 "unit" => {
@@ -257,7 +264,7 @@ impl Reader<'_> {
             tilt_rad: [0.0; 3],
             size_mm: [0.0; 3],
         };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "mounting" => mounting = self.word(node, "mounting").map(|w| (w.to_owned(), node.span())),
                 "name" => name = self.word(node, "name").map(|w| (w.to_owned(), node.span())),
@@ -299,7 +306,7 @@ impl Reader<'_> {
         let (mut axis, mut dof, mut k) = (None, None, 1.0);
         // cosine and sine, as displacement (mm) and as turn (rad)
         let (mut um, mut urad) = (None, None);
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
                 "axis" => {
@@ -361,7 +368,7 @@ impl Reader<'_> {
 
     fn noise(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "noise") else { return };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
                 "touch_um" => out.noise.touch_mm = mm_from_um(self.not_negative(node, word)),
@@ -381,7 +388,7 @@ impl Reader<'_> {
 
     fn time(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "time") else { return };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
                 "started_s" => out.clock.started_s = self.number(node, word).unwrap_or(0.0),
@@ -393,7 +400,7 @@ impl Reader<'_> {
 
     fn temperature(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "temperature") else { return };
-        for (key, node) in table {
+        for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "constant_degC" => {
                     out.temperature.extend(self.number(node, "constant_degC").map(|t| (0.0, t)));

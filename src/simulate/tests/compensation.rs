@@ -83,3 +83,119 @@ fn a_bad_compensation_is_refused_with_its_term() {
         assert!(Compensation::parse(&source("c.json", text), &machine).is_err());
     }
 }
+
+/// Pins as the module needs them for offsets of both axes (by hand: the axes pass through z = -250, pivot at 0).
+fn stock(machine: &Machine, module: &str, d_tilting: Vec3, d_turning: Vec3, shift: Option<Vec3>) -> Compensation {
+    let (across, letter) = if module == "xyzac-trt-kins" { (1, "y") } else { (0, "x") };
+    let shift = shift.map(|s| format!(r#""workpiece_shift_mm": {s:?},"#)).unwrap_or_default();
+    let text = format!(
+        r#"{{"format": "axiscal-compensation/1", "machine": "{}", "mode": "stock", "terms": [],
+            "stock": {{"module": "{module}", {shift} "pins": {{"x-rot-point": {}, "y-rot-point": {}, "z-rot-point": {},
+            "{letter}-offset": {}, "z-offset": 0.0, "tool-offset": 202.684}}}}}}"#,
+        machine.name,
+        d_tilting[0] + d_turning[0],
+        d_tilting[1] + d_turning[1],
+        -250.0 + d_tilting[2],
+        -d_turning[across],
+    );
+    Compensation::parse(&source("c.json", text), machine).unwrap().0
+}
+
+#[test]
+fn the_pins_of_the_stock_modules_take_offsets_out() {
+    let cases = [
+        (
+            "trunnion",
+            "xyzac-trt-kins",
+            AxisName::A,
+            "location-a",
+            [("EY0A", 0.02), ("EZ0A", -0.03)],
+            [0.0, 0.02, -0.03],
+        ),
+        (
+            "swivel-table-b",
+            "xyzbc-trt-kins",
+            AxisName::B,
+            "location-b",
+            [("EX0B", 0.02), ("EZ0B", -0.03)],
+            [0.02, 0.0, -0.03],
+        ),
+    ];
+    for (name, module, tilting, effect, values, d_tilting) in cases {
+        let machine = machine_named(name);
+        let d_turning = [0.011, -0.013, 0.0];
+        let scenario = Scenario::flawless()
+            .with(&machine, effect, &values)
+            .and_then(|s| s.with(&machine, "location-c", &[("EX0C", 0.011), ("EY0C", -0.013)]))
+            .unwrap();
+        let mut plan = empty_plan(&machine, "table");
+        plan.controller_frame = crate::program::plan::ControllerFrame::Tcp;
+        for (t, c) in [(0.0, 0.0), (35.0, 90.0), (-50.0, 211.0), (20.0, -75.0)] {
+            for n in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]] {
+                let at = pose(&[(tilting, t), (AxisName::C, c)]);
+                add_touch(&mut plan, &machine, "x+", plus([30.0, 0.0, -202.684], 5.0, n), n, at);
+            }
+        }
+        let moved = plus(d_tilting, 1.0, d_turning);
+        // the block stands off with the table's centre, and nothing else is left
+        let e = readings(&machine, &plan, &scenario, Some(&stock(&machine, module, d_tilting, d_turning, None)));
+        e.iter().zip(&plan.touches).for_each(|(e, t)| close(*e, dot(t.normal, moved), 1e-12));
+        // with the work offset touched off again there is nothing left at all
+        let e = readings(&machine, &plan, &scenario, Some(&stock(&machine, module, d_tilting, d_turning, Some(moved))));
+        e.iter().for_each(|e| close(*e, 0.0, 1e-12));
+        // without the transformation the pins do not show
+        plan.controller_frame = crate::program::plan::ControllerFrame::Axes;
+        let pins = stock(&machine, module, d_tilting, d_turning, Some(moved));
+        let (with, findings) = run(&machine, &plan, &scenario, Some(&pins)).unwrap();
+        let without = run(&machine, &plan, &scenario, None).unwrap().0;
+        assert_eq!(with, without);
+        assert_eq!(findings.0[0].code, "simulate::frame");
+    }
+}
+
+#[test]
+fn zeros_and_home_offsets_bring_the_axis_where_it_was_meant() {
+    let machine = machine_named("swivel-head");
+    let scenario = Scenario::flawless()
+        .with(&machine, "zero-b", &[("EB0B", 0.02)])
+        .and_then(|s| s.with(&machine, "zero-c", &[("EC0C", -0.03)]))
+        .unwrap();
+    let component = compensation(&machine, &[term("B", "zero", "ry", 0.02), term("C", "zero", "rz", -0.03)].join(","));
+    let stock = r#"{"format": "axiscal-compensation/1", "machine": "swivel-head", "mode": "stock",
+        "stock": {"home_offset_deg": {"B": 0.02, "C": -0.03}}}"#;
+    let (stock, _) = Compensation::parse(&source("c.json", stock), &machine).unwrap();
+    let mut plan = empty_plan(&machine, "table");
+    for n in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]] {
+        let at = pose(&[(AxisName::B, -30.0), (AxisName::C, 50.0)]);
+        add_touch(&mut plan, &machine, "x+", plus([30.0, 0.0, -202.684], 5.0, n), n, at);
+    }
+    for c in [&component, &stock] {
+        readings(&machine, &plan, &scenario, Some(c)).iter().for_each(|e| close(*e, 0.0, 1e-12));
+    }
+}
+
+#[test]
+fn axis_tables_take_out_errors_of_the_axes_own_position() {
+    let machine = machine_named("swivel-head");
+    // the carried table stands 100 µm/m further in R: the tool stands less far over it, the command must grow
+    let scenario = Scenario::flawless()
+        .with(&machine, "scale-x", &[("EXX", 100.0)])
+        .and_then(|s| s.with(&machine, "backlash-x", &[("backlash", 6.0)]))
+        .unwrap();
+    let text = r#"{"format": "axiscal-compensation/1", "machine": "swivel-head", "mode": "component", "terms": [],
+        "stock": {"axis_tables": {"X": {"joint": 0, "file": "x.txt",
+        "rows": [[-450, -0.042, -0.048], [450, 0.048, 0.042]]}}}}"#;
+    let (tables, _) = Compensation::parse(&source("c.json", text), &machine).unwrap();
+    let mut plan = empty_plan(&machine, "head");
+    for (block, x, n) in [("x+", 35.0, 1.0), ("x+", 25.0, -1.0), ("x-", -35.0, -1.0)] {
+        let at = pose(&[(AxisName::B, -30.0), (AxisName::C, 0.0)]);
+        add_touch(&mut plan, &machine, block, [x, 0.0, -202.684], [n, 0.0, 0.0], at);
+    }
+    // what the tables leave is second order: the table is read at the commanded place
+    readings(&machine, &plan, &scenario, Some(&tables)).iter().for_each(|e| close(*e, 0.0, 1e-5));
+    assert!(readings(&machine, &plan, &scenario, None).iter().any(|e| e.abs() > 0.01));
+    for rows in ["[]", "[[0, 0, 0], [0, 1, 1]]"] {
+        let bad = text.replace("[[-450, -0.042, -0.048], [450, 0.048, 0.042]]", rows);
+        assert!(Compensation::parse(&source("c.json", bad), &machine).is_err());
+    }
+}

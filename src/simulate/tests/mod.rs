@@ -104,7 +104,9 @@ fn linear_for(machine: &Machine, n_links: usize, pose: &AxisMap, ball: Vec3, len
     };
     let p0 = at([0.0; 3]);
     let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|u| minus(at(u), p0));
-    solve(columns, minus(ball, p0)).unwrap()
+    let rough = solve(columns, minus(ball, p0)).unwrap();
+    // once more from there: differences of one millimetre have lost digits
+    plus(rough, 1.0, solve(columns, minus(ball, at(rough))).unwrap())
 }
 
 /// The reading of a touch: recorded minus nominal along the outward normal, mm. The nominal trigger is the plan's.

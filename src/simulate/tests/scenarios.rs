@@ -40,7 +40,7 @@ fn a_full_scenario_is_read() {
     assert_eq!(scenario.seed, 7);
     assert_eq!(scenario.noise.touch_mm, 1e-3);
     let names: Vec<(&str, f64)> = scenario.planted.iter().map(|p| (p.parameter.as_str(), p.value)).collect();
-    assert_eq!(names, [("EX0C", 0.012), ("EX0B", 0.03), ("EA0B", 0.015), ("pretravel", 5.0)]);
+    assert_eq!(names, [("EA0B", 0.015), ("EX0B", 0.03), ("EX0C", 0.012), ("pretravel", 5.0)]);
     assert_eq!(scenario.blocks[0].shift_mm, [0.1, -0.2, 0.05]);
     assert_eq!(scenario.temperature_at(1.0), Some(21.5));
     assert_eq!(scenario.temperature_at(-1.0), Some(20.0));
