@@ -10,11 +10,18 @@ pub mod axes;
 pub mod diag;
 pub mod files;
 pub mod geometry;
+pub mod symbols;
 pub mod units;
 
 pub mod cli;
 pub mod fit;
 pub mod log;
 pub mod machine;
+pub mod model;
+pub mod paper;
 pub mod post;
 pub mod program;
+pub mod report;
+pub mod simulate;
+pub mod study;
+pub mod tables;

@@ -33,6 +33,30 @@ pub fn hours_from_s(s: f64) -> f64 {
     s / 3600.0
 }
 
+/// Hours to seconds.
+#[must_use]
+pub fn s_from_h(h: f64) -> f64 {
+    h * 3600.0
+}
+
+/// Milliseconds to seconds.
+#[must_use]
+pub fn s_from_ms(ms: f64) -> f64 {
+    ms * 1e-3
+}
+
+/// A speed in mm/min to mm/s.
+#[must_use]
+pub fn mm_s_from_mm_min(mm_min: f64) -> f64 {
+    mm_min / 60.0
+}
+
+/// Milliradians to radians.
+#[must_use]
+pub fn rad_from_mrad(mrad: f64) -> f64 {
+    mrad * 1e-3
+}
+
 /// Micrometres per metre (or µrad) to a plain ratio (or rad).
 #[must_use]
 pub fn ratio_from_ppm(ppm: f64) -> f64 {

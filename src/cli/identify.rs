@@ -1,16 +1,75 @@
-//! `axiscal identify`
+//! `axiscal identify`: the fit of a study.
 
+use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
+use crate::fit;
+use crate::machine::Machine;
+use nalgebra::Vector3;
+use std::path::PathBuf;
 
 /// Arguments of `identify`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The study
+    pub study: PathBuf,
+    /// Where location errors of workpiece-side axes are stated: pivot, ball, table, or X,Y,Z in mm in R
+    #[arg(long, value_name = "POINT", default_value = "pivot", allow_hyphen_values = true)]
+    pub reference: String,
+    /// With the residual of every touch
+    #[arg(long)]
+    pub residuals: bool,
+}
 
 /// Runs `identify`.
 ///
 /// # Errors
-/// When the input is unusable.
-pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
-    Err(Failure::new("cli::missing", "identify"))
+/// When the study or a file that it names is unusable.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let loaded = load_study(&args.study, io)?;
+    let mut settings = loaded.settings();
+    settings.reference = Some(reference(&args.reference, &loaded.machine)?);
+    let mut outcome = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome;
+    if !args.residuals {
+        outcome.residuals = None;
+    }
+    io.say(crate::report::fit::outcome(&outcome));
+    if let (Some(residuals), false) = (&outcome.residuals, io.json) {
+        let mut t = crate::report::fit::table(&["run", "touch", "residual um", "standardised"]);
+        for r in residuals {
+            t.add_row(vec![
+                r.run.to_string(),
+                r.id.to_string(),
+                format!("{:.3}", r.residual_um),
+                format!("{:.2}", r.standardised),
+            ]);
+        }
+        io.say(t.to_string());
+    }
+    io.answer(&outcome);
+    Ok(Answer::Done)
+}
+
+/// Reads a reference point.
+///
+/// # Errors
+/// When the word is neither a known point nor three numbers.
+pub fn reference(word: &str, machine: &Machine) -> Result<Vector3<f64>> {
+    match word {
+        "pivot" => return Ok(machine.reference.pivot),
+        "ball" => return Ok(machine.reference.ball),
+        "table" => return Ok(machine.reference.table),
+        _ => {}
+    }
+    let numbers: Vec<f64> = word
+        .split([',', ' '])
+        .filter(|w| !w.is_empty())
+        .filter_map(|w| w.parse().ok())
+        .filter(|v: &f64| v.is_finite())
+        .collect();
+    match numbers[..] {
+        [x, y, z] if word.split([',', ' ']).filter(|w| !w.is_empty()).count() == 3 => Ok(Vector3::new(x, y, z)),
+        _ => Err(Failure::new("cli::reference", format!("reference {word:?} is no point"))
+            .help("write pivot, ball, table, or X,Y,Z in mm in R, for instance 0,0,-202.684")),
+    }
 }

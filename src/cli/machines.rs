@@ -1,16 +1,123 @@
-//! `axiscal machines`
+//! `axiscal machines`: what is built in or found, one line each; `machines show NAME` prints one.
 
+use super::common::{load_machine, load_machines};
 use super::{Answer, Io};
-use crate::diag::{Failure, Result};
+use crate::diag::Result;
+use crate::machine::{Carrier, Machine, Side};
+use crate::report::fit::{number, table};
+use comfy_table::Cell;
+use serde_json::json;
+use std::path::PathBuf;
 
 /// Arguments of `machines`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// `show NAME` prints one machine
+    #[command(subcommand)]
+    pub what: Option<What>,
+    /// A machines.toml of your own (default: the one built in)
+    #[arg(long, value_name = "FILE", global = true)]
+    pub machines: Option<PathBuf>,
+}
+
+/// What to print.
+#[derive(Debug, clap::Subcommand)]
+pub enum What {
+    /// Print one machine
+    Show {
+        /// Its name
+        name: String,
+    },
+}
 
 /// Runs `machines`.
 ///
 /// # Errors
-/// When the input is unusable.
-pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
-    Err(Failure::new("cli::missing", "machines"))
+/// When the file is unusable or there is no such machine.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    match &args.what {
+        Some(What::Show { name }) => show(&load_machine(name, args.machines.as_deref(), io)?, io),
+        None => {
+            let machines = load_machines(args.machines.as_deref(), io)?;
+            let mut t = table(&["machine", "workpiece side", "tool side", "what it is"]);
+            for m in &machines {
+                t.add_row(vec![m.name.clone(), letters(m, Side::Workpiece), letters(m, Side::Tool), m.says.clone()]);
+            }
+            io.say(t.to_string());
+            io.answer(&json!({ "machines": machines.iter().map(as_json).collect::<Vec<_>>() }));
+        }
+    }
+    Ok(Answer::Done)
+}
+
+fn letters(m: &Machine, side: Side) -> String {
+    m.side(side).map(|a| a.name.to_string()).collect::<Vec<_>>().join(" ")
+}
+
+fn show(m: &Machine, io: &Io) {
+    io.say(format!("{}: {}\n", m.name, m.says));
+    let mut t = table(&["axis", "side", "direction", "point mm", "sense", "range", "indexing um"]);
+    for a in &m.axes {
+        let d = a.direction;
+        t.add_row(vec![
+            Cell::new(a.name),
+            Cell::new(if a.side == Side::Tool { "tool" } else { "workpiece" }),
+            Cell::new(format!("{} {} {}", d.x, d.y, d.z)),
+            Cell::new(if a.name.is_rotary() {
+                format!("{} {} {}", a.point.x, a.point.y, a.point.z)
+            } else {
+                "-".into()
+            }),
+            number(if a.name.is_rotary() { format!("{:+}", a.sense) } else { "-".into() }),
+            number(format!("{} … {} {}", a.range[0], a.range[1], if a.name.is_rotary() { "deg" } else { "mm" })),
+            number(if a.name.is_rotary() {
+                crate::units::um_from_mm(a.indexing_repeatability_mm).to_string()
+            } else {
+                "-".into()
+            }),
+        ]);
+    }
+    io.say(t.to_string());
+    let p = &m.probe;
+    io.say(format!(
+        "tool: {} mm from the pivot to the ball's centre\nprobe: ball {} mm, stem {} x {} mm, body {} x {} mm, head {} mm (diameters); repeatability {} um, overtravel {} mm\n       search {} mm/min, measuring touch {} mm/min, protected positioning {} mm/min",
+        m.tool.length_mm, 2.0 * p.ball_radius, 2.0 * p.stem_radius, p.stem_length, 2.0 * p.body_radius, p.body_length, 2.0 * p.head_radius, p.repeatability_um, p.overtravel, p.fast_feed, p.slow_feed, p.position_feed
+    ));
+    for mounting in &m.mountings {
+        io.say(format!("mounting {:?}: {} (carried by {})", mounting.name, mounting.says, mounting.carrier));
+        for b in &mounting.blocks {
+            let riser = b.riser.map_or_else(String::new, |r| format!(", on a riser of {} mm", r.height));
+            io.say(format!(
+                "  block {:<3} centre {} {} {} mm, edges {} {} {} mm{riser}",
+                b.name, b.centre.x, b.centre.y, b.centre.z, b.size.x, b.size.y, b.size.z
+            ));
+        }
+    }
+    io.answer(&as_json(m));
+}
+
+fn as_json(m: &Machine) -> serde_json::Value {
+    let axes: Vec<_> = m
+        .axes
+        .iter()
+        .map(|a| {
+            json!({ "name": a.name, "side": if a.side == Side::Tool { "tool" } else { "workpiece" },
+                "kind": if a.name.is_rotary() { "rotary" } else { "linear" },
+                "direction": a.direction.as_slice(), "point_mm": a.point.as_slice(), "sense": a.sense, "range": a.range })
+        })
+        .collect();
+    let mountings: Vec<_> = m
+        .mountings
+        .iter()
+        .map(|x| {
+            json!({ "name": x.name, "says": x.says, "carrier": carrier(x.carrier),
+                "blocks": x.blocks.iter().map(|b| json!({ "name": b.name, "centre": b.centre.as_slice(), "size": b.size.as_slice() })).collect::<Vec<_>>() })
+        })
+        .collect();
+    json!({ "name": m.name, "says": m.says, "workpiece_side": letters(m, Side::Workpiece), "tool_side": letters(m, Side::Tool),
+        "axes": axes, "tool_length_mm": m.tool.length_mm, "ball_radius_mm": m.probe.ball_radius, "mountings": mountings, "sha256": m.sha256 })
+}
+
+fn carrier(c: Carrier) -> String {
+    c.to_string()
 }

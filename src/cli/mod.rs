@@ -10,6 +10,7 @@ mod effects;
 mod export;
 mod generate;
 mod identify;
+mod load;
 mod machines;
 mod new;
 mod parse;

@@ -1,16 +1,130 @@
-//! `axiscal simulate`
+//! `axiscal simulate`: the virtual machine writes the log that the controller would have written.
 
+use super::common::MachineArgs;
+use super::load::load_plan;
 use super::{Answer, Io};
-use crate::diag::{Failure, Result};
+use crate::diag::{Findings, Result, source};
+use crate::files;
+use crate::log::{RawTouch, Status};
+use crate::machine::Machine;
+use crate::post::{LogRecord, Postprocessor};
+use crate::program::plan::Plan;
+use crate::simulate::{self, Compensation, Scenario, csv};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `simulate`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// The plan of what is to be touched
+    #[arg(long)]
+    pub plan: PathBuf,
+    /// What is wrong with the machine (default: nothing)
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+    /// Whose log to write: a controller's name, a postprocessor file, or csv
+    #[arg(long, default_value = "linuxcnc")]
+    pub controller: String,
+    /// The compensation that the control applies: what `export` wrote
+    #[arg(long, value_name = "DIR")]
+    pub compensation: Option<PathBuf>,
+    /// Where to write the log
+    #[arg(long, value_name = "LOG")]
+    pub out: PathBuf,
+}
+
+/// A plan of fewer touches is done before a person sees a bar.
+const LONG: usize = 50_000;
 
 /// Runs `simulate`.
 ///
 /// # Errors
-/// When the input is unusable.
-pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
-    Err(Failure::new("cli::missing", "simulate"))
+/// When an input is unusable or does not fit the machine.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let machine = args.machine.load(io)?;
+    let plan = load_plan(&args.plan, &machine, io)?;
+    let scenario = match &args.scenario {
+        None => Scenario::flawless(),
+        Some(path) => {
+            let text = source(path.display().to_string(), files::read_text(path)?);
+            reported(simulate::scenario::parse(&text, &machine)?, io)
+        }
+    };
+    let compensation = match &args.compensation {
+        None => None,
+        Some(path) => Some(reported(load_compensation(path, &machine)?, io)),
+    };
+    // an unknown controller is said before the work, not after
+    let post = match args.controller.as_str() {
+        "csv" => None,
+        word => {
+            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
+            io.report(&findings);
+            Some(post)
+        }
+    };
+    let bar = progress(plan.touches.len(), io);
+    let touches = simulate::run_with_progress(&machine, &plan, &scenario, compensation.as_ref(), &|done| {
+        bar.inc(done as u64);
+    });
+    bar.finish_and_clear();
+    let touches = reported(touches?, io);
+    let text = match &post {
+        None => csv::text(&machine, &touches),
+        Some(post) => log_text(post, &machine, &plan, &touches),
+    };
+    files::write_whole(&args.out, text.as_bytes())?;
+    let n_hits = touches.iter().filter(|t| t.status == Status::Hit).count();
+    let n_misses = touches.len() - n_hits;
+    io.say(format!("{}: {n_hits} touches, {n_misses} misses", args.out.display()));
+    io.answer(&json!({
+        "format": "axiscal-simulation/1",
+        "machine": machine.name,
+        "program": plan.program,
+        "log": args.out.display().to_string(),
+        "controller": args.controller,
+        "seed": scenario.seed,
+        "touches": touches.len(),
+        "misses": n_misses,
+        "missed": missed(&touches),
+        "compensated": compensation.is_some(),
+        "planted": scenario.planted,
+    }));
+    Ok(Answer::Done)
+}
+
+fn reported<T>((value, findings): (T, Findings), io: &Io) -> T {
+    io.report(&findings.0);
+    value
+}
+
+/// A directory that `export` wrote, or the file in it.
+fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Findings)> {
+    let file = if path.is_dir() { path.join("compensation.json") } else { path.to_path_buf() };
+    let text = source(file.display().to_string(), files::read_text(&file)?);
+    Compensation::parse(&text, machine)
+}
+
+fn log_text(post: &Postprocessor, machine: &Machine, plan: &Plan, touches: &[RawTouch]) -> String {
+    let record = |t: &RawTouch| Some(LogRecord { id: t.id?, status: t.status, position: t.position });
+    let records: Vec<LogRecord> = touches.iter().filter_map(record).collect();
+    post.log_text(machine, plan, &records)
+}
+
+fn missed(touches: &[RawTouch]) -> Vec<u64> {
+    touches.iter().filter(|t| t.status == Status::Miss).filter_map(|t| t.id).collect()
+}
+
+fn progress(n_touches: usize, io: &Io) -> ProgressBar {
+    if io.json || n_touches < LONG {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(n_touches as u64);
+    match ProgressStyle::with_template("{bar:40} {pos}/{len} touches, {eta} left") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
 }

@@ -72,13 +72,7 @@ impl Check<'_> {
     }
 
     /// Every statement about a control says where it comes from.
-    fn origin(
-        &mut self,
-        entry: &str,
-        source: &Option<String>,
-        unverified: &Option<String>,
-        span: &Range<usize>,
-    ) {
+    fn origin(&mut self, entry: &str, source: &Option<String>, unverified: &Option<String>, span: &Range<usize>) {
         match (source, unverified) {
             (_, Some(why)) => self.unverified.push((entry.to_owned(), why.clone())),
             (Some(from), None) if !from.trim().is_empty() => {}
@@ -187,7 +181,8 @@ impl Check<'_> {
             self.error(&log.file.span(), "post::end_of_line", "[log] end_of_line is empty".into(), help);
         }
         let check_word = log.check_word.as_ref().and_then(|word| {
-            let free = |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
+            let free =
+                |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
             self.word("check_word", word, free, "one capital letter that is no axis and none of N S U H P E");
             word.get_ref().bytes().next()
         });

@@ -422,7 +422,9 @@ impl<'a> Writer<'a> {
         let wrong = begins.iter().find(|(a, v)| self.at.get(*a).is_some_and(|stands| (stands - v).abs() > 1e-6));
         if let Some((axis, value)) = wrong.filter(|_| !self.loose) {
             let stands = self.at.get(axis).unwrap_or(value);
-            return Err(self.broken(format!("touch {} begins at {axis} {value}, axis {axis} stands at {stands}", touch.id)));
+            return Err(
+                self.broken(format!("touch {} begins at {axis} {value}, axis {axis} stands at {stands}", touch.id))
+            );
         }
         self.last = Named { id: touch.id, says: touch.says.clone() };
         let stands = begins.or(&self.at);

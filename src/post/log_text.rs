@@ -77,10 +77,8 @@ impl Postprocessor {
     /// # Errors
     /// When the template fails.
     pub fn log_name(&self, plan: &Plan) -> Result<String> {
-        let name = self.render(
-            "log_file",
-            context! { program => plan.program.clone(), machine => plan.machine.clone() },
-        )?;
+        let name =
+            self.render("log_file", context! { program => plan.program.clone(), machine => plan.machine.clone() })?;
         Ok(name_of(&name, |c| self.log.characters.contains(c)))
     }
 

@@ -108,7 +108,9 @@ impl Postprocessor {
     pub fn built_in() -> Result<Vec<Self>> {
         BUILT_IN
             .iter()
-            .map(|(file, text)| parse(&source(format!("postprocessors/{file} (built in)"), *text)).map(|(post, _)| post))
+            .map(|(file, text)| {
+                parse(&source(format!("postprocessors/{file} (built in)"), *text)).map(|(post, _)| post)
+            })
             .collect()
     }
 

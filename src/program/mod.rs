@@ -1,6 +1,144 @@
 //! What is to be touched, in which order and along which path: controller-neutral.
 //!
-//! `programs/*.toml` → [`plan::Plan`] (the touches) → `path` (every move, proven safe).
+//! `programs/*.toml` ([`spec`]) on a machine ([`layout`]) → [`plan::Plan`] (the touches) and [`path::Path`] (every move):
+//! chosen by `route`, proven once more by [`verify()`]. Shapes and distances are in [`scene`], the proof of a single move
+//! in [`sweep`].
 
+pub mod as_written;
+mod bare;
+mod clock;
+mod head;
+pub mod heights;
+pub mod layout;
+mod library;
 pub mod path;
 pub mod plan;
+mod reach;
+mod route;
+pub mod scene;
+pub mod spec;
+pub mod sweep;
+mod verify;
+
+#[cfg(test)]
+mod tests;
+
+pub use bare::plan_without_path;
+pub use head::{SkippedGroup, duration, pose_says, skipped_groups};
+pub use library::{built_in, choose};
+pub use spec::{ProgramSpec, load};
+pub use verify::{Violation, verify};
+
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::machine::Machine;
+use plan::{ControllerFrame, Plan, PlanBlock};
+
+/// How a program is generated.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Options {
+    /// Refuse the program when a single touch cannot be reached, instead of leaving it out.
+    pub strict: bool,
+    /// The controller's coordinates mean the tool centre point in the workpiece, under its own transformation. Plan and
+    /// path hold axis positions all the same: the postprocessor spells them.
+    pub tcp: bool,
+}
+
+/// A plan with the path that makes its touches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Generated {
+    /// The touches.
+    pub plan: Plan,
+    /// Every move.
+    pub path: path::Path,
+}
+
+/// The JSON schema of a program file.
+#[must_use]
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(as_written::File)
+}
+
+/// Makes plan and path of a program on a machine. The same input gives the same bytes.
+///
+/// Touches that cannot be reached are left out, each with its reason in `plan.skipped`, a warning for each face, and what
+/// is lost by it in `plan.notes`. The finished path is proven by [`verify()`] before it is given out.
+///
+/// # Errors
+/// When the program does not fit the machine, nothing (or with [`Options::strict`]: not everything) can be reached, or the
+/// proof finds a move that is not clear.
+pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Result<(Generated, Findings)> {
+    let (layout, mut findings) = layout::lay_out(machine, spec)?;
+    let scene = scene::Scene::new(machine, layout.mounting)?;
+    let mut routed = route::route(&scene, &layout, spec)?;
+    let groups = skipped_groups(&routed.skipped);
+    for group in &groups {
+        let message = format!(
+            "{} of block {} at {} cannot be touched ({} points): {}",
+            group.face,
+            group.block,
+            pose_says(&group.pose),
+            group.points,
+            group.reason
+        );
+        findings.push(if options.strict {
+            Finding::error("program::unreachable", message)
+                .help("take it out of the program, change the set-up, or leave --strict out")
+        } else {
+            Finding::warning("program::unreachable", message).help("these touches are left out")
+        });
+    }
+    if routed.touches.is_empty() {
+        findings.push(
+            Finding::error(
+                "program::nothing_left",
+                format!("nothing of {:?} can be touched on {}", spec.name, machine.name),
+            )
+            .help("higher risers, a longer stylus, or other poses: the reasons are above"),
+        );
+    }
+    if findings.has_errors() {
+        return Err(Failure(findings.0));
+    }
+    let notes = head::losses(&layout, &routed.touches, &routed.skipped);
+    for note in &notes {
+        findings.push(Finding::warning("program::lost", note.clone()));
+    }
+    let head = head::head(machine, spec, &layout, &routed);
+    routed.path.head = head;
+    let mounting = layout.mounting;
+    let plan = Plan {
+        format: plan::FORMAT.to_owned(),
+        machine: machine.name.clone(),
+        machine_sha256: machine.sha256.clone(),
+        program: spec.name.clone(),
+        mounting: mounting.name.clone(),
+        controller_frame: if options.tcp { ControllerFrame::Tcp } else { ControllerFrame::Axes },
+        ball_radius_mm: machine.probe.ball_radius,
+        tool_length_mm: machine.tool.length_mm,
+        placement_tolerance_mm: Some(machine.probe.placement_tolerance),
+        blocks: mounting
+            .blocks
+            .iter()
+            .map(|b| PlanBlock {
+                name: b.name.clone(),
+                carrier: mounting.carrier.to_string(),
+                mounting: None,
+                centre: b.centre.into(),
+                size: b.size.into(),
+            })
+            .collect(),
+        touches: routed.touches,
+        skipped: routed.skipped,
+        notes,
+    };
+    let generated = Generated { plan, path: routed.path };
+    let violations = verify(machine, &generated.plan, &generated.path)?;
+    if !violations.is_empty() {
+        let findings = violations.iter().map(|v| {
+            Finding::error("program::unproven", format!("step {} of the path: {}", v.step + 1, v.says))
+                .help("no file was written; please report this with the machine's and the program's file")
+        });
+        return Err(Failure(findings.collect()));
+    }
+    Ok((generated, findings))
+}

@@ -6,6 +6,7 @@ use crate::axes::AxisMap;
 
 /// One step of a program. Positions are NC coordinates relative to R, mm and deg; feeds mm/min.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant)] // most steps of a program belong to touches: boxing them would save nothing
 pub enum Step {
     /// A remark for the reader of the NC program.
     Note(String),
@@ -26,11 +27,12 @@ pub enum Step {
         /// The axes that move.
         to: AxisMap,
     },
-    /// Rotary axes move, at clearance only; the sense of each is forced.
+    /// A rotary axis moves, at clearance only; the sense is forced.
     Rotary {
-        /// Where to.
+        /// Where to: one axis.
         to: AxisMap,
-        /// +1 or -1 for each axis that moves.
+        /// +1 or -1 for the axis that moves. Empty only in the first moves of a program, when nobody knows from which
+        /// angle the axis comes: whichever way the control chooses is clear.
         sense: AxisMap,
     },
     /// Positioning near the blocks: straight, at a feed, stops the program if the probe trips.
@@ -87,4 +89,24 @@ pub struct Path {
     pub steps: Vec<Step>,
     /// Predicted run time, s.
     pub seconds: f64,
+    /// Where the rotary axes must stand at the start; `None`: anywhere.
+    pub start_near: Option<StartNear>,
+}
+
+/// A start that is not from anywhere: the first moves are proven clear only near a pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartNear {
+    /// The pose, deg.
+    pub pose: AxisMap,
+    /// How far off an axis may stand, deg.
+    pub within_deg: f64,
+}
+
+impl StartNear {
+    /// The angles in which an axis may stand, deg.
+    #[must_use]
+    pub fn window(&self, axis: &crate::machine::Axis) -> [f64; 2] {
+        let angle = self.pose.get(axis.name).unwrap_or(0.0);
+        [angle - self.within_deg, angle + self.within_deg]
+    }
 }

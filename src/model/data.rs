@@ -1,0 +1,199 @@
+//! From plans and touches to observations: what the model needs to know of each touch, and which touches it cannot use.
+
+use super::formula::{State, VARIABLES};
+use super::predict::{Observation, SetUp};
+use crate::axes::{AxisName, Position};
+use crate::log::{Status, Touch};
+use crate::machine::Machine;
+use crate::program::plan::{Plan, PlanTouch};
+use crate::units::hours_from_s;
+use nalgebra::Vector3;
+
+/// One measurement run.
+#[derive(Debug, Clone)]
+pub struct Run<'a> {
+    /// What was to be touched.
+    pub plan: &'a Plan,
+    /// What was touched, matched to the plan.
+    pub touches: &'a [Touch],
+    /// Blocks of equal mounting, carrier and name share one set-up; each run has its own where this is `None`.
+    pub mounting: Option<&'a str>,
+    /// When the run began, s on the study's clock; runs without it follow one another.
+    pub started_s: Option<f64>,
+}
+
+/// A touch that the model cannot use.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unusable {
+    /// Which run, from 0.
+    pub run: usize,
+    /// Number in the plan.
+    pub id: u64,
+    /// Line in the log.
+    pub line: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// All runs, ready for the model.
+#[derive(Debug, Clone, Default)]
+pub struct Data {
+    /// The touches that can be used.
+    pub observations: Vec<Observation>,
+    /// Their nominal counterparts: the same touches as an errorless machine makes them (for rank statements).
+    pub nominal: Vec<Observation>,
+    /// The touches that cannot.
+    pub unusable: Vec<Unusable>,
+    /// The blocks as they stood.
+    pub set_ups: Vec<SetUp>,
+    /// For each observation: touches of one point made right after each other share a number.
+    pub repeats: Vec<usize>,
+}
+
+/// Assembles runs. Positions mm and deg in R, lengths mm.
+#[must_use]
+pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
+    let mut data = Data::default();
+    let mut clock_s = 0.0;
+    let mut first_touch_s: Option<f64> = None;
+    for (index, run) in runs.iter().enumerate() {
+        let label = run_label(runs, index);
+        let started = run.started_s.unwrap_or(clock_s);
+        let mut previous: Option<&PlanTouch> = None;
+        let mut last_sense = [0.0; 6];
+        for touch in run.touches {
+            let Some(planned) = run.plan.touch(touch.id) else {
+                data.unusable.push(Unusable {
+                    run: index,
+                    id: touch.id,
+                    line: touch.line,
+                    reason: "not in the plan".into(),
+                });
+                continue;
+            };
+            let time_s = touch.time_s.unwrap_or_else(|| started + planned.time_s.unwrap_or(0.0));
+            clock_s = f64::max(clock_s, time_s);
+            let t = hours_from_s(time_s - *first_touch_s.get_or_insert(time_s));
+            senses(&mut last_sense, planned, previous);
+            previous = Some(planned);
+            let reason = match touch.status {
+                Status::Miss => Some("the search ended without a trigger"),
+                Status::Hit if touch.position.0.iter().any(|v| !v.is_finite()) => Some("a position is not a number"),
+                Status::Hit => None,
+            };
+            if let Some(reason) = reason {
+                data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason: reason.into() });
+                continue;
+            }
+            let (Some(carrier), Some(block)) = (machine.carrier(&planned.carrier), run.plan.block_of(planned)) else {
+                let reason = format!("{} carries no block {:?}", planned.carrier, planned.block);
+                data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason });
+                continue;
+            };
+            let mounting = planned.mounting.as_deref().unwrap_or(&run.plan.mounting);
+            let set_up_label = match (&label, mounting) {
+                (Some(label), _) => format!("{label}/{}", planned.block),
+                (None, "") => planned.block.clone(),
+                (None, mounting) => format!("{mounting}/{}", planned.block),
+            };
+            let set_up = data.set_ups.iter().position(|s| s.label == set_up_label).unwrap_or_else(|| {
+                data.set_ups.push(SetUp { label: set_up_label, carrier, centre: block.centre.into() });
+                data.set_ups.len() - 1
+            });
+            let point: Vector3<f64> = planned.point.into();
+            let normal = Vector3::from(planned.normal).normalize();
+            let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
+            let ball_radius = planned.ball_radius_mm.unwrap_or(run.plan.ball_radius_mm);
+            // the rotary axes stand where the control says they stand; a log without them means the plan's pose
+            let observation = Observation {
+                run: index,
+                id: touch.id,
+                set_up,
+                point,
+                normal,
+                ball_radius,
+                ball_at_zero: machine.tool.ball_at_zero(length_mm),
+                position: touch.position,
+                state: state(machine, planned, &touch.position, t, touch.temperature_deg_c, &last_sense, &normal),
+            };
+            let ideal = machine
+                .linear_for_ball(carrier, &planned.pose.position(), &(point + normal * ball_radius), length_mm)
+                .unwrap_or(touch.position);
+            data.nominal.push(Observation { position: ideal, ..observation.clone() });
+            data.repeats.push(repeat_group(&data, run.plan, planned, index));
+            data.observations.push(observation);
+        }
+    }
+    data
+}
+
+/// `None` when the plans' own mounting names tell the runs apart.
+fn run_label(runs: &[Run], index: usize) -> Option<String> {
+    if let Some(mounting) = runs[index].mounting {
+        return Some(mounting.to_owned());
+    }
+    let name = &runs[index].plan.mounting;
+    let n_equal = runs.iter().filter(|r| r.mounting.is_none() && &r.plan.mounting == name).count();
+    (n_equal > 1).then(|| format!("{name}#{}", index + 1))
+}
+
+/// +1 or -1: sense of each axis's last motion; of the touching move for an axis that moves in it.
+fn senses(last: &mut [f64; 6], touch: &PlanTouch, previous: Option<&PlanTouch>) {
+    for name in AxisName::ALL {
+        let i = name.index();
+        let in_touch = touch.end_position().get(name) - touch.start_position().get(name);
+        if in_touch.abs() > 1e-9 {
+            last[i] = in_touch.signum();
+        } else if let Some(from) = touch.from.get(name) {
+            last[i] = from.signum();
+        } else if let Some(previous) = previous {
+            let moved = touch.start_position().get(name) - previous.start_position().get(name);
+            if moved.abs() > 1e-9 {
+                last[i] = moved.signum();
+            }
+        }
+    }
+}
+
+fn state(
+    machine: &Machine,
+    touch: &PlanTouch,
+    at: &Position,
+    t: f64,
+    temperature: Option<f64>,
+    senses: &[f64; 6],
+    normal: &Vector3<f64>,
+) -> State {
+    let mut state = [0.0; VARIABLES.len()];
+    for name in AxisName::ALL {
+        state[name.index()] = at.mm_or_rad(name);
+        state[14 + name.index()] = senses[name.index()];
+    }
+    state[6] = t;
+    state[7] = temperature.unwrap_or(20.0);
+    if let Some(carrier) = machine.carrier(&touch.carrier) {
+        let in_r = machine.carrier_frame(carrier, at).rotation * normal;
+        let in_tool = machine.tool_frame(at).rotation.inverse() * in_r;
+        let spindle = crate::units::rad_from_deg(touch.spindle_deg.unwrap_or(0.0));
+        let in_probe = nalgebra::Rotation3::from_axis_angle(&machine.tool.direction, -spindle) * in_tool;
+        state[8..11].copy_from_slice(in_r.as_slice());
+        state[11..14].copy_from_slice(in_probe.as_slice());
+    }
+    state[20] = touch.feed_mm_min.unwrap_or(machine.probe.slow_feed);
+    state
+}
+
+/// A new number unless the touch before was made at the same point of the same set-up.
+fn repeat_group(data: &Data, plan: &Plan, touch: &PlanTouch, run: usize) -> usize {
+    let Some(last) = data.observations.last() else { return 0 };
+    let group = data.repeats.last().copied().unwrap_or(0);
+    let same = last.run == run
+        && plan.touch(last.id).is_some_and(|p| {
+            p.block == touch.block
+                && p.pose == touch.pose
+                && p.point == touch.point
+                && p.normal == touch.normal
+                && p.visit == touch.visit
+        });
+    if same { group } else { group + 1 }
+}

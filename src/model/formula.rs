@@ -1,0 +1,224 @@
+//! Formulas of effects: parsed once, evaluated at the state of a touch, with partial derivatives for shape parameters.
+//!
+//! The expression crate does the parsing and differentiation; this module fixes the words that a formula may use
+//! (contract section 5) and turns a mistake into a sentence that names it.
+
+use exmex::prelude::*;
+use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
+
+/// The variables of a touch that a formula may use, in the order of [`State`].
+pub const VARIABLES: [&str; 21] = [
+    "X", "Y", "Z", "A", "B", "C", "t", "T", "nx", "ny", "nz", "mx", "my", "mz", "sX", "sY", "sZ", "sA", "sB", "sC",
+    "feed",
+];
+
+/// Values of [`VARIABLES`] at one touch: X Y Z mm; A B C rad; t h; T °C; normals; senses ±1; feed mm/min.
+pub type State = [f64; VARIABLES.len()];
+
+/// Functions that a formula may use.
+pub const FUNCTIONS: [&str; 15] =
+    ["sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "ln", "sqrt", "abs", "sign", "floor", "mod", "step"];
+
+/// The operators of a formula: those of the expression crate that the contract names, and `sign`, `mod`, `step`.
+#[derive(Clone, Debug)]
+pub struct Words;
+
+impl MakeOperators<f64> for Words {
+    fn make<'a>() -> Vec<Operator<'a, f64>> {
+        let kept = ["+", "-", "*", "/", "^"];
+        let mut ops: Vec<Operator<'a, f64>> = FloatOpsFactory::<f64>::make()
+            .into_iter()
+            .filter(|op| kept.contains(&op.repr()) || FUNCTIONS.contains(&op.repr()) || op.repr() == "PI")
+            .collect();
+        let has = |ops: &[Operator<'a, f64>], word: &str| ops.iter().any(|op| op.repr() == word);
+        if !has(&ops, "sign") {
+            ops.push(Operator::make_unary("sign", |x: f64| if x == 0.0 { 0.0 } else { x.signum() }));
+        }
+        if !has(&ops, "step") {
+            ops.push(Operator::make_unary("step", |x: f64| if x >= 0.0 { 1.0 } else { 0.0 }));
+        }
+        if !has(&ops, "mod") {
+            ops.push(Operator::make_bin(
+                "mod",
+                BinOp { apply: |a: f64, b: f64| a - b * (a / b).floor(), prio: 4, is_commutative: false },
+            ));
+        }
+        ops.push(Operator::make_constant("pi", std::f64::consts::PI));
+        ops
+    }
+}
+
+type Expression = FlatEx<f64, Words>;
+
+/// Where the value of a variable of an expression comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Origin {
+    State(usize),
+    Shape(usize),
+}
+
+/// A parsed formula.
+#[derive(Debug, Clone)]
+pub struct Formula {
+    text: String,
+    constant: Option<f64>,
+    value: (Expression, Vec<Origin>),
+    /// One per shape parameter that stands in it; `None` where the crate cannot differentiate (`floor`, `step`, …).
+    partials: Vec<(usize, Option<(Expression, Vec<Origin>)>)>,
+}
+
+impl Formula {
+    /// Parses a formula; `shapes` are the names of the effect's parameters that may stand inside it.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong and which words exist.
+    pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
+        let expression =
+            Expression::parse(text).map_err(|e| format!("{} (functions: {})", e.msg(), FUNCTIONS.join(" ")))?;
+        let origins = origins(&expression, shapes)?;
+        let mut partials = Vec::new();
+        for (at, origin) in origins.iter().enumerate() {
+            if let Origin::Shape(shape) = origin {
+                let partial = expression.clone().partial(at).ok().and_then(|p| {
+                    let o = origins_of(&p, shapes).ok()?;
+                    Some((p, o))
+                });
+                partials.push((*shape, partial));
+            }
+        }
+        let constant = if origins.is_empty() { expression.eval(&[]).ok() } else { None };
+        Ok(Self { text: text.to_owned(), constant, value: (expression, origins), partials })
+    }
+
+    /// The formula as it was written.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Its value where it uses no variable.
+    #[must_use]
+    pub fn constant(&self) -> Option<f64> {
+        self.constant
+    }
+
+    /// True when a parameter of the effect stands inside.
+    #[must_use]
+    pub fn has_shape(&self) -> bool {
+        !self.partials.is_empty()
+    }
+
+    /// The state variables that it uses.
+    #[must_use]
+    pub fn variables(&self) -> Vec<&'static str> {
+        self.value.1.iter().filter_map(|o| if let Origin::State(i) = o { Some(VARIABLES[*i]) } else { None }).collect()
+    }
+
+    /// Value at a state; `shapes` are the parameters' values in their own units.
+    #[must_use]
+    pub fn eval(&self, state: &State, shapes: &[f64]) -> f64 {
+        self.constant.unwrap_or_else(|| evaluate(&self.value, state, shapes))
+    }
+
+    /// Derivatives with respect to the shape parameters that stand inside: (which, value).
+    pub fn partials<'a>(&'a self, state: &'a State, shapes: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
+        self.partials.iter().map(move |(shape, partial)| {
+            let value = partial.as_ref().map(|p| evaluate(p, state, shapes)).filter(|v| v.is_finite());
+            (*shape, value.unwrap_or_else(|| self.difference(*shape, state, shapes)))
+        })
+    }
+
+    fn difference(&self, shape: usize, state: &State, shapes: &[f64]) -> f64 {
+        let step = 1e-6 * shapes[shape].abs().max(1e-3);
+        let mut at = shapes.to_vec();
+        at[shape] += step;
+        let plus = self.eval(state, &at);
+        at[shape] -= 2.0 * step;
+        (plus - self.eval(state, &at)) / (2.0 * step)
+    }
+}
+
+fn evaluate((expression, origins): &(Expression, Vec<Origin>), state: &State, shapes: &[f64]) -> f64 {
+    // formulas are short: their variables fit on the stack
+    let mut values = [0.0; 32];
+    for (value, origin) in values.iter_mut().zip(origins) {
+        *value = match origin {
+            Origin::State(i) => state[*i],
+            Origin::Shape(i) => shapes.get(*i).copied().unwrap_or(f64::NAN),
+        };
+    }
+    expression.eval(&values[..origins.len().min(32)]).unwrap_or(f64::NAN)
+}
+
+fn origins(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
+    origins_of(expression, shapes)
+}
+
+fn origins_of(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
+    let names = expression.var_names();
+    if names.len() > 32 {
+        return Err("a formula has more than 32 variables".to_owned());
+    }
+    names
+        .iter()
+        .map(|name| {
+            // a parameter of the effect goes before a variable of the same name
+            if let Some(i) = shapes.iter().position(|s| s == name) {
+                Ok(Origin::Shape(i))
+            } else if let Some(i) = VARIABLES.iter().position(|v| v == name) {
+                Ok(Origin::State(i))
+            } else {
+                let own = if shapes.is_empty() { String::new() } else { format!("; parameters: {}", shapes.join(" ")) };
+                Err(format!(
+                    "unknown word {name:?} (variables: {}{own}; functions: {})",
+                    VARIABLES.join(" "),
+                    FUNCTIONS.join(" ")
+                ))
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(name: &str, value: f64) -> State {
+        let mut state = [0.0; VARIABLES.len()];
+        state[VARIABLES.iter().position(|v| *v == name).unwrap()] = value;
+        state
+    }
+
+    #[test]
+    fn contract_functions_are_understood() {
+        for (text, b, expected) in [
+            ("1 - cos(B)", 0.5, 1.0 - 0.5f64.cos()),
+            ("mod(B, 0.3)", 0.5, 0.2),
+            ("step(B - 1)", 0.5, 0.0),
+            ("sign(B) * abs(sin(2*B))", -0.5, -(1.0f64.sin())),
+            ("atan2(B, 1) + floor(1.7) + 2^3", 0.5, 0.5f64.atan2(1.0) + 9.0),
+            ("sqrt(exp(ln(4)))", 0.0, 2.0),
+        ] {
+            let value = Formula::parse(text, &[]).unwrap().eval(&at("B", b), &[]);
+            assert!((value - expected).abs() < 1e-14, "{text}: {value}");
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        assert!(Formula::parse("1 - cos(Q)", &[]).unwrap_err().contains("\"Q\""));
+        assert!(Formula::parse("sinh(B)", &[]).is_err());
+        assert!(Formula::parse("1 +", &[]).is_err());
+        assert!(Formula::parse("", &[]).is_err());
+    }
+
+    #[test]
+    fn shape_parameters_have_derivatives() {
+        let f = Formula::parse("1 - exp(-t/tau)", &["tau"]).unwrap();
+        let (state, tau) = (at("t", 0.7), 0.4);
+        let (which, derivative) = f.partials(&state, &[tau]).next().unwrap();
+        assert_eq!(which, 0);
+        let expected = -(-0.7f64 / tau).exp() * 0.7 / (tau * tau);
+        assert!((derivative - expected).abs() < 1e-12);
+    }
+}

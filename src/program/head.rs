@@ -1,0 +1,210 @@
+//! What a person must know before pressing start, and what was lost where touches were left out.
+
+use super::layout::{Layout, Setup};
+use super::plan::{PlanTouch, Skipped};
+use super::route::Routed;
+use super::spec::ProgramSpec;
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::machine::{Block, Machine, Mounting};
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The lines at the head of the NC program: plain ASCII, no brackets, so that every control takes them as a comment.
+pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, routed: &Routed) -> Vec<String> {
+    let probe = &machine.probe;
+    let mounting = layout.mounting;
+    let mut lines = vec![
+        format!("Probing program {} for {}", spec.name, machine.name),
+        spec.says.clone(),
+        format!(
+            "{} touches, about {}; the plan {}.plan.json belongs to it",
+            routed.touches.len(),
+            duration(routed.path.seconds),
+            spec.name
+        ),
+        "Set up:".to_owned(),
+        format!("  mounting {}: {}", mounting.name, mounting.says),
+    ];
+    for block in &mounting.blocks {
+        lines.extend(block_lines(machine, mounting, block));
+    }
+    lines.extend([
+        format!(
+            "  each block within {} mm of its place, its faces along the machine's axes",
+            probe.placement_tolerance
+        ),
+        "  the first touch of each block stops the program where it stands outside of that".to_owned(),
+        format!(
+            "  probe with ball {} mm across, stem {} mm; {} mm from the pivot or gauge line to the ball's centre",
+            2.0 * probe.ball_radius,
+            probe.stem_length,
+            machine.tool.length_mm
+        ),
+        "  the positions above and below are machine coordinates with all rotary axes at 0, ball's centre".to_owned(),
+        "Before the start:".to_owned(),
+        "  probe in the spindle, spindle stopped, nothing that touches the stylus".to_owned(),
+    ]);
+    if let Some(near) = &routed.path.start_near {
+        lines.push(format!(
+            "  turn the rotary axes to {}, within {} deg: not every angle is clear at the top",
+            pose_says(&near.pose),
+            near.within_deg
+        ));
+    }
+    let first = routed.path.steps.iter().find_map(|s| match s {
+        super::path::Step::Rapid { to } => to.iter().next(),
+        _ => None,
+    });
+    if let Some((axis, top)) = first {
+        let top = top + machine.origin.get(axis).unwrap_or(0.0);
+        lines.push(format!(
+            "  the first move takes {axis} straight to {top:.3} from where it stands: keep that way free"
+        ));
+    }
+    for line in &mut lines {
+        line.retain(|c| c.is_ascii() && !matches!(c, '(' | ')'));
+    }
+    lines.retain(|l| !l.trim().is_empty());
+    lines
+}
+
+fn block_lines(machine: &Machine, mounting: &Mounting, block: &Block) -> Vec<String> {
+    let top = block.centre + Vector3::z() * (block.size.z / 2.0 + machine.probe.ball_radius);
+    let at = machine.linear_for_ball(mounting.carrier, &Position::default(), &top, machine.tool.length_mm);
+    let mut line = format!("  block {}: {} x {} x {} mm", block.name, block.size.x, block.size.y, block.size.z);
+    if let Some(riser) = &block.riser {
+        line.push_str(&format!(", on a riser {} mm high", riser.height));
+    }
+    let mut lines = vec![line];
+    if let Some(at) = at {
+        let shown = [AxisName::X, AxisName::Y, AxisName::Z]
+            .map(|a| format!("{a} {:.3}", at.get(a) + machine.origin.get(a).unwrap_or(0.0) + 0.0));
+        lines.push(format!("    the ball rests on the middle of its upper face at {}", shown.join(" ")));
+    }
+    lines
+}
+
+/// `1 h 05 min`, `34 min`, `50 s`.
+#[must_use]
+pub fn duration(seconds: f64) -> String {
+    let minutes = (seconds / 60.0).round();
+    if seconds < 90.0 {
+        format!("{seconds:.0} s")
+    } else if minutes < 60.0 {
+        format!("{minutes:.0} min")
+    } else {
+        format!("{:.0} h {:02.0} min", (minutes / 60.0).floor(), minutes % 60.0)
+    }
+}
+
+/// A pose in words: `B -90, C 0`.
+#[must_use]
+pub fn pose_says(pose: &AxisMap) -> String {
+    pose.iter().map(|(a, v)| format!("{a} {v}")).collect::<Vec<_>>().join(", ")
+}
+
+/// Touches that were left out for one cause in one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkippedGroup {
+    /// Stage of the procedure.
+    pub stage: String,
+    /// Rotary axes, deg.
+    pub pose: AxisMap,
+    /// The block's name.
+    pub block: String,
+    /// The block's own face.
+    pub face: String,
+    /// How many points.
+    pub points: usize,
+    /// Why the first of them was left out.
+    pub reason: String,
+}
+
+/// Skipped touches by pose, block and face, in the order of the plan.
+#[must_use]
+pub fn skipped_groups(skipped: &[Skipped]) -> Vec<SkippedGroup> {
+    let mut groups: Vec<SkippedGroup> = Vec::new();
+    for s in skipped {
+        let same =
+            |g: &&mut SkippedGroup| (&g.stage, &g.block, &g.face) == (&s.stage, &s.block, &s.face) && g.pose == s.pose;
+        match groups.iter_mut().find(same) {
+            Some(group) => group.points += 1,
+            None => groups.push(SkippedGroup {
+                stage: s.stage.clone(),
+                pose: s.pose,
+                block: s.block.clone(),
+                face: s.face.clone(),
+                points: 1,
+                reason: s.reason.clone(),
+            }),
+        }
+    }
+    groups
+}
+
+/// What is lost by the touches that were left out: poses, blocks, and pairs of opposite faces of which one side is left.
+pub(super) fn losses(layout: &Layout, touches: &[PlanTouch], skipped: &[Skipped]) -> Vec<String> {
+    if skipped.is_empty() {
+        return Vec::new();
+    }
+    let mut notes = Vec::new();
+    for setup in &layout.setups {
+        let here = |pose: &AxisMap, stage: &str| *pose == setup.pose && stage == setup.spec.stage;
+        let made: BTreeSet<(&str, &str)> =
+            touches.iter().filter(|t| here(&t.pose, &t.stage)).map(|t| (t.block.as_str(), t.face.as_str())).collect();
+        notes.extend(losses_of(layout.mounting, setup, &made));
+    }
+    notes.dedup();
+    notes
+}
+
+fn losses_of(mounting: &Mounting, setup: &Setup, made: &BTreeSet<(&str, &str)>) -> Vec<String> {
+    let pose = pose_says(&setup.pose);
+    let name = |b: usize| mounting.blocks.get(b).map_or("", |b| b.name.as_str());
+    let wanted: Vec<(&str, String, Vector3<f64>)> =
+        setup.targets.iter().map(|t| (name(t.block), t.face.to_string(), t.normal)).collect();
+    if made.is_empty() {
+        return vec![format!("{pose}: nothing can be touched in this pose; every relation that needs it is lost")];
+    }
+    let mut notes = Vec::new();
+    let mut blocks: Vec<&str> = wanted.iter().map(|(b, ..)| *b).collect();
+    blocks.dedup();
+    for block in blocks.into_iter().filter(|b| !made.iter().any(|(m, _)| m == b)) {
+        notes.push(format!("{pose}: block {block} is not touched at all"));
+    }
+    // by the direction of the face, over all blocks: a relation needs one block on each side
+    let mut sides: BTreeMap<usize, [(bool, bool); 2]> = BTreeMap::new();
+    for (block, face, normal) in &wanted {
+        let axis = normal.iamax();
+        let side = sides.entry(axis).or_default();
+        let one = &mut side[usize::from(normal[axis] > 0.0)];
+        one.0 = true;
+        one.1 |= made.contains(&(*block, face.as_str()));
+    }
+    for (axis, [minus, plus]) in sides {
+        let letter = ["X", "Y", "Z"].get(axis).copied().unwrap_or_default();
+        let both_wanted = minus.0 && plus.0;
+        match (minus.1, plus.1) {
+            (true, true) => {}
+            (false, false) => {
+                notes.push(format!("{pose}: no face that looks along {letter} is touched; {letter} is lost here"))
+            }
+            (minus_made, _) if both_wanted => {
+                let (lost, left) = if minus_made { ('+', '-') } else { ('-', '+') };
+                notes.push(format!(
+                    "{pose}: the pair of faces along {letter} has lost its {lost}{letter} side; {letter} is known from the \
+                     {left}{letter} faces alone, which takes a constant pre-travel in full and needs the ball's radius and \
+                     the block's place"
+                ));
+            }
+            (minus_made, plus_made) => {
+                // one side was asked for and part of it is there, or it is gone
+                let asked = if minus.0 { minus_made } else { plus_made };
+                if !asked {
+                    notes.push(format!("{pose}: {letter} is lost here"));
+                }
+            }
+        }
+    }
+    notes
+}

@@ -1,0 +1,235 @@
+//! A program on a machine: which points are to be touched in which pose, in order. Whether they can be reached is not
+//! asked here.
+
+use super::as_written::FacesIn;
+use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, SetupSpec};
+use crate::axes::{AxisMap, Position};
+use crate::diag::{Finding, Findings, Result};
+use crate::machine::{Block, Machine, Mounting};
+use nalgebra::{Rotation3, Vector3};
+
+/// A point that is to be touched, in the carrier's frame, mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// Place of the block in the mounting.
+    pub block: usize,
+    /// The block's own face.
+    pub face: Face,
+    /// Nominal contact.
+    pub point: Vector3<f64>,
+    /// Outward unit normal: an axis of the carrier's frame.
+    pub normal: Vector3<f64>,
+}
+
+/// A set-up: one pose and its targets in the order block, face, point.
+#[derive(Debug, Clone)]
+pub struct Setup<'a> {
+    /// What the program says about it.
+    pub spec: &'a SetupSpec,
+    /// Every rotary axis of the machine, deg.
+    pub pose: AxisMap,
+    /// The targets; each is touched `spec.repeats` times.
+    pub targets: Vec<Target>,
+}
+
+impl Setup<'_> {
+    /// The pose with the linear axes at 0.
+    #[must_use]
+    pub fn at_pose(&self) -> Position {
+        self.pose.position()
+    }
+}
+
+/// A whole program on a machine.
+#[derive(Debug, Clone)]
+pub struct Layout<'a> {
+    /// The artefact.
+    pub mounting: &'a Mounting,
+    /// The set-ups, in order.
+    pub setups: Vec<Setup<'a>>,
+}
+
+/// Lays a program out on a machine.
+///
+/// # Errors
+/// When the machine lacks what the program names, a pose lies outside its ranges, or a point lies off its face; all
+/// findings at once.
+pub fn lay_out<'a>(machine: &'a Machine, spec: &'a ProgramSpec) -> Result<(Layout<'a>, Findings)> {
+    let mut check = Check { machine, spec, findings: Findings::default() };
+    if let Some(written_for) = spec.machine.as_ref().filter(|m| m.value != machine.name) {
+        check.findings.push(
+            Finding::warning(
+                "program::other_machine",
+                format!(
+                    "program {:?} is written for {}, and is used for {}",
+                    spec.name, written_for.value, machine.name
+                ),
+            )
+            .help("limits and collisions are checked for this machine; look at the poses all the same")
+            .at(&spec.source, written_for.span.clone()),
+        );
+    }
+    let Some(mounting) = machine.mounting(&spec.mounting.value) else {
+        let names: Vec<&str> = machine.mountings.iter().map(|m| m.name.as_str()).collect();
+        return Err(spec
+            .error(
+                &spec.mounting.span,
+                "program::unknown_mounting",
+                format!("{} has no mounting {:?}", machine.name, spec.mounting.value),
+                format!("it has: {}; a mounting is described in the machine's file", names.join(", ")),
+            )
+            .into());
+    };
+    let setups: Vec<Setup> = spec.setups.iter().map(|s| check.setup(mounting, s)).collect();
+    let touches: usize = setups.iter().map(|s| s.targets.len().saturating_mul(s.spec.repeats as usize)).sum();
+    if touches > MOST_TOUCHES {
+        check.error(
+            &spec.mounting,
+            "program::too_many",
+            format!("the program asks for {touches} touches"),
+            format!("write fewer points, poses or repeats: {MOST_TOUCHES} at most"),
+        );
+    }
+    check.findings.finish(Layout { mounting, setups })
+}
+
+struct Check<'a> {
+    machine: &'a Machine,
+    spec: &'a ProgramSpec,
+    findings: Findings,
+}
+
+impl<'a> Check<'a> {
+    /// A list of angles gives the same finding once for each: the first is enough.
+    fn push_once(&mut self, finding: Finding) {
+        if !self.findings.0.iter().any(|f| f.message == finding.message && f.span == finding.span) {
+            self.findings.push(finding);
+        }
+    }
+
+    fn error<T>(&mut self, at: &At<T>, code: &'static str, message: String, help: String) {
+        self.push_once(self.spec.error(&at.span, code, message, help));
+    }
+
+    fn setup(&mut self, mounting: &Mounting, spec: &'a SetupSpec) -> Setup<'a> {
+        let machine = self.machine;
+        for (at, map) in [(&spec.pose, &spec.pose.value), (&spec.from, &spec.from.value)] {
+            for (axis, _) in map.iter().filter(|(a, _)| machine.axis(*a).is_none()) {
+                let has: Vec<String> = machine.rotary().map(|a| a.name.to_string()).collect();
+                self.error(
+                    at,
+                    "program::unknown_axis",
+                    format!("{} has no axis {axis}", machine.name),
+                    format!("its rotary axes are {}", has.join(" and ")),
+                );
+            }
+        }
+        let mut pose = AxisMap::default();
+        for axis in machine.rotary() {
+            let angle = spec.pose.value.get(axis.name).unwrap_or(0.0);
+            pose.set(axis.name, angle);
+            let [low, high] = axis.range;
+            if !(low..=high).contains(&angle) {
+                self.error(
+                    &spec.pose,
+                    "program::pose_outside",
+                    format!("{} = {angle} deg is outside the range of {} ({low} … {high})", axis.name, machine.name),
+                    "choose an angle inside the range, or correct the range in the machine's file".to_owned(),
+                );
+            }
+        }
+        let blocks = self.blocks(mounting, spec);
+        let to_carrier = machine.carrier_frame(mounting.carrier, &pose.position()).rotation.inverse();
+        let to_carrier = match self.spec.faces_in {
+            FacesIn::Block => Rotation3::identity(),
+            FacesIn::Machine => to_carrier.to_rotation_matrix(),
+        };
+        let targets = blocks
+            .iter()
+            .flat_map(|&b| spec.faces.iter().map(move |f| (b, f)))
+            .flat_map(|(b, faces)| match &mounting.blocks.get(b) {
+                Some(block) => self.face(b, block, faces, &to_carrier),
+                None => Vec::new(),
+            })
+            .collect();
+        Setup { spec, pose, targets }
+    }
+
+    fn blocks(&mut self, mounting: &Mounting, spec: &SetupSpec) -> Vec<usize> {
+        let Some(named) = &spec.blocks else { return (0..mounting.blocks.len()).collect() };
+        let mut out = Vec::new();
+        for name in named {
+            match mounting.blocks.iter().position(|b| b.name == name.value) {
+                Some(i) => out.push(i),
+                None => {
+                    let has: Vec<&str> = mounting.blocks.iter().map(|b| b.name.as_str()).collect();
+                    self.error(
+                        name,
+                        "program::unknown_block",
+                        format!("mounting {:?} of {} has no block {:?}", mounting.name, self.machine.name, name.value),
+                        format!("it has: {}", has.join(", ")),
+                    );
+                }
+            }
+        }
+        out
+    }
+
+    /// The targets on a face that is named in a frame, `to_carrier` turning that frame's directions into the carrier's.
+    fn face(&mut self, b: usize, block: &Block, named: &FaceGrid, to_carrier: &Rotation3<f64>) -> Vec<Target> {
+        let face = named.face.value;
+        let (u, v) = face.tangents();
+        let along = [face.normal(), u, v].map(|d| axis_of(&(to_carrier * d)));
+        let [Some(normal), Some(u), Some(v)] = along else {
+            self.error(
+                &named.face,
+                "program::skew_face",
+                format!("no face of block {:?} looks along machine {face} in this pose", block.name),
+                "name faces in machine directions only where the carrier stands at a multiple of 90 degrees, \
+                 else write faces_in = \"block\""
+                    .to_owned(),
+            );
+            return Vec::new();
+        };
+        let half = |d: &Vector3<f64>| block.size.component_mul(&d.abs()).sum() / 2.0;
+        let mut out = Vec::new();
+        for &(along_u, across) in &named.points {
+            let along_v = match across {
+                Across::FromCentre(mm) => mm,
+                Across::Depth(mm) => half(&v) - mm,
+            };
+            let to_edge = (half(&u) - along_u.abs()).min(half(&v) - along_v.abs());
+            if to_edge < 0.0 {
+                self.error(
+                    &named.grid,
+                    "program::off_face",
+                    format!("grid {:?} reaches {:.3} mm past the edge of face {face}", named.grid.value, -to_edge),
+                    format!("block {:?} measures {:?} mm: keep the points on it", block.name, block.size.as_slice()),
+                );
+                continue;
+            }
+            if to_edge < self.machine.probe.placement_tolerance {
+                let finding = Finding::warning(
+                    "program::near_edge",
+                    format!("grid {:?} comes within {to_edge:.3} mm of the edge of face {face}", named.grid.value),
+                )
+                .help(format!(
+                    "a block may stand {} mm from its place: the ball can then miss the face",
+                    self.machine.probe.placement_tolerance
+                ))
+                .at(&self.spec.source, named.grid.span.clone());
+                self.push_once(finding);
+            }
+            let point = block.centre + normal * half(&normal) + u * along_u + v * along_v;
+            out.push(Target { block: b, face: Face::from_normal(&normal), point, normal });
+        }
+        out
+    }
+}
+
+/// The axis of a frame that a direction lies along, exact; `None` when it lies askew.
+fn axis_of(direction: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let rounded = direction.map(f64::round);
+    // adding zero turns -0 into 0, so that files do not show it
+    ((direction - rounded).norm() < 1e-9).then(|| rounded.add_scalar(0.0))
+}

@@ -1,0 +1,60 @@
+//! The programs that are built in, and which of them is meant for a machine.
+
+use super::spec::{ProgramSpec, load};
+use crate::diag::{Failure, Result, source};
+use crate::machine::Machine;
+
+/// The programs that are built in: file name and text.
+const BUILT_IN: [(&str, &str); 5] = [
+    ("programs/head.toml", include_str!("../../programs/head.toml")),
+    ("programs/table.toml", include_str!("../../programs/table.toml")),
+    ("programs/double-head.toml", include_str!("../../programs/double-head.toml")),
+    ("programs/basic-trunnion.toml", include_str!("../../programs/basic-trunnion.toml")),
+    ("programs/basic-swivel-table-b.toml", include_str!("../../programs/basic-swivel-table-b.toml")),
+];
+
+/// The programs that are built in.
+///
+/// # Errors
+/// Never for a released program: the files are tested.
+pub fn built_in() -> Result<Vec<ProgramSpec>> {
+    BUILT_IN
+        .iter()
+        .map(|(name, text)| load(&source(format!("{name} (built in)"), *text)).map(|(spec, _)| spec))
+        .collect()
+}
+
+/// Chooses the program of a name for a machine: the one that was written for it, else the only one that names no axis
+/// which the machine lacks and whose mounting it has.
+///
+/// # Errors
+/// When there is none, or several fit; the message lists what there is.
+pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &Machine) -> Result<ProgramSpec> {
+    let mut names: Vec<String> = specs.iter().map(|s| s.name.clone()).collect();
+    names.dedup();
+    let named: Vec<ProgramSpec> = specs.into_iter().filter(|s| s.name == name).collect();
+    if named.is_empty() {
+        return Err(Failure::new("program::unknown", format!("no program is called {name:?}"))
+            .help(format!("there are: {}; a file of your own goes with --program FILE.toml", names.join(", "))));
+    }
+    let written_for: Vec<String> = named.iter().filter_map(|s| s.machine.as_ref().map(|m| m.value.clone())).collect();
+    let written_for_it = |s: &ProgramSpec| s.machine.as_ref().is_none_or(|m| m.value == machine.name);
+    let fits = |s: &ProgramSpec| {
+        machine.mounting(&s.mounting.value).is_some()
+            && s.setups.iter().all(|x| x.pose.value.iter().all(|(a, _)| machine.axis(a).is_some()))
+    };
+    if let Some(spec) = named.iter().find(|s| written_for_it(s)) {
+        return Ok(spec.clone());
+    }
+    let mut fitting = named.into_iter().filter(fits);
+    match (fitting.next(), fitting.next()) {
+        (Some(only), None) => Ok(only),
+        _ => Err(Failure::new(
+            "program::other_machine",
+            format!("program {name:?} is written for {}, not for {}", written_for.join(", "), machine.name),
+        )
+        .help(
+            "`axiscal programs` lists which program is for which machine; copy the nearest one and adapt it to yours",
+        )),
+    }
+}

@@ -1,0 +1,497 @@
+//! From the points of a program to its path: touches with their places, and every move between them.
+//!
+//! Each move is proven when it is chosen; where there is no clear move the touch is left out with the reason. The whole
+//! path is walked once more by `verify`, which shares nothing with the choices that are made here.
+
+use super::clock::{Clock, distance_mm};
+use super::heights::{Heights, Lift};
+use super::layout::{Layout, Setup, Target};
+use super::path::{Path, StartNear, Step, TouchStep};
+use super::plan::{PlanTouch, Skipped};
+use super::reach::Reached;
+use super::scene::Scene;
+use super::spec::ProgramSpec;
+use super::sweep::Manner;
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::diag::{Failure, Result};
+use rayon::prelude::*;
+
+/// A protected move is never shorter than this, mm: some controls refuse a probing move of a few tenths.
+pub(super) const SHORTEST_PROTECTED_MM: f64 = 1.0;
+
+/// Steps in which a height for turning is searched, mm.
+const TURN_STEP_MM: f64 = 10.0;
+
+/// Coordinates that differ by less are the same place, mm or deg.
+const SAME: f64 = 1e-9;
+
+/// What the routing of a program gives.
+#[derive(Debug, Default)]
+pub(super) struct Routed {
+    pub(super) touches: Vec<PlanTouch>,
+    pub(super) skipped: Vec<Skipped>,
+    pub(super) path: Path,
+}
+
+/// Routes a program.
+///
+/// # Errors
+/// When no program can begin on this machine: no axis lifts the probe, or not even near the first pose all is clear.
+pub(super) fn route(scene: &Scene, layout: &Layout, spec: &ProgramSpec) -> Result<Routed> {
+    let Some(lift) = scene.lift() else {
+        return Err(Failure::new("program::no_lift", format!("{} has no linear axis", scene.machine.name))
+            .help("a probing program needs X, Y and Z"));
+    };
+    if scene.search_past_mm().is_none() {
+        return Err(Failure::new(
+            "program::overtravel",
+            format!("the probe of {} leaves no room for a search", scene.machine.name),
+        )
+        .help(
+            "a search goes past the nominal contact by more than placement_tolerance, and by both together the stylus may \
+             be pushed: search and overtravel - placement_tolerance must be above placement_tolerance",
+        ));
+    }
+    let mut router = Router {
+        scene,
+        layout,
+        lift,
+        overshoot_deg: spec.overshoot_deg,
+        out: Routed::default(),
+        clock: Clock::default(),
+        at: None,
+        senses: AxisMap::default(),
+        spindle_deg: None,
+        visit: 0,
+        met: vec![false; layout.mounting.blocks.len()],
+        heights: Heights { over_all: lift.top_height(), over_blocks: lift.top_height() },
+    };
+    for (number, setup) in (1..).zip(&layout.setups) {
+        router.setup(number, setup)?;
+    }
+    router.leave();
+    router.out.path.seconds = router.clock.rounded_s();
+    Ok(router.out)
+}
+
+struct Router<'a, 'm> {
+    scene: &'a Scene<'m>,
+    layout: &'a Layout<'a>,
+    lift: Lift,
+    overshoot_deg: f64,
+    out: Routed,
+    clock: Clock,
+    /// Where the machine stands; `None` until the first moves have brought it to a known place.
+    at: Option<Position>,
+    /// Sense of each rotary axis's last move.
+    senses: AxisMap,
+    spindle_deg: Option<f64>,
+    visit: u32,
+    /// Blocks that have been touched.
+    met: Vec<bool>,
+    /// Of the pose in which the machine stands.
+    heights: Heights,
+}
+
+/// A turn of one rotary axis: where to and, where it is known, in which sense.
+type Turn = (AxisName, f64, Option<f64>);
+
+impl Router<'_, '_> {
+    fn setup(&mut self, number: u32, setup: &Setup) -> Result<()> {
+        let probe = &self.scene.machine.probe;
+        let room = probe.clearance + probe.placement_tolerance + probe.approach;
+        let heights = self.scene.heights(&self.lift, &setup.at_pose(), room);
+        let carrier = self.layout.mounting.carrier;
+        let reached: Vec<_> = setup
+            .targets
+            .par_iter()
+            .map(|t| self.scene.reach(&self.lift, carrier, &setup.at_pose(), t, heights.over_all))
+            .collect();
+        let Some(first) = reached.iter().find_map(|r| r.as_ref().ok()) else {
+            for (target, reached) in setup.targets.iter().zip(reached) {
+                self.skip(setup, target, reached.err().unwrap_or_default());
+            }
+            return Ok(());
+        };
+        if let Err(reason) = self.index(number, setup, heights, first)? {
+            for (target, reached) in setup.targets.iter().zip(reached) {
+                self.skip(setup, target, reached.err().unwrap_or_else(|| reason.clone()));
+            }
+            return Ok(());
+        }
+        for (target, reached) in setup.targets.iter().zip(reached) {
+            match reached.and_then(|r| self.travel(&r.start).map(|()| r)) {
+                Ok(reached) => {
+                    for repeat in 1..=setup.spec.repeats {
+                        self.touch(setup, target, &reached, repeat);
+                    }
+                }
+                Err(reason) => self.skip(setup, target, reason),
+            }
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, setup: &Setup, target: &Target, reason: String) {
+        self.out.skipped.push(Skipped {
+            stage: setup.spec.stage.clone(),
+            block: self.layout.mounting.blocks.get(target.block).map(|b| b.name.clone()).unwrap_or_default(),
+            face: target.face.to_string(),
+            point: target.point.into(),
+            pose: setup.pose,
+            reason,
+        });
+    }
+
+    /// Brings the rotary axes to a pose. The inner error is the reason why this set-up cannot be reached.
+    fn index(&mut self, number: u32, setup: &Setup, heights: Heights, first: &Reached) -> Result<Result<(), String>> {
+        let turns = match self.turns(setup) {
+            Ok(turns) => turns,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        let number_and_name = Step::Setup { number, says: setup_says(setup) };
+        let Some(at) = self.at else {
+            self.begin(number_and_name, setup, &turns, first)?;
+            self.heights = heights;
+            return Ok(Ok(()));
+        };
+        let spindle_turns = setup.spec.spindle_deg.is_some_and(|deg| self.spindle_deg != Some(deg));
+        if turns.is_empty() {
+            if spindle_turns {
+                self.rise(self.heights.over_all);
+            }
+            self.push(number_and_name);
+            self.orient(setup);
+            return Ok(Ok(()));
+        }
+        // both poses' heights, or as much more as the turns need
+        let mut height = self.lift.height(&at).max(self.heights.over_all).max(heights.over_all);
+        let top = self.lift.top_height();
+        loop {
+            let height_here = height.min(top);
+            match self.clear_turns(&at, height_here, &turns, first) {
+                Ok(()) => {
+                    self.rise(height_here);
+                    self.push(number_and_name);
+                    self.orient(setup);
+                    for turn in &turns {
+                        self.turn(turn);
+                    }
+                    self.visit += 1;
+                    self.heights = heights;
+                    return Ok(Ok(()));
+                }
+                Err(reason) if height >= top => {
+                    return Ok(Err(format!("even at the top of {} {reason}", self.lift.axis)));
+                }
+                Err(_) => height += TURN_STEP_MM,
+            }
+        }
+    }
+
+    /// Proves the turns at a height, and the way on to the first column in the new pose.
+    fn clear_turns(&self, at: &Position, height: f64, turns: &[Turn], first: &Reached) -> Result<(), String> {
+        let mut here = *at;
+        here.set(self.lift.axis, self.lift.coordinate(height));
+        self.scene.clear_straight(at, &here, Manner::Guarded).map_err(|hit| format!("on the way up {hit}"))?;
+        for (axis, to, _) in turns {
+            self.scene.clear_turn(&here, *axis, *to).map_err(|hit| format!("as {axis} turns to {to} {hit}"))?;
+            here.set(*axis, *to);
+        }
+        self.lateral(&here, &first.start).map(|_| ())
+    }
+
+    /// The first moves: nobody knows where the machine stands.
+    fn begin(&mut self, setup_step: Step, setup: &Setup, turns: &[Turn], first: &Reached) -> Result<()> {
+        let lift = self.lift;
+        let anywhere = self.scene.clear_from_anywhere(&lift, &|a| a.range);
+        if !anywhere {
+            let near = StartNear { pose: setup.pose, within_deg: self.overshoot_deg };
+            if !self.scene.clear_from_anywhere(&lift, &|a| near.window(a)) {
+                return Err(Failure::new(
+                    "program::no_start",
+                    format!("{} at the top of its range does not lift the probe over everything", lift.axis),
+                )
+                .help(
+                    "a longer range, a lower artefact or a shorter stylus: the first moves must be clear wherever the \
+                       machine stands",
+                ));
+            }
+            self.out.path.start_near = Some(near);
+        }
+        self.push(setup_step);
+        // half of its range, for want of a place to count from
+        let half = |a: AxisName| self.scene.machine.axis(a).map_or(0.0, |a| (a.range[1] - a.range[0]) / 2.0);
+        self.clock.rapid(half(lift.axis));
+        self.push(Step::Rapid { to: AxisMap::default().with(lift.axis, lift.top) });
+        self.orient(setup);
+        for turn in turns {
+            self.clock.rotary(half(turn.0));
+            self.turn(turn);
+        }
+        self.visit += 1;
+        let mut at = first.start;
+        at.set(lift.axis, lift.top);
+        for axis in self.across() {
+            self.clock.rapid(half(axis));
+            self.push(Step::Rapid { to: AxisMap::default().with(axis, at.get(axis)) });
+        }
+        self.at = Some(at);
+        Ok(())
+    }
+
+    fn orient(&mut self, setup: &Setup) {
+        let deg = setup.spec.spindle_deg.or(self.spindle_deg).unwrap_or(0.0);
+        if self.spindle_deg != Some(deg) {
+            self.push(Step::OrientSpindle { deg });
+            self.spindle_deg = Some(deg);
+        }
+    }
+
+    /// The turns that bring each rotary axis to the pose in the sense that is wanted.
+    fn turns(&self, setup: &Setup) -> Result<Vec<Turn>, String> {
+        let mut turns = Vec::new();
+        for axis in self.scene.machine.rotary() {
+            let (name, [low, high]) = (axis.name, axis.range);
+            let target = setup.pose.get(name).unwrap_or(0.0);
+            let wanted = setup.spec.from.value.get(name);
+            let past = |sense: f64| {
+                let before = target - sense * self.overshoot_deg;
+                (low..=high).contains(&before).then_some(before).ok_or_else(|| {
+                    format!(
+                        "{name} cannot come to {target} deg with {} angles: its range ends at {}",
+                        if sense > 0.0 { "rising" } else { "falling" },
+                        if sense > 0.0 { low } else { high },
+                    )
+                })
+            };
+            let Some(at) = self.at else {
+                // from an unknown angle: past the pose on one side, then to it in a sense that is known
+                let sense = wanted.unwrap_or(if past(1.0).is_ok() { 1.0 } else { -1.0 });
+                turns.push((name, past(sense)?, None));
+                turns.push((name, target, Some(sense)));
+                continue;
+            };
+            let way = target - at.get(name);
+            if way.abs() < SAME {
+                if let Some(sense) = wanted.filter(|w| self.senses.get(name) != Some(*w)) {
+                    turns.push((name, past(sense)?, Some(-sense)));
+                    turns.push((name, target, Some(sense)));
+                }
+                continue;
+            }
+            let natural = way.signum();
+            match wanted {
+                Some(sense) if sense != natural => {
+                    turns.push((name, past(sense)?, Some(natural)));
+                    turns.push((name, target, Some(sense)));
+                }
+                _ => turns.push((name, target, Some(natural))),
+            }
+        }
+        Ok(turns)
+    }
+
+    fn turn(&mut self, (axis, to, sense): &Turn) {
+        let mut senses = AxisMap::default();
+        if let Some(sense) = sense {
+            senses.set(*axis, *sense);
+            self.senses.set(*axis, *sense);
+        }
+        if let Some(at) = &mut self.at {
+            self.clock.rotary((to - at.get(*axis)).abs());
+            at.set(*axis, *to);
+        }
+        self.push(Step::Rotary { to: AxisMap::default().with(*axis, *to), sense: senses });
+    }
+
+    /// The linear axes other than the lift.
+    fn across(&self) -> impl Iterator<Item = AxisName> + use<> {
+        let lift = self.lift.axis;
+        [AxisName::X, AxisName::Y, AxisName::Z].into_iter().filter(move |a| *a != lift)
+    }
+
+    /// Rapids across at the height of `from`, one axis at a time: the order in which they are clear.
+    fn lateral(&self, from: &Position, to: &Position) -> Result<Vec<AxisName>, String> {
+        let forth: Vec<AxisName> = self.across().filter(|a| (to.get(*a) - from.get(*a)).abs() > SAME).collect();
+        let back: Vec<AxisName> = forth.iter().rev().copied().collect();
+        let try_order = |order: &[AxisName]| {
+            let mut here = *from;
+            for axis in order {
+                let mut next = here;
+                next.set(*axis, to.get(*axis));
+                self.scene.inside_limits(&next)?;
+                self.scene.clear_straight(&here, &next, Manner::Rapid).map_err(|hit| hit.to_string())?;
+                here = next;
+            }
+            Ok(())
+        };
+        try_order(&forth).map(|()| forth).or_else(|reason: String| try_order(&back).map(|()| back).map_err(|_| reason))
+    }
+
+    /// From where the ball stands over to a touch's start: up, across, down.
+    fn travel(&mut self, start: &Position) -> Result<(), String> {
+        let Some(at) = self.at else { return Err("the machine does not stand at a known place".to_owned()) };
+        if at == *start {
+            return Ok(());
+        }
+        let lift = self.lift;
+        let here = lift.height(&at);
+        let least = here.max(lift.height(start)) + SHORTEST_PROTECTED_MM;
+        // low over the blocks where that is clear, over everything where it is not; from high up straight across
+        let candidates = if here >= self.heights.over_all {
+            [here, here]
+        } else {
+            [least.max(self.heights.over_blocks), least.max(self.heights.over_all)]
+        };
+        let mut reason = String::new();
+        for height in candidates {
+            match self.over(&at, start, height) {
+                Ok((above_here, order, above_start)) => {
+                    if height > here {
+                        self.protected(&above_here);
+                    }
+                    for axis in order {
+                        self.rapid(axis, start.get(axis));
+                    }
+                    // no closer than everything allows at rapid, the rest protected
+                    let low = self.heights.over_all.max(lift.height(start) + SHORTEST_PROTECTED_MM);
+                    if lift.height(&above_start) > low + SAME {
+                        self.rapid(lift.axis, lift.coordinate(low));
+                    }
+                    self.protected(start);
+                    return Ok(());
+                }
+                Err(e) => reason = e,
+            }
+        }
+        Err(format!("no clear way there: {reason}"))
+    }
+
+    /// Proves up, across and down through a height.
+    fn over(
+        &self,
+        at: &Position,
+        start: &Position,
+        height: f64,
+    ) -> Result<(Position, Vec<AxisName>, Position), String> {
+        let [mut above_here, mut above_start] = [*at, *start];
+        for above in [&mut above_here, &mut above_start] {
+            above.set(self.lift.axis, self.lift.coordinate(height));
+            self.scene.inside_limits(above)?;
+        }
+        self.scene.clear_straight(at, &above_here, Manner::Guarded).map_err(|hit| hit.to_string())?;
+        let order = self.lateral(&above_here, &above_start)?;
+        self.scene.clear_straight(&above_start, start, Manner::Guarded).map_err(|hit| hit.to_string())?;
+        Ok((above_here, order, above_start))
+    }
+
+    /// Up to a height where the ball stands: protected until it is over everything, at rapid from there on.
+    fn rise(&mut self, height: f64) {
+        let Some(mut to) = self.at else { return };
+        let here = self.lift.height(&to);
+        let guarded = height.min(self.heights.over_all.max(here + SHORTEST_PROTECTED_MM));
+        if guarded > here + SAME && here < self.heights.over_all - SAME {
+            to.set(self.lift.axis, self.lift.coordinate(guarded));
+            self.protected(&to);
+        }
+        if height > self.lift.height(&to) + SAME {
+            self.rapid(self.lift.axis, self.lift.coordinate(height));
+        }
+    }
+
+    fn protected(&mut self, to: &Position) {
+        let Some(at) = self.at else { return };
+        let feed = self.scene.machine.probe.position_feed;
+        let (from, to_map) = (linear(&at), linear(to));
+        self.clock.feed(distance_mm(&from, &to_map), feed);
+        let mut moved = AxisMap::default();
+        for (axis, value) in to_map.iter().filter(|(a, v)| (v - at.get(*a)).abs() > SAME) {
+            moved.set(axis, value);
+        }
+        self.push(Step::Protected { to: moved, feed });
+        self.at = Some(*to);
+    }
+
+    fn rapid(&mut self, axis: AxisName, to: f64) {
+        if let Some(at) = &mut self.at {
+            self.clock.rapid((to - at.get(axis)).abs());
+            at.set(axis, to);
+        }
+        self.push(Step::Rapid { to: AxisMap::default().with(axis, to) });
+    }
+
+    fn touch(&mut self, setup: &Setup, target: &Target, reached: &Reached, repeat: u32) {
+        let probe = &self.scene.machine.probe;
+        let id = self.out.touches.len() as u64 + 1;
+        let block = self.layout.mounting.blocks.get(target.block).map(|b| b.name.clone()).unwrap_or_default();
+        let first = self.met.get_mut(target.block).is_some_and(|met| !std::mem::replace(met, true));
+        let measure_feed = setup.spec.feed_mm_min.unwrap_or(probe.slow_feed);
+        let step = TouchStep {
+            id,
+            says: format!("block {block} face {}", target.face),
+            start: linear(&reached.start),
+            nominal: linear(&reached.nominal),
+            end: linear(&reached.end),
+            pose: setup.pose,
+            first,
+            tolerance_mm: probe.placement_tolerance,
+            // an unknown block is met slowly: nobody can say yet where it stands
+            search_feed: if first { probe.slow_feed } else { probe.fast_feed },
+            measure_feed,
+            back_off_mm: probe.back_off,
+        };
+        self.clock.touch(&step);
+        self.out.touches.push(PlanTouch {
+            id,
+            stage: setup.spec.stage.clone(),
+            repeat,
+            carrier: self.layout.mounting.carrier.to_string(),
+            mounting: None,
+            block,
+            face: target.face.to_string(),
+            point: target.point.into(),
+            normal: target.normal.into(),
+            pose: setup.pose,
+            start: step.start,
+            nominal: step.nominal,
+            end: step.end,
+            time_s: Some(self.clock.rounded_s()),
+            visit: Some(self.visit),
+            feed_mm_min: Some(measure_feed),
+            spindle_deg: setup.spec.spindle_deg.or(self.spindle_deg.filter(|deg| *deg != 0.0)),
+            tool_length_mm: None,
+            ball_radius_mm: None,
+            from: self.senses,
+            first,
+        });
+        let to = step.start;
+        self.clock.feed(distance_mm(&step.nominal, &to), probe.position_feed);
+        self.push(Step::Touch(step));
+        self.push(Step::Retract { to, feed: probe.position_feed });
+    }
+
+    /// Up and away at the end.
+    fn leave(&mut self) {
+        if self.at.is_some() {
+            self.rise(self.heights.over_all);
+            self.rapid(self.lift.axis, self.lift.top);
+        }
+    }
+
+    fn push(&mut self, step: Step) {
+        self.out.path.steps.push(step);
+    }
+}
+
+/// The linear axes of a position.
+fn linear(at: &Position) -> AxisMap {
+    let p = at.xyz_mm();
+    AxisMap::xyz(p.x, p.y, p.z)
+}
+
+/// A set-up in words.
+fn setup_says(setup: &Setup) -> String {
+    let pose: Vec<String> = setup.pose.iter().map(|(a, v)| format!("{a} {v}")).collect();
+    format!("{}, {}", setup.spec.stage, pose.join(" "))
+}

@@ -1,0 +1,255 @@
+//! Everything that can collide: ball, stem, body and head on the tool side; blocks, risers, plates and tables on the
+//! workpiece side; and the distances between them. Shapes and distances are parry3d's.
+//!
+//! What is not modelled is not protected: cables, a door, the column, and whatever else the machine's file does not name.
+
+use crate::axes::{AxisName, Position};
+use crate::diag::{Failure, Result};
+use crate::geometry::{Transform, apply};
+use crate::machine::{Axis, Carrier, Machine, Mounting, Shape, Side};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::{Pose, Rot3, Vec3};
+use parry3d_f64::query;
+use parry3d_f64::shape::SharedShape;
+
+/// Lengths beyond this (1 km) are a slip of the pen, and the distance algorithm would overflow on them.
+const LARGEST_LENGTH_MM: f64 = 1e6;
+
+/// A piece of the probe, head included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// The spindle head from the probe's body up to the pivot.
+    Head,
+    /// The probe's body.
+    Body,
+    /// The stem.
+    Stem,
+    /// The ball.
+    Ball,
+}
+
+impl std::fmt::Display for Part {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Head => "head",
+            Self::Body => "probe body",
+            Self::Stem => "stem",
+            Self::Ball => "ball",
+        })
+    }
+}
+
+/// What a solid of the workpiece side is: it decides how much room it is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A block, by its place in the mounting: it may stand off by the placement tolerance.
+    Block(usize),
+    /// A riser or plate of the mounting: it was set up together with the blocks.
+    Mounted,
+    /// A part of the machine.
+    Fixed,
+}
+
+/// A convex shape on a body of the machine.
+pub(super) struct Solid {
+    shape: SharedShape,
+    /// In the body's frame (R with all axes at 0).
+    local: Isometry3<f64>,
+    /// Radius of the sphere about the shape's own origin that holds it, mm.
+    reach: f64,
+}
+
+impl Solid {
+    fn new(shape: SharedShape, local: Isometry3<f64>, reach: f64) -> Self {
+        Self { shape, local, reach }
+    }
+
+    fn ball(centre: Vector3<f64>, radius: f64) -> Self {
+        Self::new(SharedShape::ball(radius), Translation3::from(centre).into(), radius)
+    }
+
+    fn cuboid(centre: Vector3<f64>, size: Vector3<f64>) -> Self {
+        let half = size / 2.0;
+        Self::new(SharedShape::cuboid(half.x, half.y, half.z), Translation3::from(centre).into(), half.norm())
+    }
+
+    fn cylinder(foot: Vector3<f64>, direction: &Unit<Vector3<f64>>, radius: f64, height: f64) -> Self {
+        // parry's cylinders stand along y
+        let turn = UnitQuaternion::rotation_between_axis(&Vector3::y_axis(), direction)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+        let centre = foot + direction.into_inner() * (height / 2.0);
+        Self::new(
+            SharedShape::cylinder(height / 2.0, radius),
+            Isometry3::from_parts(Translation3::from(centre), turn),
+            radius.hypot(height / 2.0),
+        )
+    }
+
+    /// Centre of the sphere that holds it, in R, mm.
+    pub(super) fn centre(&self, body: &Transform) -> Vector3<f64> {
+        apply(body, &self.local.translation.vector)
+    }
+
+    /// Radius of that sphere, mm.
+    pub(super) fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// The box along R's axes that holds it.
+    pub(super) fn aabb(&self, body: &Transform) -> Aabb {
+        self.shape.compute_aabb(&parry(&(body * self.local)))
+    }
+
+    /// How far it extends along a direction, mm from R's origin.
+    pub(super) fn extent(&self, body: &Transform, direction: &Vector3<f64>) -> f64 {
+        let at = body * self.local;
+        let d = at.inverse_transform_vector(direction);
+        let support = self.shape.as_support_map().map_or(self.reach, |s| {
+            let p = s.local_support_point(Vec3::new(d.x, d.y, d.z));
+            Vector3::new(p.x, p.y, p.z).dot(&d)
+        });
+        at.translation.vector.dot(direction) + support
+    }
+}
+
+/// A solid of the workpiece side.
+pub(super) struct Obstacle {
+    pub(super) name: String,
+    pub(super) role: Role,
+    /// Place in [`Scene::carriers`].
+    pub(super) carrier: usize,
+    pub(super) solid: Solid,
+}
+
+/// Machine and artefact as solids.
+pub struct Scene<'m> {
+    /// The machine.
+    pub machine: &'m Machine,
+    pub(super) parts: Vec<(Part, Solid)>,
+    pub(super) obstacles: Vec<Obstacle>,
+    pub(super) carriers: Vec<Carrier>,
+}
+
+/// Where the bodies of the machine are: the tool and each carrier of obstacles, in R.
+#[derive(Debug, Clone)]
+pub struct Placement {
+    pub(super) tool: Transform,
+    pub(super) carriers: Vec<Transform>,
+}
+
+impl<'m> Scene<'m> {
+    /// The solids of a machine with an artefact mounted.
+    ///
+    /// # Errors
+    /// When a length is so large that distances cannot be computed.
+    pub fn new(machine: &'m Machine, mounting: &Mounting) -> Result<Self> {
+        let probe = &machine.probe;
+        let up = &machine.tool.direction;
+        let ball = machine.tool.ball_at_zero(machine.tool.length_mm);
+        let along = |mm: f64| ball + up.into_inner() * mm;
+        let body_foot = probe.stem_length;
+        let head_foot = body_foot + probe.body_length;
+        let head_height = machine.tool.length_mm - head_foot;
+        let mut parts = Vec::new();
+        // a probe that reaches up to the pivot leaves no room for a head
+        if head_height > 1e-3 {
+            parts.push((Part::Head, Solid::cylinder(along(head_foot), up, probe.head_radius, head_height)));
+        }
+        parts.push((Part::Body, Solid::cylinder(along(body_foot), up, probe.body_radius, probe.body_length)));
+        parts.push((Part::Stem, Solid::cylinder(ball, up, probe.stem_radius, probe.stem_length)));
+        parts.push((Part::Ball, Solid::ball(ball, probe.ball_radius)));
+
+        let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: Vec::new() };
+        for (i, block) in mounting.blocks.iter().enumerate() {
+            let solid = Solid::cuboid(block.centre, block.size);
+            scene.add(format!("block {}", block.name), Role::Block(i), mounting.carrier, solid);
+        }
+        for (role, solids) in [(Role::Mounted, &mounting.solids), (Role::Fixed, &machine.solids)] {
+            for s in solids {
+                let solid = match &s.shape {
+                    Shape::Box { centre, size } => Solid::cuboid(*centre, *size),
+                    Shape::Cylinder { foot, direction, radius, height } => {
+                        Solid::cylinder(*foot, direction, *radius, *height)
+                    }
+                };
+                scene.add(s.name.clone(), role, s.carrier, solid);
+            }
+        }
+        let lengths = scene.parts.iter().map(|(_, s)| s).chain(scene.obstacles.iter().map(|o| &o.solid));
+        let axes = machine.axes.iter().flat_map(|a| [a.point.norm(), a.range[0].abs(), a.range[1].abs()]);
+        let largest = lengths.map(|s| s.local.translation.vector.norm() + s.reach).chain(axes).fold(0.0, f64::max);
+        if largest.is_nan() || largest >= LARGEST_LENGTH_MM {
+            return Err(Failure::new(
+                "program::too_large",
+                format!("a place, size or range of {} reaches {largest:e} mm", machine.name),
+            )
+            .help("lengths in the machine's file are millimetres: correct the largest one"));
+        }
+        Ok(scene)
+    }
+
+    fn add(&mut self, name: String, role: Role, carrier: Carrier, solid: Solid) {
+        let carrier = self.carriers.iter().position(|c| *c == carrier).unwrap_or_else(|| {
+            self.carriers.push(carrier);
+            self.carriers.len() - 1
+        });
+        self.obstacles.push(Obstacle { name, role, carrier, solid });
+    }
+
+    /// Places all bodies.
+    #[must_use]
+    pub fn place(&self, at: &Position) -> Placement {
+        Placement {
+            tool: self.machine.tool_frame(at),
+            carriers: self.carriers.iter().map(|c| self.machine.carrier_frame(*c, at)).collect(),
+        }
+    }
+
+    /// Distance between a part and an obstacle, mm; 0 when they overlap.
+    pub(super) fn gap(&self, part: &Solid, obstacle: &Obstacle, placed: &Placement) -> f64 {
+        let Some(carrier) = placed.carriers.get(obstacle.carrier) else { return 0.0 };
+        let (a, b) = (placed.tool * part.local, carrier * obstacle.solid.local);
+        // a pair that parry cannot compare counts as touching: refused, never let through
+        query::distance(&parry(&a), part.shape.as_ref(), &parry(&b), obstacle.solid.shape.as_ref())
+            .map_or(0.0, |d| if d.distance.is_finite() { d.distance } else { 0.0 })
+    }
+
+    /// The line of a rotary axis in R: a point of it and its direction.
+    pub(super) fn axis_line(&self, axis: &Axis, at: &Position) -> (Vector3<f64>, Vector3<f64>) {
+        let before = self
+            .machine
+            .side(axis.side)
+            .take_while(|a| a.name != axis.name)
+            .fold(Transform::identity(), |t, a| t * a.motion(at));
+        (apply(&before, &axis.point), before.rotation * axis.direction.into_inner())
+    }
+
+    /// True when a rotary axis moves this carrier of obstacles.
+    pub(super) fn carries(&self, axis: AxisName, carrier: usize) -> bool {
+        self.carriers.get(carrier).is_some_and(|c| self.machine.carrier_chain(*c).iter().any(|a| a.name == axis))
+    }
+
+    /// Upper bound of the distance from an axis's line of any point of a solid, mm.
+    pub(super) fn radius_about(line: &(Vector3<f64>, Vector3<f64>), solid: &Solid, body: &Transform) -> f64 {
+        let from_line = solid.centre(body) - line.0;
+        (from_line - line.1 * from_line.dot(&line.1)).norm() + solid.reach()
+    }
+
+    /// Which side an axis is on.
+    pub(super) fn side_of(&self, axis: AxisName) -> Option<Side> {
+        self.machine.axis(axis).map(|a| a.side)
+    }
+}
+
+/// A transform as parry takes it.
+fn parry(t: &Transform) -> Pose {
+    let (p, q) = (&t.translation.vector, t.rotation.coords);
+    Pose::from_parts(Vec3::new(p.x, p.y, p.z), Rot3::from_xyzw(q.x, q.y, q.z, q.w))
+}
+
+/// Lower bound of the distance between what two boxes hold, mm.
+pub(super) fn box_gap(a: &Aabb, b: &Aabb) -> f64 {
+    let apart = (a.mins - b.maxs).max(b.mins - a.maxs).max(Vec3::ZERO);
+    apart.length()
+}

@@ -1,0 +1,372 @@
+//! The proof of a finished path: walked step by step, knowing only the machine, the plan and the steps.
+//!
+//! It shares shapes and distances with the routing, and none of its choices: not its heights, not its order, not what it
+//! believed to be clear. Every move is checked against limits and against collision over its whole length, every touch
+//! against the plan, every turn for its sense.
+
+use super::path::{Path, Step, TouchStep};
+use super::plan::{Plan, PlanTouch};
+use super::scene::Scene;
+use super::sweep::Manner;
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::diag::Result;
+use crate::machine::Machine;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Places that differ by less are the same, mm or deg.
+const SAME: f64 = 1e-6;
+
+/// What is wrong with a path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// Place in [`Path::steps`], from 0.
+    pub step: usize,
+    /// What is wrong there.
+    pub says: String,
+}
+
+/// Walks a path and reports everything in it that could break a probe or that the plan does not ask for.
+///
+/// # Errors
+/// When the plan names a mounting that the machine lacks, or the machine's lengths cannot be computed with.
+pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violation>> {
+    let mounting = machine.mounting(&plan.mounting).ok_or_else(|| {
+        crate::diag::Failure::new(
+            "program::unknown_mounting",
+            format!("the plan is for mounting {:?}, which {} lacks", plan.mounting, machine.name),
+        )
+        .help("plan and machine belong together: make the plan again")
+    })?;
+    let scene = Scene::new(machine, mounting)?;
+    let mut walk = Walk {
+        scene: &scene,
+        plan,
+        at: AxisMap::default(),
+        senses: AxisMap::default(),
+        in_contact: None,
+        at_start_of: None,
+        next_touch: 0,
+        moves: Vec::new(),
+        violations: Vec::new(),
+        start_near: path.start_near.as_ref(),
+        anywhere: None,
+    };
+    for (i, step) in path.steps.iter().enumerate() {
+        walk.step(i, step);
+    }
+    if walk.in_contact.is_some() {
+        walk.violation(path.steps.len().saturating_sub(1), "the path ends with the ball at a block".to_owned());
+    }
+    for touch in plan.touches.iter().skip(walk.next_touch) {
+        let says = format!("touch {} of the plan is not made", touch.id);
+        walk.violations.push(Violation { step: path.steps.len(), says });
+    }
+    let mut violations = walk.violations;
+    // each by itself, in the order of the path whatever order the threads take
+    let found: Vec<Option<Violation>> = walk.moves.par_iter().map(|m| m.check(&scene)).collect();
+    violations.extend(found.into_iter().flatten());
+    violations.sort_by_key(|v| v.step);
+    Ok(violations)
+}
+
+/// A move whose ends are known.
+struct Move {
+    step: usize,
+    from: Position,
+    to: Position,
+    how: How,
+}
+
+enum How {
+    Straight(Manner),
+    /// Several axes at rapid: each by its own speed, anywhere in the box that they span.
+    Spanned,
+    Turn(AxisName),
+}
+
+impl Move {
+    fn check(&self, scene: &Scene) -> Option<Violation> {
+        let proven = match &self.how {
+            How::Straight(manner) => scene.clear_straight(&self.from, &self.to, *manner),
+            How::Turn(axis) => scene.clear_turn(&self.from, *axis, self.to.get(*axis)),
+            How::Spanned => scene.clear_box(&self.from, &self.to),
+        };
+        proven.err().map(|hit| Violation { step: self.step, says: hit.to_string() })
+    }
+}
+
+struct Walk<'a, 'm> {
+    scene: &'a Scene<'m>,
+    plan: &'a Plan,
+    /// The axes whose place is known.
+    at: AxisMap,
+    senses: AxisMap,
+    /// The start of the touch that was just made: the ball may still press.
+    in_contact: Option<AxisMap>,
+    /// Start of the touch at which the ball stands and from which it may search.
+    at_start_of: Option<AxisMap>,
+    next_touch: usize,
+    moves: Vec<Move>,
+    violations: Vec<Violation>,
+    start_near: Option<&'a super::path::StartNear>,
+    /// Whether moves from an unknown place are proven clear; computed when it is first asked for.
+    anywhere: Option<bool>,
+}
+
+impl Walk<'_, '_> {
+    fn violation(&mut self, step: usize, says: String) {
+        self.violations.push(Violation { step, says });
+    }
+
+    fn step(&mut self, i: usize, step: &Step) {
+        let moves = !matches!(step, Step::Note(_) | Step::Setup { .. });
+        if moves && self.in_contact.is_some() && !matches!(step, Step::Retract { .. }) {
+            self.violation(i, "the ball may still press against the block: a retract must come first".to_owned());
+            self.in_contact = None;
+        }
+        match step {
+            Step::Note(_) | Step::Setup { .. } | Step::OrientSpindle { .. } => {}
+            Step::Rapid { to } => self.linear(i, to, None),
+            Step::Protected { to, feed } => self.linear(i, to, Some(*feed)),
+            Step::Rotary { to, sense } => self.rotary(i, to, sense),
+            Step::Touch(touch) => self.touch(i, touch),
+            Step::Retract { to, feed } => self.retract(i, to, *feed),
+        }
+    }
+
+    /// The full position, when every axis of the machine is known.
+    fn known(&self) -> Option<Position> {
+        let all = self.scene.machine.axes.iter().all(|a| self.at.get(a.name).is_some());
+        all.then(|| self.at.position())
+    }
+
+    fn inside(&mut self, i: usize, to: &AxisMap) {
+        for (name, value) in to.iter() {
+            match self.scene.machine.axis(name).map(|a| a.range) {
+                None => self.violation(i, format!("the machine has no axis {name}")),
+                Some([low, high]) if value >= low - SAME && value <= high + SAME => {}
+                Some([low, high]) => {
+                    let origin = self.scene.machine.origin.get(name).unwrap_or(0.0);
+                    let says = format!(
+                        "{name} = {:.3} is outside the range of the axis ({} to {})",
+                        value + origin,
+                        low + origin,
+                        high + origin
+                    );
+                    self.violation(i, says);
+                }
+            }
+        }
+    }
+
+    fn linear(&mut self, i: usize, to: &AxisMap, feed: Option<f64>) {
+        self.inside(i, to);
+        if to.iter().any(|(a, _)| a.is_rotary()) {
+            self.violation(i, "a move of linear axes turns a rotary axis".to_owned());
+        }
+        if feed.is_some_and(|f| !(f > 0.0 && f <= self.scene.machine.probe.position_feed)) {
+            self.violation(i, "a protected move is faster than the machine's position_feed".to_owned());
+        }
+        let before = self.known();
+        match before {
+            Some(from) => {
+                let end = to.or(&self.at).position();
+                let moving = to.iter().filter(|(a, v)| (v - from.get(*a)).abs() > SAME).count();
+                let how = match feed {
+                    Some(_) => How::Straight(Manner::Guarded),
+                    None if moving > 1 => How::Spanned,
+                    None => How::Straight(Manner::Rapid),
+                };
+                self.moves.push(Move { step: i, from, to: end, how });
+            }
+            None => self.unknown_start(i, to, feed.is_some()),
+        }
+        self.at = to.or(&self.at);
+        self.at_start_of = feed.and(Some(self.at));
+    }
+
+    /// A move while the place of some axis is not known: only up to the top, and then whatever is clear from anywhere.
+    fn unknown_start(&mut self, i: usize, to: &AxisMap, protected: bool) {
+        let Some(lift) = self.scene.lift() else { return };
+        let at_top = self.at.get(lift.axis) == Some(lift.top);
+        let only: Vec<(AxisName, f64)> = to.iter().collect();
+        if protected || only.len() != 1 {
+            self.violation(i, "from an unknown place one axis moves at a time".to_owned());
+        } else if !at_top && only != [(lift.axis, lift.top)] {
+            self.violation(
+                i,
+                format!("the first move must take {} to its top: nobody knows where the machine stands", lift.axis),
+            );
+        } else if at_top && !self.clear_anywhere() {
+            self.violation(i, "the way from an unknown place is not proven clear".to_owned());
+        }
+    }
+
+    fn clear_anywhere(&mut self) -> bool {
+        if let Some(known) = self.anywhere {
+            return known;
+        }
+        let Some(lift) = self.scene.lift() else { return false };
+        let clear = self.scene.clear_from_anywhere(&lift, &|a| match self.start_near {
+            Some(near) => near.window(a),
+            None => a.range,
+        });
+        self.anywhere = Some(clear);
+        clear
+    }
+
+    fn rotary(&mut self, i: usize, to: &AxisMap, sense: &AxisMap) {
+        self.inside(i, to);
+        self.at_start_of = None;
+        if to.iter().count() != 1 {
+            self.violation(i, "rotary axes move one at a time".to_owned());
+        }
+        for (axis, target) in to.iter() {
+            if !axis.is_rotary() {
+                self.violation(i, format!("{axis} is no rotary axis"));
+                continue;
+            }
+            match self.at.get(axis) {
+                Some(angle) => {
+                    let way = target - angle;
+                    if sense.get(axis) != Some(way.signum()) || way.abs() < SAME {
+                        let says =
+                            format!("{axis} goes from {angle} to {target}, and its sense says {:?}", sense.get(axis));
+                        self.violation(i, says);
+                    }
+                }
+                None if sense.get(axis).is_some() => {
+                    self.violation(i, format!("{axis} is to turn in a given sense from an unknown angle"));
+                }
+                None => {}
+            }
+            match self.known() {
+                Some(from) => {
+                    let mut end = from;
+                    end.set(axis, target);
+                    self.moves.push(Move { step: i, from, to: end, how: How::Turn(axis) });
+                    self.moves.push(Move { step: i, from, to: from, how: How::Straight(Manner::Rapid) });
+                }
+                None => {
+                    let lift = self.scene.lift();
+                    if lift.is_none_or(|l| self.at.get(l.axis) != Some(l.top)) || !self.clear_anywhere() {
+                        self.violation(i, format!("{axis} turns where it is not proven clear"));
+                    }
+                }
+            }
+            self.at.set(axis, target);
+            if let Some(s) = sense.get(axis) {
+                self.senses.set(axis, s);
+            }
+        }
+    }
+
+    fn touch(&mut self, i: usize, touch: &TouchStep) {
+        let Some(planned) = self.plan.touches.get(self.next_touch) else {
+            self.violation(i, format!("touch {} is not in the plan", touch.id));
+            return;
+        };
+        self.next_touch += 1;
+        if planned.id != touch.id {
+            self.violation(i, format!("touch {} comes where the plan has touch {}", touch.id, planned.id));
+        }
+        let Some(at) = self.known() else {
+            self.violation(i, format!("touch {} begins at an unknown place", touch.id));
+            return;
+        };
+        for says in self.against_plan(&at, touch, planned) {
+            self.violation(i, format!("touch {}: {says}", touch.id));
+        }
+        if self.at_start_of.is_none() {
+            self.violation(i, format!("touch {}: the ball did not come to the start by a protected move", touch.id));
+        }
+        let block = self.scene_block(planned);
+        match block {
+            Some(b) => {
+                let [nominal, end] = [touch.nominal, touch.end].map(|m| m.or(&touch.pose).position());
+                self.moves.push(Move { step: i, from: at, to: nominal, how: How::Straight(Manner::ToContact(b)) });
+                self.moves.push(Move { step: i, from: nominal, to: end, how: How::Straight(Manner::PastContact(b)) });
+            }
+            None => self.violation(i, format!("touch {}: the mounting has no block {:?}", touch.id, planned.block)),
+        }
+        self.inside(i, &touch.end);
+        self.in_contact = Some(touch.start);
+    }
+
+    fn scene_block(&self, planned: &PlanTouch) -> Option<usize> {
+        let mounting = self.scene.machine.mounting(&self.plan.mounting)?;
+        mounting.blocks.iter().position(|b| b.name == planned.block)
+    }
+
+    /// What in a touch differs from the plan, from the errorless machine, or from what the probe can bear.
+    fn against_plan(&self, at: &Position, touch: &TouchStep, planned: &PlanTouch) -> Vec<String> {
+        let machine = self.scene.machine;
+        let probe = &machine.probe;
+        let mut says = Vec::new();
+        let mut need = |good: bool, text: &str| {
+            if !good {
+                says.push(text.to_owned());
+            }
+        };
+        need(near(at, &touch.start.or(&touch.pose).position()), "the ball does not stand at its start");
+        let same = |a: &AxisMap, b: &AxisMap| near(&a.position(), &b.position());
+        need(same(&touch.start, &planned.start), "its start is not the plan's");
+        need(same(&touch.nominal, &planned.nominal), "its nominal place is not the plan's");
+        need(same(&touch.end, &planned.end), "its end is not the plan's");
+        need(same(&touch.pose, &planned.pose), "its pose is not the plan's");
+        need(
+            planned.from.iter().all(|(a, s)| self.senses.get(a) == Some(s)),
+            "an axis came in another sense than planned",
+        );
+        // the geometry from the carrier's frame, not from the plan's own numbers
+        let carrier = machine.carrier(&planned.carrier);
+        let normal = Vector3::from(planned.normal);
+        let contact = Vector3::from(planned.point);
+        let off_face = |m: &AxisMap| {
+            let position = m.or(&touch.pose).position();
+            let ball = carrier.map(|c| machine.ball_in(c, &position, machine.tool.length_mm)).unwrap_or_default();
+            let from_contact = ball - contact;
+            let along = from_contact.dot(&normal);
+            (along - probe.ball_radius, (from_contact - normal * along).norm())
+        };
+        let [start, nominal, end] = [&touch.start, &touch.nominal, &touch.end].map(off_face);
+        need([start, nominal, end].iter().all(|(_, aside)| *aside < SAME), "it does not run along the face's normal");
+        need(nominal.0.abs() < SAME, "the nominal place does not touch the face");
+        need(start.0 > probe.placement_tolerance + probe.clearance, "it begins too near to the face");
+        need(-end.0 >= probe.placement_tolerance, "it ends before a block at the placement tolerance would be met");
+        need(
+            -end.0 + probe.placement_tolerance <= probe.overtravel + SAME,
+            "it could push the probe past its overtravel",
+        );
+        need(touch.tolerance_mm <= probe.placement_tolerance + SAME, "its tolerance is wider than the probe's");
+        need(touch.search_feed > 0.0 && touch.search_feed <= probe.fast_feed, "its search is faster than fast_feed");
+        need(!touch.first || touch.search_feed <= probe.slow_feed, "the first touch of a block must search slowly");
+        need(touch.measure_feed > 0.0 && touch.back_off_mm > 0.0, "its feeds and ways must be more than 0");
+        need(touch.back_off_mm < start.0, "it backs off past its start");
+        let met = self.plan.touches.iter().take(self.next_touch - 1).any(|t| t.block == planned.block);
+        need(met || touch.first, "it is the first touch of its block and is not marked so");
+        says
+    }
+
+    fn retract(&mut self, i: usize, to: &AxisMap, feed: f64) {
+        match self.in_contact.take() {
+            None => self.violation(i, "a retract without a touch before it".to_owned()),
+            Some(start) => {
+                let full = |m: &AxisMap| m.or(&self.at).position();
+                if !near(&full(to), &full(&start)) {
+                    self.violation(i, "the retract does not end at the touch's start".to_owned());
+                }
+                if !(feed > 0.0 && feed <= self.scene.machine.probe.position_feed) {
+                    self.violation(i, "a retract is faster than the machine's position_feed".to_owned());
+                }
+            }
+        }
+        self.at = to.or(&self.at);
+        self.at_start_of = Some(self.at);
+    }
+}
+
+fn near(a: &Position, b: &Position) -> bool {
+    a.0.iter().zip(b.0).all(|(x, y)| (x - y).abs() < SAME)
+}

@@ -1,0 +1,126 @@
+//! The answer of `identify` as a table with its remarks.
+
+use crate::fit::outcome::{Outcome, Parameter, Status};
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
+
+/// A table in the house's form.
+#[must_use]
+pub fn table(head: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_header(head.iter().map(|h| Cell::new(h)));
+    table
+}
+
+/// A right-aligned cell.
+#[must_use]
+pub fn number(text: impl ToString) -> Cell {
+    Cell::new(text.to_string()).set_alignment(CellAlignment::Right)
+}
+
+/// Value and uncertainty with the digits that the uncertainty leaves: two significant ones of it.
+#[must_use]
+pub fn digits(value: f64, sigma: Option<f64>) -> String {
+    let decimals = match sigma {
+        Some(s) if s > 0.0 && s.is_finite() => (1 - s.log10().floor() as i32).clamp(0, 12) as usize,
+        _ => 6,
+    };
+    format!("{value:.decimals$}")
+}
+
+/// The whole answer.
+#[must_use]
+pub fn outcome(o: &Outcome) -> String {
+    let mut out = String::new();
+    out += &format!(
+        "{}: {} touches, {} unknowns of rank {} ({} degrees of freedom), condition {:.1}\n",
+        o.machine, o.touches, o.unknowns, o.rank, o.dof, o.condition
+    );
+    out += &format!(
+        "error left {} um RMS against a noise of {} um per touch ({}); chi2/dof {:.3}\n",
+        significant(o.rms_um),
+        significant(o.noise_um),
+        match o.noise_source.as_str() {
+            "repeats" => "from repeated touches",
+            "declared" => "as the machine file declares it: the plan has no repeats",
+            _ => "as the study states it",
+        },
+        o.chi2_per_dof
+    );
+    out += &format!(
+        "{} after {} steps: {}\n\n",
+        if o.converged { "converged" } else { "NOT converged" },
+        o.iterations,
+        o.stopped
+    );
+    let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
+    let mut t = table(&["parameter", "effect", "value", "unit", "std. uncertainty", "95 %", "status"]);
+    for p in results {
+        let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |a| format!("{} ({a})", p.name));
+        t.add_row(vec![
+            Cell::new(name),
+            Cell::new(&p.effect),
+            number(if p.status == Status::Undetermined { "?".into() } else { digits(p.value, p.sigma) }),
+            Cell::new(&p.unit),
+            number(p.sigma.map_or_else(|| "-".into(), significant)),
+            number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
+            Cell::new(status(p.status)),
+        ]);
+    }
+    out += &t.to_string();
+    out.push('\n');
+    let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
+    if !blocks.is_empty() {
+        let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
+        out += &format!(
+            "and {} set-up unknowns of the blocks, {n_known} of them identified (--json lists them)\n",
+            blocks.len()
+        );
+    }
+    if o.parameters.iter().any(|p| p.effect.starts_with("location") || p.effect == "paper-table") {
+        let [x, y, z] = o.reference_mm;
+        out += &format!("location errors of workpiece-side axes are stated at ({x}, {y}, {z}) mm in R\n");
+    }
+    for u in &o.undetermined {
+        out += &format!("not told by this data: {}\n", u.says);
+    }
+    for r in &o.rejected {
+        out += &format!("not used: touch {} of run {}: {}\n", r.id, r.run, r.reason);
+    }
+    for w in &o.warnings {
+        out += &format!("warning: {w}\n");
+    }
+    out
+}
+
+/// Three significant digits, plainly written where that is readable.
+#[must_use]
+pub fn significant(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format!("{x}");
+    }
+    let magnitude = x.abs().log10().floor() as i32;
+    if (-7..6).contains(&magnitude) { format!("{x:.*}", (2 - magnitude).max(0) as usize) } else { format!("{x:.2e}") }
+}
+
+fn status(status: Status) -> &'static str {
+    match status {
+        Status::Identified => "identified",
+        Status::Fixed => "fixed",
+        Status::PriorDominated => "prior-dominated",
+        Status::Undetermined => "undetermined",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_follow_the_uncertainty() {
+        assert_eq!(digits(0.029_984_56, Some(2.3e-4)), "0.02998");
+        assert_eq!(digits(12.3, Some(4.0)), "12.3");
+        assert_eq!(significant(0.000_234_5), "0.000235");
+        assert_eq!(significant(1234.5), "1234");
+    }
+}

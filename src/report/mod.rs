@@ -1,0 +1,3 @@
+//! What a person sees in the terminal: formats, never computes.
+
+pub mod fit;

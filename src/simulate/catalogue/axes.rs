@@ -1,0 +1,187 @@
+//! Errors that depend on where an axis stands or from where it came: squareness, scale, straightness, angular errors,
+//! harmonics of rotary axes, backlash, gross mistakes.
+//!
+//! A displacement is that of what the axis carries, in R, as a function of the axis's NC coordinate; for rotary axes
+//! it stands before the axis's motion (it does not turn with it), for linear axes after (lever arms are counted in
+//! the frame that moves). Polynomials are scaled to [`SPAN_MM`].
+
+use super::location::linear_axis;
+use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
+use super::{Parameter, Refusal, Settings, across, along, axis_here, axis_of, dof_letter};
+use crate::axes::AxisName;
+use crate::machine::Machine;
+use crate::simulate::terms::{Shape, Target};
+
+/// The travel at which polynomial errors have their stated size, mm.
+pub const SPAN_MM: f64 = 300.0;
+/// Pitch of a ball screw when none is given, mm.
+const PITCH_MM: f64 = 10.0;
+
+const LINEAR: [char; 3] = ['x', 'y', 'z'];
+const ROTARY: [char; 3] = ['a', 'b', 'c'];
+
+/// Ids of this family.
+pub fn ids(_: &Machine) -> Vec<String> {
+    let mut out: Vec<String> = ["xy", "yz", "zx"].map(|p| format!("squareness-{p}")).to_vec();
+    for l in LINEAR {
+        out.extend([format!("scale-{l}"), format!("positioning-{l}-2"), format!("pitch-{l}"), format!("backlash-{l}")]);
+        out.extend(LINEAR.into_iter().filter(|&d| d != l).map(|d| format!("straightness-{d}{l}")));
+        out.extend(ROTARY.map(|d| format!("angular-{d}{l}")));
+    }
+    for r in ROTARY {
+        for family in ["radial", "axial", "tilt", "positioning"] {
+            out.extend((1..=3).map(|k| format!("{family}-{r}-{k}")));
+        }
+        out.extend([format!("positioning-{r}-linear"), format!("backlash-{r}")]);
+    }
+    out.push("sign-or-axis-swap".to_owned());
+    out
+}
+
+/// Parameters of an id of this family.
+pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
+    if id == "sign-or-axis-swap" {
+        return Ok(machine.axes.iter().map(|a| flipped(a.name)).collect());
+    }
+    if let Some(found) = axis_of(id, "backlash", machine) {
+        return Ok(vec![backlash(found?.1)]);
+    }
+    let (family, rest) = id.split_once('-').ok_or(Refusal::Unknown)?;
+    if let Some((letter, k)) = rest.split_once('-') {
+        let axis = axis_in(letter)?;
+        return match (family, k) {
+            ("positioning", "2") if !axis.is_rotary() => Ok(vec![bend(linear_axis(axis, machine)?)]),
+            ("positioning", "linear") if axis.is_rotary() => {
+                axis_here(axis, machine)?;
+                Ok(vec![rotary_scale(axis)])
+            }
+            _ if axis.is_rotary() => harmonic(family, axis, k, machine),
+            _ => Err(Refusal::Unknown),
+        };
+    }
+    match (family, rest) {
+        ("squareness", "xy") => squareness(AxisName::Y, 0, -1.0, machine),
+        ("squareness", "yz") => squareness(AxisName::Z, 1, -1.0, machine),
+        ("squareness", "zx") => squareness(AxisName::Z, 0, 1.0, machine),
+        ("scale", letter) => {
+            let axis = linear_in(letter, machine)?;
+            let shape = Shape::Power(axis, 1.0, 1);
+            Ok(vec![Parameter::at(format!("E{axis}{axis}"), UmPerM, moved(axis, along(axis)), shape)])
+        }
+        ("pitch", letter) => Ok(pitch(linear_in(letter, machine)?, settings)),
+        ("straightness", pair) => {
+            let (dof, axis) = pair_in(pair, machine)?;
+            if dof >= 3 || dof == along(axis) {
+                return Err(Refusal::Unknown);
+            }
+            Ok([2, 3].map(|n| polynomial(axis, dof, n, true)).to_vec())
+        }
+        ("angular", pair) => {
+            let (dof, axis) = pair_in(pair, machine)?;
+            if dof < 3 { Err(Refusal::Unknown) } else { Ok(vec![polynomial(axis, dof, 1, false)]) }
+        }
+        _ => Err(Refusal::Unknown),
+    }
+}
+
+fn axis_in(letter: &str) -> Result<AxisName, Refusal> {
+    let mut letters = letter.chars();
+    match (letters.next(), letters.next()) {
+        (Some(c), None) if c.is_ascii_lowercase() => AxisName::from_letter(c).ok_or(Refusal::Unknown),
+        _ => Err(Refusal::Unknown),
+    }
+}
+
+fn linear_in(letter: &str, machine: &Machine) -> Result<AxisName, Refusal> {
+    let axis = axis_in(letter)?;
+    if axis.is_rotary() { Err(Refusal::Unknown) } else { linear_axis(axis, machine) }
+}
+
+/// `yx` → component y of linear axis X.
+fn pair_in(pair: &str, machine: &Machine) -> Result<(usize, AxisName), Refusal> {
+    if pair.len() != 2 || !pair.is_ascii() {
+        return Err(Refusal::Unknown);
+    }
+    let (dof, axis) = pair.split_at(1);
+    Ok((axis_in(dof)?.index(), linear_in(axis, machine)?))
+}
+
+fn moved(axis: AxisName, dof: usize) -> Target {
+    Target::Axis { axis, after: !axis.is_rotary(), dof }
+}
+
+/// The axis moves askew: across its way in proportion to its coordinate.
+fn squareness(axis: AxisName, dof: usize, sign: f64, machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
+    let axis = linear_axis(axis, machine)?;
+    // the turn that does this: about z for Y along x, about x for Z along y, about y for Z along x
+    let about = 3 + (3 - along(axis) - dof);
+    let name = format!("E{}0{axis}", dof_letter(about));
+    Ok(vec![Parameter::new(name, Urad, [(moved(axis, dof), Shape::Power(axis, 1.0, 1), sign)])])
+}
+
+/// Curvature of the scale.
+fn bend(axis: AxisName) -> Parameter {
+    polynomial(axis, along(axis), 2, true)
+}
+
+/// `amount * (q / 300 mm)^n`.
+fn polynomial(axis: AxisName, dof: usize, n: i32, numbered: bool) -> Parameter {
+    let unit = if dof < 3 { Um } else { Urad };
+    let number = if numbered { n.to_string() } else { String::new() };
+    let name = format!("E{}{axis}{number}", dof_letter(dof));
+    Parameter::at(name, unit, moved(axis, dof), Shape::Power(axis, SPAN_MM, n))
+}
+
+/// The screw's error of every turn.
+fn pitch(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
+    let period = settings("pitch").unwrap_or(PITCH_MM);
+    let target = moved(axis, along(axis));
+    vec![
+        Parameter::at(format!("E{axis}{axis}c"), Um, target, Shape::PitchCosine(axis, period)),
+        Parameter::at(format!("E{axis}{axis}s"), Um, target, Shape::PitchSine(axis, period)),
+        Parameter::setting("pitch", Mm, Some(PITCH_MM)),
+    ]
+}
+
+/// A rotary scale that counts too much or too little: angle in proportion to the angle.
+fn rotary_scale(axis: AxisName) -> Parameter {
+    let dof = along(axis) + 3;
+    // micrometres per metre is microradians per radian
+    Parameter::at(format!("E{axis}{axis}"), UmPerM, moved(axis, dof), Shape::Power(axis, 1.0, 1))
+}
+
+/// Error motions that repeat k times per turn.
+fn harmonic(family: &str, axis: AxisName, k: &str, machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
+    let dofs: Vec<usize> = match family {
+        "radial" => across(axis).collect(),
+        "axial" => vec![along(axis)],
+        "tilt" => across(axis).map(|d| d + 3).collect(),
+        "positioning" => vec![along(axis) + 3],
+        _ => return Err(Refusal::Unknown),
+    };
+    let order = match k {
+        "1" => 1.0,
+        "2" => 2.0,
+        "3" => 3.0,
+        _ => return Err(Refusal::Unknown),
+    };
+    axis_here(axis, machine)?;
+    let row = |dof: usize, letter: char, shape: Shape| {
+        let unit = if dof < 3 { Um } else { Urad };
+        Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape)
+    };
+    let pair = |dof: usize| [row(dof, 'c', Shape::Cosine(axis, order)), row(dof, 's', Shape::Sine(axis, order))];
+    Ok(dofs.into_iter().flat_map(pair).collect())
+}
+
+/// The axis lags behind the control by half the lost motion, whichever way it goes.
+fn backlash(axis: AxisName) -> Parameter {
+    let unit = if axis.is_rotary() { Urad } else { Um };
+    let row = Parameter::new("backlash", unit, [(Target::Reading(axis), Shape::Sense(axis), -0.5)]);
+    row.alias(format!("backlash_{axis}")).alias(format!("b_{axis}"))
+}
+
+/// The control counts this axis the wrong way round (value 1).
+fn flipped(axis: AxisName) -> Parameter {
+    Parameter::new(format!("flip_{axis}"), One, [(Target::Reading(axis), Shape::Power(axis, 1.0, 1), -2.0)])
+}

@@ -1,0 +1,104 @@
+//! What weight does to head and table, and what is wrong with the artefact.
+
+use super::axes::SPAN_MM;
+use super::unit::Unit::{H, One, PpmPerK, Um, Urad};
+use super::{Parameter, Refusal, Settings, along, dof_letter};
+use crate::axes::AxisName;
+use crate::machine::{Machine, Side};
+use crate::simulate::terms::{Shape, Target};
+
+/// Ids of this family.
+pub fn ids(_: &Machine) -> Vec<String> {
+    let weight = ["head-sag", "head-tilt", "table-sag", "table-load"];
+    let artefact = ["block-size", "block-shape", "block-slip", "block-temperature"];
+    weight.into_iter().chain(artefact).map(str::to_owned).collect()
+}
+
+/// Parameters of an id of this family.
+pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
+    match id {
+        // a head that hangs out sinks, to whichever side it leans
+        "head-sag" => {
+            tilting_head(machine)?;
+            let acts = [(Target::BallInMachine(2), Shape::Tilt, -1.0)];
+            Ok(vec![Parameter::new("head_sag", Um, acts).alias("k").alias("sag")])
+        }
+        // and its weight turns it further about its own axis
+        "head-tilt" => {
+            let axis = tilting_head(machine)?;
+            let target = Target::Axis { axis, after: false, dof: along(axis) + 3 };
+            let name = format!("E{}{axis}s", dof_letter(along(axis) + 3));
+            Ok(vec![Parameter::at(name, Urad, target, Shape::Sine(axis, 1.0)).alias("head_tilt").alias("k")])
+        }
+        "table-sag" => table_sag(machine),
+        "table-load" => table_load(machine),
+        "block-size" => Ok((0..3).map(size).collect()),
+        "block-shape" => {
+            let acts = [(Target::HalfSize(0), Shape::Constant, 0.5), (Target::HalfSize(1), Shape::Constant, -0.5)];
+            Ok(vec![Parameter::new("dXY", Um, acts)])
+        }
+        "block-slip" => slip(settings),
+        "block-temperature" => {
+            let acts = [(Target::HalfSizeRatio, Shape::Warmth, 1.0)];
+            Ok(vec![Parameter::new("block_expansion", PpmPerK, acts).alias("alpha")])
+        }
+        _ => Err(Refusal::Unknown),
+    }
+}
+
+/// The first axis of the head that tilts the tool.
+fn tilting_head(machine: &Machine) -> Result<AxisName, Refusal> {
+    let tilts = |a: &&crate::machine::Axis| a.side == Side::Tool && a.name.is_rotary() && a.direction.z.abs() < 0.5;
+    let found = machine.axes.iter().find(tilts).map(|a| a.name);
+    found.ok_or_else(|| Refusal::NotHere(format!("the head of {:?} does not tilt", machine.name)))
+}
+
+/// The table sinks the further out it stands: a bowl.
+fn table_sag(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
+    let axes: Vec<AxisName> = machine
+        .axes
+        .iter()
+        .filter(|a| a.side == Side::Workpiece && matches!(a.name, AxisName::X | AxisName::Y))
+        .map(|a| a.name)
+        .collect();
+    let Some(&last) = axes.last() else {
+        return Err(Refusal::NotHere(format!("the table of {:?} does not move along X or Y", machine.name)));
+    };
+    let target = Target::Axis { axis: last, after: true, dof: 2 };
+    let acts = axes.into_iter().map(|a| (target, Shape::Power(a, SPAN_MM, 2), -1.0));
+    Ok(vec![Parameter::new("table_sag", Um, acts).alias("k").alias("sag")])
+}
+
+/// A load beside the centre tilts the plate, and the tilt turns with it.
+fn table_load(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
+    let last = machine.axes.iter().rfind(|a| a.side == Side::Workpiece && a.name.is_rotary()).map(|a| a.name);
+    let Some(axis) = last else {
+        return Err(Refusal::NotHere(format!("{:?} has no rotary table", machine.name)));
+    };
+    let row =
+        |name: &str, dof: usize| Parameter::at(name, Urad, Target::Axis { axis, after: true, dof }, Shape::Constant);
+    Ok(vec![row("load_a", 3), row("load_b", 4)])
+}
+
+/// The edge of all blocks along their own x, y or z is longer by this much.
+fn size(i: usize) -> Parameter {
+    let acts = [(Target::HalfSize(i), Shape::Constant, 0.5)];
+    Parameter::new(format!("s{}", dof_letter(i)), Um, acts).alias(format!("size_{}", dof_letter(i)))
+}
+
+/// All blocks slip on their carrier at one moment.
+fn slip(settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
+    let shape = match (settings("from_touch"), settings("from_h")) {
+        (Some(touch), _) => Shape::FromTouch(touch),
+        (None, Some(hour)) => Shape::FromHour(hour),
+        (None, None) => {
+            return Err(Refusal::NotHere("it must say when: from_touch (number) or from_h (hours)".to_owned()));
+        }
+    };
+    let names = ["dx", "dy", "dz", "rx", "ry", "rz"];
+    let mut rows: Vec<Parameter> =
+        (0..6).map(|i| Parameter::at(names[i], if i < 3 { Um } else { Urad }, Target::Block(i), shape)).collect();
+    rows.push(Parameter::setting("from_touch", One, None));
+    rows.push(Parameter::setting("from_h", H, None));
+    Ok(rows)
+}

@@ -1,0 +1,227 @@
+//! `compensation.json` as it is written → [`Compensation`].
+
+use super::component::Component;
+use super::stock::TiltingTable;
+use super::table::Table;
+use super::{Compensation, Kinematics};
+use crate::axes::AxisName;
+use crate::diag::{Finding, Findings, Result, Source, from_json};
+use crate::machine::Machine;
+use crate::simulate::chain::Chain;
+use crate::simulate::rigid::Vec3;
+use crate::simulate::terms::Shifts;
+use crate::units::rad_from_deg;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// The format line of a compensation.
+pub const FORMAT: &str = "axiscal-compensation/1";
+
+#[derive(Debug, Deserialize)]
+struct Written {
+    format: String,
+    machine: String,
+    mode: String,
+    #[serde(default)]
+    reference_mm: Option<Vec3>,
+    #[serde(default)]
+    terms: Vec<WrittenTerm>,
+    #[serde(default)]
+    stock: Option<WrittenStock>,
+}
+
+/// An error that the control takes into account, mm or deg.
+#[derive(Debug, Deserialize)]
+struct WrittenTerm {
+    axis: String,
+    place: String,
+    dof: String,
+    value: f64,
+    unit: String,
+}
+
+/// What the control's own means hold.
+#[derive(Debug, Default, Deserialize)]
+struct WrittenStock {
+    #[serde(default)]
+    module: Option<String>,
+    #[serde(default)]
+    pins: BTreeMap<String, f64>,
+    #[serde(default)]
+    home_offset_deg: BTreeMap<AxisName, f64>,
+    #[serde(default)]
+    axis_tables: BTreeMap<AxisName, WrittenTable>,
+    /// How far the work offset is moved after loading, mm in R.
+    #[serde(default)]
+    workpiece_shift_mm: Option<Vec3>,
+}
+
+#[derive(Debug, Deserialize)]
+struct WrittenTable {
+    rows: Vec<[f64; 3]>,
+}
+
+const UNCHANGED: &str = "give the compensation.json that `axiscal export` wrote, unedited";
+
+impl Compensation {
+    /// Reads `compensation.json` of an export.
+    ///
+    /// # Errors
+    /// When the text is not of this form, or was made for another machine.
+    pub fn parse(source: &Source, machine: &Machine) -> Result<(Self, Findings)> {
+        let written: Written = serde_json::from_str(source.inner()).map_err(|e| {
+            from_json(&e, source, "compensation::not_json")
+                .help("a compensation is written by `axiscal export` (axiscal-compensation/1)")
+        })?;
+        let mut reader = Reader { source, machine, findings: Findings::default() };
+        if written.format != FORMAT {
+            let message = format!("format is {:?}, expected {FORMAT:?}", written.format);
+            reader.error(
+                "compensation::format",
+                message,
+                "is this a compensation? `axiscal export` writes compensation.json",
+            );
+        }
+        if written.machine != machine.name {
+            let message = format!("the compensation is for {:?}, not for {:?}", written.machine, machine.name);
+            reader.error("compensation::machine", message, "name the machine that it was exported for with --machine");
+        }
+        let stock = written.stock.unwrap_or_default();
+        let mut told_less_deg = [0.0; 6];
+        let kinematics = match written.mode.as_str() {
+            "component" => {
+                let p = &machine.reference.pivot;
+                let reference = written.reference_mm.unwrap_or([p.x, p.y, p.z]);
+                let known = reader.terms(&written.terms, &mut told_less_deg);
+                if !reference.iter().all(|x| x.is_finite()) {
+                    reader.error("compensation::reference", "reference_mm is no point", UNCHANGED);
+                }
+                Kinematics::Component(Component { chain: Chain::new(machine, reference), known })
+            }
+            "stock" => {
+                reader.home_offsets(&stock, &mut told_less_deg);
+                match &stock.module {
+                    None => Kinematics::Identity,
+                    Some(module) => reader.tilting_table(module, &stock).unwrap_or(Kinematics::Identity),
+                }
+            }
+            other => {
+                let message = format!("mode is {other:?}, expected \"component\" or \"stock\"");
+                reader.error("compensation::mode", message, "export again with this version");
+                Kinematics::Identity
+            }
+        };
+        let tables = stock.axis_tables.iter().filter_map(|(axis, table)| reader.table(*axis, table)).collect();
+        reader.findings.finish(Self { kinematics, told_less_deg, tables })
+    }
+}
+
+struct Reader<'a> {
+    source: &'a Source,
+    machine: &'a Machine,
+    findings: Findings,
+}
+
+impl Reader<'_> {
+    fn error(&mut self, code: &'static str, message: impl Into<String>, help: &str) {
+        self.findings.push(Finding::error(code, message).help(help).at(self.source, 0..0));
+    }
+
+    fn terms(&mut self, terms: &[WrittenTerm], told_less_deg: &mut [f64; 6]) -> Shifts {
+        let mut known = Shifts::default();
+        for (i, term) in terms.iter().enumerate() {
+            if let Err(what) = self.term(term, &mut known, told_less_deg) {
+                let message = format!("term {} of the compensation: {what}", i + 1);
+                self.error("compensation::term", message, UNCHANGED);
+            }
+        }
+        known
+    }
+
+    fn term(&self, term: &WrittenTerm, known: &mut Shifts, told_less_deg: &mut [f64; 6]) -> Result<(), String> {
+        let mut letters = term.axis.chars();
+        let name = letters.next().and_then(AxisName::from_letter).filter(|_| letters.next().is_none());
+        let axis = name.and_then(|a| self.machine.axis(a)).filter(|a| a.name.is_rotary());
+        let axis = axis.ok_or_else(|| format!("axis {:?} is no rotary axis of {:?}", term.axis, self.machine.name))?;
+        let dof = ["dx", "dy", "dz", "rx", "ry", "rz"].iter().position(|d| *d == term.dof);
+        let dof = dof.ok_or_else(|| format!("dof {:?} is not known", term.dof))?;
+        if !term.value.is_finite() {
+            return Err(format!("value {} is not finite", term.value));
+        }
+        let value = match (term.unit.as_str(), dof < 3) {
+            ("mm", true) => term.value,
+            ("deg", false) => rad_from_deg(term.value),
+            (unit, _) => return Err(format!("{} is given in {unit:?}", term.dof)),
+        };
+        let i = axis.name.index();
+        match term.place.as_str() {
+            "before" => known.before[i][dof] += value,
+            "after" => known.after[i][dof] += value,
+            // right-handed about the axis's direction, whichever way its coordinate counts
+            "zero" if dof >= 3 => told_less_deg[i] += axis.sense * term.value,
+            place => return Err(format!("place {place:?} is not known for {}", term.dof)),
+        }
+        Ok(())
+    }
+
+    fn home_offsets(&mut self, stock: &WrittenStock, told_less_deg: &mut [f64; 6]) {
+        for (&axis, &deg) in &stock.home_offset_deg {
+            if self.machine.axis(axis).is_none() || !deg.is_finite() {
+                let message = format!("the home offset of {axis} is {deg} on {:?}", self.machine.name);
+                self.error("compensation::home_offset", message, UNCHANGED);
+                continue;
+            }
+            // homed to where it stands: a command of that much less brings it to the same place
+            told_less_deg[axis.index()] += deg;
+        }
+    }
+
+    fn tilting_table(&mut self, module: &str, stock: &WrittenStock) -> Option<Kinematics> {
+        let tilting = match module {
+            "xyzac-trt-kins" => AxisName::A,
+            "xyzbc-trt-kins" => AxisName::B,
+            _ => {
+                let message = format!("kinematics module {module:?} is not known");
+                self.error("compensation::module", message, "there are: xyzac-trt-kins, xyzbc-trt-kins");
+                return None;
+            }
+        };
+        if self.machine.axis(tilting).is_none() || self.machine.axis(AxisName::C).is_none() {
+            let message = format!("module {module} needs axes {tilting} and C, {:?} lacks one", self.machine.name);
+            self.error("compensation::module", message, UNCHANGED);
+            return None;
+        }
+        let length = self.machine.tool.length_mm;
+        let mut pin = |name: &str, default: Option<f64>| {
+            let value = stock.pins.get(name).copied().or(default);
+            match value {
+                Some(v) if v.is_finite() => v,
+                _ => {
+                    self.error("compensation::pin", format!("pin {name} of {module} has no value"), UNCHANGED);
+                    0.0
+                }
+            }
+        };
+        let rot_point = [pin("x-rot-point", None), pin("y-rot-point", None), pin("z-rot-point", None)];
+        let offset = [pin("x-offset", Some(0.0)), pin("y-offset", Some(0.0)), pin("z-offset", Some(0.0))];
+        let tool_beyond_mm = pin("tool-offset", Some(length)) - length;
+        let origin = [AxisName::X, AxisName::Y, AxisName::Z].map(|a| self.machine.origin.get(a).unwrap_or(0.0));
+        let workpiece_shift = stock.workpiece_shift_mm.unwrap_or([0.0; 3]);
+        let table = TiltingTable { tilting, rot_point, offset, tool_beyond_mm, origin, workpiece_shift };
+        Some(Kinematics::TiltingTable(table))
+    }
+
+    fn table(&mut self, axis: AxisName, written: &WrittenTable) -> Option<Table> {
+        let rows = &written.rows;
+        let good = self.machine.axis(axis).is_some()
+            && !rows.is_empty()
+            && rows.iter().flatten().all(|x| x.is_finite())
+            && rows.windows(2).all(|w| w[0][0] < w[1][0]);
+        if !good {
+            let message = format!("the axis table of {axis} is empty, not ascending, not of numbers or of no axis");
+            self.error("compensation::table", message, UNCHANGED);
+            return None;
+        }
+        Some(Table { axis, origin: self.machine.origin.get(axis).unwrap_or(0.0), rows: rows.clone() })
+    }
+}

@@ -1,0 +1,302 @@
+//! From plan and scenario to touches that can be made, each with everything it depends on.
+
+use super::chain::{Chain, Stylus};
+use super::control::Compensation;
+use super::noise::Dice;
+use super::rigid::{Vec3, minus, unit};
+use super::scenario::{BlockError, Scenario};
+use super::terms::{Shifts, Terms, TouchState};
+use crate::axes::{AxisName, Position};
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::machine::{Carrier, Machine};
+use crate::program::plan::{ControllerFrame, Plan, PlanTouch};
+use crate::units::hours_from_s;
+use std::collections::BTreeMap;
+
+/// What one touch takes when the plan does not say, s.
+const TOUCH_S: f64 = 12.0;
+
+/// The virtual machine with a program in it.
+pub struct Bench<'a> {
+    pub chain: Chain,
+    pub terms: Terms,
+    pub compensation: Option<&'a Compensation>,
+    /// Does the program command the tool centre point?
+    pub tcp: bool,
+    pub dice: Dice,
+    pub rounding_mm: f64,
+    pub present: [bool; 6],
+    pub touches: Vec<Ready>,
+}
+
+/// A touch with everything it depends on.
+pub struct Ready {
+    pub id: u64,
+    /// Number in the plan, from 1.
+    pub number: usize,
+    pub start: Position,
+    pub end: Position,
+    /// Axes between the base and the block's carrier.
+    pub n_links: usize,
+    pub stylus: Stylus,
+    pub ball_radius_mm: f64,
+    /// The block's centre in the carrier's frame, mm.
+    pub centre: Vec3,
+    /// Half of its edges, mm.
+    pub half: Vec3,
+    /// Planned place and size less real ones.
+    pub wrong: Option<BlockError>,
+    /// Outward normal of the face in the carrier's frame.
+    pub normal: Vec3,
+    pub state: TouchState,
+    pub visit: u64,
+    pub time_s: Option<f64>,
+    pub temperature_deg_c: Option<f64>,
+}
+
+/// Checks that the plan fits the machine and sets everything up.
+pub fn bench<'a>(
+    machine: &'a Machine,
+    plan: &Plan,
+    scenario: &Scenario,
+    compensation: Option<&'a Compensation>,
+) -> Result<(Bench<'a>, Findings)> {
+    let mut findings = Findings::default();
+    if plan.machine != machine.name {
+        return Err(Failure::new(
+            "simulate::machine",
+            format!("the plan was made for machine {:?}, not for {:?}", plan.machine, machine.name),
+        )
+        .help("name the plan's machine with --machine, or make the plan again"));
+    }
+    let tcp = plan.controller_frame == ControllerFrame::Tcp;
+    if let Some(Err(why)) = compensation.map(|c| c.acts_on(tcp)) {
+        let finding = if tcp {
+            Finding::error("simulate::frame", why).help("make the plan without --tcp")
+        } else {
+            Finding::warning("simulate::frame", why).help("make the plan with --tcp to see the pins at work")
+        };
+        findings.push(finding);
+    }
+    let p = &machine.reference.pivot;
+    let chain = Chain::new(machine, [p.x, p.y, p.z]);
+    let terms = Terms::new(scenario.terms.iter().copied());
+    let times = times(plan, scenario, terms.timed(), &mut findings);
+    let mut present = [false; 6];
+    for axis in &machine.axes {
+        present[axis.name.index()] = true;
+    }
+    let mut senses = Senses::default();
+    let mut visits = Visits::default();
+    let mut touches = Vec::with_capacity(plan.touches.len());
+    for (i, touch) in plan.touches.iter().enumerate() {
+        match ready(machine, plan, scenario, &chain, touch) {
+            Ok(mut ready) => {
+                ready.number = i + 1;
+                (ready.time_s, ready.state.hours) = times[i];
+                ready.temperature_deg_c = scenario.temperature_at(ready.state.hours);
+                if let Some(degrees) = ready.temperature_deg_c {
+                    ready.state.temperature_deg_c = degrees;
+                }
+                ready.state.sense = senses.next(touch, &ready);
+                ready.visit = visits.next(touch, plan, &ready);
+                touches.push(ready);
+            }
+            Err(what) => findings.push(
+                Finding::error("simulate::touch", format!("touch {} cannot be made: {what}", touch.id))
+                    .help("make the plan again with `axiscal generate`"),
+            ),
+        }
+    }
+    let dice = Dice::new(scenario, plan, compensation.is_some());
+    let rounding_mm = scenario.noise.rounding_mm;
+    findings.finish(Bench { chain, terms, compensation, tcp, dice, rounding_mm, present, touches })
+}
+
+/// Log time (s) and hours since the study's first touch of each touch.
+fn times(plan: &Plan, scenario: &Scenario, needed: bool, findings: &mut Findings) -> Vec<(Option<f64>, f64)> {
+    let untimed = plan.touches.iter().any(|t| t.time_s.is_none());
+    if untimed && needed {
+        let message =
+            format!("the plan has no times, but the scenario changes with time: {TOUCH_S} s per touch are taken");
+        findings.push(Finding::warning("simulate::no_times", message).help("make the plan again: it predicts time_s"));
+    }
+    let mut last = 0.0;
+    let mut own: Vec<(Option<f64>, f64)> = Vec::with_capacity(plan.touches.len());
+    for touch in &plan.touches {
+        last = touch.time_s.unwrap_or(last + TOUCH_S);
+        let since_start = scenario.clock.started_s + last;
+        own.push((touch.time_s.map(|_| since_start).or(needed.then_some(since_start)), since_start));
+    }
+    let first = scenario.clock.first_touch_s.or(own.first().map(|t| t.1)).unwrap_or(0.0);
+    own.into_iter().map(|(logged, at)| (logged, hours_from_s(at - first))).collect()
+}
+
+fn ready(
+    machine: &Machine,
+    plan: &Plan,
+    scenario: &Scenario,
+    chain: &Chain,
+    touch: &PlanTouch,
+) -> Result<Ready, String> {
+    let carrier = machine.carrier(&touch.carrier).filter(|c| *c != Carrier::Base);
+    let carrier = carrier.ok_or_else(|| format!("{:?} carries no blocks on {:?}", touch.carrier, machine.name))?;
+    for axis in &machine.axes {
+        let name = axis.name;
+        let given = if name.is_rotary() {
+            touch.pose.get(name).is_some()
+        } else {
+            touch.start.get(name).is_some() && touch.end.get(name).is_some()
+        };
+        if !given {
+            return Err(format!("the position of axis {name} is not given"));
+        }
+    }
+    let (start, end) = (touch.start_position(), touch.end_position());
+    for name in AxisName::ALL {
+        if !(start.get(name).is_finite() && end.get(name).is_finite()) {
+            return Err(format!("the position of axis {name} is not a number"));
+        }
+        if machine.axis(name).is_none() && (start.get(name) != 0.0 || end.get(name) != 0.0) {
+            return Err(format!("{:?} has no axis {name}", machine.name));
+        }
+        if name.is_rotary() && start.get(name) != end.get(name) {
+            return Err(format!("axis {name} turns during the search"));
+        }
+    }
+    if start == end {
+        return Err("its search ends where it starts".to_owned());
+    }
+    let block = plan.block_of(touch).ok_or_else(|| format!("the plan lacks its block {:?}", touch.block))?;
+    let ball_radius_mm = touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm);
+    let length_mm = touch.tool_length_mm.unwrap_or(plan.tool_length_mm);
+    if !(ball_radius_mm.is_finite() && ball_radius_mm > 0.0) {
+        return Err(format!("the ball's radius is {ball_radius_mm} mm"));
+    }
+    if !(length_mm.is_finite() && block.centre.iter().all(|x| x.is_finite())) {
+        return Err("its tool length or block centre is not a number".to_owned());
+    }
+    if !block.size.iter().all(|&s| s.is_finite() && s > 0.0) {
+        return Err(format!("block {:?} has an edge of no length", block.name));
+    }
+    let stylus = Stylus { length_mm, spindle_deg: touch.spindle_deg.unwrap_or(0.0) };
+    if !stylus.spindle_deg.is_finite() {
+        return Err("its spindle orientation is not a number".to_owned());
+    }
+    let n_links = chain.links_to(carrier);
+    Ok(Ready {
+        id: touch.id,
+        number: 0,
+        start,
+        end,
+        n_links,
+        stylus,
+        ball_radius_mm,
+        centre: block.centre,
+        half: block.size.map(|s| 0.5 * s),
+        wrong: wrong_block(machine, plan, scenario, touch),
+        normal: touch.normal,
+        state: state(machine, chain, touch, &start, &end, n_links, stylus),
+        visit: 0,
+        time_s: None,
+        temperature_deg_c: None,
+    })
+}
+
+/// What the scenario says about the block of a touch. A plan without mountings is matched by the blocks' carrier.
+fn wrong_block(machine: &Machine, plan: &Plan, scenario: &Scenario, touch: &PlanTouch) -> Option<BlockError> {
+    let mounting = touch.mounting.as_deref().unwrap_or(&plan.mounting);
+    let found = scenario.blocks.iter().find(|b| {
+        let same_mounting = if mounting.is_empty() {
+            machine.mounting(&b.mounting).is_some_and(|m| m.carrier.to_string() == touch.carrier)
+        } else {
+            b.mounting == mounting
+        };
+        b.name == touch.block && same_mounting
+    });
+    found.cloned()
+}
+
+/// Everything that the errors of a touch may depend on besides axis positions; senses and time come later.
+fn state(
+    machine: &Machine,
+    chain: &Chain,
+    touch: &PlanTouch,
+    start: &Position,
+    end: &Position,
+    n_links: usize,
+    stylus: Stylus,
+) -> TouchState {
+    let none = Shifts::default();
+    let (from, to) = (chain.place(start, &none, n_links, stylus), chain.place(end, &none, n_links, stylus));
+    let way = minus(to.carrier.inward(to.ball), from.carrier.inward(from.ball));
+    let tool = chain.tool_frame(start, &none);
+    let approach_tool = tool.inward_direction(from.carrier.outward_direction(unit(way)));
+    let feed = touch.feed_mm_min.filter(|f| f.is_finite()).unwrap_or(machine.probe.slow_feed);
+    TouchState {
+        sense: [0.0; 6],
+        feed_mm_min: feed,
+        hours: 0.0,
+        stylus_ratio: stylus.length_mm / machine.tool.length_mm,
+        id: touch.id,
+        approach_probe: chain.spindle(stylus.spindle_deg).inward_direction(approach_tool),
+        down_tool: tool.inward_direction([0.0, 0.0, -1.0]),
+        tool_axis: tool.outward_direction(chain.tool_direction()),
+        stylus_axis: chain.tool_direction(),
+        ..TouchState::default()
+    }
+}
+
+/// Senses of the axes' last motions, from touch to touch.
+#[derive(Default)]
+struct Senses {
+    last: [f64; 6],
+    /// Where the axes stood after the last touch.
+    stood: Option<Position>,
+}
+
+impl Senses {
+    fn next(&mut self, touch: &PlanTouch, ready: &Ready) -> [f64; 6] {
+        for name in AxisName::ALL {
+            let i = name.index();
+            let searched = ready.end.get(name) - ready.start.get(name);
+            let came = self.stood.map_or(0.0, |p| ready.start.get(name) - p.get(name));
+            // the search itself, else the forced sense of indexing, else the way from the last touch
+            let forced = touch.from.get(name).unwrap_or(0.0);
+            for motion in [searched, forced, came] {
+                if motion != 0.0 && motion.is_finite() {
+                    self.last[i] = motion.signum();
+                    break;
+                }
+            }
+        }
+        self.stood = Some(ready.end);
+        self.last
+    }
+}
+
+/// Numbers of index visits: the plan's own, or a new one whenever a rotary axis or the mounting changes.
+#[derive(Default)]
+struct Visits {
+    known: BTreeMap<(u32, String), u64>,
+    last: Option<(Position, String)>,
+    count: u64,
+}
+
+impl Visits {
+    fn next(&mut self, touch: &PlanTouch, plan: &Plan, ready: &Ready) -> u64 {
+        let mounting = touch.mounting.as_deref().unwrap_or(&plan.mounting).to_owned();
+        if let Some(visit) = touch.visit {
+            let next = self.known.len() as u64;
+            // visits without a number count from far above
+            return *self.known.entry((visit, mounting)).or_insert(next);
+        }
+        let mut pose = ready.start;
+        pose.0[..3].fill(0.0);
+        if self.last.as_ref() != Some(&(pose, mounting.clone())) {
+            self.count += 1;
+            self.last = Some((pose, mounting));
+        }
+        (1 << 32) + self.count
+    }
+}

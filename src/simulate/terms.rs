@@ -1,0 +1,280 @@
+//! What is wrong with the virtual machine: terms, each an amount times a function of the state at a place of the chain.
+
+use super::rigid::{Vec3, dot, norm};
+use crate::axes::{AxisName, Position};
+use crate::units::mm_s_from_mm_min;
+
+/// What a touch is like while the ball searches: everything a term may depend on besides the axes' positions.
+#[derive(Debug, Clone, Copy)]
+pub struct TouchState {
+    /// Sense (+1, -1, 0 when nothing is known) of each axis's last motion.
+    pub sense: [f64; 6],
+    /// Feed of the search, mm/min.
+    pub feed_mm_min: f64,
+    /// Hours since the first touch.
+    pub hours: f64,
+    /// Temperature, °C.
+    pub temperature_deg_c: f64,
+    /// Length of the stylus over that of the machine's own.
+    pub stylus_ratio: f64,
+    /// Number of the touch in the plan.
+    pub id: u64,
+    /// The way of the ball over the workpiece, unit vector in the frame that turns with tool and spindle.
+    pub approach_probe: Vec3,
+    /// Down, unit vector in the tool's frame (which does not turn with the spindle).
+    pub down_tool: Vec3,
+    /// From the ball to the spindle, unit vector in R.
+    pub tool_axis: Vec3,
+    /// Along `tool_axis`, unit vector in the frame of the probe.
+    pub stylus_axis: Vec3,
+}
+
+impl Default for TouchState {
+    fn default() -> Self {
+        Self {
+            sense: [0.0; 6],
+            feed_mm_min: 0.0,
+            hours: 0.0,
+            temperature_deg_c: 20.0,
+            stylus_ratio: 1.0,
+            id: 0,
+            approach_probe: [0.0, 0.0, -1.0],
+            down_tool: [0.0, 0.0, -1.0],
+            tool_axis: [0.0, 0.0, 1.0],
+            stylus_axis: [0.0, 0.0, 1.0],
+        }
+    }
+}
+
+/// Where a term acts. `dof` 0, 1, 2: displacement along x, y, z (mm); 3, 4, 5: turn about x, y, z (rad).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// The error motion of an axis, before or after its own motion.
+    Axis {
+        /// Which axis.
+        axis: AxisName,
+        /// After its motion (the error moves with the axis) instead of before.
+        after: bool,
+        /// Component, 0 to 5.
+        dof: usize,
+    },
+    /// The ball, along an axis of R.
+    BallInMachine(usize),
+    /// The ball, along an axis of the tool's frame (turns with the head, not with the spindle).
+    BallInTool(usize),
+    /// The ball, along an axis of the stylus's frame (turns with the spindle too).
+    BallInStylus(usize),
+    /// The ball, away from the spindle.
+    Length,
+    /// An axis stands elsewhere than the control believes by this much: mm, or rad for a rotary axis.
+    Reading(AxisName),
+    /// The trigger comes this much later along the approach, mm.
+    Late,
+    /// Half the block's edge along its own x, y, z, mm.
+    HalfSize(usize),
+    /// The same in parts of the edge.
+    HalfSizeRatio,
+    /// The block's place in its carrier, component 0 to 5.
+    Block(usize),
+    /// The block's place, away from the carrier's centre line, mm.
+    BlockOutward,
+}
+
+/// A function of the state. Angles of axes enter in radians, time in hours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// 1.
+    Constant,
+    /// cos(k·q) of a rotary axis.
+    Cosine(AxisName, f64),
+    /// sin(k·q) of a rotary axis.
+    Sine(AxisName, f64),
+    /// (q/scale)^n: mm for a linear axis, rad for a rotary one.
+    Power(AxisName, f64, i32),
+    /// cos(2π·q/period) of a linear axis.
+    PitchCosine(AxisName, f64),
+    /// sin(2π·q/period) of a linear axis.
+    PitchSine(AxisName, f64),
+    /// The sense of an axis's last motion.
+    Sense(AxisName),
+    /// Square of the approach's part along the stylus.
+    AxialApproach,
+    /// ρ·cos(k·φ), φ the direction of the approach about the stylus, ρ its part across the stylus.
+    LobeCosine(f64),
+    /// ρ·sin(k·φ).
+    LobeSine(f64),
+    /// Feed, mm/s.
+    Feed,
+    /// The part of gravity across the stylus along a tool axis, times the square of the stylus's relative length.
+    StylusGravity(usize),
+    /// |sin| of the tool's tilt from the vertical of R.
+    Tilt,
+    /// Hours since the first touch.
+    Hours,
+    /// 1 - exp(-t/τ), τ in hours.
+    WarmUp(f64),
+    /// Temperature over 20 °C, K.
+    Warmth,
+    /// The same times the position of an axis.
+    WarmthTimes(AxisName),
+    /// 1 from this time on (hours), 0 before.
+    FromHour(f64),
+    /// 1 from this touch on, 0 before.
+    FromTouch(f64),
+}
+
+impl Shape {
+    /// Does it change while the linear axes move?
+    fn moves(&self) -> bool {
+        match self {
+            Self::Power(axis, ..) | Self::WarmthTimes(axis) => !axis.is_rotary(),
+            Self::PitchCosine(..) | Self::PitchSine(..) => true,
+            _ => false,
+        }
+    }
+
+    /// Does it need the time of the touch?
+    fn timed(&self) -> bool {
+        matches!(self, Self::Hours | Self::WarmUp(_) | Self::Warmth | Self::WarmthTimes(_) | Self::FromHour(_))
+    }
+
+    fn value(&self, touch: &TouchState, joints: &Position) -> f64 {
+        let q = |axis: AxisName| joints.mm_or_rad(axis);
+        let turn = std::f64::consts::TAU;
+        match *self {
+            Self::Constant => 1.0,
+            Self::Cosine(axis, k) => (k * q(axis)).cos(),
+            Self::Sine(axis, k) => (k * q(axis)).sin(),
+            Self::Power(axis, scale, n) => (q(axis) / scale).powi(n),
+            Self::PitchCosine(axis, period) => (turn * q(axis) / period).cos(),
+            Self::PitchSine(axis, period) => (turn * q(axis) / period).sin(),
+            Self::Sense(axis) => touch.sense[axis.index()],
+            Self::AxialApproach => dot(touch.approach_probe, touch.stylus_axis).powi(2),
+            Self::LobeCosine(k) => lobe(touch.approach_probe, k).1,
+            Self::LobeSine(k) => lobe(touch.approach_probe, k).0,
+            Self::Feed => mm_s_from_mm_min(touch.feed_mm_min),
+            Self::StylusGravity(i) => {
+                let along = dot(touch.down_tool, touch.stylus_axis);
+                (touch.down_tool[i] - along * touch.stylus_axis[i]) * touch.stylus_ratio.powi(2)
+            }
+            Self::Tilt => norm([touch.tool_axis[0], touch.tool_axis[1], 0.0]),
+            Self::Hours => touch.hours,
+            Self::WarmUp(tau) => -(-touch.hours / tau).exp_m1(),
+            Self::Warmth => touch.temperature_deg_c - REFERENCE_DEG_C,
+            Self::WarmthTimes(axis) => (touch.temperature_deg_c - REFERENCE_DEG_C) * q(axis),
+            Self::FromHour(h) => f64::from(touch.hours >= h),
+            Self::FromTouch(id) => f64::from(touch.id as f64 >= id),
+        }
+    }
+}
+
+/// Lengths are stated at this temperature (ISO 1), °C.
+pub const REFERENCE_DEG_C: f64 = 20.0;
+
+/// Sine and cosine of k times the direction of the approach about the stylus, times the part across the stylus.
+fn lobe(approach: Vec3, k: f64) -> (f64, f64) {
+    let across = approach[0].hypot(approach[1]);
+    let (s, c) = (k * approach[1].atan2(approach[0])).sin_cos();
+    (across * s, across * c)
+}
+
+/// One thing that is wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Term {
+    /// Where it acts.
+    pub target: Target,
+    /// On what it depends.
+    pub shape: Shape,
+    /// How much: mm, rad, or what its shape leaves of them.
+    pub amount: f64,
+}
+
+/// The sum of all terms at one state.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Shifts {
+    /// Error motion of each axis before its motion: dx dy dz (mm), rx ry rz (rad).
+    pub before: [[f64; 6]; 6],
+    /// And after it.
+    pub after: [[f64; 6]; 6],
+    /// Displacement of the ball in R, mm.
+    pub ball_machine: Vec3,
+    /// In the tool's frame.
+    pub ball_tool: Vec3,
+    /// In the stylus's frame.
+    pub ball_stylus: Vec3,
+    /// Lengthening of the tool, mm.
+    pub length: f64,
+    /// Where the axes really stand less where the control believes, mm and rad.
+    pub reading: [f64; 6],
+    /// Lateness of the trigger, mm.
+    pub late: f64,
+    /// Half sizes of the block, mm.
+    pub half_size: Vec3,
+    /// The same in parts of the edge.
+    pub half_size_ratio: f64,
+    /// Displacement of the block in its carrier, mm and rad.
+    pub block: [f64; 6],
+    /// Displacement of the block outward, mm.
+    pub block_outward: f64,
+}
+
+impl Shifts {
+    fn add(&mut self, target: Target, value: f64) {
+        match target {
+            Target::Axis { axis, after: false, dof } => self.before[axis.index()][dof] += value,
+            Target::Axis { axis, after: true, dof } => self.after[axis.index()][dof] += value,
+            Target::BallInMachine(i) => self.ball_machine[i] += value,
+            Target::BallInTool(i) => self.ball_tool[i] += value,
+            Target::BallInStylus(i) => self.ball_stylus[i] += value,
+            Target::Length => self.length += value,
+            Target::Reading(axis) => self.reading[axis.index()] += value,
+            Target::Late => self.late += value,
+            Target::HalfSize(i) => self.half_size[i] += value,
+            Target::HalfSizeRatio => self.half_size_ratio += value,
+            Target::Block(i) => self.block[i] += value,
+            Target::BlockOutward => self.block_outward += value,
+        }
+    }
+}
+
+/// The terms of a machine, those that change during a search apart from those that do not.
+#[derive(Debug, Clone, Default)]
+pub struct Terms {
+    steady: Vec<Term>,
+    moving: Vec<Term>,
+}
+
+impl Terms {
+    /// Sorts terms; those of amount 0 are left out.
+    pub fn new(terms: impl IntoIterator<Item = Term>) -> Self {
+        let (moving, steady) = terms.into_iter().filter(|t| t.amount != 0.0).partition(|t| t.shape.moves());
+        Self { steady, moving }
+    }
+
+    /// Does nothing change while the ball searches? Then its way in the block's frame is straight.
+    pub fn steady(&self) -> bool {
+        self.moving.is_empty()
+    }
+
+    /// Does a term need the time of the touch?
+    pub fn timed(&self) -> bool {
+        self.steady.iter().chain(&self.moving).any(|t| t.shape.timed())
+    }
+
+    /// The sum of what does not change during a touch.
+    pub fn during(&self, touch: &TouchState, pose: &Position) -> Shifts {
+        sum(Shifts::default(), &self.steady, touch, pose)
+    }
+
+    /// With what does, at positions of the axes.
+    pub fn at(&self, steady: &Shifts, touch: &TouchState, joints: &Position) -> Shifts {
+        sum(*steady, &self.moving, touch, joints)
+    }
+}
+
+fn sum(mut out: Shifts, terms: &[Term], touch: &TouchState, joints: &Position) -> Shifts {
+    for term in terms {
+        out.add(term.target, term.amount * term.shape.value(touch, joints));
+    }
+    out
+}

@@ -1,0 +1,139 @@
+//! One touch: the search, the contact, the trigger, and what the log then says.
+
+use super::contact::{Contact, first_contact};
+use super::control::Mapping;
+use super::prepare::{Bench, Ready};
+use super::rigid::{Rigid, Vec3, dot, minus, norm, plus};
+use super::terms::Shifts;
+use crate::axes::Position;
+use crate::log::{RawTouch, Status};
+
+/// A made touch.
+pub struct Outcome {
+    /// What the log says.
+    pub raw: RawTouch,
+    /// What a person should know about it.
+    pub remark: Option<Remark>,
+}
+
+/// What may be said about a touch.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Remark {
+    /// No contact before the end.
+    Missed,
+    /// In contact before the start, by this depth in mm.
+    Already(f64),
+    /// Not a face but an edge or a corner was met.
+    Edge,
+    /// Another face was met than planned.
+    OtherFace,
+    /// The control could not move there.
+    Unreachable(&'static str),
+}
+
+/// Makes a touch.
+pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
+    let log = |position: Position, status: Status, remark: Option<Remark>| Outcome {
+        raw: RawTouch {
+            id: Some(ready.id),
+            position: rounded(position, bench.rounding_mm),
+            present: bench.present,
+            status,
+            time_s: ready.time_s,
+            temperature_deg_c: ready.temperature_deg_c,
+            line: ready.number,
+        },
+        remark,
+    };
+    let ends = (&ready.start, &ready.end);
+    let mapping = match bench.compensation {
+        None => Ok(Mapping::DIRECT),
+        Some(c) => c.mapping(&bench.chain, bench.tcp, ends, &ready.state.sense, ready.stylus),
+    };
+    let mapping = match mapping {
+        Ok(mapping) => mapping,
+        Err(why) => return log(ready.start, Status::Miss, Some(Remark::Unreachable(why))),
+    };
+    // errors depend on where the axes stand, not on what was commanded
+    let steady = bench.terms.during(&ready.state, &mapping.joints(&ready.start));
+    let scatter = bench.dice.visit_mm(ready.visit);
+    let (block, half) = real_block(bench, ready, &steady);
+    let ball_in_block = |s: f64| -> Vec3 {
+        let joints = mapping.joints(&commanded(ready, s));
+        let moved;
+        let shifts = if bench.terms.steady() {
+            &steady
+        } else {
+            moved = bench.terms.at(&steady, &ready.state, &joints);
+            &moved
+        };
+        let place = bench.chain.place(&joints, shifts, ready.n_links, ready.stylus);
+        let ball = plus(place.ball, 1.0, scatter);
+        block.inward(place.carrier.inward(ball))
+    };
+    let straight = bench.terms.steady() && mapping.is_affine();
+    let (at, normal, faces) = match first_contact(&ball_in_block, straight, half, ready.ball_radius_mm) {
+        Contact::Met { at, normal, faces } => (at, normal, faces),
+        Contact::Missed => return log(ready.end, Status::Miss, Some(Remark::Missed)),
+        Contact::Already(depth) => return log(ready.start, Status::Miss, Some(Remark::Already(depth))),
+    };
+    // the probe triggers that much later on the commanded line
+    let way = norm(way_of(ready));
+    let late = steady.late + bench.dice.late_mm(ready.id);
+    let trigger = at + late / way;
+    if trigger > 1.0 {
+        return log(ready.end, Status::Miss, Some(Remark::Missed));
+    }
+    let remark = if faces > 1 {
+        Some(Remark::Edge)
+    } else if dot(normal, ready.normal) < 0.5 {
+        Some(Remark::OtherFace)
+    } else {
+        None
+    };
+    log(commanded(ready, trigger), Status::Hit, remark)
+}
+
+/// The commanded linear way, mm.
+fn way_of(ready: &Ready) -> Vec3 {
+    let xyz = |p: &Position| [p.0[0], p.0[1], p.0[2]];
+    minus(xyz(&ready.end), xyz(&ready.start))
+}
+
+/// The commanded position on the way from start (0) to end (1).
+fn commanded(ready: &Ready, s: f64) -> Position {
+    let mut out = ready.start;
+    for (slot, way) in out.0.iter_mut().zip(way_of(ready)) {
+        *slot += s * way;
+    }
+    out
+}
+
+/// The frame of the real block in its carrier (origin at its centre, axes along its edges) and its half edges, mm.
+fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Vec3) {
+    let mut half = plus(plus(ready.half, shifts.half_size_ratio, ready.half), 1.0, shifts.half_size);
+    let mut frame = Rigid::shift(ready.centre);
+    if shifts.block_outward != 0.0 {
+        let outward = bench.chain.outward_from_centre(ready.n_links, ready.centre);
+        frame = Rigid::shift(plus(ready.centre, shifts.block_outward, outward));
+    }
+    if shifts.block != [0.0; 6] {
+        frame = frame.then(&Rigid::error(&shifts.block, [0.0; 3]));
+    }
+    if let Some(wrong) = &ready.wrong {
+        let ([x, y, z], [a, b, c]) = (wrong.shift_mm, wrong.tilt_rad);
+        frame = frame.then(&Rigid::error(&[x, y, z, a, b, c], [0.0; 3]));
+        half = plus(half, 0.5, wrong.size_mm);
+    }
+    (frame, half)
+}
+
+/// As a log with few digits would hold it.
+fn rounded(mut position: Position, step_mm: f64) -> Position {
+    if step_mm > 0.0 {
+        for x in &mut position.0[..3] {
+            *x = (*x / step_mm).round() * step_mm;
+        }
+    }
+    position
+}

@@ -1,0 +1,311 @@
+//! `study.toml`: what was measured and what the model holds (contract section 1).
+//!
+//! Reading gives checked records with the findings' places; writing edits the text in place, so that the user's comments
+//! and order stay. Nothing here opens the files that a study names: `cli` does.
+
+use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
+use crate::fit::Knowledge;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use toml::Spanned;
+
+/// The study as written.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AsWritten {
+    /// A machines.toml of the user's own, relative to the study (default: the one built in).
+    pub machines: Option<String>,
+    /// Name of the machine.
+    #[schemars(with = "String")]
+    pub machine: Spanned<String>,
+    /// Effects of the user's own, relative to the study.
+    #[serde(default)]
+    pub effects_file: Vec<String>,
+    /// The measurement runs, in the order in which they were run.
+    #[serde(default)]
+    pub data: Vec<DataAsWritten>,
+    /// What the model holds.
+    #[serde(default)]
+    pub model: ModelAsWritten,
+    /// What the user states about the noise.
+    #[serde(default)]
+    pub noise: NoiseAsWritten,
+}
+
+/// One run as written.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DataAsWritten {
+    /// The plan, relative to the study.
+    #[schemars(with = "String")]
+    pub plan: Spanned<String>,
+    /// The log, relative to the study.
+    #[schemars(with = "String")]
+    pub log: Spanned<String>,
+    /// A controller, a postprocessor file, or `csv`.
+    #[schemars(with = "String")]
+    pub controller: Spanned<String>,
+    /// When the run began, s on the study's one clock.
+    #[schemars(with = "Option<f64>")]
+    pub started: Option<Spanned<f64>>,
+    /// Blocks of equal mounting, carrier and name share one set-up.
+    pub mounting: Option<String>,
+    /// The compensation that the control applied during this run: the directory or file that `export` wrote.
+    pub compensation: Option<String>,
+}
+
+/// The model as written.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ModelAsWritten {
+    /// Ids of the effects: the whole model.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub effects: Vec<Spanned<String>>,
+    /// Parameters that are held or have a prior.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, ParameterAsWritten>")]
+    pub parameters: BTreeMap<String, Spanned<ParameterAsWritten>>,
+}
+
+/// What is said of one parameter.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterAsWritten {
+    /// Its value, in its unit.
+    pub value: Option<f64>,
+    /// Held at the value.
+    #[serde(default)]
+    pub fixed: bool,
+    /// Or known to this standard deviation.
+    pub sigma: Option<f64>,
+}
+
+/// What the user states about the noise.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseAsWritten {
+    /// Standard deviation of a touch, µm.
+    pub touch_um: Option<f64>,
+}
+
+/// A checked study. Paths are as written: relative to the study.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// A machines.toml of the user's own.
+    pub machines: Option<String>,
+    /// Name of the machine.
+    pub machine: String,
+    /// Effects of the user's own.
+    pub effects_files: Vec<String>,
+    /// The measurement runs.
+    pub data: Vec<DataEntry>,
+    /// Ids of the effects.
+    pub effects: Vec<String>,
+    /// Parameters that are held or have a prior.
+    pub knowledge: BTreeMap<String, Knowledge>,
+    /// Standard deviation of a touch, mm, where stated.
+    pub touch_sigma_mm: Option<f64>,
+}
+
+/// One run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DataEntry {
+    /// The plan.
+    pub plan: String,
+    /// The log.
+    pub log: String,
+    /// A controller, a postprocessor file, or `csv`.
+    pub controller: String,
+    /// When the run began, s.
+    pub started_s: Option<f64>,
+    /// Blocks of equal mounting, carrier and name share one set-up.
+    pub mounting: Option<String>,
+    /// The compensation that was active.
+    pub compensation: Option<String>,
+}
+
+impl Study {
+    /// Reads a study.
+    ///
+    /// # Errors
+    /// When the text is not TOML of this form or contradicts itself; every finding has its place.
+    pub fn parse(source: &Source) -> Result<(Self, Findings)> {
+        let w: AsWritten = toml::from_str(source.inner()).map_err(|e| {
+            from_toml(&e, source, "study::not_toml")
+                .help("`axiscal new` writes a study; `axiscal schema study` prints the form")
+        })?;
+        let mut findings = Findings::default();
+        if w.data.is_empty() {
+            findings.push(
+                Finding::error("study::no_data", "the study names no measurement")
+                    .help("add a [[data]] table with plan, log and controller")
+                    .at(source, 0..0),
+            );
+        }
+        if w.model.effects.is_empty() {
+            findings.push(
+                Finding::error("study::no_effects", "the model holds no effect")
+                    .help("write [model] effects = [\"location-b\", …]: `axiscal effects` lists them")
+                    .at(source, 0..0),
+            );
+        }
+        let mut data = Vec::new();
+        for d in &w.data {
+            if let Some(started) = &d.started
+                && !started.get_ref().is_finite()
+            {
+                findings.push(
+                    Finding::error("study::started", "started is not a number")
+                        .help("seconds on the study's clock")
+                        .at(source, started.span()),
+                );
+            }
+            data.push(DataEntry {
+                plan: d.plan.get_ref().clone(),
+                log: d.log.get_ref().clone(),
+                controller: d.controller.get_ref().clone(),
+                started_s: d.started.as_ref().map(|s| *s.get_ref()),
+                mounting: d.mounting.clone(),
+                compensation: d.compensation.clone(),
+            });
+        }
+        let mut knowledge = BTreeMap::new();
+        for (name, spanned) in &w.model.parameters {
+            let p = spanned.get_ref();
+            let known = match (p.value, p.fixed, p.sigma) {
+                (Some(value), true, None) if value.is_finite() => Some(Knowledge::Fixed(value)),
+                (Some(value), false, Some(sigma)) if value.is_finite() && sigma.is_finite() && sigma > 0.0 => {
+                    Some(Knowledge::Prior { value, sigma })
+                }
+                _ => None,
+            };
+            match known {
+                Some(known) => {
+                    knowledge.insert(name.clone(), known);
+                }
+                None => findings.push(
+                    Finding::error("study::parameter", format!("what is said of {name} is not usable"))
+                        .help("write value and fixed = true, or value and sigma (greater than 0)")
+                        .at(source, spanned.span()),
+                ),
+            }
+        }
+        let touch_sigma_mm = w.noise.touch_um.map(crate::units::mm_from_um);
+        if touch_sigma_mm.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+            findings.push(
+                Finding::error("study::noise", "touch_um is not a number greater than 0")
+                    .help("the standard deviation of one touch in um")
+                    .at(source, 0..0),
+            );
+        }
+        findings.finish(Self {
+            machines: w.machines,
+            machine: w.machine.into_inner(),
+            effects_files: w.effects_file,
+            data,
+            effects: w.model.effects.into_iter().map(Spanned::into_inner).collect(),
+            knowledge,
+            touch_sigma_mm,
+        })
+    }
+
+    /// The text of a fresh study.
+    ///
+    /// # Errors
+    /// Never for strings that TOML can hold; the text is read back before it is returned.
+    pub fn fresh(&self) -> Result<String> {
+        use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, value};
+        let mut doc = DocumentMut::new();
+        if let Some(machines) = &self.machines {
+            doc["machines"] = value(machines);
+        }
+        doc["machine"] = value(&self.machine);
+        if !self.effects_files.is_empty() {
+            doc["effects_file"] = value(self.effects_files.iter().collect::<Array>());
+        }
+        let mut runs = ArrayOfTables::new();
+        for entry in &self.data {
+            let mut run = Table::new();
+            run["plan"] = value(&entry.plan);
+            run["log"] = value(&entry.log);
+            run["controller"] = value(&entry.controller);
+            if let Some(s) = entry.started_s {
+                run["started"] = value(s);
+            }
+            if let Some(m) = &entry.mounting {
+                run["mounting"] = value(m);
+            }
+            if let Some(c) = &entry.compensation {
+                run["compensation"] = value(c);
+            }
+            runs.push(run);
+        }
+        doc["data"] = Item::ArrayOfTables(runs);
+        let mut model = Table::new();
+        model["effects"] = value(self.effects.iter().collect::<Array>());
+        model
+            .decor_mut()
+            .set_prefix("\n# the whole model: nothing is added to it. `axiscal effects` lists what there is\n");
+        doc["model"] = Item::Table(model);
+        if let Some(sigma) = self.touch_sigma_mm {
+            let mut noise = Table::new();
+            noise["touch_um"] = value(crate::units::um_from_mm(sigma));
+            doc["noise"] = Item::Table(noise);
+        }
+        let text = format!("# what was measured, and what the model holds (docs/guide)\n{doc}");
+        Self::parse(&crate::diag::source("study.toml", text.clone()))
+            .map_err(|f| Failure::new("study::unwritable", format!("the study cannot be written: {f}")))?;
+        Ok(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diag::source;
+
+    fn example() -> Study {
+        Study {
+            machines: None,
+            machine: "swivel-head".into(),
+            effects_files: vec![],
+            data: vec![DataEntry {
+                plan: "head.plan.json".into(),
+                log: "head \"1\".log".into(),
+                controller: "linuxcnc".into(),
+                started_s: Some(3.0),
+                mounting: None,
+                compensation: None,
+            }],
+            effects: vec!["location-b".into(), "block-setup".into()],
+            knowledge: BTreeMap::new(),
+            touch_sigma_mm: None,
+        }
+    }
+
+    #[test]
+    fn a_fresh_study_reads_back() {
+        let text = example().fresh().unwrap();
+        let (back, _) = Study::parse(&source("s.toml", text)).unwrap();
+        assert_eq!(back.data, example().data);
+        assert_eq!(back.effects, example().effects);
+    }
+
+    #[test]
+    fn knowledge_is_read() {
+        let text = "machine = \"m\"\n[[data]]\nplan=\"p\"\nlog=\"l\"\ncontroller=\"csv\"\n[model]\neffects=[\"location-b\"]\n[model.parameters.EX0B]\nvalue = 0.03\nfixed = true\n[model.parameters.EZ0B]\nvalue=0.0\nsigma=0.005\n";
+        let (study, _) = Study::parse(&source("s.toml", text)).unwrap();
+        assert_eq!(study.knowledge["EX0B"], Knowledge::Fixed(0.03));
+        assert_eq!(study.knowledge["EZ0B"], Knowledge::Prior { value: 0.0, sigma: 0.005 });
+    }
+
+    #[test]
+    fn mistakes_have_their_place() {
+        let text = "machine = \"m\"\n[[data]]\nplan=\"p\"\nlog=\"l\"\ncontroller=\"csv\"\n[model]\neffects=[\"location-b\"]\n[model.parameters.EX0B]\nvalue = 0.03\n";
+        let failure = Study::parse(&source("s.toml", text)).unwrap_err();
+        assert!(failure.0[0].place().unwrap().starts_with("s.toml:8:"), "{:?}", failure.0[0].place());
+        assert!(Study::parse(&source("s.toml", "machine = ")).is_err());
+    }
+}

@@ -1,0 +1,193 @@
+//! LinuxCNC: a kinematics component of the machine's own chain that carries every location error, and beside it what
+//! the stock means of LinuxCNC carry (`stock/`).
+//!
+//! Everything here is a pure function from a correction to files; the caller writes them. Tested against LinuxCNC
+//! 2.9.0~pre1; the meaning of the stock modules' pins is in `stock.rs`, that of the axis tables in `axis_table.rs`.
+
+pub mod axis_table;
+pub mod component;
+pub mod ini;
+mod pack;
+pub mod readme;
+pub mod stock;
+pub mod work_offset;
+
+use super::compensation::{Compensation, Mode};
+use super::correction::{Correction, Limits};
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::machine::Machine;
+use ini::UserIni;
+
+/// Id of the controller.
+pub const CONTROLLER: &str = "linuxcnc";
+
+/// HAL names have at most this many characters (`HAL_NAME_LEN`).
+pub const HAL_NAME_LEN: usize = 47;
+
+/// How to export.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Distance from the reference point at which what is left is stated, mm.
+    pub radius_mm: f64,
+    /// Above these an export is refused.
+    pub limits: Limits,
+    /// Export all the same.
+    pub force: bool,
+    /// The machine's INI file, for its old values and the numbers of its joints.
+    pub ini: Option<UserIni>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { radius_mm: 100.0, limits: Limits::default(), force: false, ini: None }
+    }
+}
+
+/// An error that stays after loading.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Left {
+    /// ISO symbol.
+    pub parameter: String,
+    /// Id of its effect.
+    pub effect: String,
+    /// Its value.
+    pub value: f64,
+    /// Unit of the value.
+    pub unit: String,
+    /// Distance at which a tilt acts, mm.
+    pub lever_mm: f64,
+    /// The error that it leaves there, µm; none where the unit says nothing about that or it is not known.
+    pub left_um: Option<f64>,
+    /// Why it is not carried.
+    pub why: String,
+}
+
+/// What one way of loading carries and leaves.
+#[derive(Debug, Clone)]
+pub struct Way {
+    /// Its record, as written to `compensation.json`.
+    pub compensation: Compensation,
+    /// What it leaves.
+    pub left: Vec<Left>,
+}
+
+/// The files of an export, with what they carry.
+#[derive(Debug, Clone)]
+pub struct Export {
+    /// Path below the output directory, and contents.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// By the kinematics component.
+    pub component: Way,
+    /// By what LinuxCNC has without it.
+    pub stock: Way,
+}
+
+/// Program and version, as every file names it.
+#[must_use]
+pub fn program() -> String {
+    format!("axiscal {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The compensation files for LinuxCNC.
+///
+/// # Errors
+/// When a value is beyond the limits and `force` is not set, the active compensation belongs to another machine or
+/// controller, or the INI does not fit the machine.
+pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> Result<(Export, Findings)> {
+    let mut findings = Findings::default();
+    if !(options.radius_mm.is_finite() && options.radius_mm > 0.0) {
+        return Err(Failure::new("tables::radius", format!("the radius is {} mm", options.radius_mm))
+            .help("give the radius of the workpiece about the rotary axis, above 0"));
+    }
+    for mut finding in correction.beyond(&options.limits) {
+        if options.force {
+            finding.severity = crate::diag::Severity::Warning;
+            finding.help = Some("exported because it was forced: move the machine slowly at first".to_owned());
+        }
+        findings.push(finding);
+    }
+    if let Some(active) = &correction.active {
+        match active.check_belongs(machine, CONTROLLER) {
+            Ok(more) => findings.0.extend(more.0),
+            Err(failure) => findings.0.extend(failure.0),
+        }
+        findings.push(mode_note(active.mode));
+    }
+    let joints = match ini::Joints::of(machine, options.ini.as_ref()) {
+        Ok(joints) => Some(joints),
+        Err(failure) => {
+            findings.0.extend(failure.0);
+            None
+        }
+    };
+    if correction.terms.is_empty() && correction.shapes.is_empty() {
+        findings.push(
+            Finding::warning("tables::nothing", "no parameter of status \"identified\" that a table can hold")
+                .help("`axiscal identify` says what the data cannot tell; `axiscal effects` lists the effects"),
+        );
+    }
+    let (joints, findings) = findings.finish(joints)?;
+    let Some(joints) = joints else {
+        return Err(Failure(findings.0));
+    };
+    let (export, more) = pack::pack(machine, correction, options, &joints)?;
+    let mut findings = findings;
+    findings.0.extend(more.0);
+    Ok((export, findings))
+}
+
+fn mode_note(active: Mode) -> Finding {
+    let other = match active {
+        Mode::Component => "stock/",
+        Mode::Stock => "the component",
+    };
+    Finding::info(
+        "tables::one_way",
+        format!("during the measurement the control applied a compensation of mode \"{active}\"; its values are in the totals"),
+    )
+    .help(format!("before changing to {other}, load the restoring files of the old one: the two ways must never act together"))
+}
+
+/// Renders a template with a context; templates are part of the program, so that failing is a fault of ours that the
+/// user sees as an error, not as a panic.
+fn render(name: &str, template: &str, context: &minijinja::Value) -> Result<String> {
+    let fault = |e: minijinja::Error| {
+        Failure::new("tables::template", format!("template {name}: {e:#}"))
+            .help("this is a fault of the program: please report it with the study and the machine file")
+    };
+    let mut syntax = minijinja::syntax::SyntaxConfig::builder();
+    syntax.trim_blocks(true).lstrip_blocks(true).keep_trailing_newline(true);
+    let mut environment = minijinja::Environment::new();
+    environment.set_syntax(syntax.build().map_err(fault)?);
+    environment.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
+    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
+    environment.add_template(name, template).map_err(fault)?;
+    environment.get_template(name).and_then(|t| t.render(context)).map_err(fault)
+}
+
+/// A text of the user's on one line of a comment: no line ends, no end of a C comment, no brackets that an NC comment
+/// would end at.
+fn one_line(text: &str) -> String {
+    let cleaned: String = text
+        .chars()
+        .map(|c| match c {
+            '(' => '[',
+            ')' => ']',
+            c if c.is_control() => ' ',
+            c => c,
+        })
+        .collect();
+    cleaned.replace("*/", "* /").replace("/*", "/ *").replace("??/", "?? /").trim_end_matches('\\').to_owned()
+}
+
+/// The lines at the head of every file.
+fn head(machine: &Machine, correction: &Correction) -> Vec<String> {
+    let p = &correction.provenance;
+    let or = |text: &str| if text.is_empty() { "not stated".to_owned() } else { one_line(text) };
+    vec![
+        format!("Written by {} for machine {}.", program(), one_line(&machine.name)),
+        format!("Study: {}", or(&p.study)),
+        format!("Study sha256: {}", or(&p.study_sha256)),
+        format!("Date of the data: {}", or(&p.data_date)),
+    ]
+}

@@ -1,0 +1,154 @@
+//! Every effect, on every machine to which it applies: the analytic derivative of a touch against central differences.
+
+use axiscal::axes::{AxisName, Position};
+use axiscal::diag::source;
+use axiscal::machine::{self, Carrier, Machine, Side};
+use axiscal::model::catalogue::Catalogue;
+use axiscal::model::formula::VARIABLES;
+use axiscal::model::predict::{Model, Observation, SetUp};
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// An effect at every place of the chain, with shape parameters inside: what the catalogue does not yet use.
+const OWN: &str = r#"
+[[effect]]
+id = "own-everywhere"
+at = "X"
+terms = [
+  { parameter = "p1", unit = "um/m", dof = "dy", formula = "X" },
+  { parameter = "p2", unit = "urad", dof = "rz", formula = "Y/300" },
+  { parameter = "p3", unit = "um", dof = "dz", formula = "1 - exp(-t/tau)", at = "Z" },
+  { parameter = "p4", unit = "mm", dof = "dx", formula = "cos(k*X)", at = "tool" },
+  { parameter = "p5", unit = "mrad", dof = "rx", formula = "ny", at = "tool" },
+  { parameter = "p6", unit = "um", dof = "dx", formula = "T - 20", at = "workpiece" },
+  { parameter = "p7", unit = "urad", dof = "ry", formula = "1", at = "workpiece" },
+  { parameter = "p8", unit = "um", dof = "r", formula = "mx^2 - my^2", at = "trigger" },
+  { parameter = "p9", unit = "um", dof = "X", formula = "sX", at = "reading" },
+  { parameter = "p10", unit = "urad", dof = "Z", formula = "1", at = "reading" },
+  { parameter = "p11", unit = "um", dof = "Y", formula = "Y", at = "reading" },
+]
+shape = [
+  { parameter = "tau", unit = "h", start = 0.5, min = 0.01, max = 10 },
+  { parameter = "k", unit = "1", start = 0.1 },
+]
+[[effect]]
+id = "own-b"
+at = "B"
+terms = [
+  { parameter = "q1", unit = "urad", dof = "ry", formula = "sin(2*B)" },
+  { parameter = "q2", unit = "urad", dof = "rx", formula = "1", frame = "moving" },
+  { parameter = "q3", unit = "urad", dof = "B", formula = "1", at = "reading" },
+]
+[[effect]]
+id = "own-c"
+at = "C"
+terms = [
+  { parameter = "w1", unit = "um", dof = "dx", formula = "cos(C)" },
+  { parameter = "w2", unit = "urad", dof = "ry", formula = "1", frame = "moving" },
+  { parameter = "w3", unit = "urad", dof = "C", formula = "sC", at = "reading" },
+]
+[[effect]]
+id = "own-a"
+at = "A"
+terms = [
+  { parameter = "v1", unit = "urad", dof = "rx", formula = "1", frame = "moving" },
+  { parameter = "v2", unit = "urad", dof = "A", formula = "1", at = "reading" },
+]
+"#;
+
+fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -> Observation {
+    let mut position = Position::default();
+    for axis in &machine.axes {
+        let [low, high] = if axis.name.is_rotary() { [-170.0, 170.0] } else { [-200.0, 200.0] };
+        position.set(axis.name, rng.random_range(low..high));
+    }
+    let mut state = [0.0; VARIABLES.len()];
+    for (i, name) in AxisName::ALL.into_iter().enumerate() {
+        state[i] = position.mm_or_rad(name);
+        state[14 + i] = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+    }
+    for value in &mut state[6..14] {
+        *value = rng.random_range(0.1..1.0);
+    }
+    state[20] = 60.0;
+    let unit = |rng: &mut ChaCha8Rng| {
+        Vector3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(0.1..1.0)).normalize()
+    };
+    Observation {
+        run: 0,
+        id: 1,
+        set_up: rng.random_range(0..carriers.len()),
+        point: unit(rng) * 40.0,
+        normal: unit(rng),
+        ball_radius: 3.0,
+        ball_at_zero: machine.tool.ball_at_zero(180.0),
+        position,
+        state,
+    }
+}
+
+#[test]
+fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_machine() {
+    let (machines, _) = machine::load(&source("machines.toml", machine::BUILT_IN)).unwrap();
+    let mut catalogue = Catalogue::built_in().unwrap();
+    catalogue.add_file(&source("own.toml", OWN)).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut n_checked = 0;
+    for machine in &machines {
+        let mut carriers = vec![Carrier::Table];
+        carriers.extend(machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).map(|a| Carrier::Axis(a.name)));
+        let set_ups: Vec<SetUp> = carriers
+            .iter()
+            .enumerate()
+            .map(|(i, c)| SetUp { label: format!("b{i}"), carrier: *c, centre: Vector3::new(30.0, -10.0, -200.0) })
+            .collect();
+        for effect in catalogue.iter().filter(|e| e.applies_to(machine)) {
+            let model = Model::new(machine, &[effect], &set_ups, machine.reference.pivot);
+            let mut scratch = model.scratch();
+            let mut row = vec![0.0; model.n_unknowns()];
+            let mut largest = vec![0.0f64; model.n_unknowns()];
+            for _ in 0..60 {
+                let touch = random_touch(machine, &carriers, &mut rng);
+                // sizes far above usual ones, so that an error of second order would show
+                let theta: Vec<f64> = model
+                    .unknowns
+                    .iter()
+                    .map(|u| {
+                        if u.start == 0.0 {
+                            rng.random_range(-20.0..20.0) * u.typical
+                        } else {
+                            u.start * rng.random_range(0.8..1.2)
+                        }
+                    })
+                    .collect();
+                model.gap_and_row(&touch, &theta, &mut scratch, &mut row);
+                for j in 0..theta.len() {
+                    let step = 1e-4 * model.unknowns[j].typical;
+                    let mut at = theta.clone();
+                    at[j] += step;
+                    let plus = model.gap(&touch, &at, &mut scratch);
+                    at[j] = theta[j] - step;
+                    let minus = model.gap(&touch, &at, &mut scratch);
+                    let numeric = (plus - minus) / (2.0 * step);
+                    let scale = row[j].abs().max(1e-3 / model.unknowns[j].typical);
+                    assert!(
+                        (row[j] - numeric).abs() < 2e-5 * scale,
+                        "{} {} {}: analytic {} numeric {}",
+                        machine.name,
+                        effect.id,
+                        model.unknowns[j].name,
+                        row[j],
+                        numeric
+                    );
+                    largest[j] = largest[j].max(row[j].abs());
+                    n_checked += 1;
+                }
+            }
+            for (u, size) in model.unknowns.iter().zip(&largest) {
+                assert!(*size > 0.0, "{} {} {} never has a derivative", machine.name, effect.id, u.name);
+            }
+        }
+    }
+    assert!(n_checked > 10_000, "{n_checked}");
+}

@@ -1,0 +1,31 @@
+#!/bin/sh
+# Installs what the rig needs from Debian: LinuxCNC for user space, halcompile, a C compiler.
+# Does nothing when all of it is there. Needs root to install, nothing to find that all is well.
+set -eu
+
+present() {
+    command -v linuxcnc >/dev/null 2>&1 && command -v halcompile >/dev/null 2>&1 &&
+        command -v gcc >/dev/null 2>&1 && /usr/bin/python3 -c 'import linuxcnc, tomllib' >/dev/null 2>&1
+}
+
+if present; then
+    echo "LinuxCNC is present"
+    exit 0
+fi
+if [ "$(id -u)" != 0 ]; then
+    echo "install.sh: LinuxCNC is missing and only root can install it" >&2
+    exit 1
+fi
+
+export DEBIAN_FRONTEND=noninteractive
+try=1
+until apt-get update -q && apt-get install -y -q --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev gcc; do
+    if [ "$try" -ge 5 ]; then
+        echo "install.sh: apt-get failed $try times" >&2
+        exit 1
+    fi
+    sleep $((try * 5))          # a mirror that is busy now is often well again in seconds
+    try=$((try + 1))
+done
+present || { echo "install.sh: installed, but linuxcnc, halcompile or the Python module is still missing" >&2; exit 1; }
+echo "LinuxCNC installed"

@@ -1,0 +1,11 @@
+//! The tables of a correction: the mapping against an independent calculation, the C component against the Rust one, the
+//! stock modules as installed, and what an export writes.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod by_hand;
+mod component;
+mod export;
+mod mapping;
+mod stock;
+mod support;
