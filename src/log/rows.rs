@@ -42,12 +42,10 @@ impl Search {
         let off = row.position.xyz_mm() - self.start.xyz_mm();
         let along = off.dot(&self.toward);
         let aside = (off - self.toward * along).norm();
-        let posed = machine
-            .rotary()
-            .filter(|a| row.present[a.name.index()])
-            .all(|a| (row.position.get(a.name) - self.start.get(a.name)).abs() <= POSE_ROOM_DEG);
-        (posed && aside <= LINE_ROOM_MM && along >= -LINE_ROOM_MM && along <= self.length + LINE_ROOM_MM)
-            .then_some(along)
+        let posed = machine.rotary().filter(|a| row.present[a.name.index()]).all(|a| {
+            (row.position.get(a.name) - self.start.get(a.name)).abs() <= POSE_ROOM_DEG
+        });
+        (posed && aside <= LINE_ROOM_MM && along >= -LINE_ROOM_MM && along <= self.length + LINE_ROOM_MM).then_some(along)
     }
 
     fn same_as(&self, other: &Self) -> bool {
@@ -79,9 +77,8 @@ pub(super) fn number(
         let Some(index) = (next..searches.len()).find(|i| searches[*i].along(machine, &row).is_some()) else {
             unmatched.push(|| {
                 let earlier = searches[..next.min(searches.len())].iter().any(|s| s.along(machine, &row).is_some());
-                let why =
-                    if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
-                let message = format!("line {}: the row {why}; it is not used", row.line);
+                let why = if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
+                let message = format!("the row {why}; it is not used");
                 at(Finding::warning("log::unmatched", message), row.line)
             });
             continue;
