@@ -47,7 +47,13 @@ pub(crate) fn path(plan: &Plan, probe: &crate::machine::as_written::Probe) -> pa
     ];
     for (i, t) in plan.touches.iter().enumerate() {
         if i != 1 {
-            steps.push(Step::Setup { number: 1 + u32::from(i > 1), says: format!("face {}", t.face) });
+            let number = 1 + u32::from(i > 1);
+            // the second set-up begins high over the first column, the opening ended at X0 Y0
+            let to = |axis: AxisName| Step::Rapid {
+                to: AxisMap::default().with(axis, plan.touches[i.saturating_sub(1)].start.get(axis).unwrap()),
+            };
+            let resume = if number == 1 { Vec::new() } else { vec![to(AxisName::X), to(AxisName::Y)] };
+            steps.push(Step::Setup { number, says: format!("face {}", t.face), resume: Some(resume) });
         }
         let start = t.start;
         for axis in [AxisName::X, AxisName::Y] {
