@@ -15,6 +15,7 @@ pub use check::parse;
 pub use emit::NcProgram;
 pub use frame::Frame;
 pub use log_text::{LogRecord, digest};
+pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
 pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;
