@@ -274,7 +274,7 @@ impl<'a> Writer<'a> {
             self.plan.program, self.machine.name, self.post.name
         )];
         head.extend(self.path.head.iter().cloned());
-        head.push(format!("log: {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
+        head.push(format!("the log is {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
         if let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) {
             head.push(format!("coordinates are the tool's place in the workpiece: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());

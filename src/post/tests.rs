@@ -1,6 +1,5 @@
 use super::*;
 use crate::axes::AxisMap;
-use crate::log::Status;
 use crate::machine::Machine;
 use crate::program::path::{self, Step, TouchStep};
 use crate::program::plan::{ControllerFrame, Plan};
