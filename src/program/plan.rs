@@ -213,7 +213,7 @@ impl Plan {
                 );
             }
             let norm = touch.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if !((norm - 1.0).abs() < 1e-6) {
+            if norm.is_nan() || (norm - 1.0).abs() >= 1e-6 {
                 bad(
                     "plan::normal",
                     format!("normal of touch {} has length {norm}", touch.id),

@@ -21,7 +21,8 @@ const FINEST_WAY_MM: f64 = 5e-4;
 pub enum Manner {
     /// It cannot stop: what was set up by hand may stand off by the placement tolerance, on top of the clearance.
     Rapid,
-    /// It stops when the probe trips: the clearance to everything.
+    /// It stops when the probe trips: the clearance to everything. Body and head, which trip nothing, keep the room of a
+    /// rapid.
     Guarded,
     /// A search up to the nominal contact with this block: only the ball may come near it.
     ToContact(usize),
@@ -62,6 +63,10 @@ impl Scene<'_> {
             (Manner::Rapid, Role::Block(_) | Role::Mounted) => Some(probe.clearance + probe.placement_tolerance),
             (Manner::ToContact(b), Role::Block(o)) if b == o && part == Part::Ball => None,
             (Manner::PastContact(b), Role::Block(o)) if b == o => None,
+            // body and head trip nothing: no control stops them
+            (_, Role::Block(_) | Role::Mounted) if matches!(part, Part::Head | Part::Body) => {
+                Some(probe.clearance + probe.placement_tolerance)
+            }
             _ => Some(probe.clearance),
         }
     }

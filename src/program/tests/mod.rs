@@ -65,3 +65,48 @@ fn basic_is_complete_on_both_table_machines() {
         assert_eq!(g.plan.touches.len(), 4 * 48 + 2 * 40 + 2 * 30);
     }
 }
+
+/// The trunnion machine with its text changed, and what `basic` gives on it.
+fn changed_trunnion(changes: &[(&str, &str)]) -> Generated {
+    let start = BUILT_IN.find("name = \"trunnion\"").unwrap();
+    let (before, mut machine_text) = (&BUILT_IN[..start], BUILT_IN[start..].to_owned());
+    for (old, new) in changes {
+        assert!(machine_text.contains(old), "{old}");
+        machine_text = machine_text.replacen(old, new, 1);
+    }
+    let machine = machine_of(&format!("{before}{machine_text}"), "trunnion");
+    let spec = super::choose(super::built_in().unwrap(), "basic", &machine).unwrap();
+    generate(&machine, &spec, &Options::default())
+        .unwrap_or_else(|f| panic!("{}", f.0.iter().map(|f| format!("{f}\n")).collect::<String>()))
+        .0
+}
+
+#[test]
+fn a_knee_that_lifts_the_table_is_an_axis_like_any_other() {
+    let (_, usual) = built_in("trunnion", "basic");
+    let z_to_table = [
+        ("name = \"A\"\nparent = \"base\"", "name = \"A\"\nparent = \"Z\""),
+        ("name = \"Z\"\nparent = \"Y\"", "name = \"Z\"\nparent = \"base\""),
+        ("[machine.tool]\nparent = \"Z\"", "[machine.tool]\nparent = \"Y\""),
+    ];
+    let knee = changed_trunnion(&z_to_table);
+    assert_eq!(knee.plan.touches, usual.plan.touches);
+    assert_eq!(knee.path.steps, usual.path.steps);
+}
+
+#[test]
+fn a_lift_that_counts_downwards_lifts_towards_its_lower_end() {
+    let (_, usual) = built_in("trunnion", "basic");
+    let z_down = [(
+        "direction = [0.0, 0.0, 1.0]\nrange = [-200.0, 350.0]",
+        "direction = [0.0, 0.0, -1.0]\nrange = [-350.0, 200.0]",
+    )];
+    let down = changed_trunnion(&z_down);
+    assert_eq!(down.plan.touches.len(), usual.plan.touches.len());
+    for (a, b) in down.plan.touches.iter().zip(&usual.plan.touches) {
+        let z = |t: &super::plan::PlanTouch| t.nominal.get(AxisName::Z).unwrap();
+        assert!((z(a) + z(b)).abs() < 1e-8);
+    }
+    let first = down.path.steps.first().unwrap();
+    assert_eq!(*first, super::path::Step::Rapid { to: crate::axes::AxisMap::default().with(AxisName::Z, -350.0) });
+}
