@@ -158,24 +158,15 @@ pub fn read_log(
     plan: &Plan,
     io: &Io,
 ) -> Result<Vec<Touch>> {
-    let name = path.display().to_string();
-    let raw = if controller == "csv" {
-        let (raw, findings) = log::csv::read(bytes, &name)?;
-        io.report(&findings.0);
-        raw
+    let post = if controller == "csv" {
+        None
     } else {
         let (post, findings) = Postprocessor::load_built_in_or_file(controller)?;
         io.report(&findings);
-        let (parsed, findings) = log::parse(bytes, &name, &post)?;
-        io.report(&findings.0);
-        parsed.touches
+        Some(post)
     };
-    let (touches, findings) = log::match_to_plan(machine, plan, raw);
+    let writer = post.as_ref().map_or(log::Writer::Csv, log::Writer::Controller);
+    let (read, findings) = log::read(bytes, &path.display().to_string(), writer, machine, plan)?;
     io.report(&findings.0);
-    if findings.has_errors() {
-        return Err(Failure(
-            findings.0.into_iter().filter(|f| f.severity == crate::diag::Severity::Error).take(1).collect(),
-        ));
-    }
-    Ok(touches)
+    Ok(read.touches)
 }
