@@ -33,7 +33,7 @@ pub(super) fn match_at(
     let mut findings = Findings::default();
     let at = |finding: Finding, line: usize| match places {
         Some(places) => places.at_line(finding, line),
-        None => finding,
+        None => Finding { message: format!("line {line}: {}", finding.message), ..finding },
     };
     let raw = if raw.iter().any(|t| t.id.is_none()) {
         let (numbered, row_findings) = rows::number(machine, plan, raw, &at);
@@ -51,7 +51,7 @@ pub(super) fn match_at(
         let Some(id) = touch.id else { continue };
         if !by_id.contains_key(&id) {
             unknown.push(|| {
-                let message = format!("line {line}: touch {id} is not in the plan; it is not used");
+                let message = format!("touch {id} is not in the plan; it is not used");
                 at(Finding::warning("log::unmatched", message).help("is this the plan that the program was made with?"), line)
             });
             continue;
@@ -82,14 +82,14 @@ pub(super) fn match_at(
     for ((planned, raw), good) in pairs.iter().zip(good) {
         let position = complete(planned, raw);
         if !good {
-            implausible.push(|| at(not_here(machine, planned, raw, &position), raw.line));
+            implausible.push(|| at(not_here(machine, planned, &position), raw.line));
             continue;
         }
         if raw.status == Status::Miss {
             missed.push(|| {
                 let message = format!(
-                    "line {}: touch {} (block {}, face {}) was missed: the probe did not trigger",
-                    raw.line, planned.id, planned.block, planned.face
+                    "touch {} (block {}, face {}) was missed: the probe did not trigger",
+                    planned.id, planned.block, planned.face
                 );
                 let help = "it is kept as a miss and not used; is the block there, is the probe switched on?";
                 at(Finding::warning("log::missed", message).help(help), raw.line)
@@ -158,7 +158,7 @@ pub(super) fn fits(machine: &Machine, planned: &PlanTouch, position: &Position, 
     off <= room_mm(machine) && turned <= POSE_ROOM_DEG
 }
 
-fn not_here(machine: &Machine, planned: &PlanTouch, raw: &RawTouch, position: &Position) -> Finding {
+fn not_here(machine: &Machine, planned: &PlanTouch, position: &Position) -> Finding {
     let nominal = planned.nominal_position();
     let (axis, found, wanted) = AxisName::ALL
         .into_iter()
@@ -167,8 +167,8 @@ fn not_here(machine: &Machine, planned: &PlanTouch, raw: &RawTouch, position: &P
         .max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()))
         .unwrap_or((AxisName::X, 0.0, 0.0));
     let message = format!(
-        "line {}: touch {} reads {axis} {found:.3}, expected about {wanted:.3}: too far away to be this touch; it is not used",
-        raw.line, planned.id
+        "touch {} reads {axis} {found:.3}, expected about {wanted:.3}: too far away to be this touch; it is not used",
+        planned.id
     );
     Finding::warning("log::implausible", message)
         .help(format!("a touch may lie up to {:.1} mm from its nominal place (overtravel and placement tolerance)", room_mm(machine)))
@@ -179,7 +179,7 @@ pub(super) fn ranges(ids: &[u64]) -> String {
     let mut out: Vec<String> = Vec::new();
     let mut rest = ids;
     while let Some((first, _)) = rest.split_first() {
-        let run = rest.iter().zip(*first..).take_while(|(id, expected)| **id == *expected).count().max(1);
+        let run = 1 + rest.windows(2).take_while(|pair| pair[0].checked_add(1) == Some(pair[1])).count();
         out.push(if run > 1 { format!("{first}-{}", rest[run - 1]) } else { first.to_string() });
         rest = &rest[run..];
         if out.len() == 8 && !rest.is_empty() {

@@ -84,12 +84,6 @@ impl Capped {
         self.shown.len() + self.more
     }
 
-    /// True when there was none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.shown.is_empty()
-    }
-
     /// Those that are shown, and one that counts the rest.
     pub fn drain(self, what: &str, code: &'static str) -> Vec<Finding> {
         let mut findings = self.shown;

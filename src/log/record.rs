@@ -93,7 +93,9 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
         } else if *letter == b'N' {
             let wrong = || Fault::at(line, word, width, "log::id", "the number of a touch is whole and not negative");
             id = Some(whole(value).ok_or_else(wrong)?);
+            sum += value.value;
         } else if *letter == b'S' {
+            sum += value.value;
             status = Some(match value.value {
                 1.0 => Status::Hit,
                 0.0 => Status::Miss,
@@ -119,7 +121,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
         // every value and the sum are rounded by at most half a digit, with a little room for the doubles themselves
         let room = (count + 1.0) * 0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0)) + 1e-9;
         if (check - sum).abs() > room {
-            let message = format!("the positions add up to {sum:.6}, the line says {check:.6}: it was damaged or edited");
+            let message = format!("the numbers add up to {sum:.6}, the line says {check:.6}: it was damaged or edited");
             return Err(Fault::at(line, word, width, "log::sum", message));
         }
     }

@@ -78,7 +78,7 @@ pub(super) fn number(
             unmatched.push(|| {
                 let earlier = searches[..next.min(searches.len())].iter().any(|s| s.along(machine, &row).is_some());
                 let why = if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
-                let message = format!("line {}: the row {why}; it is not used", row.line);
+                let message = format!("the row {why}; it is not used");
                 at(Finding::warning("log::unmatched", message), row.line)
             });
             continue;

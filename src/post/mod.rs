@@ -83,7 +83,7 @@ pub struct LogRule {
     pub exact_decimals: bool,
     /// `.` or `,`
     pub mark: u8,
-    /// Letter of the word with the sum of the axis positions.
+    /// Letter of the word with the sum of all other numbers of the line: it shows a damaged digit.
     pub check_word: Option<u8>,
     /// A file of nothing but columns.
     pub columns: Option<ColumnRule>,
