@@ -1,16 +1,62 @@
-//! `axiscal controllers`
+//! `axiscal controllers`: what is built in, and one of them as a file to start from.
 
 use super::{Answer, Io};
-use crate::diag::{Failure, Result};
+use crate::diag::Result;
+use crate::post::Postprocessor;
+use comfy_table::{Table, presets};
 
 /// Arguments of `controllers`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(subcommand)]
+    what: Option<What>,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Print one: the file, to save, change and use with `--controller FILE.toml`
+    Show {
+        /// Its name, or a file of your own to check
+        name: String,
+    },
+}
 
 /// Runs `controllers`.
 ///
 /// # Errors
-/// When the input is unusable.
-pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
-    Err(Failure::new("cli::missing", "controllers"))
+/// When there is none of that name, or the user's own file is unusable.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    match &args.what {
+        None => {
+            let all = Postprocessor::built_in()?;
+            let mut table = Table::new();
+            table.load_style(presets::NOTHING);
+            for post in &all {
+                table.add_row([&post.name, &post.says]);
+            }
+            io.say(table.to_string());
+            io.say("`axiscal controllers show NAME > mine.toml` gives a file to change; use it with --controller mine.toml");
+            io.answer(&all.iter().map(facts).collect::<Vec<_>>());
+        }
+        Some(What::Show { name }) => {
+            let (post, findings) = Postprocessor::load_built_in_or_file(name)?;
+            io.report(&findings);
+            io.say(post.text.trim_end());
+            io.answer(&facts(&post));
+        }
+    }
+    Ok(Answer::Done)
+}
+
+fn facts(post: &Postprocessor) -> serde_json::Value {
+    let unverified: Vec<_> =
+        post.unverified.iter().map(|(entry, why)| serde_json::json!({ "entry": entry, "why": why })).collect();
+    serde_json::json!({
+        "name": post.name,
+        "says": post.says,
+        "extension": post.extension,
+        "tcp": post.tcp.is_some(),
+        "log_decimals": post.log.decimals,
+        "unverified": unverified,
+    })
 }

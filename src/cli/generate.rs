@@ -1,16 +1,165 @@
-//! `axiscal generate`
+//! `axiscal generate`: the NC program and its plan, written only when the whole path is proven clear.
 
+use super::common::MachineArgs;
 use super::{Answer, Io};
-use crate::diag::{Failure, Result};
+use crate::axes::AxisMap;
+use crate::diag::{Failure, Finding, Result, source};
+use crate::files;
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
+use crate::report::fit::{number, table};
+use comfy_table::Cell;
+use serde_json::json;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `generate`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Name of a program (`axiscal programs` lists them), or a file of your own: FILE.toml
+    #[arg(long, short)]
+    program: String,
+    /// Name of the controller (`axiscal controllers` lists them)
+    #[arg(long, short, required_unless_present = "postprocessor")]
+    controller: Option<String>,
+    /// A postprocessor file of your own, instead of --controller
+    #[arg(long, value_name = "FILE", conflicts_with = "controller")]
+    postprocessor: Option<PathBuf>,
+    /// Folder for the two files, PROGRAM.<ext> and PROGRAM.plan.json
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// The same touches under the control's own transformation, to see a loaded compensation at work
+    #[arg(long)]
+    tcp: bool,
+    /// Refuse the program when a single touch cannot be reached, instead of leaving it out
+    #[arg(long)]
+    strict: bool,
+}
 
 /// Runs `generate`.
 ///
 /// # Errors
-/// When the input is unusable.
-pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
-    Err(Failure::new("cli::missing", "generate"))
+/// When machine, program or controller are unusable, or nothing can be reached; nothing is written then.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let machine = args.machine.load(io)?;
+    let spec = load_program(&args.program, &machine, io)?;
+    let word = match (&args.postprocessor, &args.controller) {
+        // a path without a folder or an ending would read as the name of a controller
+        (Some(file), _) => Path::new(".").join(file).display().to_string(),
+        (None, Some(name)) => name.clone(),
+        (None, None) => {
+            return Err(Failure::new("cli::controller", "no controller is named").help("add --controller NAME"));
+        }
+    };
+    let (post, findings) = Postprocessor::load_built_in_or_file(&word)?;
+    io.report(&findings);
+    let options = Options { strict: args.strict, tcp: args.tcp };
+    let (generated, findings) = program::generate(&machine, &spec, &options)?;
+    let nc = post.program(&machine, &generated.plan, &generated.path)?;
+    // the summary shows what was left out; with --json it goes to stderr, finding by finding
+    let shown = |f: &&Finding| io.json || !matches!(f.code, "program::unreachable" | "program::lost");
+    io.report(&findings.0.iter().chain(&nc.findings.0).filter(shown).cloned().collect::<Vec<_>>());
+
+    let program_file = args.out.join(format!("{}.{}", spec.name, nc.extension));
+    let plan_file = args.out.join(format!("{}.plan.json", spec.name));
+    files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
+    files::write_whole(&program_file, nc.text.as_bytes())?;
+    summary(&machine, &post.name, &generated, [&program_file, &plan_file], io);
+    Ok(Answer::Done)
+}
+
+/// A program by name, or from a file of the user's own when the word ends in `.toml` or holds a `/`.
+///
+/// # Errors
+/// When there is none of that name for this machine, or the file is unusable.
+pub(super) fn load_program(word: &str, machine: &Machine, io: &Io) -> Result<ProgramSpec> {
+    if !is_file(word) {
+        return program::choose(program::built_in()?, word, machine);
+    }
+    let (spec, findings) = program::load(&source(word, files::read_text(Path::new(word))?))?;
+    io.report(&findings.0);
+    Ok(spec)
+}
+
+/// Whether a word means a file rather than a name.
+pub(super) fn is_file(word: &str) -> bool {
+    word.ends_with(".toml") || word.contains(['/', '\\'])
+}
+
+/// Touches of one stage in one pose.
+struct SetupCount {
+    stage: String,
+    pose: AxisMap,
+    visit: Option<u32>,
+    touches: usize,
+}
+
+/// Neighbouring touches of one stage, pose and visit, counted.
+fn setups(generated: &Generated) -> Vec<SetupCount> {
+    let mut out: Vec<SetupCount> = Vec::new();
+    for t in &generated.plan.touches {
+        match out.last_mut() {
+            Some(last) if last.stage == t.stage && last.pose == t.pose && last.visit == t.visit => last.touches += 1,
+            _ => out.push(SetupCount { stage: t.stage.clone(), pose: t.pose, visit: t.visit, touches: 1 }),
+        }
+    }
+    out
+}
+
+fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&PathBuf; 2], io: &Io) {
+    let (plan, path) = (&generated.plan, &generated.path);
+    let setups = setups(generated);
+    let skipped = program::skipped_groups(&plan.skipped);
+    let mut t = table(&["stage", "pose (deg)", "touches"]);
+    for s in &setups {
+        t.add_row(vec![Cell::new(&s.stage), Cell::new(pose_says(&s.pose)), number(s.touches)]);
+    }
+    io.say(t.to_string());
+    io.say(format!(
+        "{} touches on {}, mounting {:?}, about {}",
+        plan.touches.len(),
+        machine.name,
+        plan.mounting,
+        program::duration(path.seconds)
+    ));
+    if !skipped.is_empty() {
+        io.say(format!("\n{} touches were left out:", plan.skipped.len()));
+        let mut t = table(&["pose (deg)", "block", "face", "points", "why"]);
+        for SkippedGroup { pose, block, face, points, reason, .. } in &skipped {
+            t.add_row(vec![
+                Cell::new(pose_says(pose)),
+                Cell::new(block),
+                Cell::new(face),
+                number(points),
+                Cell::new(reason),
+            ]);
+        }
+        io.say(t.to_string());
+        for note in &plan.notes {
+            io.say(format!("  {note}"));
+        }
+    }
+    let [program_file, plan_file] = files;
+    io.say(format!("\nwritten: {}\n         {}", program_file.display(), plan_file.display()));
+    io.say("the head of the program says what to set up where");
+    io.answer(&json!({
+        "format": "axiscal-generated/1",
+        "machine": machine.name,
+        "program": plan.program,
+        "controller": controller,
+        "mounting": plan.mounting,
+        "controller_frame": plan.controller_frame,
+        "touches": plan.touches.len(),
+        "time_s": path.seconds,
+        "setups": setups.iter().map(|s| json!({
+            "stage": s.stage, "pose": s.pose, "visit": s.visit, "touches": s.touches,
+        })).collect::<Vec<_>>(),
+        "skipped": skipped.iter().map(|s| json!({
+            "stage": s.stage, "pose": s.pose, "block": s.block, "face": s.face, "points": s.points, "reason": s.reason,
+        })).collect::<Vec<_>>(),
+        "notes": plan.notes,
+        "files": { "program": program_file, "plan": plan_file },
+    }));
 }

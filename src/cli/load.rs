@@ -4,7 +4,7 @@ use super::common::{Io, load_machine};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
 use crate::fit::Settings;
-use crate::log::{self, Touch};
+use crate::log::{self, Touch, Writer};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
@@ -159,23 +159,16 @@ pub fn read_log(
     io: &Io,
 ) -> Result<Vec<Touch>> {
     let name = path.display().to_string();
-    let raw = if controller == "csv" {
-        let (raw, findings) = log::csv::read(bytes, &name)?;
-        io.report(&findings.0);
-        raw
+    let post;
+    let writer = if controller == "csv" {
+        Writer::Csv
     } else {
-        let (post, findings) = Postprocessor::load_built_in_or_file(controller)?;
+        let (read, findings) = Postprocessor::load_built_in_or_file(controller)?;
         io.report(&findings);
-        let (parsed, findings) = log::parse(bytes, &name, &post)?;
-        io.report(&findings.0);
-        parsed.touches
+        post = read;
+        Writer::Controller(&post)
     };
-    let (touches, findings) = log::match_to_plan(machine, plan, raw);
+    let (matched, findings) = log::read(bytes, &name, writer, machine, plan)?;
     io.report(&findings.0);
-    if findings.has_errors() {
-        return Err(Failure(
-            findings.0.into_iter().filter(|f| f.severity == crate::diag::Severity::Error).take(1).collect(),
-        ));
-    }
-    Ok(touches)
+    Ok(matched.touches)
 }

@@ -1,16 +1,156 @@
-//! `axiscal parse`
+//! `axiscal parse`: a controller's log → the touches CSV.
 
+use super::common::load_machine;
 use super::{Answer, Io};
-use crate::diag::{Failure, Result};
+use crate::axes::AxisName;
+use crate::diag::{Result, source};
+use crate::files;
+use crate::log::{self, MatchedLog, Status, Touch, Writer};
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use crate::program::plan::Plan;
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+use std::path::PathBuf;
 
 /// Arguments of `parse`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The log that the probing program wrote
+    pub log: PathBuf,
+    /// Controller that wrote it: a name (`axiscal controllers` lists them), a postprocessor FILE.toml, or `csv`
+    #[arg(long, value_name = "NAME|FILE")]
+    pub controller: String,
+    /// The plan that `generate` wrote together with the program
+    #[arg(long, value_name = "FILE")]
+    pub plan: PathBuf,
+    /// A machines.toml of your own (default: the one built in)
+    #[arg(long, value_name = "FILE")]
+    pub machines: Option<PathBuf>,
+    /// Where to write the touches (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// The answer as JSON.
+#[derive(Serialize)]
+struct Parsed<'a> {
+    format: &'static str,
+    machine: &'a str,
+    program: &'a str,
+    complete: bool,
+    runs: usize,
+    planned: usize,
+    hits: usize,
+    misses: usize,
+    missing: Vec<u64>,
+    touches: Vec<serde_json::Value>,
+}
 
 /// Runs `parse`.
 ///
 /// # Errors
-/// When the input is unusable.
-pub fn run(_args: &Args, _io: &Io) -> Result<Answer> {
-    Err(Failure::new("cli::missing", "parse"))
+/// When the plan, the machine or the log is unusable.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let plan_source = source(args.plan.display().to_string(), files::read_text(&args.plan)?);
+    let (plan, findings) = Plan::parse(&plan_source)?;
+    io.report(&findings.0);
+    let machine = load_machine(&plan.machine, args.machines.as_deref(), io)?;
+    let post = match args.controller.as_str() {
+        "csv" => None,
+        word => {
+            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
+            io.report(&findings);
+            Some(post)
+        }
+    };
+    let writer = post.as_ref().map_or(Writer::Csv, Writer::Controller);
+    let bytes = files::read_bytes(&args.log)?;
+    let (read, findings) = log::read(&bytes, &args.log.display().to_string(), writer, &machine, &plan)?;
+    io.report(&findings.0);
+    if let Some(out) = &args.out {
+        files::write_whole(out, log::csv::write(&machine, &read.touches).as_bytes())?;
+    }
+    io.say(summary(&plan, &read));
+    if let Some(out) = &args.out {
+        io.say(format!("touches written to {}", out.display()));
+    }
+    io.answer(&answer(&machine, &plan, &read));
+    Ok(Answer::Done)
+}
+
+fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a> {
+    let touches = read.touches.iter().map(|t| {
+        let mut object = serde_json::Map::new();
+        object.insert("id".into(), t.id.into());
+        for axis in AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()) {
+            object.insert(axis.to_string(), (t.position.get(axis) + 0.0).into());
+        }
+        let status = if t.status == Status::Hit { "hit" } else { "miss" };
+        object.insert("status".into(), status.into());
+        t.time_s.into_iter().for_each(|v| drop(object.insert("time_s".into(), v.into())));
+        t.temperature_deg_c.into_iter().for_each(|v| drop(object.insert("temperature_degC".into(), v.into())));
+        object.insert("line".into(), t.line.into());
+        serde_json::Value::Object(object)
+    });
+    let have: std::collections::BTreeSet<u64> = read.touches.iter().map(|t| t.id).collect();
+    let hits = read.touches.iter().filter(|t| t.status == Status::Hit).count();
+    Parsed {
+        format: "axiscal-parse/1",
+        machine: &plan.machine,
+        program: &plan.program,
+        complete: read.complete,
+        runs: read.runs,
+        planned: plan.touches.len(),
+        hits,
+        misses: read.touches.len() - hits,
+        missing: plan.touches.iter().map(|t| t.id).filter(|id| !have.contains(id)).collect(),
+        touches: touches.collect(),
+    }
+}
+
+/// One row per stage and block: what was planned, what was touched, how far off the nominal contact.
+fn summary(plan: &Plan, read: &MatchedLog) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.set_header(["stage", "block", "planned", "hit", "missed", "not in the log", "off nominal, mm"]);
+    let mut rows: Vec<(&str, &str, Vec<Option<&Touch>>, Vec<f64>)> = Vec::new();
+    let by_id: std::collections::BTreeMap<u64, &Touch> = read.touches.iter().map(|t| (t.id, t)).collect();
+    for planned in &plan.touches {
+        let touch = by_id.get(&planned.id).copied();
+        let index = rows.iter().position(|r| r.0 == planned.stage && r.1 == planned.block).unwrap_or_else(|| {
+            rows.push((&planned.stage, &planned.block, Vec::new(), Vec::new()));
+            rows.len() - 1
+        });
+        rows[index].2.push(touch);
+        if let Some(hit) = touch.filter(|t| t.status == Status::Hit) {
+            let off = hit.position.xyz_mm() - planned.nominal_position().xyz_mm();
+            let way = planned.end_position().xyz_mm() - planned.start_position().xyz_mm();
+            let length = way.norm();
+            rows[index].3.push(if length > 0.0 { off.dot(&way) / length } else { off.norm() });
+        }
+    }
+    for (stage, block, touches, offs) in rows {
+        let count = |status| touches.iter().flatten().filter(|t| t.status == status).count();
+        let low = offs.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = offs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let range = if offs.is_empty() { String::new() } else { format!("{low:+.3} .. {high:+.3}") };
+        let absent = touches.iter().filter(|t| t.is_none()).count();
+        table.add_row([
+            stage.to_owned(),
+            block.to_owned(),
+            touches.len().to_string(),
+            count(Status::Hit).to_string(),
+            count(Status::Miss).to_string(),
+            absent.to_string(),
+            range,
+        ]);
+    }
+    for index in 2..=6 {
+        if let Some(column) = table.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let end = if read.complete { "the run is complete" } else { "THE RUN IS NOT COMPLETE" };
+    format!("{table}\nprogram {} on {}: {} of {} touches read, {end}", plan.program, plan.machine, read.touches.len(), plan.touches.len())
 }

@@ -1,4 +1,141 @@
 //! A controller's log → [`RawTouch`] records with their line numbers → touches matched to the plan.
+//!
+//! [`parse`] reads the bytes, driven by the postprocessor's file; [`to_axes`] makes axis positions of a control's own
+//! coordinates; [`match_to_plan`] finds the touch of the plan that each one is; [`read`] does all three, [`csv`] reads
+//! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
+pub mod csv;
+mod lines;
+mod matching;
+mod parse;
+mod place;
+mod record;
+mod rows;
+mod swaps;
 pub mod touch;
+mod words;
+
+pub use matching::match_to_plan;
+pub use parse::{ParsedLog, parse};
+pub use record::LogHeader;
 pub use touch::{RawTouch, Status, Touch};
+
+use crate::axes::{AxisMap, AxisName};
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::machine::Machine;
+use crate::post::{Frame, Postprocessor, digest, log_word};
+use crate::program::plan::Plan;
+use place::Places;
+
+/// Who wrote a log.
+#[derive(Debug, Clone, Copy)]
+pub enum Writer<'a> {
+    /// A control, with its postprocessor.
+    Controller(&'a Postprocessor),
+    /// The project's own form, `controller = "csv"`.
+    Csv,
+}
+
+/// A log, read and matched to its plan.
+#[derive(Debug, Clone)]
+pub struct MatchedLog {
+    /// In the order of the plan, each once; missed touches are among them.
+    pub touches: Vec<Touch>,
+    /// The run came to its end (always true for a CSV).
+    pub complete: bool,
+    /// How many runs the log holds.
+    pub runs: usize,
+}
+
+/// Reads a log and matches it to its plan.
+///
+/// # Errors
+/// When nothing of it can be used, or it belongs to another program.
+pub fn read(
+    bytes: &[u8],
+    name: &str,
+    writer: Writer<'_>,
+    machine: &Machine,
+    plan: &Plan,
+) -> Result<(MatchedLog, Findings)> {
+    let places = Places::new(bytes, name);
+    let (mut parsed, mut findings) = match writer {
+        Writer::Controller(post) => parse(bytes, name, post)?,
+        Writer::Csv => {
+            let (touches, findings) = csv::read(bytes, name)?;
+            (ParsedLog { touches, header: None, complete: true, columns: false, runs: 1 }, findings)
+        }
+    };
+    let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());
+    if let Some(header) = &parsed.header {
+        belongs(header, machine, plan, &places, &mut findings).map_err(|f| joined(&findings, f))?;
+    }
+    if let Writer::Controller(_) = writer {
+        to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
+    }
+    let (touches, more) =
+        matching::match_at(machine, plan, parsed.touches, Some(&places)).map_err(|f| joined(&findings, f))?;
+    findings.0.extend(more.0);
+    Ok((MatchedLog { touches, complete: parsed.complete, runs: parsed.runs }, findings))
+}
+
+/// Is this the log of the plan's program?
+fn belongs(
+    header: &LogHeader,
+    machine: &Machine,
+    plan: &Plan,
+    places: &Places<'_>,
+    findings: &mut Findings,
+) -> Result<()> {
+    let (program, of_machine) = (log_word(&plan.program), log_word(&machine.name));
+    if header.program != program || header.machine != of_machine {
+        let message = format!(
+            "the log is of program {} on machine {}, the plan is of program {program} on machine {of_machine}",
+            header.program, header.machine
+        );
+        let finding = Finding::error("log::other_program", message)
+            .help("use the plan that `axiscal generate` wrote together with the program");
+        return Err(places.at_line(finding, header.line).into());
+    }
+    if header.digest != digest(plan) {
+        let message =
+            format!("the program that wrote this log was made from another plan ({} touches)", header.touches);
+        let finding = Finding::warning("log::other_plan", message).help(
+            "touches are matched by number and checked by place; better use the plan that belongs to the program",
+        );
+        findings.push(places.at_line(finding, header.line));
+    }
+    Ok(())
+}
+
+/// Makes axis positions (relative to R) of a control's own coordinates, where the plan's program was written for the
+/// control's own transformation. The positions are those of an errorless machine.
+///
+/// # Errors
+/// When the machine's linear axes do not span space.
+pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Result<()> {
+    if !Frame::of(machine, plan).is_tcp() {
+        return Ok(());
+    }
+    for touch in touches {
+        let planned = touch.id.and_then(|id| plan.touch(id));
+        let length = planned.and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
+        let mut shown = touch.position;
+        // rotary axes that the log lacks stand at the plan's pose
+        let pose = planned.map_or_else(AxisMap::default, |t| t.pose);
+        AxisName::ALL.into_iter().filter(|a| !touch.present[a.index()]).for_each(|a| {
+            if let Some(value) = pose.get(a) {
+                shown.set(a, value);
+            }
+        });
+        let frame = Frame::new(machine, plan.controller_frame, length);
+        touch.position = frame.axes_from_controller(&shown).ok_or_else(|| {
+            Failure::new("log::frame", format!("the linear axes of machine {} do not span space", machine.name))
+                .help("check the directions of X, Y and Z in machines.toml")
+        })?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

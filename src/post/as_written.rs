@@ -238,7 +238,7 @@ pub struct Log {
     /// `.` or `,`
     #[schemars(with = "String")]
     pub decimal_mark: Spanned<String>,
-    /// Letter of the word with the sum of the axis positions, where the control can write one.
+    /// Letter of the word with the sum of all other numbers of the line, where the control can write one.
     #[schemars(with = "Option<String>")]
     pub check_word: Option<Spanned<String>>,
     /// A file of nothing but columns, where the control has such a log of its own.

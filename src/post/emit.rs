@@ -274,7 +274,7 @@ impl<'a> Writer<'a> {
             self.plan.program, self.machine.name, self.post.name
         )];
         head.extend(self.path.head.iter().cloned());
-        head.push(format!("log: {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
+        head.push(format!("the log is {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
         if let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) {
             head.push(format!("coordinates are the tool's place in the workpiece: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());
@@ -311,7 +311,7 @@ impl<'a> Writer<'a> {
     fn step(&mut self, step: &Step) -> Result<()> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
-            Step::Setup { number, says } => self.setup(*number, says),
+            Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),
             Step::OrientSpindle { deg } => {
                 let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
                 self.render("orient", context! { deg => self.number(angle) })
@@ -352,7 +352,7 @@ impl<'a> Writer<'a> {
         if feed.is_finite() && feed > 0.0 { Ok(self.number(feed)) } else { Err(self.broken(format!("feed {feed}"))) }
     }
 
-    fn setup(&mut self, number: u32, says: &str) -> Result<()> {
+    fn setup(&mut self, number: u32, says: &str, resume: Option<&[Step]>) -> Result<()> {
         self.close_setup()?;
         let known = self.axes.iter().all(|a| self.at.get(*a).is_some());
         if std::mem::take(&mut self.in_opening) && known {
@@ -360,39 +360,33 @@ impl<'a> Writer<'a> {
         }
         self.open_setup = Some(self.label);
         self.render("setup", context! { number => number, says => says })?;
-        let moves = match self.opening {
-            Some(opening) => Some(self.resume_moves(&opening)?),
-            None => None,
+        let moves = match (self.opening, resume) {
+            (Some(opening), Some(resume)) => Some(self.resume_moves(&opening, resume)?),
+            _ => None,
         };
         let possible = moves.is_some();
         self.render("resume", context! { number, possible, moves => moves.unwrap_or_default() })
     }
 
-    /// From where the opening of the program ends to where the present set-up begins: rotary axes first, then X and Y,
-    /// Z last when it goes down and first when it goes up. Both places are at clearance.
-    fn resume_moves(&self, opening: &AxisMap) -> Result<Vec<Value>> {
-        let mut places = Vec::new();
-        let mut turn = AxisMap::default();
-        for (axis, value) in self.at.iter().filter(|(a, _)| a.is_rotary()) {
-            if opening.get(axis) != Some(value) {
-                turn.set(axis, value);
-            }
-        }
-        if !turn.is_empty() {
-            places.extend(self.rotary_steps(opening, &turn)?);
-        }
-        let mut stands = turn.or(opening);
-        let goes_up = self.at.get(AxisName::Z) > opening.get(AxisName::Z);
-        let (x, y, z) = (AxisName::X, AxisName::Y, AxisName::Z);
-        let order = if goes_up { [z, x, y] } else { [x, y, z] };
-        for axis in order {
-            let Some(value) = self.at.get(axis).filter(|v| opening.get(axis) != Some(*v)) else { continue };
-            stands.set(axis, value);
-            if self.frame.is_tcp() {
-                let world = self.controller(&stands);
-                places.push(AxisMap::xyz(world.0[0], world.0[1], world.0[2]));
-            } else {
-                places.push(AxisMap::default().with(axis, value));
+    /// The way that the path gives from where the opening ends to where the present set-up begins.
+    fn resume_moves(&self, opening: &AxisMap, resume: &[Step]) -> Result<Vec<Value>> {
+        let (mut stands, mut places) = (*opening, Vec::new());
+        for step in resume {
+            match step {
+                Step::Rotary { to, .. } => {
+                    places.extend(self.rotary_steps(&stands, to)?);
+                    stands = to.or(&stands);
+                }
+                Step::Rapid { to } => {
+                    stands = to.or(&stands);
+                    if self.frame.is_tcp() {
+                        let world = self.controller(&stands);
+                        places.push(AxisMap::xyz(world.0[0], world.0[1], world.0[2]));
+                    } else {
+                        places.push(*to);
+                    }
+                }
+                _ => return Err(self.broken("the way to a set-up holds more than rapids and turns".into())),
             }
         }
         places.iter().map(|place| self.words(place)).collect()

@@ -97,13 +97,15 @@ impl Postprocessor {
             let length = plan.touch(record.id).and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
             let frame = Frame::new(machine, plan.controller_frame, length);
             let shown = frame.controller_from_axes(&record.position);
-            let mut line = format!("P N{} S{}", record.id, i32::from(record.status == Status::Hit));
+            let status = i32::from(record.status == Status::Hit);
+            let mut line = format!("P N{} S{status}", record.id);
             for axis in &axes {
                 // writing into a String cannot fail
                 let _ = write!(line, " {axis}{}", number(shown.get(*axis)));
             }
             if let Some(letter) = self.log.check_word {
-                let sum: f64 = axes.iter().map(|a| shown.get(*a)).sum();
+                // ids are small: a double holds them
+                let sum = record.id as f64 + f64::from(status) + axes.iter().map(|a| shown.get(*a)).sum::<f64>();
                 let _ = write!(line, " {}{}", letter as char, number(sum));
             }
             lines.push(line);

@@ -15,6 +15,7 @@ pub use check::parse;
 pub use emit::NcProgram;
 pub use frame::Frame;
 pub use log_text::{LogRecord, digest};
+pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
 pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;
@@ -82,7 +83,7 @@ pub struct LogRule {
     pub exact_decimals: bool,
     /// `.` or `,`
     pub mark: u8,
-    /// Letter of the word with the sum of the axis positions.
+    /// Letter of the word with the sum of all other numbers of the line: it shows a damaged digit.
     pub check_word: Option<u8>,
     /// A file of nothing but columns.
     pub columns: Option<ColumnRule>,

@@ -1,6 +1,5 @@
 use super::*;
 use crate::axes::AxisMap;
-use crate::log::Status;
 use crate::machine::Machine;
 use crate::program::path::{self, Step, TouchStep};
 use crate::program::plan::{ControllerFrame, Plan};
@@ -48,7 +47,13 @@ pub(crate) fn path(plan: &Plan, probe: &crate::machine::as_written::Probe) -> pa
     ];
     for (i, t) in plan.touches.iter().enumerate() {
         if i != 1 {
-            steps.push(Step::Setup { number: 1 + u32::from(i > 1), says: format!("face {}", t.face) });
+            let number = 1 + u32::from(i > 1);
+            // the second set-up begins high over the first column, the opening ended at X0 Y0
+            let to = |axis: AxisName| Step::Rapid {
+                to: AxisMap::default().with(axis, plan.touches[i.saturating_sub(1)].start.get(axis).unwrap()),
+            };
+            let resume = if number == 1 { Vec::new() } else { vec![to(AxisName::X), to(AxisName::Y)] };
+            steps.push(Step::Setup { number, says: format!("face {}", t.face), resume: Some(resume) });
         }
         let start = t.start;
         for axis in [AxisName::X, AxisName::Y] {
@@ -73,7 +78,7 @@ pub(crate) fn path(plan: &Plan, probe: &crate::machine::as_written::Probe) -> pa
         steps.push(Step::Retract { to, feed: probe.position_feed });
         steps.push(Step::Protected { to: z(high), feed: probe.position_feed });
     }
-    path::Path { head: vec!["three touches (by hand), about 1 min".into()], steps, seconds: 60.0 }
+    path::Path { head: vec!["three touches (by hand), about 1 min".into()], steps, seconds: 60.0, start_near: None }
 }
 
 fn program_of(name: &str, mounting: &str, block: &str, frame: ControllerFrame) -> String {

@@ -251,7 +251,7 @@ fn state(
 #[derive(Default)]
 struct Senses {
     last: [f64; 6],
-    /// Where the axes stood after the last touch.
+    /// Where the axes stood after the last touch: a search ends with the way back to its start.
     stood: Option<Position>,
 }
 
@@ -270,7 +270,7 @@ impl Senses {
                 }
             }
         }
-        self.stood = Some(ready.end);
+        self.stood = Some(ready.start);
         self.last
     }
 }

@@ -27,7 +27,7 @@ pub fn parameters(id: &str, machine: &Machine, _: Settings<'_>) -> Result<Vec<Pa
     let head = AxisName::B;
     match id {
         "tool-length" => {
-            let row = Parameter::at("tool_length", Mm, Target::Length, Shape::Constant).alias("length").alias("dL");
+            let row = Parameter::at("dL", Mm, Target::Length, Shape::Constant).alias("tool_length");
             Ok(vec![row])
         }
         "paper-head" => {

@@ -1,0 +1,275 @@
+//! One line of a log → header, touch or end; or a row of columns. Driven by the postprocessor's data.
+
+use super::lines::blanks;
+use super::touch::{RawTouch, Status};
+use super::words::{Fault, Number, number, whole};
+use crate::axes::{AxisName, Position};
+use crate::post::{ColumnRule, LogRule};
+
+/// What a line says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// A run begins.
+    Head(LogHeader),
+    /// A touch.
+    Touch(RawTouch),
+    /// A run has come to its end; number of touches of the plan.
+    End(u64),
+    /// Nothing.
+    Blank,
+}
+
+/// The line with which a run begins.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogHeader {
+    /// Controller, in capitals.
+    pub controller: String,
+    /// Machine, in capitals.
+    pub machine: String,
+    /// Program, in capitals.
+    pub program: String,
+    /// Of the plan.
+    pub digest: String,
+    /// Touches of the plan.
+    pub touches: u64,
+    /// Set-up with which the run begins: 1, or where it was started again.
+    pub setup: u64,
+    /// Line in the log, from 1.
+    pub line: usize,
+}
+
+/// Reads a line of words.
+///
+/// # Errors
+/// When the line is not understood as a whole.
+pub fn record(line: &[u8], line_number: usize, rule: &LogRule) -> Result<Record, Fault> {
+    let begin = blanks(line);
+    let Some((first, rest)) = begin.split_first() else { return Ok(Record::Blank) };
+    match first {
+        b'P' => touch(line, rest, line_number, rule).map(Record::Touch),
+        b'H' => head(line, rest, line_number).map(Record::Head),
+        b'E' => end(line, rest).map(Record::End),
+        _ => Err(Fault::at(line, begin, begin.len(), "log::not_understood", format!(
+            "{} is not a line of this log: a touch begins with P, a run with H, its end with E", show(begin)
+        ))),
+    }
+}
+
+/// A piece of a line for a message.
+fn show(bytes: &[u8]) -> String {
+    let shown: String = bytes.iter().take(40).map(|b| if (b' '..=b'~').contains(b) { *b as char } else { '?' }).collect();
+    format!("{shown:?}{}", if bytes.len() > 40 { " ..." } else { "" })
+}
+
+fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Result<RawTouch, Fault> {
+    let mut seen = [false; 256];
+    let (mut id, mut status, mut check) = (None, None, None);
+    let mut position = Position::default();
+    let mut present = [false; 6];
+    let mut sum = 0.0;
+    loop {
+        rest = blanks(rest);
+        let Some((letter, after)) = rest.split_first() else { break };
+        let word = rest;
+        let axis = axis_of(*letter);
+        if axis.is_none() && !matches!(letter, b'N' | b'S') && Some(*letter) != rule.check_word {
+            return Err(Fault::at(line, word, 1, "log::unknown_word", format!("unknown word {}", show(word))));
+        }
+        if std::mem::replace(&mut seen[usize::from(*letter)], true) {
+            let message = format!("the word {} stands twice", *letter as char);
+            return Err(Fault::at(line, word, 1, "log::word_twice", message));
+        }
+        let (tail, value) = value(line, after, rule)?;
+        let width = word.len() - tail.len();
+        if !tail.is_empty() && !matches!(tail[0], b' ' | b'\t' | b'A'..=b'Z') {
+            let message = format!("expected a blank or the next word, found {}", show(tail));
+            return Err(Fault::at(line, tail, 1, "log::in_number", message));
+        }
+        if let Some(axis) = axis {
+            exact(line, word, width, value, rule)?;
+            position.set(axis, value.value);
+            present[axis.index()] = true;
+            sum += value.value;
+        } else if *letter == b'N' {
+            let wrong = || Fault::at(line, word, width, "log::id", "the number of a touch is whole and not negative");
+            id = Some(whole(value).ok_or_else(wrong)?);
+            sum += value.value;
+        } else if *letter == b'S' {
+            sum += value.value;
+            status = Some(match value.value {
+                1.0 => Status::Hit,
+                0.0 => Status::Miss,
+                _ => return Err(Fault::at(line, word, width, "log::status", "status S is 1 (hit) or 0 (miss)")),
+            });
+        } else {
+            exact(line, word, width, value, rule)?;
+            check = Some((value.value, word, width));
+        }
+        rest = tail;
+    }
+    let lacks = |what: &str| Fault::at(line, &line[line.len()..], 1, "log::cut_line", format!("the line ends without {what}"));
+    let id = id.ok_or_else(|| lacks("the number N of its touch"))?;
+    let status = status.ok_or_else(|| lacks("its status S"))?;
+    for axis in [AxisName::X, AxisName::Y, AxisName::Z] {
+        if !present[axis.index()] {
+            return Err(lacks(&format!("{axis}")));
+        }
+    }
+    if let Some(letter) = rule.check_word {
+        let (check, word, width) = check.ok_or_else(|| lacks(&format!("its sum {}", letter as char)))?;
+        let count = present.iter().filter(|p| **p).count() as f64;
+        // every value and the sum are rounded by at most half a digit, with a little room for the doubles themselves
+        let room = (count + 1.0) * 0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0)) + 1e-9;
+        if (check - sum).abs() > room {
+            let message = format!("the numbers add up to {sum:.6}, the line says {check:.6}: it was damaged or edited");
+            return Err(Fault::at(line, word, width, "log::sum", message));
+        }
+    }
+    Ok(RawTouch {
+        id: Some(id),
+        position,
+        present,
+        status,
+        time_s: None,
+        temperature_deg_c: None,
+        line: line_number,
+    })
+}
+
+fn axis_of(letter: u8) -> Option<AxisName> {
+    match letter {
+        b'X' => Some(AxisName::X),
+        b'Y' => Some(AxisName::Y),
+        b'Z' => Some(AxisName::Z),
+        b'A' => Some(AxisName::A),
+        b'B' => Some(AxisName::B),
+        b'C' => Some(AxisName::C),
+        _ => None,
+    }
+}
+
+/// A finite number, or the fault that says what stands there instead.
+fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Number), Fault> {
+    let fault = |code, message: String| Err(Fault::at(line, at, word_length(at), code, message));
+    match number(rule.mark)(at) {
+        Ok((rest, n)) if n.value.is_finite() => {
+            let other = if rule.mark == b',' { b'.' } else { b',' };
+            if rest.first() == Some(&other) {
+                let message = format!(
+                    "{} has the decimal mark '{}', this controller writes '{}'",
+                    show(&at[..word_length(at)]),
+                    other as char,
+                    rule.mark as char
+                );
+                return fault("log::decimal_mark", message);
+            }
+            Ok((rest, n))
+        }
+        Ok(_) => fault("log::not_a_number", format!("{} is too large", show(&at[..word_length(at)]))),
+        Err(_) => {
+            fault("log::not_a_number", format!("expected a number, found {}", show(&at[..word_length(at)])))
+        }
+    }
+}
+
+/// Up to the next blank.
+fn word_length(at: &[u8]) -> usize {
+    at.iter().position(|b| *b == b' ' || *b == b'\t').unwrap_or(at.len())
+}
+
+/// A number with another count of decimals than the controller writes was cut or edited.
+fn exact(line: &[u8], word: &[u8], width: usize, n: Number, rule: &LogRule) -> Result<(), Fault> {
+    let found = n.decimals.unwrap_or(0);
+    if rule.exact_decimals && found != rule.decimals {
+        let message = format!(
+            "{} has {found} decimals, this controller writes {}: the line was cut or edited",
+            show(&word[..width]),
+            rule.decimals
+        );
+        return Err(Fault::at(line, word, width, "log::decimals", message));
+    }
+    Ok(())
+}
+
+fn end(line: &[u8], rest: &[u8]) -> Result<u64, Fault> {
+    let begin = blanks(rest);
+    begin
+        .strip_prefix(b"N")
+        .and_then(|digits| number(b'.')(digits).ok())
+        .filter(|(tail, _)| blanks(tail).is_empty())
+        .and_then(|(_, n)| whole(n))
+        .ok_or_else(|| Fault::at(line, begin, begin.len(), "log::end", "the end of a run is `E N` and the count of touches"))
+}
+
+fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault> {
+    let fault = |message: &str| Fault::at(line, rest, rest.len(), "log::head", message);
+    let text = std::str::from_utf8(rest).map_err(|_| fault("the head of a run holds characters that are not ASCII"))?;
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    let [mark, version, controller, machine, program, digest, touches, setup] = words[..] else {
+        return Err(fault("the head of a run is `H AXISCAL 1 controller machine program digest N touches U set-up`"));
+    };
+    if mark != "AXISCAL" || version != crate::post::LOG_VERSION.to_string() {
+        return Err(fault("this is not the head of a log of this version of axiscal"));
+    }
+    let count = |word: &str, letter: char| {
+        let digits = word.strip_prefix(letter)?;
+        number(b'.')(digits.as_bytes()).ok().filter(|(tail, _)| tail.is_empty()).and_then(|(_, n)| whole(n))
+    };
+    match (count(touches, 'N'), count(setup, 'U')) {
+        (Some(touches), Some(setup)) => Ok(LogHeader {
+            controller: controller.to_owned(),
+            machine: machine.to_owned(),
+            program: program.to_owned(),
+            digest: digest.to_owned(),
+            touches,
+            setup,
+            line: line_number,
+        }),
+        _ => Err(fault("the head of a run ends with N and the count of touches, U and the first set-up")),
+    }
+}
+
+/// Reads a row of columns: a touch without a number, hit for all that the row says. `None` for a blank line.
+///
+/// # Errors
+/// When the line is not such a row.
+pub fn row(line: &[u8], line_number: usize, columns: &ColumnRule, rule: &LogRule) -> Result<Option<RawTouch>, Fault> {
+    let mut rest = blanks(line);
+    if rest.is_empty() {
+        return Ok(None);
+    }
+    let exact_rule = LogRule { decimals: columns.decimals, ..rule.clone() };
+    let mut position = Position::default();
+    let mut present = [false; 6];
+    for (index, axis) in columns.axes.iter().enumerate() {
+        if rest.is_empty() {
+            let message = format!("{index} numbers, expected {}: the line was cut", columns.axes.len());
+            return Err(Fault::at(line, rest, 1, "log::cut_line", message));
+        }
+        let (tail, n) = value(line, rest, rule)?;
+        let width = rest.len() - tail.len();
+        if !tail.is_empty() && blanks(tail).len() == tail.len() {
+            let message = format!("expected a blank after the number, found {}", show(tail));
+            return Err(Fault::at(line, tail, 1, "log::in_number", message));
+        }
+        exact(line, rest, width, n, &exact_rule)?;
+        if let Some(axis) = axis {
+            position.set(*axis, n.value);
+            present[axis.index()] = true;
+        }
+        rest = blanks(tail);
+    }
+    if !rest.is_empty() {
+        let message = format!("more than {} numbers: {}", columns.axes.len(), show(rest));
+        return Err(Fault::at(line, rest, rest.len(), "log::too_long", message));
+    }
+    Ok(Some(RawTouch {
+        id: None,
+        position,
+        present,
+        status: Status::Hit,
+        time_s: None,
+        temperature_deg_c: None,
+        line: line_number,
+    }))
+}

@@ -1,0 +1,121 @@
+//! When most touches lie far from their places: which simple mistake would explain it?
+
+use super::matching::{fits, ranges};
+use super::touch::RawTouch;
+use crate::axes::{AxisName, Position};
+use crate::diag::Finding;
+use crate::machine::Machine;
+use crate::program::plan::PlanTouch;
+use crate::units::mm_from_inch;
+use nalgebra::Vector3;
+
+/// A mistake: what it says, what undoes it.
+struct Mistake {
+    says: String,
+    help: &'static str,
+    undo: Box<dyn Fn(Position) -> Position>,
+}
+
+/// The finding for a log of which `bad` touches are not where the plan has them.
+pub(super) fn explain(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], bad: usize) -> Finding {
+    let whole = |raw: &RawTouch, planned: &PlanTouch| {
+        let mut position = planned.nominal_position();
+        AxisName::ALL.into_iter().filter(|a| raw.present[a.index()]).for_each(|a| position.set(a, raw.position.get(a)));
+        position
+    };
+    for mistake in mistakes(machine).into_iter().chain(shift(pairs, whole)) {
+        let good = pairs
+            .iter()
+            .filter(|(planned, raw)| fits(machine, planned, &(mistake.undo)(whole(raw, planned)), raw.present))
+            .count();
+        if good * 10 >= pairs.len() * 9 {
+            let message = format!(
+                "{bad} of {} touches are far from their places, and {good} would be right if {}",
+                pairs.len(),
+                mistake.says
+            );
+            return Finding::error("log::swapped", message).help(mistake.help);
+        }
+    }
+    let ids: Vec<u64> = pairs.iter().map(|(t, _)| t.id).collect();
+    let message = format!(
+        "{bad} of {} touches are far from where the plan has them (touches {}): this is the log of another program or machine",
+        pairs.len(),
+        ranges(&ids)
+    );
+    Finding::error("log::other_plan", message)
+        .help("use the plan that `axiscal generate` wrote together with the program")
+}
+
+fn mistakes(machine: &Machine) -> Vec<Mistake> {
+    let columns = "check the order of the columns: the file itself is not changed";
+    let signs =
+        "coordinates are NC coordinates, tool over workpiece: X grows when the tool goes to +X over the workpiece";
+    let mut all = Vec::new();
+    let [x, y, z] = [0usize, 1, 2];
+    let orders = [
+        ([y, x, z], "X and Y"),
+        ([z, y, x], "X and Z"),
+        ([x, z, y], "Y and Z"),
+        ([y, z, x], "X, Y and Z"),
+        ([z, x, y], "X, Y and Z"),
+    ];
+    for (order, names) in orders {
+        all.push(Mistake {
+            says: format!("the columns {names} were exchanged"),
+            help: columns,
+            undo: Box::new(move |p| p.with_xyz_mm(Vector3::new(p.0[order[0]], p.0[order[1]], p.0[order[2]]))),
+        });
+    }
+    let rotary: Vec<AxisName> = machine.rotary().map(|a| a.name).collect();
+    if let [first, second] = rotary[..] {
+        all.push(Mistake {
+            says: format!("the columns {first} and {second} were exchanged"),
+            help: columns,
+            undo: Box::new(move |mut p| {
+                p.0.swap(first.index(), second.index());
+                p
+            }),
+        });
+    }
+    all.push(Mistake {
+        says: "the numbers were inches".into(),
+        help: "the program sets millimetres: was the log written by it?",
+        undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(mm_from_inch))),
+    });
+    let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();
+    for subset in 1u32..1 << axes.len() {
+        // one or two signs: more is no simple mistake any longer
+        if subset.count_ones() > 2 {
+            continue;
+        }
+        let turned: Vec<AxisName> =
+            axes.iter().enumerate().filter(|(i, _)| subset >> i & 1 == 1).map(|(_, a)| *a).collect();
+        let names: Vec<String> = turned.iter().map(ToString::to_string).collect();
+        all.push(Mistake {
+            says: format!("the sign of {} were the other one", names.join(" and ")),
+            help: signs,
+            undo: Box::new(move |mut p| {
+                turned.iter().for_each(|a| p.set(*a, -p.get(*a)));
+                p
+            }),
+        });
+    }
+    all
+}
+
+/// The same shift in all touches: another origin.
+fn shift(pairs: &[(&PlanTouch, RawTouch)], whole: impl Fn(&RawTouch, &PlanTouch) -> Position) -> Option<Mistake> {
+    let median = |axis: usize| {
+        let mut all: Vec<f64> =
+            pairs.iter().map(|(t, raw)| whole(raw, t).0[axis] - t.nominal_position().0[axis]).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    };
+    let by = Vector3::new(median(0)?, median(1)?, median(2)?);
+    Some(Mistake {
+        says: format!("all were shifted by X {:.3} Y {:.3} Z {:.3} mm", by.x, by.y, by.z),
+        help: "is `origin` in machines.toml the machine position at the origin of R? was another offset active in that run?",
+        undo: Box::new(move |p| p.with_xyz_mm(p.xyz_mm() - by)),
+    })
+}

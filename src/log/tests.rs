@@ -1,0 +1,322 @@
+use super::*;
+use crate::axes::Position;
+use crate::diag::Severity;
+use crate::post::LogRecord;
+use crate::post::tests::{machine, plan};
+use crate::program::plan::ControllerFrame;
+use proptest::prelude::*;
+
+fn post() -> Postprocessor {
+    Postprocessor::load_built_in_or_file("linuxcnc").unwrap().0
+}
+
+fn record(id: u64, position: Position) -> LogRecord {
+    LogRecord { id, status: Status::Hit, position }
+}
+
+/// A log of the plan's touches, each a little off its nominal place.
+fn records(plan: &Plan) -> Vec<LogRecord> {
+    let off = |t: &crate::program::plan::PlanTouch| {
+        let mut p = t.nominal_position();
+        p.0[0] += 0.001 * t.id as f64;
+        p
+    };
+    plan.touches.iter().map(|t| record(t.id, off(t))).collect()
+}
+
+fn codes(findings: &[Finding]) -> Vec<&'static str> {
+    findings.iter().map(|f| f.code).collect()
+}
+
+#[test]
+fn what_the_machine_would_write_is_read_back() {
+    for (name, mounting) in [("swivel-head", "table"), ("trunnion", "table"), ("double-head", "head")] {
+        let machine = machine(name);
+        for frame in [ControllerFrame::Axes, ControllerFrame::Tcp] {
+            let mut plan = plan(&machine, mounting, "x+");
+            plan.controller_frame = frame;
+            let text = post().log_text(&machine, &plan, &records(&plan));
+            let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan).unwrap();
+            assert!(findings.0.is_empty(), "{findings:?}");
+            assert!(read.complete && read.runs == 1 && read.touches.len() == 3);
+            for (touch, record) in read.touches.iter().zip(records(&plan)) {
+                assert_eq!(touch.id, record.id);
+                for (a, b) in touch.position.0.iter().zip(record.position.0) {
+                    // six decimals; a turn of the frame may add a last digit
+                    assert!((a - b).abs() < 1.1e-6, "{name} {frame:?} {touch:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_last_complete_run_counts() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    let run = |shift: f64| {
+        let mut all = records(&plan);
+        all.iter_mut().for_each(|r| r.position.0[1] += shift);
+        post().log_text(&machine, &plan, &all)
+    };
+    let stopped = run(0.5).lines().take(3).fold(String::new(), |t, l| t + l + "\n");
+    let text = format!("{}{}{stopped}", run(0.1), run(0.2));
+    let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan).unwrap();
+    assert_eq!(codes(&findings.0), ["log::runs"]);
+    assert_eq!(findings.0[0].place().unwrap(), "t.log:6:1");
+    assert_eq!(read.runs, 3);
+    assert!((read.touches[0].position.0[1] - plan.touches[0].nominal.position().0[1] - 0.2).abs() < 1e-9);
+}
+
+#[test]
+fn a_run_that_was_started_again_goes_on() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    let text = post().log_text(&machine, &plan, &records(&plan));
+    let lines: Vec<&str> = text.lines().collect();
+    let again = lines[0].strip_suffix("U1").unwrap().to_owned() + "U2";
+    let text = [lines[0], lines[1], lines[2], &again, lines[2], lines[3], lines[4], ""].join("\n");
+    let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan).unwrap();
+    assert_eq!(codes(&findings.0), ["log::twice"]);
+    assert!(read.complete);
+    assert_eq!(read.touches.iter().map(|t| t.line).collect::<Vec<_>>(), [2, 5, 6]);
+}
+
+#[test]
+fn simple_mistakes_are_named() {
+    let machine = machine("swivel-head");
+    // enough touches for "most of them"
+    let mut plan = plan(&machine, "head", "x+");
+    let more: Vec<_> = plan.touches.iter().cloned().map(|t| crate::program::plan::PlanTouch { id: t.id + 10, ..t }).collect();
+    plan.touches.extend(more);
+    let as_csv = |change: &dyn Fn(&mut Position)| {
+        let touches: Vec<Touch> = records(&plan)
+            .into_iter()
+            .map(|r| {
+                let mut position = r.position;
+                change(&mut position);
+                let (id, status) = (r.id, r.status);
+                Touch { id, position, status, time_s: None, temperature_deg_c: None, line: 0 }
+            })
+            .collect();
+        let text = csv::write(&machine, &touches);
+        read(text.as_bytes(), "t.csv", Writer::Csv, &machine, &plan)
+    };
+    as_csv(&|_| {}).unwrap();
+    let cases: [(&dyn Fn(&mut Position), &str); 5] = [
+        (&|p| p.0.swap(0, 2), "the columns X and Z were exchanged"),
+        (&|p| p.0[0] = -p.0[0], "the sign of X were the other one"),
+        (&|p| p.0[..3].iter_mut().for_each(|v| *v /= 25.4), "the numbers were inches"),
+        (&|p| p.0[1] += 100.0, "shifted by X 0.011 Y 100.000"),
+        (&|p| p.0 = [p.0[2] * 3.0, 77.0 + p.0[1] * p.0[0], -p.0[0], 0.0, 0.0, 0.0], "another program or machine"),
+    ];
+    for (change, expected) in cases {
+        let failure = as_csv(change).unwrap_err();
+        let error = failure.0.iter().find(|f| f.severity == Severity::Error).unwrap();
+        assert!(error.message.contains(expected), "{}", error.message);
+        assert_eq!(error.place().unwrap(), "t.csv:2:1");
+    }
+}
+
+#[test]
+fn a_csv_may_come_from_a_spreadsheet() {
+    let expected = csv::read(b"id,X,Y,Z,B,status\n1,1.5,-2,3,-30,hit\n2,1,2,3,4,miss\n", "t").unwrap().0;
+    assert_eq!(expected[0].position.0, [1.5, -2.0, 3.0, 0.0, -30.0, 0.0]);
+    assert_eq!(expected[0].present, [true, true, true, false, true, false]);
+    for other in [
+        "id;X;Y;Z;B;status\n1;1,5;-2;3;-30;hit\n2;1;2;3;4;miss\n",
+        "status\tB\tZ\tY\tX\tid\nhit\t-30\t3\t-2\t1.5\t1\nmiss\t4\t3\t2\t1\t2\n",
+        "\u{feff}\"id\",\"X\",\"Y\",\"Z\",\"B\",\"status\"\r\n\"1\",1.5,-2,3,-30,hit\r\n2,1,2,3,4,\"miss\"",
+    ] {
+        assert_eq!(csv::read(other.as_bytes(), "t").unwrap().0, expected, "{other}");
+    }
+    let (touches, findings) = csv::read(b"id,X,Y,Z\n1,1,5,-2,3\n2,1,2,3\n3,1,2,nan\n4,1,2,", "t").unwrap();
+    assert_eq!(touches.len(), 1);
+    let places: Vec<_> = findings.0.iter().map(|f| f.place().unwrap()).collect();
+    assert_eq!(places, ["t:2:1", "t:4:7", "t:5:7"]);
+    assert!(findings.0[0].message.contains("decimal commas"));
+    for bad in ["id,X,Y\n1,2,3\n", "id,X,Y,Z,Q\n1,2,3,4,5\n", "id,X,Y,Z,X\n1,2,3,4,5\n", "id,X,Y,Z\n", " \n"] {
+        assert!(csv::read(bad.as_bytes(), "t").is_err(), "{bad}");
+    }
+}
+
+/// Rows as LinuxCNC logs them for the moves of a touch, given how far along the search each stands, mm.
+fn rows(plan: &Plan, touch: usize, along: &[f64]) -> String {
+    let t = &plan.touches[touch];
+    let (start, end) = (t.start_position(), t.end_position());
+    let way = (end.xyz_mm() - start.xyz_mm()).normalize();
+    along
+        .iter()
+        .map(|a| {
+            let p = start.xyz_mm() + way * *a;
+            let r = &start.0[3..];
+            format!("{:.6} {:.6} {:.6} {:.6} {:.6} {:.6} 0.000000 0.000000 0.000000\n", p.x, p.y, p.z, r[0], r[1], r[2])
+        })
+        .collect()
+}
+
+#[test]
+fn columns_are_matched_by_place() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    let cases: [(&str, String, &[(u64, Status)], &[&str]); 6] = [
+        (
+            "search, release, measure",
+            rows(&plan, 0, &[2.010, 1.995, 2.001]) + &rows(&plan, 1, &[2.010, 1.995, 2.001]) + &rows(&plan, 2, &[2.01, 1.99, 2.0]),
+            &[(1, Status::Hit), (2, Status::Hit), (3, Status::Hit)],
+            &[],
+        ),
+        (
+            "duplicates dropped, head cut",
+            rows(&plan, 1, &[2.001]) + &rows(&plan, 2, &[2.01, 2.001]),
+            &[(2, Status::Hit), (3, Status::Hit)],
+            &["log::missing"],
+        ),
+        (
+            "a miss that looks like a hit",
+            rows(&plan, 0, &[2.01, 1.99, 2.0]) + &rows(&plan, 1, &[3.997]),
+            &[(1, Status::Hit), (2, Status::Miss)],
+            &["log::missed", "log::missing"],
+        ),
+        (
+            "rows of moves between",
+            rows(&plan, 0, &[0.0, 2.01, 2.0, 1.51, 2.001, 1.999, 0.0]) + &rows(&plan, 1, &[2.01, 1.99, 2.001]),
+            &[(1, Status::Hit), (2, Status::Hit)],
+            &["log::missing"],
+        ),
+        (
+            "elsewhere",
+            rows(&plan, 0, &[2.01, 1.99, 2.001]) + "1.000000 2.000000 3.000000 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\n",
+            &[(1, Status::Hit)],
+            &["log::unmatched", "log::missing"],
+        ),
+        (
+            "overwritten in the middle of a number",
+            rows(&plan, 0, &[2.01, 1.99, 2.001]) + "28.00000028.000000 0.000000 8.000000 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\n",
+            &[(1, Status::Hit)],
+            &["log::in_number", "log::missing"],
+        ),
+    ];
+    for (name, text, expected, expected_codes) in cases {
+        let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan)
+            .unwrap_or_else(|e| panic!("{name}: {:?}", e.0));
+        let found: Vec<_> = read.touches.iter().map(|t| (t.id, t.status)).collect();
+        assert_eq!(found, expected, "{name}");
+        assert_eq!(codes(&findings.0), expected_codes, "{name}: {:?}", findings.0);
+        if let Some(first) = read.touches.first().filter(|t| t.id == 1 && t.status == Status::Hit) {
+            let off = (first.position.xyz_mm() - plan.touches[0].nominal_position().xyz_mm()).norm();
+            assert!(off < 0.0011, "{name}: the measuring touch is the one that counts, not {off}");
+        }
+    }
+}
+
+#[test]
+fn touches_at_one_place_are_shared_out_or_refused() {
+    let machine = machine("swivel-head");
+    let mut plan = plan(&machine, "head", "x+");
+    let again = crate::program::plan::PlanTouch { id: 7, ..plan.touches[0].clone() };
+    plan.touches.insert(1, again);
+    let triples = rows(&plan, 0, &[2.01, 1.99, 2.001, 2.02, 1.98, 2.002]);
+    let (read_back, _) = read(triples.as_bytes(), "t", Writer::Controller(&post()), &machine, &plan).unwrap();
+    assert_eq!(read_back.touches.iter().map(|t| (t.id, t.line)).collect::<Vec<_>>(), [(1, 3), (7, 6)]);
+    let dropped = rows(&plan, 0, &[2.01, 1.99, 2.001, 2.02, 1.98]) + &rows(&plan, 2, &[2.01, 1.99, 2.0]);
+    let (read_back, findings) = read(dropped.as_bytes(), "t", Writer::Controller(&post()), &machine, &plan).unwrap();
+    assert_eq!(read_back.touches.iter().map(|t| t.id).collect::<Vec<_>>(), [2]);
+    assert!(codes(&findings.0).contains(&"log::ambiguous"));
+}
+
+/// What can happen to a file.
+#[derive(Debug, Clone)]
+enum Damage {
+    Cut(usize),
+    Delete(usize, usize),
+    Overwrite(usize, Vec<u8>),
+    Insert(usize, Vec<u8>),
+    Repeat(usize, usize),
+}
+
+fn damage() -> impl Strategy<Value = Damage> {
+    let bytes = prop::collection::vec(prop_oneof![any::<u8>(), prop::sample::select(&b"0123456789-. \n\rPNSXYZBCKHE,"[..])], 1..12);
+    prop_oneof![
+        any::<usize>().prop_map(Damage::Cut),
+        (any::<usize>(), 1..40usize).prop_map(|(a, n)| Damage::Delete(a, n)),
+        (any::<usize>(), bytes.clone()).prop_map(|(a, b)| Damage::Overwrite(a, b)),
+        (any::<usize>(), bytes).prop_map(|(a, b)| Damage::Insert(a, b)),
+        (any::<usize>(), 1..80usize).prop_map(|(a, n)| Damage::Repeat(a, n)),
+    ]
+}
+
+fn apply(text: &mut Vec<u8>, damage: &Damage) {
+    let len = text.len().max(1);
+    match damage {
+        Damage::Cut(at) => text.truncate(at % len),
+        Damage::Delete(at, n) => drop(text.drain(at % len..(at % len + n).min(text.len()))),
+        Damage::Overwrite(at, bytes) => {
+            let place = text.iter_mut().skip(at % len);
+            place.zip(bytes).for_each(|(t, b)| *t = *b);
+        }
+        Damage::Insert(at, bytes) => drop(text.splice(at % len..at % len, bytes.iter().copied())),
+        Damage::Repeat(at, n) => {
+            let piece = text[at % len..(at % len + n).min(text.len())].to_vec();
+            text.extend(piece);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn positions_survive_writing_and_reading(values in prop::collection::vec(-400.0..400.0f64, 5), miss: bool) {
+        let machine = machine("swivel-head");
+        let plan = plan(&machine, "head", "x+");
+        let position = Position([values[0], values[1], values[2], 0.0, values[3] / 10.0, values[4]]);
+        let status = if miss { Status::Miss } else { Status::Hit };
+        let text = post().log_text(&machine, &plan, &[LogRecord { id: 2, status, position }]);
+        let (parsed, findings) = parse(text.as_bytes(), "t", &post()).unwrap();
+        prop_assert!(findings.0.is_empty(), "{:?}", findings.0);
+        prop_assert_eq!(parsed.touches.len(), 1);
+        prop_assert_eq!(parsed.touches[0].status, status);
+        for (a, b) in parsed.touches[0].position.0.iter().zip(position.0) {
+            prop_assert!((a - b).abs() <= 0.5001e-6);
+        }
+    }
+
+    #[test]
+    fn a_csv_survives_writing_and_reading(values in prop::collection::vec(-400.0..400.0f64, 5), time in prop::option::of(0.0..1e5f64)) {
+        let machine = machine("swivel-head");
+        let position = Position([values[0], values[1], values[2], 0.0, values[3], values[4]]);
+        let touch = Touch { id: 3, position, status: Status::Miss, time_s: time, temperature_deg_c: time, line: 2 };
+        let (back, _) = csv::read(csv::write(&machine, std::slice::from_ref(&touch)).as_bytes(), "t").unwrap();
+        prop_assert_eq!(back[0].position, position);
+        prop_assert_eq!((back[0].id, back[0].status, back[0].time_s), (Some(3), Status::Miss, time));
+    }
+
+    #[test]
+    fn damage_never_panics_and_never_invents_a_touch(damages in prop::collection::vec(damage(), 1..4)) {
+        let machine = machine("swivel-head");
+        let plan = plan(&machine, "head", "x+");
+        let clean = post().log_text(&machine, &plan, &records(&plan));
+        let (original, _) = parse(clean.as_bytes(), "t", &post()).unwrap();
+        let mut text = clean.into_bytes();
+        damages.iter().for_each(|d| apply(&mut text, d));
+        if let Ok((parsed, _)) = parse(&text, "t", &post()) {
+            for touch in &parsed.touches {
+                let known = original.touches.iter().any(|o| o.id == touch.id && o.position == touch.position && o.status == touch.status);
+                prop_assert!(known, "invented {:?} in {:?}", touch, String::from_utf8_lossy(&text));
+            }
+        }
+        let _ = read(&text, "t", Writer::Controller(&post()), &machine, &plan);
+        let _ = csv::read(&text, "t");
+    }
+
+    #[test]
+    fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..400), text in "[PHEN0-9X.\\- \r\n]{0,300}") {
+        let machine = machine("trunnion");
+        let plan = plan(&machine, "table", "x+");
+        for input in [bytes.as_slice(), text.as_bytes()] {
+            let _ = read(input, "t", Writer::Controller(&post()), &machine, &plan);
+            let _ = read(input, "t", Writer::Csv, &machine, &plan);
+        }
+    }
+}
