@@ -1,4 +1,5 @@
 //! A compensation as `export` writes it, applied by the virtual machine's control: what it carries is gone.
+#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use axiscal::diag::source;
