@@ -1,4 +1,5 @@
 //! A compensation as `export` writes it, applied by the virtual machine's control: what it carries is gone.
+#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use axiscal::diag::source;
@@ -20,23 +21,23 @@ fn errors(machine: &Machine, effects: &[&str], rng: &mut ChaCha8Rng) -> (Scenari
     let mut terms = Vec::new();
     for effect in effects {
         let Some(row) = catalogue.get(effect, machine) else { continue };
-        for p in &row.parameters {
+        for (index, p) in row.parameters.iter().enumerate() {
             let size = if p.unit == "mm" { 0.1 } else { 0.05 };
             let value = rng.random_range(-size..size);
             scenario = scenario.with(machine, effect, &[(&p.name, value)]).unwrap();
-            let Meaning::At(spot) = meaning(effect, &p.name, machine) else { panic!("{effect} {}", p.name) };
-            terms.push(Term {
+            let Meaning::Location(spots) = meaning(row, index, machine) else { panic!("{effect} {}", p.name) };
+            terms.extend(spots.into_iter().map(|(spot, per_unit)| Term {
                 axis: spot.axis,
                 place: spot.place,
                 dof: spot.dof,
-                value,
-                unit: p.unit.clone(),
+                value: value * per_unit,
+                unit: spot.dof.unit().to_owned(),
                 parameter: p.name.clone(),
                 effect: (*effect).to_owned(),
                 active_before: 0.0,
-                identified: value,
+                identified: value * per_unit,
                 sigma: None,
-            });
+            }));
         }
     }
     (scenario, terms)

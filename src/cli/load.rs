@@ -4,7 +4,7 @@ use super::common::{Io, load_machine};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
 use crate::fit::Settings;
-use crate::log::{self, Touch, Writer};
+use crate::log::{self, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
@@ -158,17 +158,15 @@ pub fn read_log(
     plan: &Plan,
     io: &Io,
 ) -> Result<Vec<Touch>> {
-    let name = path.display().to_string();
-    let post;
-    let writer = if controller == "csv" {
-        Writer::Csv
+    let post = if controller == "csv" {
+        None
     } else {
-        let (read, findings) = Postprocessor::load_built_in_or_file(controller)?;
+        let (post, findings) = Postprocessor::load_built_in_or_file(controller)?;
         io.report(&findings);
-        post = read;
-        Writer::Controller(&post)
+        Some(post)
     };
-    let (matched, findings) = log::read(bytes, &name, writer, machine, plan)?;
+    let writer = post.as_ref().map_or(log::Writer::Csv, log::Writer::Controller);
+    let (read, findings) = log::read(bytes, &path.display().to_string(), writer, machine, plan)?;
     io.report(&findings.0);
-    Ok(matched.touches)
+    Ok(read.touches)
 }

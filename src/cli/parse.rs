@@ -132,6 +132,8 @@ fn summary(plan: &Plan, read: &MatchedLog) -> String {
     }
     for (stage, block, touches, offs) in rows {
         let count = |status| touches.iter().flatten().filter(|t| t.status == status).count();
+        // to the printed digits, so that nothing reads -0.000
+        let offs: Vec<f64> = offs.iter().map(|v| (v * 1e3).round() / 1e3 + 0.0).collect();
         let low = offs.iter().copied().fold(f64::INFINITY, f64::min);
         let high = offs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let range = if offs.is_empty() { String::new() } else { format!("{low:+.3} .. {high:+.3}") };

@@ -1,8 +1,9 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
 use super::as_written::EndOfLine;
+use super::opening::Opening;
 use super::{Frame, Postprocessor, log_text};
-use crate::axes::{AxisMap, AxisName, Position};
+use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
 use crate::program::path::{Path, Step, TouchStep};
@@ -33,10 +34,12 @@ impl Postprocessor {
     pub fn program(&self, machine: &Machine, plan: &Plan, path: &Path) -> Result<NcProgram> {
         let mut writer = Writer::new(self, machine, plan, path)?;
         writer.start()?;
-        for (index, step) in path.steps.iter().enumerate() {
-            writer.index = index;
-            writer.step(step)?;
-        }
+        let opening = Opening::of(path, machine, writer.frame.is_tcp());
+        let (first, rest) = (opening.steps.clone(), opening.rest.clone());
+        writer.opening = opening;
+        writer.steps(&first)?;
+        writer.opened();
+        writer.steps(&rest)?;
         writer.end()?;
         writer.finish()
     }
@@ -49,26 +52,28 @@ struct Named {
     says: String,
 }
 
-struct Writer<'a> {
-    post: &'a Postprocessor,
-    plan: &'a Plan,
-    machine: &'a Machine,
-    path: &'a Path,
-    frame: Frame<'a>,
-    axes: Vec<AxisName>,
+pub(super) struct Writer<'a> {
+    pub(super) post: &'a Postprocessor,
+    pub(super) plan: &'a Plan,
+    pub(super) machine: &'a Machine,
+    pub(super) path: &'a Path,
+    pub(super) frame: Frame<'a>,
+    pub(super) axes: Vec<AxisName>,
     text: String,
     findings: Findings,
     /// Step that is being written.
-    index: usize,
+    pub(super) index: usize,
     label: usize,
     /// Where the axes stand, as far as the path has said, relative to R.
-    at: AxisMap,
+    pub(super) at: AxisMap,
     /// True after a touch: the axes of the approach stand somewhere before `at`.
-    loose: bool,
-    /// Where every axis stood when the first set-up began: a run that starts again comes from there.
-    opening: Option<AxisMap>,
-    /// True until the first set-up begins.
-    in_opening: bool,
+    pub(super) loose: bool,
+    /// The first moves, which bring the machine from anywhere to a known place.
+    pub(super) opening: Opening,
+    /// Sense of each rotary axis's last move.
+    pub(super) senses: AxisMap,
+    /// Orientation of the spindle at the control, deg.
+    pub(super) oriented: Option<f64>,
     /// Label of the set-up that is open.
     open_setup: Option<usize>,
     last: Named,
@@ -103,8 +108,9 @@ impl<'a> Writer<'a> {
             label: LABELS_PER_STEP,
             at,
             loose: false,
-            opening: None,
-            in_opening: true,
+            opening: Opening::default(),
+            senses: AxisMap::default(),
+            oriented: None,
             open_setup: None,
             last: Named::default(),
         };
@@ -140,96 +146,6 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    // ------------------------------------------------------------------------------------------------- words
-
-    fn number(&self, value: f64) -> String {
-        self.post.number.number(value)
-    }
-
-    /// Axis words of a template: `{ axis, value, word, rotary }`.
-    fn words(&self, to: &AxisMap) -> Result<Value> {
-        let mut words = Vec::new();
-        for (axis, value) in to.iter() {
-            if !value.is_finite() {
-                return Err(self.broken(format!("axis {axis} is sent to {value}")));
-            }
-            if self.machine.axis(axis).is_none() {
-                return Err(self.broken(format!("axis {axis} is moved, which machine {} lacks", self.machine.name)));
-            }
-            words.push(context! {
-                axis => axis.to_string(),
-                value => self.number(value),
-                word => self.post.number.axis_word(axis, value),
-                rotary => axis.is_rotary(),
-            });
-        }
-        Ok(Value::from(words))
-    }
-
-    /// The path is not what the template language can be trusted with.
-    fn broken(&self, what: String) -> Failure {
-        Failure::new("post::path", format!("step {} of the path: {what}", self.index + 1))
-            .help("this is a fault of the path, not of the postprocessor: report it with the plan")
-    }
-
-    /// The control's coordinates of a place; rotary axes that nothing has been said about stand at 0.
-    fn controller(&self, axes: &AxisMap) -> Position {
-        self.frame.controller_from_axes(&axes.position())
-    }
-
-    /// Words of a move of linear axes. Under a transformation every coordinate may change.
-    fn linear_words(&self, to: &AxisMap) -> Result<AxisMap> {
-        if !self.frame.is_tcp() {
-            return Ok(*to);
-        }
-        let target = to.or(&self.at);
-        let turned = self.machine.rotary().any(|a| self.at.get(a.name).is_none_or(|v| v != 0.0));
-        let linear = [AxisName::X, AxisName::Y, AxisName::Z];
-        if linear.iter().any(|a| target.get(*a).is_none()) {
-            // both frames are the same while the rotary axes stand at 0
-            return if turned {
-                Err(self.broken("under the transformation a linear axis moves whose position is not known".into()))
-            } else {
-                Ok(*to)
-            };
-        }
-        let (before, after) = (self.controller(&self.at), self.controller(&target));
-        let after = AxisMap::xyz(after.0[0], after.0[1], after.0[2]);
-        let known = !self.loose && linear.iter().all(|a| self.at.get(*a).is_some());
-        let before = if known { AxisMap::xyz(before.0[0], before.0[1], before.0[2]) } else { AxisMap::default() };
-        let mut moved = self.post.number.moved(&before, &after);
-        if moved.is_empty() {
-            moved = after;
-        }
-        Ok(moved)
-    }
-
-    /// The places between two rotary positions; one place without a transformation.
-    fn rotary_steps(&self, from: &AxisMap, to: &AxisMap) -> Result<Vec<AxisMap>> {
-        let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) else { return Ok(vec![*to]) };
-        if AxisName::ALL[..3].iter().any(|a| from.get(*a).is_none()) {
-            return Err(self.broken("under the transformation a rotary axis moves before X, Y, Z are known".into()));
-        }
-        let way = to.iter().map(|(a, v)| (v - from.get(a).unwrap_or(0.0)).abs()).fold(0.0, f64::max);
-        // at most 720 deg in steps of at least a small fraction of a degree
-        let steps = (way / tcp.rotary_step_deg).ceil().clamp(1.0, 1e5);
-        let mut words = Vec::new();
-        let mut k = 1.0;
-        while k <= steps {
-            let mut place = *from;
-            for (axis, value) in to.iter() {
-                let begin = from.get(axis).unwrap_or(0.0);
-                place.set(axis, if k < steps { begin + (value - begin) * (k / steps) } else { value });
-            }
-            let world = self.controller(&place);
-            let mut step = AxisMap::xyz(world.0[0], world.0[1], world.0[2]);
-            to.iter().for_each(|(axis, _)| step.set(axis, place.get(axis).unwrap_or(0.0)));
-            words.push(step);
-            k += 1.0;
-        }
-        Ok(words)
-    }
-
     // ------------------------------------------------------------------------------------------------- rendering
 
     fn render(&mut self, template: &str, context: Value) -> Result<()> {
@@ -252,8 +168,9 @@ impl<'a> Writer<'a> {
         };
         let rendered = self.post.render(template, context! { ..context, ..common })?;
         self.label += LABELS_PER_STEP;
+        let rendered = rendered.strip_suffix('\n').unwrap_or(&rendered);
         if !rendered.is_empty() {
-            self.text.push_str(&rendered);
+            self.text.push_str(rendered);
             self.text.push('\n');
         }
         Ok(())
@@ -270,8 +187,11 @@ impl<'a> Writer<'a> {
     fn start(&mut self) -> Result<()> {
         let setups = self.path.steps.iter().filter(|s| matches!(s, Step::Setup { .. })).count();
         let mut head = vec![format!(
-            "axiscal: probing program {} for machine {}, controller {}",
-            self.plan.program, self.machine.name, self.post.name
+            "axiscal {}: program {}, machine {}, controller {}",
+            env!("CARGO_PKG_VERSION"),
+            self.plan.program,
+            self.machine.name,
+            self.post.name
         )];
         head.extend(self.path.head.iter().cloned());
         head.push(format!("the log is {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
@@ -283,8 +203,16 @@ impl<'a> Writer<'a> {
             head.push(format!("NOT VERIFIED on a real control: {entry}: {why}"));
         }
         let origin = self.axes.iter().map(|a| (a.to_string(), self.number(self.machine.origin.get(*a).unwrap_or(0.0))));
+        let near = self.path.start_near.as_ref().map(|near| {
+            let window = |a: &crate::machine::Axis| {
+                let [low, high] = near.window(a);
+                context! { axis => a.name.to_string(), low => self.number(low), high => self.number(high) }
+            };
+            self.machine.rotary().map(window).collect::<Vec<_>>()
+        });
         let context = context! {
             head => head,
+            start_near => near.unwrap_or_default(),
             setups => setups,
             origin => map(origin),
             slow_feed => self.number(self.machine.probe.slow_feed),
@@ -308,12 +236,24 @@ impl<'a> Writer<'a> {
 
     // ------------------------------------------------------------------------------------------------- steps
 
+    fn steps(&mut self, indices: &[usize]) -> Result<()> {
+        let path = self.path;
+        for index in indices {
+            self.index = *index;
+            if let Some(step) = path.steps.get(*index) {
+                self.step(step)?;
+            }
+        }
+        Ok(())
+    }
+
     fn step(&mut self, step: &Step) -> Result<()> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
             Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),
             Step::OrientSpindle { deg } => {
                 let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
+                self.oriented = Some(angle);
                 self.render("orient", context! { deg => self.number(angle) })
             }
             Step::Rapid { to } => {
@@ -354,42 +294,11 @@ impl<'a> Writer<'a> {
 
     fn setup(&mut self, number: u32, says: &str, resume: Option<&[Step]>) -> Result<()> {
         self.close_setup()?;
-        let known = self.axes.iter().all(|a| self.at.get(*a).is_some());
-        if std::mem::take(&mut self.in_opening) && known {
-            self.opening = Some(self.at);
-        }
         self.open_setup = Some(self.label);
         self.render("setup", context! { number => number, says => says })?;
-        let moves = match (self.opening, resume) {
-            (Some(opening), Some(resume)) => Some(self.resume_moves(&opening, resume)?),
-            _ => None,
-        };
+        let moves = self.resume(resume)?;
         let possible = moves.is_some();
         self.render("resume", context! { number, possible, moves => moves.unwrap_or_default() })
-    }
-
-    /// The way that the path gives from where the opening ends to where the present set-up begins.
-    fn resume_moves(&self, opening: &AxisMap, resume: &[Step]) -> Result<Vec<Value>> {
-        let (mut stands, mut places) = (*opening, Vec::new());
-        for step in resume {
-            match step {
-                Step::Rotary { to, .. } => {
-                    places.extend(self.rotary_steps(&stands, to)?);
-                    stands = to.or(&stands);
-                }
-                Step::Rapid { to } => {
-                    stands = to.or(&stands);
-                    if self.frame.is_tcp() {
-                        let world = self.controller(&stands);
-                        places.push(AxisMap::xyz(world.0[0], world.0[1], world.0[2]));
-                    } else {
-                        places.push(*to);
-                    }
-                }
-                _ => return Err(self.broken("the way to a set-up holds more than rapids and turns".into())),
-            }
-        }
-        places.iter().map(|place| self.words(place)).collect()
     }
 
     fn rotary(&mut self, to: &AxisMap, sense: &AxisMap) -> Result<()> {
@@ -408,6 +317,7 @@ impl<'a> Writer<'a> {
             self.render("rotary", context! { to => words, sense => senses.clone() })?;
         }
         self.moved(to);
+        self.senses = sense.or(&self.senses);
         Ok(())
     }
 

@@ -9,6 +9,8 @@ mod check;
 mod emit;
 mod frame;
 mod log_text;
+mod moves;
+mod opening;
 mod spelling;
 
 pub use check::parse;

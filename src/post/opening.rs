@@ -1,0 +1,98 @@
+//! The first moves of a program, and the way back in when it starts again at a later set-up.
+//!
+//! The first moves bring the machine from anywhere to a known place with the lift at its top, where nothing can meet
+//! whatever the other axes do: the path has proven that. A run that starts again makes the same moves, then goes up
+//! there to where its set-up begins, rotary axes first and in the sense in which they would have come, the lift last.
+
+use super::emit::Writer;
+use crate::axes::{AxisMap, AxisName};
+use crate::diag::Result;
+use crate::machine::Machine;
+use crate::program::path::{Path, Step};
+use minijinja::Value;
+
+/// The first moves.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Opening {
+    /// Indices of the path's steps, in the order in which they are written.
+    pub(super) steps: Vec<usize>,
+    /// The rest, in order.
+    pub(super) rest: Vec<usize>,
+    /// The axis that lifts the probe over everything.
+    lift: Option<AxisName>,
+    /// Where every axis stands after them; `None` where that is not known.
+    place: Option<AxisMap>,
+}
+
+impl Opening {
+    /// Takes the first moves out of the first set-up. Under a transformation linear axes go first: a turn needs to know
+    /// where they stand.
+    pub(super) fn of(path: &Path, machine: &Machine, tcp: bool) -> Self {
+        let mut known = AxisMap::default();
+        let whole = |known: &AxisMap| machine.axes.iter().all(|a| known.get(a.name).is_some());
+        let mut setup = None;
+        let mut steps = Vec::new();
+        let mut lift = None;
+        for (index, step) in path.steps.iter().enumerate() {
+            if whole(&known) {
+                break;
+            }
+            match step {
+                Step::Setup { .. } if setup.is_none() => setup = Some(index),
+                Step::Note(_) | Step::OrientSpindle { .. } => steps.push(index),
+                Step::Rapid { to } | Step::Rotary { to, .. } => {
+                    if lift.is_none() {
+                        lift = to.iter().map(|(a, _)| a).find(|a| !a.is_rotary());
+                    }
+                    known = to.or(&known);
+                    steps.push(index);
+                }
+                _ => break,
+            }
+        }
+        if !whole(&known) {
+            // a path by hand that begins otherwise: as it stands, and with no way back in
+            return Self { rest: (0..path.steps.len()).collect(), ..Self::default() };
+        }
+        if tcp {
+            steps.sort_by_key(|i| matches!(path.steps.get(*i), Some(Step::Rotary { .. })));
+        }
+        let rest = (0..path.steps.len()).filter(|i| !steps.contains(i)).collect();
+        Self { steps, rest, lift, ..Self::default() }
+    }
+}
+
+impl Writer<'_> {
+    /// Remembers where the first moves have brought the machine.
+    pub(super) fn opened(&mut self) {
+        if self.opening.lift.is_some() && self.path.start_near.is_none() {
+            self.opening.place = Some(self.at);
+        }
+    }
+
+    /// The way that the path gives from where the first moves end to where the present set-up begins; `None` where the
+    /// path proves none.
+    pub(super) fn resume(&self, way: Option<&[Step]>) -> Result<Option<Vec<Value>>> {
+        let (Some(opening), Some(way)) = (self.opening.place, way) else { return Ok(None) };
+        let (mut stands, mut places) = (opening, Vec::new());
+        for step in way {
+            match step {
+                Step::Rotary { to, .. } => {
+                    places.extend(self.rotary_steps(&stands, to)?);
+                    stands = to.or(&stands);
+                }
+                Step::Rapid { to } => {
+                    stands = to.or(&stands);
+                    places.push(if self.frame.is_tcp() {
+                        let world = self.controller(&stands);
+                        AxisMap::xyz(world.0[0], world.0[1], world.0[2])
+                    } else {
+                        *to
+                    });
+                }
+                _ => return Err(self.broken("the way to a set-up holds more than rapids and turns".into())),
+            }
+        }
+        Ok(Some(places.iter().map(|place| self.words(place)).collect::<Result<_>>()?))
+    }
+}
