@@ -117,16 +117,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let out = args.out.display();
     io.say("Where to look:");
     for (file, what) in [
-        ("head.ngc, table.ngc", "the programs: their head says what to set up where"),
-        ("head.log, table.log", "what LinuxCNC would have written"),
+        ("head.ngc", "the first program (table.ngc is the second): its head says what to set up where"),
+        ("head.log", "what LinuxCNC would have written"),
         ("wrong.toml", "what was wrong with the machine"),
         ("study.toml", "the study: `axiscal identify` takes it"),
         ("compensation/README.txt", "how to load the compensation, and what must be set again"),
     ] {
-        io.say(format!(
-            "  {:<40} {what}",
-            file.split(", ").map(|f| format!("{out}/{f}")).collect::<Vec<_>>().join(", ")
-        ));
+        io.say(format!("  {:<38} {what}", format!("{out}/{file}")));
     }
     io.say(format!("Next: axiscal identify {out}/study.toml"));
     io.answer(&json!({
@@ -224,7 +221,7 @@ impl<'a> Bench<'a> {
             study_sha256: String::new(),
             data_date: "simulated".into(),
         };
-        let (correction, _) = Correction::collect(&self.machine, &fit.outcome, None, Vec::new(), provenance)?;
+        let (correction, _) = Correction::collect(&self.machine, &self.catalogue, &fit.outcome, None, provenance)?;
         let (export, _) = linuxcnc::export(&self.machine, &correction, &linuxcnc::Options::default())?;
         for (name, contents) in &export.files {
             self.write(&format!("compensation/{name}"), contents)?;

@@ -12,6 +12,7 @@ use super::reach::Reached;
 use super::scene::Scene;
 use super::spec::ProgramSpec;
 use super::sweep::Manner;
+use super::turns::{Turn, turn_step, turns};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
 use rayon::prelude::*;
@@ -93,9 +94,6 @@ struct Router<'a, 'm> {
     /// Of the pose in which the machine stands.
     heights: Heights,
 }
-
-/// A turn of one rotary axis: where to and, where it is known, in which sense.
-type Turn = (AxisName, f64, Option<f64>);
 
 impl Router<'_, '_> {
     fn setup(&mut self, number: u32, setup: &Setup) -> Result<()> {
@@ -264,49 +262,8 @@ impl Router<'_, '_> {
         Some(steps)
     }
 
-    /// The turns that bring each rotary axis from a place (with the senses in which it came there; `None`: unknown) to a
-    /// pose in the senses that are wanted.
     fn turns(&self, from: Option<(Position, AxisMap)>, pose: &AxisMap, wanted: &AxisMap) -> Result<Vec<Turn>, String> {
-        let mut turns = Vec::new();
-        for axis in self.scene.machine.rotary() {
-            let (name, [low, high]) = (axis.name, axis.range);
-            let target = pose.get(name).unwrap_or(0.0);
-            let wanted = wanted.get(name);
-            let past = |sense: f64| {
-                let before = target - sense * self.overshoot_deg;
-                (low..=high).contains(&before).then_some(before).ok_or_else(|| {
-                    format!(
-                        "{name} cannot come to {target} deg with {} angles: its range ends at {}",
-                        if sense > 0.0 { "rising" } else { "falling" },
-                        if sense > 0.0 { low } else { high },
-                    )
-                })
-            };
-            let Some((at, senses)) = from else {
-                // from an unknown angle: past the pose on one side, then to it in a sense that is known
-                let sense = wanted.unwrap_or(if past(1.0).is_ok() { 1.0 } else { -1.0 });
-                turns.push((name, past(sense)?, None));
-                turns.push((name, target, Some(sense)));
-                continue;
-            };
-            let way = target - at.get(name);
-            if way.abs() < SAME {
-                if let Some(sense) = wanted.filter(|w| senses.get(name) != Some(*w)) {
-                    turns.push((name, past(sense)?, Some(-sense)));
-                    turns.push((name, target, Some(sense)));
-                }
-                continue;
-            }
-            let natural = way.signum();
-            match wanted {
-                Some(sense) if sense != natural => {
-                    turns.push((name, past(sense)?, Some(natural)));
-                    turns.push((name, target, Some(sense)));
-                }
-                _ => turns.push((name, target, Some(natural))),
-            }
-        }
-        Ok(turns)
+        turns(self.scene.machine, self.overshoot_deg, from, pose, wanted)
     }
 
     fn turn(&mut self, (axis, to, sense): &Turn) {
@@ -503,10 +460,4 @@ impl Router<'_, '_> {
 fn linear(at: &Position) -> AxisMap {
     let p = at.xyz_mm();
     AxisMap::xyz(p.x, p.y, p.z)
-}
-
-/// A turn as a step.
-fn turn_step(axis: AxisName, to: f64, sense: Option<f64>) -> Step {
-    let turn = |value: f64| AxisMap::default().with(axis, value);
-    Step::Rotary { to: turn(to), sense: sense.map_or_else(AxisMap::default, turn) }
 }
