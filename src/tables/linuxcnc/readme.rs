@@ -3,7 +3,7 @@
 use super::pack::Packing;
 use super::{Left, Way, component, head, one_line, render, stock};
 use crate::diag::Result;
-use crate::machine::Side;
+use crate::machine::{Carrier, Side};
 use crate::tables::compensation::Term;
 use crate::units::um_from_mm;
 use minijinja::context;
@@ -93,6 +93,14 @@ pub(super) fn text(packing: &Packing, by_component: &Way, by_stock: &Way) -> Res
         correction.of_measurement.iter().map(|(effect, n)| format!("{} ({n})", one_line(effect))).collect();
     let table_axes =
         machine.rotary().filter(|a| a.side == Side::Workpiece).map(|a| a.name.to_string()).collect::<Vec<_>>();
+    // what stands on the linear axes' table does not move with the rotary axis that the component looks at
+    let workpiece_axis = machine.side(Side::Workpiece).last().map(|a| a.name);
+    let beside: Vec<String> = machine
+        .mountings
+        .iter()
+        .filter(|m| workpiece_axis.is_some_and(|a| a.is_rotary() && m.carrier != Carrier::Axis(a)))
+        .map(|m| one_line(&m.name))
+        .collect();
     render(
         "README.txt",
         TEMPLATE,
@@ -105,6 +113,8 @@ pub(super) fn text(packing: &Packing, by_component: &Way, by_stock: &Way) -> Res
             stock_point => by_stock.compensation.reference_mm.map(|v| v.to_string()).to_vec(),
             reference => correction.reference_mm.map(|v| v.to_string()).to_vec(),
             table_axes => table_axes,
+            beside => beside,
+            workpiece_axis => workpiece_axis.map(|a| a.to_string()).unwrap_or_default(),
             tool_length => machine.tool.length_mm,
             carried => carried(&by_component.compensation.terms),
             any => !by_component.compensation.terms.is_empty(),
