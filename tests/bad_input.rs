@@ -1,0 +1,317 @@
+//! Bad input through the binary: a clear message with the place, exit code 2 (or a warning and 0 where the rest is usable),
+//! never a panic, never a half-written file.
+#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+struct Job(tempfile::TempDir);
+
+impl Job {
+    /// A folder with a program, its plan, and a good log of the virtual machine.
+    fn new() -> Self {
+        let job = Self(tempfile::tempdir().unwrap());
+        let ok = job.call(&[
+            "generate",
+            "--machine",
+            "swivel-head",
+            "--program",
+            "table",
+            "--controller",
+            "linuxcnc",
+            "--out",
+            ".",
+        ]);
+        assert!(ok.status.success(), "{}", said(&ok));
+        job.write("wrong.toml", "seed = 3\n[effects.paper-table]\nd_xCY = 0.03\n[noise]\ntouch_um = 0.2\n");
+        let ok = job.call(&[
+            "simulate",
+            "--plan",
+            "table.plan.json",
+            "--machine",
+            "swivel-head",
+            "--scenario",
+            "wrong.toml",
+            "--controller",
+            "linuxcnc",
+            "--out",
+            "good.log",
+        ]);
+        assert!(ok.status.success(), "{}", said(&ok));
+        job
+    }
+
+    fn call(&self, args: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_axiscal")).args(args).current_dir(self.0.path()).output().unwrap()
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+
+    fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Parses a log into touches.csv; the file is written when, and only when, the exit code is 0.
+    fn parse(&self, log: &str) -> Output {
+        let _ = std::fs::remove_file(self.path("touches.csv"));
+        let out =
+            self.call(&["parse", log, "--controller", "linuxcnc", "--plan", "table.plan.json", "--out", "touches.csv"]);
+        assert_eq!(self.path("touches.csv").exists(), out.status.code() == Some(0), "{}", said(&out));
+        self.unbroken(&out);
+        out
+    }
+
+    /// No panic, and nothing temporary left behind.
+    fn unbroken(&self, out: &Output) {
+        let text = said(out);
+        assert!(!text.contains("panicked") && out.status.code().is_some_and(|c| (0..=2).contains(&c)), "{text}");
+        for entry in std::fs::read_dir(self.0.path()).unwrap() {
+            let name = entry.unwrap().file_name();
+            assert!(!name.to_string_lossy().starts_with(".axiscal-"), "{name:?} is left behind");
+        }
+    }
+}
+
+fn said(out: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr))
+}
+
+/// The exit code, and words that the message must hold.
+#[track_caller]
+fn expect(out: &Output, code: i32, words: &[&str]) {
+    let text = said(out);
+    assert_eq!(out.status.code(), Some(code), "{text}");
+    for word in words {
+        assert!(text.contains(word), "{word:?} is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn damaged_logs() {
+    let job = Job::new();
+    let good = job.read("good.log");
+    let lines: Vec<&str> = good.lines().collect();
+    let replaced = |n: usize, with: &str| -> String {
+        let mut all: Vec<String> = lines.iter().map(|l| (*l).to_owned()).collect();
+        all[n] = with.to_owned();
+        all.join("\n") + "\n"
+    };
+
+    job.write("half.log", &good[..good.len() / 2]);
+    expect(&job.parse("half.log"), 0, &["half.log:", "warning"]);
+
+    job.write("crlf.log", good.replace('\n', "\r\n"));
+    expect(&job.parse("crlf.log"), 0, &["154"]);
+
+    job.write("empty.log", "");
+    expect(&job.parse("empty.log"), 2, &["empty.log", "help:"]);
+
+    let noise: Vec<u8> = (0..4000u32).map(|i| (i * 7919 % 251) as u8).collect();
+    job.write("binary.log", noise);
+    expect(&job.parse("binary.log"), 2, &["binary.log", "help:"]);
+
+    job.write("nan.log", replaced(10, &lines[10].replacen(|c: char| c == 'X', "XNAN ", 1)));
+    expect(&job.parse("nan.log"), 0, &["nan.log:11:"]);
+
+    // a miss is a touch without a trigger: kept, marked, and never a measurement
+    job.write("miss.log", replaced(10, &lines[10].replace(" S1 ", " S0 ")));
+    expect(&job.parse("miss.log"), 0, &["miss.log:11:"]);
+    assert!(job.read("touches.csv").contains("miss"));
+
+    // X and Z exchanged in every line
+    let swapped: String =
+        good.lines().map(|l| l.replace('X', "q").replace('Z', "X").replace('q', "Z") + "\n").collect();
+    job.write("swapped.log", swapped.replacen("H ZZISCZL", "H AXISCAL", 1));
+    let out = job.parse("swapped.log");
+    assert_ne!(out.status.code(), Some(0), "{}", said(&out));
+
+    // a second run behind the first: the last complete one is taken, and that is said
+    job.write("twice.log", format!("{good}{good}"));
+    expect(&job.parse("twice.log"), 0, &["run"]);
+}
+
+#[test]
+fn a_log_of_another_program_is_refused() {
+    let job = Job::new();
+    let ok = job.call(&[
+        "generate",
+        "--machine",
+        "swivel-head",
+        "--program",
+        "head",
+        "--controller",
+        "linuxcnc",
+        "--out",
+        ".",
+    ]);
+    assert!(ok.status.success());
+    let out = job.call(&[
+        "parse",
+        "good.log",
+        "--controller",
+        "linuxcnc",
+        "--plan",
+        "head.plan.json",
+        "--out",
+        "touches.csv",
+    ]);
+    job.unbroken(&out);
+    expect(&out, 2, &["good.log:1:", "plan"]);
+    assert!(!job.path("touches.csv").exists());
+}
+
+#[test]
+fn unusable_calls_name_the_remedy() {
+    let job = Job::new();
+    let cases: [(&[&str], &[&str]); 8] = [
+        (
+            &["generate", "--machine", "nonsense", "--program", "head", "--controller", "linuxcnc", "--out", "o"],
+            &["nonsense", "swivel-head"],
+        ),
+        (
+            &[
+                "generate",
+                "--machine",
+                "swivel-head",
+                "--program",
+                "nonsense",
+                "--controller",
+                "linuxcnc",
+                "--out",
+                "o",
+            ],
+            &["nonsense", "head"],
+        ),
+        (
+            &["generate", "--machine", "swivel-head", "--program", "head", "--controller", "nonsense", "--out", "o"],
+            &["nonsense", "linuxcnc"],
+        ),
+        (
+            &["generate", "--machine", "trunnion", "--program", "head", "--controller", "linuxcnc", "--out", "o"],
+            &["head", "trunnion"],
+        ),
+        (&["parse", "absent.log", "--controller", "linuxcnc", "--plan", "table.plan.json"], &["absent.log"]),
+        (&["parse", "good.log", "--controller", "linuxcnc", "--plan", "good.log"], &["good.log:1:"]),
+        (&["identify", "absent.toml"], &["absent.toml"]),
+        (
+            &[
+                "simulate",
+                "--plan",
+                "table.plan.json",
+                "--machine",
+                "double-head",
+                "--controller",
+                "linuxcnc",
+                "--out",
+                "x.log",
+            ],
+            &["swivel-head", "double-head"],
+        ),
+    ];
+    for (args, words) in cases {
+        let out = job.call(args);
+        job.unbroken(&out);
+        expect(&out, 2, words);
+        assert!(said(&out).contains("help:"), "{args:?} gives no remedy:\n{}", said(&out));
+    }
+    assert!(!job.path("o").exists() && !job.path("x.log").exists(), "a refused call wrote something");
+}
+
+#[test]
+fn broken_toml_has_line_and_column() {
+    let job = Job::new();
+    job.write("broken.toml", "format = \"axiscal-machines/1\"\n[[machine]\nname = \"m\"\n");
+    expect(&job.call(&["machines", "--machines", "broken.toml"]), 2, &["broken.toml:2:"]);
+    job.write("study.toml", "machine = \"swivel-head\"\n[[data]]\nplan = 3\n");
+    expect(&job.call(&["identify", "study.toml"]), 2, &["study.toml:3:"]);
+    job.write("study.toml", "machine = \"swivel-head\"\n[[data]]\nplan = \"table.plan.json\"\nlog = \"good.log\"\ncontroller = \"linuxcnc\"\n[model]\neffects = [\"paper-tabel\"]\n");
+    expect(&job.call(&["identify", "study.toml"]), 2, &["paper-tabel", "paper-table"]);
+    job.write("wrong.toml", "[effects.paper-table]\nd_xCY = nan\n");
+    let args = [
+        "simulate",
+        "--plan",
+        "table.plan.json",
+        "--machine",
+        "swivel-head",
+        "--scenario",
+        "wrong.toml",
+        "--controller",
+        "linuxcnc",
+        "--out",
+        "x.log",
+    ];
+    expect(&job.call(&args), 2, &["wrong.toml:2:"]);
+    assert!(!job.path("x.log").exists());
+}
+
+#[test]
+fn a_machine_with_several_mistakes_gets_all_findings_at_once() {
+    let job = Job::new();
+    let text = include_str!("../machines.toml");
+    let damaged = text
+        .replacen("parent = \"base\"\n", "", 1) // X has no parent
+        .replacen("direction = [0.0, 1.0, 0.0]\n", "", 1) // Y has no direction
+        .replacen("range = [-350.0, 350.0]", "range = [350.0, -350.0]", 1) // Z the wrong way round
+        .replacen("[machine.tool]\nparent = \"B\"", "[[machine.tool]]\nparent = \"B\"\npivot = [0, 0, 0]\ndirection = [0, 0, 1]\nlength = 1.0\n[[machine.tool]]\nparent = \"B\"", 1);
+    job.write("own.toml", damaged);
+    let out = job.call(&["machines", "--machines", "own.toml"]);
+    expect(&out, 2, &["axis X", "no parent", "axis Y", "no direction", "axis Z", "lowest before highest", "2 tools"]);
+    assert!(said(&out).matches("help:").count() >= 4);
+    // and a chain that bears itself
+    job.write("cyclic.toml", text.replacen("name = \"X\"\nparent = \"base\"", "name = \"X\"\nparent = \"C\"", 1));
+    expect(&job.call(&["machines", "--machines", "cyclic.toml"]), 2, &["cyclic"]);
+}
+
+#[test]
+fn an_unwritable_folder_leaves_nothing_behind() {
+    let job = Job::new();
+    job.write("a-file", "");
+    let out = job.call(&[
+        "generate",
+        "--machine",
+        "swivel-head",
+        "--program",
+        "head",
+        "--controller",
+        "linuxcnc",
+        "--out",
+        "a-file/below",
+    ]);
+    job.unbroken(&out);
+    expect(&out, 2, &["a-file"]);
+}
+
+#[test]
+fn a_study_is_never_overwritten() {
+    let job = Job::new();
+    job.write("study.toml", "# mine\n");
+    let out = job.call(&[
+        "new",
+        "--machine",
+        "swivel-head",
+        "--plan",
+        "table.plan.json",
+        "--log",
+        "good.log",
+        "--out",
+        "study.toml",
+    ]);
+    expect(&out, 2, &["exists"]);
+    assert_eq!(job.read("study.toml"), "# mine\n");
+}
+
+#[test]
+fn a_file_of_zeros_is_refused() {
+    let job = Job::new();
+    // a sparse file: no disk is used, and it is read no further than it must be
+    let file = std::fs::File::create(job.path("huge.log")).unwrap();
+    file.set_len(64 << 20).unwrap();
+    let out = job.parse("huge.log");
+    expect(&out, 2, &["huge.log"]);
+}
