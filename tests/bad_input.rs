@@ -119,9 +119,16 @@ fn damaged_logs() {
     job.write("nan.log", replaced(10, &lines[10].replacen(|c: char| c == 'X', "XNAN ", 1)));
     expect(&job.parse("nan.log"), 0, &["nan.log:11:"]);
 
+    // a line that somebody edited does not add up any more
+    job.write("edited.log", replaced(10, &lines[10].replace(" S1 ", " S0 ")));
+    expect(&job.parse("edited.log"), 0, &["edited.log:11:", "not used"]);
+
     // a miss is a touch without a trigger: kept, marked, and never a measurement
-    job.write("miss.log", replaced(10, &lines[10].replace(" S1 ", " S0 ")));
-    expect(&job.parse("miss.log"), 0, &["miss.log:11:"]);
+    job.write("moved.toml", "[[block]]\nmounting = \"table\"\nname = \"x+\"\nshift = [0.0, 0.0, -2.5]\n");
+    let args = ["simulate", "--plan", "table.plan.json", "--machine", "swivel-head", "--scenario", "moved.toml"];
+    let ok = job.call(&[&args[..], &["--controller", "linuxcnc", "--out", "miss.log"]].concat());
+    assert!(ok.status.success(), "{}", said(&ok));
+    expect(&job.parse("miss.log"), 0, &["miss.log:2:", "missed"]);
     assert!(job.read("touches.csv").contains("miss"));
 
     // X and Z exchanged in every line

@@ -6,7 +6,6 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -79,20 +78,21 @@ fn the_papers_order() -> Check {
     job.scenario(&[("paper-head", &HEAD), ("paper-table", &TABLE)], &[], noise_um, 7)?;
 
     job.run("head", "head-1", &Control::plain())?;
-    let fit = job.identify("head-1", &["head"], &["head-1"], &["paper-head"], noise_um, None)?;
+    let fit = job.identify("head-1", &Study::new(&["head"], &["head-1"], &["paper-head"], noise_um))?;
     within(&fit, &HEAD, Some(0.3))?;
     job.export("head-1", "comp-b")?;
     let with_b = job.component("comp-b")?;
     job.run("head", "head-2", &with_b)?;
-    job.only_noise("head", "head-2", &["paper-head"], noise_um, Some("comp-b"))?;
+    job.only_noise("head", "head-2", &["paper-head"], noise_um)?;
 
     job.run("table", "table-1", &with_b)?;
-    let fit = job.identify("table-1", &["table"], &["table-1"], &["paper-table"], noise_um, Some("comp-b"))?;
+    let study = Study { active: Some("comp-b"), ..Study::new(&["table"], &["table-1"], &["paper-table"], noise_um) };
+    let fit = job.identify("table-1", &study)?;
     within(&fit, &TABLE, Some(0.3))?;
     job.export("table-1", "comp-bc")?;
     let with_both = job.component("comp-bc")?;
     job.run("table", "table-2", &with_both)?;
-    job.only_noise("table", "table-2", &["paper-table"], noise_um, Some("comp-bc"))
+    job.only_noise("table", "table-2", &["paper-table"], noise_um)
 }
 
 /// Errors and block displacements drawn now, both logs in one study: 39 unknowns of rank 39.
@@ -105,7 +105,7 @@ fn drawn_errors() -> Check {
     job.scenario(&effects, &truth.blocks, noise_um, truth.seed)?;
     job.run("head", "head", &Control::plain())?;
     job.run("table", "table", &Control::plain())?;
-    let fit = job.identify("both", &["head", "table"], &["head", "table"], &MODEL, noise_um, None)?;
+    let fit = job.identify("both", &Study::new(&["head", "table"], &["head", "table"], &MODEL, noise_um))?;
     if (fit["unknowns"].as_u64(), fit["rank"].as_u64()) != (Some(39), Some(39)) {
         return Err(format!("{} unknowns of rank {}, expected 39 of 39", fit["unknowns"], fit["rank"]));
     }
@@ -135,7 +135,7 @@ fn servo_latch() -> Check {
     job.run("table", "table", &servo)?;
     // 60 mm/min for up to 1 ms: uniformly distributed over 1 um, on top of the probe's 0.5 um
     let noise_um = (0.5f64.powi(2) + 1.0 / 12.0).sqrt();
-    let fit = job.identify("both", &["head", "table"], &["head", "table"], &MODEL, noise_um, None)?;
+    let fit = job.identify("both", &Study::new(&["head", "table"], &["head", "table"], &MODEL, noise_um))?;
     for (_, values) in &truth.effects[..2] {
         within(&fit, values, None)?;
     }
@@ -155,6 +155,7 @@ fn stock_trunnion() -> Check {
         [("EY0A", 0.021), ("EZ0A", -0.017)],
         ("EA0A", 0.006),
         ("EB0A", 0.004),
+        "EA0C",
     )
 }
 
@@ -166,6 +167,7 @@ fn stock_swivel_table() -> Check {
         [("EX0B", 0.021), ("EZ0B", -0.017)],
         ("EB0B", 0.006),
         ("EA0B", 0.004),
+        "EB0C",
     )
 }
 
@@ -177,6 +179,7 @@ fn stock(
     offsets: [(&'static str, f64); 2],
     zero: (&'static str, f64),
     tilt: (&'static str, f64),
+    same_as_zero: &str,
 ) -> Check {
     let job = Job::new(machine)?;
     let noise_um = 0.05;
@@ -194,7 +197,9 @@ fn stock(
     // the machine as it is: axis positions, no transformation
     job.run("basic", "as-is", &Control::plain())?;
     let model = [ids[0], ids[1], "location-c", "scale-x", "scale-y", "scale-z"];
-    let fit = job.identify("as-is", &["basic"], &["as-is"], &model, noise_um, None)?;
+    // a tilt of the turntable about the swivel axis is that axis's zero position: one number, held in one place
+    let study = Study { zero: &[same_as_zero], ..Study::new(&["basic"], &["as-is"], &model, noise_um) };
+    let fit = job.identify("as-is", &study)?;
     for (_, values) in &effects {
         within(&fit, values, Some(0.3))?;
     }
@@ -343,6 +348,43 @@ impl Control {
     }
 }
 
+/// What a study holds.
+struct Study<'a> {
+    programs: &'a [&'a str],
+    logs: &'a [&'a str],
+    effects: &'a [&'a str],
+    /// Parameters that are held at 0.
+    zero: &'a [&'a str],
+    noise_um: f64,
+    /// The compensation that was active.
+    active: Option<&'a str>,
+}
+
+impl<'a> Study<'a> {
+    fn new(programs: &'a [&'a str], logs: &'a [&'a str], effects: &'a [&'a str], noise_um: f64) -> Self {
+        Self { programs, logs, effects, zero: &[], noise_um, active: None }
+    }
+
+    fn text(&self, machine: &str) -> String {
+        let mut text = format!("machine = \"{machine}\"\n");
+        for (program, log) in self.programs.iter().zip(self.logs) {
+            let _ = writeln!(
+                text,
+                "[[data]]\nplan = \"{program}.plan.json\"\nlog = \"{log}.log\"\ncontroller = \"linuxcnc\""
+            );
+            if let Some(active) = self.active {
+                let _ = writeln!(text, "compensation = \"{active}\"");
+            }
+        }
+        let _ = writeln!(text, "[model]\neffects = {:?}", self.effects);
+        for name in self.zero {
+            let _ = writeln!(text, "[model.parameters.{name}]\nvalue = 0.0\nfixed = true");
+        }
+        let _ = writeln!(text, "[noise]\ntouch_um = {}", self.noise_um);
+        text
+    }
+}
+
 struct Job {
     dir: PathBuf,
     machine: String,
@@ -413,14 +455,32 @@ impl Job {
     }
 
     /// Runs a program on LinuxCNC; `log` is the name that its log gets.
+    ///
+    /// On a computer that is busy with other work LinuxCNC itself can lose a race after a probing move ("Queue is not
+    /// empty after probing"): such a run is no verdict on the program and is made again, nearer to real time.
     fn run(&self, program: &str, log: &str, control: &Control) -> Check {
+        let warp: u32 = std::env::var("AXISCAL_WARP").ok().and_then(|w| w.parse().ok()).unwrap_or(10);
+        let mut last = String::new();
+        for warp in [warp, warp.div_ceil(2), warp.div_ceil(4)] {
+            match self.run_at(program, log, control, warp) {
+                Err(why) if why.contains("Queue is not empty after probing") => {
+                    println!("  {log}: LinuxCNC lost a race at {warp} times real time");
+                    last = why;
+                }
+                other => return other,
+            }
+        }
+        Err(last)
+    }
+
+    fn run_at(&self, program: &str, log: &str, control: &Control, warp: u32) -> Check {
         let tree = Path::new(env!("CARGO_MANIFEST_DIR"));
         let out = self.dir.join(format!("rig-{log}"));
         let mut rig = Command::new("python3");
         rig.arg(tree.join("tests/linuxcnc/rig.py"))
             .args(["--machines".as_ref(), tree.join("machines.toml").as_os_str()])
             .args(["--machine", &self.machine, "--latch", control.latch])
-            .args(["--warp", &std::env::var("AXISCAL_WARP").unwrap_or_else(|_| "10".into())])
+            .args(["--warp", &warp.to_string()])
             .args(["--plan".as_ref(), self.dir.join(format!("{program}.plan.json")).as_os_str()])
             .args(["--program".as_ref(), self.dir.join(format!("{program}.ngc")).as_os_str()])
             .args(["--scenario".as_ref(), self.dir.join("wrong.toml").as_os_str()])
@@ -481,75 +541,38 @@ impl Job {
     }
 
     /// A study and its fit.
-    fn identify(
-        &self,
-        study: &str,
-        programs: &[&str],
-        logs: &[&str],
-        effects: &[&str],
-        noise_um: f64,
-        active: Option<&str>,
-    ) -> Result<Value, String> {
-        self.study(study, programs, logs, effects, noise_um, active, false)?;
-        let fit = self.json(&["identify", &format!("{study}.toml")])?;
+    fn identify(&self, name: &str, study: &Study) -> Result<Value, String> {
+        self.write(&format!("{name}.toml"), &study.text(&self.machine))?;
+        let fit = self.json(&["identify", &format!("{name}.toml")])?;
         if fit["converged"] != true || !fit["rejected"].as_array().is_some_and(Vec::is_empty) {
-            return Err(format!("{study}: converged {}, rejected {}", fit["converged"], fit["rejected"]));
+            return Err(format!("{name}: converged {}, rejected {}", fit["converged"], fit["rejected"]));
         }
         Ok(fit)
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn study(
-        &self,
-        study: &str,
-        programs: &[&str],
-        logs: &[&str],
-        effects: &[&str],
-        noise_um: f64,
-        active: Option<&str>,
-        all_zero: bool,
-    ) -> Check {
-        let mut text = format!("machine = \"{}\"\n", self.machine);
-        for (program, log) in programs.iter().zip(logs) {
-            let _ = writeln!(
-                text,
-                "[[data]]\nplan = \"{program}.plan.json\"\nlog = \"{log}.log\"\ncontroller = \"linuxcnc\""
-            );
-            if let Some(active) = active {
-                let _ = writeln!(text, "compensation = \"{active}\"");
-            }
-        }
-        let _ = writeln!(text, "[model]\neffects = {effects:?}");
-        if all_zero {
-            let names = self.json(&["effects", "--machine", &self.machine])?;
-            let effect =
-                |id: &str| names["effects"].as_array().and_then(|all| all.iter().find(|e| e["id"] == id).cloned());
-            let mut zero = BTreeMap::new();
-            for p in effects
-                .iter()
-                .filter_map(|id| effect(id))
-                .flat_map(|e| e["parameters"].as_array().cloned().unwrap_or_default())
-            {
-                zero.insert(p["name"].as_str().unwrap_or_default().to_owned(), ());
-            }
-            for name in zero.keys() {
-                let _ = writeln!(text, "[model.parameters.{name}]\nvalue = 0.0\nfixed = true");
-            }
-        }
-        let _ = writeln!(text, "[noise]\ntouch_um = {noise_um}");
-        self.write(&format!("{study}.toml"), &text)
-    }
-
     /// RMS of the readings of an errorless model, um.
     fn left(&self, program: &str, log: &str, effects: &[&str], noise_um: f64) -> Result<f64, String> {
-        let study = format!("{log}-left");
-        self.study(&study, &[program], &[log], effects, noise_um, None, true)?;
-        self.json(&["identify", &format!("{study}.toml")])?["rms_um"].as_f64().ok_or("no rms".into())
+        let catalogue = self.json(&["effects", "--machine", &self.machine])?;
+        let rows = catalogue["effects"].as_array().ok_or("no effects")?;
+        let of = |id: &str| rows.iter().find(|e| e["id"] == id).and_then(|e| e["parameters"].as_array().cloned());
+        let names: Vec<String> = effects
+            .iter()
+            .filter_map(|id| of(id))
+            .flatten()
+            .filter_map(|p| p["name"].as_str().map(str::to_owned))
+            .collect();
+        let zero: Vec<&str> = names.iter().map(String::as_str).collect();
+        let (programs, logs) = ([program], [log]);
+        let study = Study { zero: &zero, ..Study::new(&programs, &logs, effects, noise_um) };
+        let name = format!("{log}-left");
+        self.write(&format!("{name}.toml"), &study.text(&self.machine))?;
+        self.json(&["identify", &format!("{name}.toml")])?["rms_um"].as_f64().ok_or("no rms".into())
     }
 
     /// With the compensation loaded, an errorless model fits to the noise.
-    fn only_noise(&self, program: &str, log: &str, effects: &[&str], noise_um: f64, _active: Option<&str>) -> Check {
+    fn only_noise(&self, program: &str, log: &str, effects: &[&str], noise_um: f64) -> Check {
         let rms = self.left(program, log, effects, noise_um)?;
+        println!("  {log}: {rms:.4} um left of a noise of {noise_um} um");
         // 154 touches and more: the RMS scatters by 6 % of itself
         if !((0.75 * noise_um)..(1.25 * noise_um)).contains(&rms) {
             return Err(format!("{program} as {log}: {rms:.4} um left, expected the noise of {noise_um} um"));

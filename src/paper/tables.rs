@@ -96,7 +96,10 @@ impl Bench<'_> {
                 let turn = self.machine.carrier_frame(carrier, &pose.with_xyz_mm(Vector3::zeros()))
                     * translation(Vector3::zeros());
                 let normal = turn.rotation * Vector3::from(planned.normal);
-                let moved = t.position.xyz_mm() - planned.nominal_position().xyz_mm();
+                // the plan's own places are rounded for the control: the nominal one is computed anew
+                let ball = Vector3::from(planned.point) + Vector3::from(planned.normal) * self.plan.ball_radius_mm;
+                let nominal = self.machine.linear_for_ball(carrier, &pose, &ball, self.plan.tool_length_mm)?;
+                let moved = t.position.xyz_mm() - nominal.xyz_mm();
                 Some(Reading {
                     pose_deg: [AxisName::A, AxisName::B, AxisName::C].map(|a| pose.get(a)),
                     normal,
