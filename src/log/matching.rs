@@ -7,6 +7,7 @@ use super::touch::{RawTouch, Status, Touch};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Finding, Findings, Result};
 use crate::machine::Machine;
+use crate::post::as_written::Role;
 use crate::program::plan::{Plan, PlanTouch};
 use std::collections::BTreeMap;
 
@@ -20,14 +21,15 @@ const POSE_ROOM_DEG: f64 = 0.5;
 /// # Errors
 /// When most touches cannot be this plan's: swapped columns, inches, another origin, another plan.
 pub fn match_to_plan(machine: &Machine, plan: &Plan, raw: Vec<RawTouch>) -> Result<(Vec<Touch>, Findings)> {
-    match_at(machine, plan, raw, None)
+    match_at(machine, plan, raw, &[Role::Search, Role::Release, Role::Measure], None)
 }
 
-/// The same with places in the log for the findings.
+/// The same with places in the log for the findings, and the rows of one touch in a log of columns.
 pub(super) fn match_at(
     machine: &Machine,
     plan: &Plan,
     raw: Vec<RawTouch>,
+    per_touch: &[Role],
     places: Option<&Places<'_>>,
 ) -> Result<(Vec<Touch>, Findings)> {
     let mut findings = Findings::default();
@@ -36,7 +38,7 @@ pub(super) fn match_at(
         None => Finding { message: format!("line {line}: {}", finding.message), ..finding },
     };
     let raw = if raw.iter().any(|t| t.id.is_none()) {
-        let (numbered, row_findings) = rows::number(machine, plan, raw, &at);
+        let (numbered, row_findings) = rows::number(machine, plan, raw, per_touch, &at);
         findings.0.extend(row_findings);
         numbered
     } else {
@@ -71,7 +73,7 @@ pub(super) fn match_at(
     let good: Vec<bool> =
         pairs.iter().map(|(planned, raw)| fits(machine, planned, &complete(planned, raw), raw.present)).collect();
     let bad = good.iter().filter(|g| !**g).count();
-    if bad > 3 && bad * 2 > pairs.len() {
+    if bad > 1 && bad * 2 > pairs.len() {
         let line = pairs.first().map_or(1, |(_, raw)| raw.line);
         findings.push(at(swaps::explain(machine, &pairs, bad), line));
         return findings.finish(Vec::new());

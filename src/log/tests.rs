@@ -159,7 +159,7 @@ fn rows(plan: &Plan, touch: usize, along: &[f64]) -> String {
 fn columns_are_matched_by_place() {
     let machine = machine("swivel-head");
     let plan = plan(&machine, "head", "x+");
-    let cases: [(&str, String, &[(u64, Status)], &[&str]); 6] = [
+    let cases: [(&str, String, &[(u64, Status)], &[&str]); 7] = [
         (
             "search, release, measure",
             rows(&plan, 0, &[2.010, 1.995, 2.001]) + &rows(&plan, 1, &[2.010, 1.995, 2.001]) + &rows(&plan, 2, &[2.01, 1.99, 2.0]),
@@ -168,9 +168,15 @@ fn columns_are_matched_by_place() {
         ),
         (
             "duplicates dropped, head cut",
-            rows(&plan, 1, &[2.001]) + &rows(&plan, 2, &[2.01, 2.001]),
+            rows(&plan, 1, &[2.001]) + &rows(&plan, 2, &[2.01, 1.99, 2.001]),
             &[(2, Status::Hit), (3, Status::Hit)],
             &["log::missing"],
+        ),
+        (
+            "cut after the release: the row of the release is not taken for the touch",
+            rows(&plan, 0, &[2.01, 1.99, 2.001]) + &rows(&plan, 1, &[2.01, 1.99]),
+            &[(1, Status::Hit)],
+            &["log::ambiguous", "log::missing"],
         ),
         (
             "a miss that looks like a hit",
