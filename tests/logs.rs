@@ -54,7 +54,8 @@ fn check(case: &Case, machine: &Machine, plan: &Plan, post: &Postprocessor) -> R
     let says = findings.iter().any(|f| f.message.contains(case.says)) || (findings.is_empty() && case.says.is_empty());
     let refused = findings.iter().any(|f| f.severity == Severity::Error);
     let remedied = findings.iter().filter(|f| f.severity == Severity::Error).all(|f| f.help.is_some());
-    if touches.as_deref() == case.touches && found == case.findings && says && refused == touches.is_none() && remedied {
+    if touches.as_deref() == case.touches && found == case.findings && says && refused == touches.is_none() && remedied
+    {
         return Ok(());
     }
     let messages: Vec<&str> = findings.iter().map(|f| f.message.as_str()).collect();

@@ -2,18 +2,13 @@
 
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
-use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
-use crate::fit::{self, Fit, outcome::Status};
-use crate::model::catalogue::{Effect, Place, Term};
-use crate::model::formula::VARIABLES;
+use crate::fit::{self, Fit};
 use crate::report::fit::{number, significant, table};
 use crate::tables::compensation::{Compensation, Provenance};
-use crate::tables::correction::{AxisShape, Correction};
+use crate::tables::correction::Correction;
 use crate::tables::linuxcnc::{self, Export, Left, Options, ini::UserIni};
-use crate::tables::place::Dof;
-use crate::units::{deg_from_rad, rad_from_deg};
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -98,8 +93,8 @@ fn export(
     io.report(&fit.outcome.warnings.iter().map(|w| Finding::warning("export::fit", w.clone())).collect::<Vec<_>>());
     let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let provenance = Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date };
-    let shapes = shapes(loaded, fit);
-    let (correction, findings) = Correction::collect(&loaded.machine, &fit.outcome, active, shapes, provenance)?;
+    let (correction, findings) =
+        Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, active, provenance)?;
     io.report(&findings.0);
     let ini = match &args.ini {
         Some(path) => Some(UserIni::read(&source(path.display().to_string(), files::read_text(path)?))?),
@@ -150,55 +145,6 @@ fn newest_log(loaded: &Loaded) -> String {
     let newest =
         loaded.study.data.iter().filter_map(|d| std::fs::metadata(folder.join(&d.log)).ok()?.modified().ok()).max();
     newest.map_or_else(|| "unknown".to_owned(), |t| time::OffsetDateTime::from(t).date().to_string())
-}
-
-/// Identified errors that depend on nothing but one axis's own position: what an axis table can hold.
-fn shapes(loaded: &Loaded, fit: &Fit) -> Vec<AxisShape> {
-    let mut out = Vec::new();
-    for id in &fit.outcome.effects {
-        let Some(effect) = loaded.catalogue.get(id, &loaded.machine) else { continue };
-        for term in &effect.terms {
-            let (Place::Before(axis) | Place::After(axis)) = term.place else { continue };
-            let name = &effect.parameters[term.parameter].name;
-            let Some(p) = fit.outcome.parameters.iter().find(|p| &p.name == name && p.effect == effect.id) else {
-                continue;
-            };
-            if p.status != Status::Identified || term.formula.constant().is_some() {
-                continue;
-            }
-            if let Some(shape) = shape(effect, term, axis, fit) {
-                out.push(shape);
-            }
-        }
-    }
-    out
-}
-
-fn shape(effect: &Effect, term: &Term, axis: AxisName, fit: &Fit) -> Option<AxisShape> {
-    let dof = *Dof::ALL.get(term.component)?;
-    let factor = effect.parameters[term.parameter].factor;
-    let values: Vec<f64> = effect
-        .parameters
-        .iter()
-        .map(|p| {
-            fit.outcome.parameters.iter().find(|o| o.name == p.name && o.effect == effect.id).map_or(0.0, |o| o.value)
-        })
-        .collect();
-    let (amount, formula) = (values[term.parameter] * factor, term.formula.clone());
-    let error = move |q: f64, sense: f64| {
-        let mut state = [0.0; VARIABLES.len()];
-        state[axis.index()] = if axis.is_rotary() { rad_from_deg(q) } else { q };
-        state[14 + axis.index()] = sense;
-        let value = amount * formula.eval(&state, &values);
-        if dof.is_angle() { deg_from_rad(value) } else { value }
-    };
-    Some(AxisShape {
-        parameter: effect.parameters[term.parameter].name.clone(),
-        axis,
-        dof,
-        variables: term.formula.variables().into_iter().map(str::to_owned).collect(),
-        error: Box::new(error),
-    })
 }
 
 fn say(export: &Export, args: &Args, io: &Io) {

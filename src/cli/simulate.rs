@@ -5,11 +5,11 @@ use super::load::load_plan;
 use super::{Answer, Io};
 use crate::diag::{Findings, Result, source};
 use crate::files;
-use crate::log::{RawTouch, Status};
+use crate::log::{self, RawTouch, Status, Touch};
 use crate::machine::Machine;
 use crate::post::{LogRecord, Postprocessor};
 use crate::program::plan::Plan;
-use crate::simulate::{self, Compensation, Scenario, csv};
+use crate::simulate::{self, Compensation, Scenario};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     bar.finish_and_clear();
     let touches = reported(touches?, io);
     let text = match &post {
-        None => csv::text(&machine, &touches),
+        None => log::csv::write(&machine, &numbered(&touches)),
         Some(post) => log_text(post, &machine, &plan, &touches),
     };
     files::write_whole(&args.out, text.as_bytes())?;
@@ -106,6 +106,15 @@ fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Fi
     let file = if path.is_dir() { path.join("compensation.json") } else { path.to_path_buf() };
     let text = source(file.display().to_string(), files::read_text(&file)?);
     Compensation::parse(&text, machine)
+}
+
+/// The touches as a CSV holds them; every simulated touch has its number.
+fn numbered(touches: &[RawTouch]) -> Vec<Touch> {
+    let touch = |t: &RawTouch| {
+        let RawTouch { position, status, time_s, temperature_deg_c, line, .. } = *t;
+        Some(Touch { id: t.id?, position, status, time_s, temperature_deg_c, line })
+    };
+    touches.iter().filter_map(touch).collect()
 }
 
 fn log_text(post: &Postprocessor, machine: &Machine, plan: &Plan, touches: &[RawTouch]) -> String {

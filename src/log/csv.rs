@@ -85,11 +85,13 @@ fn header(line: &[u8], start: usize, separator: u8, places: &Places<'_>) -> Resu
                 places.at(Finding::error("log::column_twice", format!("column {name} stands twice")).help(FORM), range),
             ),
             Some(column) => columns.push(column),
-            None => findings.push(places.at(
-                Finding::error("log::unknown_column", format!("column {name:?} is not known"))
-                    .help("columns are id, X, Y, Z, A, B, C, time_s, temperature_degC, status"),
-                range,
-            )),
+            None => findings.push(
+                places.at(
+                    Finding::error("log::unknown_column", format!("column {name:?} is not known"))
+                        .help("columns are id, X, Y, Z, A, B, C, time_s, temperature_degC, status"),
+                    range,
+                ),
+            ),
         }
     }
     let needed = [Column::Id, Column::Axis(AxisName::X), Column::Axis(AxisName::Y), Column::Axis(AxisName::Z)];

@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn every_kind_of_line_end_is_read() {
-        let expected: Vec<(usize, usize, &[u8], bool)> = vec![(1, 0, b"a", true), (2, 2, b"", true), (3, 3, b"b", false)];
+        let expected: Vec<(usize, usize, &[u8], bool)> =
+            vec![(1, 0, b"a", true), (2, 2, b"", true), (3, 3, b"b", false)];
         assert_eq!(all(b"a\n\nb"), expected);
         assert_eq!(all(b"a\r\rb"), expected);
         assert_eq!(all(b"a\r\nb\r\n"), vec![(1, 0, &b"a"[..], true), (2, 3, &b"b"[..], true)]);

@@ -54,14 +54,23 @@ pub(super) fn match_at(
         if !by_id.contains_key(&id) {
             unknown.push(|| {
                 let message = format!("touch {id} is not in the plan; it is not used");
-                at(Finding::warning("log::unmatched", message).help("is this the plan that the program was made with?"), line)
+                at(
+                    Finding::warning("log::unmatched", message)
+                        .help("is this the plan that the program was made with?"),
+                    line,
+                )
             });
             continue;
         }
         if let Some(older) = known.insert(id, touch) {
             twice.push(|| {
-                let message = format!("touch {id} stands twice, in lines {} and {line}: the later one is used", older.line);
-                at(Finding::warning("log::twice", message).help("this is as it should be where a set-up was started again"), line)
+                let message =
+                    format!("touch {id} stands twice, in lines {} and {line}: the later one is used", older.line);
+                at(
+                    Finding::warning("log::twice", message)
+                        .help("this is as it should be where a set-up was started again"),
+                    line,
+                )
             });
         }
     }
@@ -172,8 +181,10 @@ fn not_here(machine: &Machine, planned: &PlanTouch, position: &Position) -> Find
         "touch {} reads {axis} {found:.3}, expected about {wanted:.3}: too far away to be this touch; it is not used",
         planned.id
     );
-    Finding::warning("log::implausible", message)
-        .help(format!("a touch may lie up to {:.1} mm from its nominal place (overtravel and placement tolerance)", room_mm(machine)))
+    Finding::warning("log::implausible", message).help(format!(
+        "a touch may lie up to {:.1} mm from its nominal place (overtravel and placement tolerance)",
+        room_mm(machine)
+    ))
 }
 
 /// `1-5, 9, 12-14`

@@ -51,7 +51,13 @@ pub struct MatchedLog {
 ///
 /// # Errors
 /// When nothing of it can be used, or it belongs to another program.
-pub fn read(bytes: &[u8], name: &str, writer: Writer<'_>, machine: &Machine, plan: &Plan) -> Result<(MatchedLog, Findings)> {
+pub fn read(
+    bytes: &[u8],
+    name: &str,
+    writer: Writer<'_>,
+    machine: &Machine,
+    plan: &Plan,
+) -> Result<(MatchedLog, Findings)> {
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
         Writer::Controller(post) => parse(bytes, name, post)?,
@@ -68,14 +74,20 @@ pub fn read(bytes: &[u8], name: &str, writer: Writer<'_>, machine: &Machine, pla
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
-    let (touches, more) =
-        matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places)).map_err(|f| joined(&findings, f))?;
+    let (touches, more) = matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places))
+        .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
     Ok((MatchedLog { touches, complete: parsed.complete, runs: parsed.runs }, findings))
 }
 
 /// Is this the log of the plan's program?
-fn belongs(header: &LogHeader, machine: &Machine, plan: &Plan, places: &Places<'_>, findings: &mut Findings) -> Result<()> {
+fn belongs(
+    header: &LogHeader,
+    machine: &Machine,
+    plan: &Plan,
+    places: &Places<'_>,
+    findings: &mut Findings,
+) -> Result<()> {
     let (program, of_machine) = (log_word(&plan.program), log_word(&machine.name));
     if header.program != program || header.machine != of_machine {
         let message = format!(
@@ -87,9 +99,11 @@ fn belongs(header: &LogHeader, machine: &Machine, plan: &Plan, places: &Places<'
         return Err(places.at_line(finding, header.line).into());
     }
     if header.digest != digest(plan) {
-        let message = format!("the program that wrote this log was made from another plan ({} touches)", header.touches);
-        let finding = Finding::warning("log::other_plan", message)
-            .help("touches are matched by number and checked by place; better use the plan that belongs to the program");
+        let message =
+            format!("the program that wrote this log was made from another plan ({} touches)", header.touches);
+        let finding = Finding::warning("log::other_plan", message).help(
+            "touches are matched by number and checked by place; better use the plan that belongs to the program",
+        );
         findings.push(places.at_line(finding, header.line));
     }
     Ok(())

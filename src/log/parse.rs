@@ -52,13 +52,27 @@ pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLo
     let mut runs = vec![Run::default()];
     for line in lines {
         let outcome = match post.log.columns.as_ref().filter(|_| is_columns) {
-            Some(columns) => row(line.bytes, line.number, columns, &post.log).map(|r| r.map_or(Record::Blank, Record::Touch)),
+            Some(columns) => {
+                row(line.bytes, line.number, columns, &post.log).map(|r| r.map_or(Record::Blank, Record::Touch))
+            }
             None => record(line.bytes, line.number, &post.log),
         };
         match outcome {
             // without a check word a number that was cut may look whole
             Ok(Record::Touch(_)) if !line.ended && (is_columns || post.log.check_word.is_none()) => {
-                faults.push(|| cut(&places, &line, &Fault::at(line.bytes, line.bytes, line.bytes.len(), "log::cut_line", "the last line has no end")));
+                faults.push(|| {
+                    cut(
+                        &places,
+                        &line,
+                        &Fault::at(
+                            line.bytes,
+                            line.bytes,
+                            line.bytes.len(),
+                            "log::cut_line",
+                            "the last line has no end",
+                        ),
+                    )
+                });
             }
             Ok(record) => take(record, &line, &mut runs),
             Err(fault) if !line.ended => faults.push(|| cut(&places, &line, &fault)),
@@ -114,8 +128,9 @@ pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) 
         return Err(places.at(finding, at..at + 1).into());
     }
     if bytes.starts_with(b"\xef\xbb\xbf") {
-        let finding = Finding::info("log::byte_order_mark", "the log begins with a byte order mark: an editor has saved it")
-            .help("it is read all the same");
+        let finding =
+            Finding::info("log::byte_order_mark", "the log begins with a byte order mark: an editor has saved it")
+                .help("it is read all the same");
         findings.push(places.at(finding, 0..3));
         return Ok(3);
     }
@@ -132,8 +147,10 @@ fn line_ends(lines: &Lines<'_>, post: &Postprocessor, places: &Places<'_>, findi
     };
     if !post.log.end_of_line.contains(&found) {
         let at = first.start + first.bytes.len();
-        let finding = Finding::warning("log::line_ends", format!("the lines end with {says}; {} writes others", post.name))
-            .help("they are read all the same; was the log opened in an editor? prefer the file as the control wrote it");
+        let finding =
+            Finding::warning("log::line_ends", format!("the lines end with {says}; {} writes others", post.name)).help(
+                "they are read all the same; was the log opened in an editor? prefer the file as the control wrote it",
+            );
         findings.push(places.at(finding, at..at + 1));
     }
 }

@@ -43,10 +43,12 @@ impl Search {
         let off = row.position.xyz_mm() - self.start.xyz_mm();
         let along = off.dot(&self.toward);
         let aside = (off - self.toward * along).norm();
-        let posed = machine.rotary().filter(|a| row.present[a.name.index()]).all(|a| {
-            (row.position.get(a.name) - self.start.get(a.name)).abs() <= POSE_ROOM_DEG
-        });
-        (posed && aside <= LINE_ROOM_MM && along >= -LINE_ROOM_MM && along <= self.length + LINE_ROOM_MM).then_some(along)
+        let posed = machine
+            .rotary()
+            .filter(|a| row.present[a.name.index()])
+            .all(|a| (row.position.get(a.name) - self.start.get(a.name)).abs() <= POSE_ROOM_DEG);
+        (posed && aside <= LINE_ROOM_MM && along >= -LINE_ROOM_MM && along <= self.length + LINE_ROOM_MM)
+            .then_some(along)
     }
 
     fn same_as(&self, other: &Self) -> bool {
@@ -79,7 +81,8 @@ pub(super) fn number(
         let Some(index) = (next..searches.len()).find(|i| searches[*i].along(machine, &row).is_some()) else {
             unmatched.push(|| {
                 let earlier = searches[..next.min(searches.len())].iter().any(|s| s.along(machine, &row).is_some());
-                let why = if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
+                let why =
+                    if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
                 at(Finding::warning("log::unmatched", format!("the row {why}; it is not used")), row.line)
             });
             continue;
@@ -171,7 +174,8 @@ impl Group {
             // moves off the face are logged too: what follows the last of them begins with the measuring touch
             [.., last] => {
                 let first = last.first().ok_or("no row")?;
-                let unbroken = self.rows.windows(2).any(|w| w[1].1.line == first.1.line && w[0].1.line + 1 == first.1.line);
+                let unbroken =
+                    self.rows.windows(2).any(|w| w[1].1.line == first.1.line && w[0].1.line + 1 == first.1.line);
                 if unbroken { Ok(status(first)) } else { Err("a line before the measuring touch is lost") }
             }
             [] => Err("no row"),

@@ -43,15 +43,23 @@ pub(super) fn explain(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], bad: 
         pairs.len(),
         ranges(&ids)
     );
-    Finding::error("log::other_plan", message).help("use the plan that `axiscal generate` wrote together with the program")
+    Finding::error("log::other_plan", message)
+        .help("use the plan that `axiscal generate` wrote together with the program")
 }
 
 fn mistakes(machine: &Machine) -> Vec<Mistake> {
     let columns = "check the order of the columns: the file itself is not changed";
-    let signs = "coordinates are NC coordinates, tool over workpiece: X grows when the tool goes to +X over the workpiece";
+    let signs =
+        "coordinates are NC coordinates, tool over workpiece: X grows when the tool goes to +X over the workpiece";
     let mut all = Vec::new();
     let [x, y, z] = [0usize, 1, 2];
-    let orders = [([y, x, z], "X and Y"), ([z, y, x], "X and Z"), ([x, z, y], "Y and Z"), ([y, z, x], "X, Y and Z"), ([z, x, y], "X, Y and Z")];
+    let orders = [
+        ([y, x, z], "X and Y"),
+        ([z, y, x], "X and Z"),
+        ([x, z, y], "Y and Z"),
+        ([y, z, x], "X, Y and Z"),
+        ([z, x, y], "X, Y and Z"),
+    ];
     for (order, names) in orders {
         all.push(Mistake {
             says: format!("the columns {names} were exchanged"),

@@ -1,7 +1,7 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
 use super::as_written::EndOfLine;
-use super::opening::{Opening, Resume};
+use super::opening::Opening;
 use super::{Frame, Postprocessor, log_text};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -250,7 +250,7 @@ impl<'a> Writer<'a> {
     fn step(&mut self, step: &Step) -> Result<()> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
-            Step::Setup { number, says } => self.setup(*number, says),
+            Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),
             Step::OrientSpindle { deg } => {
                 let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
                 self.oriented = Some(angle);
@@ -292,14 +292,13 @@ impl<'a> Writer<'a> {
         if feed.is_finite() && feed > 0.0 { Ok(self.number(feed)) } else { Err(self.broken(format!("feed {feed}"))) }
     }
 
-    fn setup(&mut self, number: u32, says: &str) -> Result<()> {
+    fn setup(&mut self, number: u32, says: &str, resume: Option<&[Step]>) -> Result<()> {
         self.close_setup()?;
         self.open_setup = Some(self.label);
         self.render("setup", context! { number => number, says => says })?;
-        let resume = self.resume()?;
-        let possible = resume.is_some();
-        let Resume { moves, orient } = resume.unwrap_or_default();
-        self.render("resume", context! { number, possible, moves, orient })
+        let moves = self.resume(resume)?;
+        let possible = moves.is_some();
+        self.render("resume", context! { number, possible, moves => moves.unwrap_or_default() })
     }
 
     fn rotary(&mut self, to: &AxisMap, sense: &AxisMap) -> Result<()> {

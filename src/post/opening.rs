@@ -11,10 +11,6 @@ use crate::machine::Machine;
 use crate::program::path::{Path, Step};
 use minijinja::Value;
 
-/// A rotary axis comes to its angle from so far past it, deg, where its range allows: its play is then taken up in the
-/// same sense as in the whole program.
-const OVERSHOOT_DEG: f64 = 5.0;
-
 /// The first moves.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Opening {
@@ -26,17 +22,6 @@ pub(super) struct Opening {
     lift: Option<AxisName>,
     /// Where every axis stands after them; `None` where that is not known.
     place: Option<AxisMap>,
-    senses: AxisMap,
-    oriented: Option<f64>,
-}
-
-/// The way to the beginning of a set-up.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Resume {
-    /// Lists of axis words.
-    pub(super) moves: Vec<Value>,
-    /// Orientation of the spindle, where it has changed since the first moves.
-    pub(super) orient: Option<String>,
 }
 
 impl Opening {
@@ -83,45 +68,31 @@ impl Writer<'_> {
         if self.opening.lift.is_some() && self.path.start_near.is_none() {
             self.opening.place = Some(self.at);
         }
-        self.opening.senses = self.senses;
-        self.opening.oriented = self.oriented;
     }
 
-    /// The way from where the first moves end to where the machine stands now; `None` where it is not proven.
-    pub(super) fn resume(&self) -> Result<Option<Resume>> {
-        let (Some(opening), Some(lift)) = (self.opening.place, self.opening.lift) else { return Ok(None) };
-        let mut stands = opening;
-        let mut places = Vec::new();
-        for axis in self.machine.rotary() {
-            let (name, [low, high]) = (axis.name, axis.range);
-            let (Some(value), sense) = (self.at.get(name), self.senses.get(name)) else { return Ok(None) };
-            if opening.get(name) == Some(value) && self.opening.senses.get(name) == sense {
-                continue;
-            }
-            let past = sense.map(|s| value - s * OVERSHOOT_DEG).filter(|v| (low..=high).contains(v));
-            for target in past.into_iter().chain([value]) {
-                let turn = AxisMap::default().with(name, target);
-                places.extend(self.rotary_steps(&stands, &turn)?);
-                stands = turn.or(&stands);
+    /// The way that the path gives from where the first moves end to where the present set-up begins; `None` where the
+    /// path proves none.
+    pub(super) fn resume(&self, way: Option<&[Step]>) -> Result<Option<Vec<Value>>> {
+        let (Some(opening), Some(way)) = (self.opening.place, way) else { return Ok(None) };
+        let (mut stands, mut places) = (opening, Vec::new());
+        for step in way {
+            match step {
+                Step::Rotary { to, .. } => {
+                    places.extend(self.rotary_steps(&stands, to)?);
+                    stands = to.or(&stands);
+                }
+                Step::Rapid { to } => {
+                    stands = to.or(&stands);
+                    places.push(if self.frame.is_tcp() {
+                        let world = self.controller(&stands);
+                        AxisMap::xyz(world.0[0], world.0[1], world.0[2])
+                    } else {
+                        *to
+                    });
+                }
+                _ => return Err(self.broken("the way to a set-up holds more than rapids and turns".into())),
             }
         }
-        let across = AxisName::ALL[..3].iter().copied().filter(|a| *a != lift);
-        for axis in across.chain([lift]) {
-            let Some(value) = self.at.get(axis) else { return Ok(None) };
-            if stands.get(axis) == Some(value) {
-                continue;
-            }
-            stands.set(axis, value);
-            let here = AxisMap::default().with(axis, value);
-            places.push(if self.frame.is_tcp() {
-                let world = self.controller(&stands);
-                AxisMap::xyz(world.0[0], world.0[1], world.0[2])
-            } else {
-                here
-            });
-        }
-        let moves: Vec<Value> = places.iter().map(|place| self.words(place)).collect::<Result<_>>()?;
-        let orient = self.oriented.filter(|_| self.oriented != self.opening.oriented).map(|deg| self.number(deg));
-        Ok(Some(Resume { moves, orient }))
+        Ok(Some(places.iter().map(|place| self.words(place)).collect::<Result<_>>()?))
     }
 }

@@ -18,6 +18,7 @@ mod route;
 pub mod scene;
 pub mod spec;
 pub mod sweep;
+mod turns;
 mod verify;
 
 #[cfg(test)]

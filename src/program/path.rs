@@ -10,12 +10,18 @@ use crate::axes::AxisMap;
 pub enum Step {
     /// A remark for the reader of the NC program.
     Note(String),
-    /// A set-up begins: pose, number of the index visit, what a person reads about it.
+    /// A set-up begins: a place at which the program can be taken up again.
+    ///
+    /// The moves before the first one are the opening of the program: after them the machine stands at a known place at
+    /// the top of the lifting axis.
     Setup {
-        /// Running number from 1: a resume point.
+        /// Running number from 1.
         number: u32,
         /// What is touched in it.
         says: String,
+        /// The way from the end of the opening to where this set-up begins: rapids of one axis and turns with their
+        /// senses, proven like every other move. `None`: no way is proven clear, the program cannot be taken up here.
+        resume: Option<Vec<Step>>,
     },
     /// Spindle stopped and oriented, right-handed about the tool frame's +z, deg.
     OrientSpindle {

@@ -12,6 +12,7 @@ use super::reach::Reached;
 use super::scene::Scene;
 use super::spec::ProgramSpec;
 use super::sweep::Manner;
+use super::turns::{Turn, turn_step, turns};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
 use rayon::prelude::*;
@@ -61,7 +62,7 @@ pub(super) fn route(scene: &Scene, layout: &Layout, spec: &ProgramSpec) -> Resul
         clock: Clock::default(),
         at: None,
         senses: AxisMap::default(),
-        spindle_deg: None,
+        opening: None,
         visit: 0,
         met: vec![false; layout.mounting.blocks.len()],
         heights: Heights { over_all: lift.top_height(), over_blocks: lift.top_height() },
@@ -85,16 +86,14 @@ struct Router<'a, 'm> {
     at: Option<Position>,
     /// Sense of each rotary axis's last move.
     senses: AxisMap,
-    spindle_deg: Option<f64>,
+    /// Where the opening ended, and the senses in which the rotary axes came there.
+    opening: Option<(Position, AxisMap)>,
     visit: u32,
     /// Blocks that have been touched.
     met: Vec<bool>,
     /// Of the pose in which the machine stands.
     heights: Heights,
 }
-
-/// A turn of one rotary axis: where to and, where it is known, in which sense.
-type Turn = (AxisName, f64, Option<f64>);
 
 impl Router<'_, '_> {
     fn setup(&mut self, number: u32, setup: &Setup) -> Result<()> {
@@ -145,25 +144,16 @@ impl Router<'_, '_> {
 
     /// Brings the rotary axes to a pose. The inner error is the reason why this set-up cannot be reached.
     fn index(&mut self, number: u32, setup: &Setup, heights: Heights, first: &Reached) -> Result<Result<(), String>> {
-        let turns = match self.turns(setup) {
+        let turns = match self.turns(self.at.map(|at| (at, self.senses)), &setup.pose, &setup.spec.from.value) {
             Ok(turns) => turns,
             Err(reason) => return Ok(Err(reason)),
         };
-        let number_and_name = Step::Setup { number, says: setup_says(setup) };
         let Some(at) = self.at else {
-            self.begin(number_and_name, setup, &turns, first)?;
+            self.begin(setup, &turns, first)?;
+            self.enter(number, setup);
             self.heights = heights;
             return Ok(Ok(()));
         };
-        let spindle_turns = setup.spec.spindle_deg.is_some_and(|deg| self.spindle_deg != Some(deg));
-        if turns.is_empty() {
-            if spindle_turns {
-                self.rise(self.heights.over_all);
-            }
-            self.push(number_and_name);
-            self.orient(setup);
-            return Ok(Ok(()));
-        }
         // both poses' heights, or as much more as the turns need
         let mut height = self.lift.height(&at).max(self.heights.over_all).max(heights.over_all);
         let top = self.lift.top_height();
@@ -172,12 +162,11 @@ impl Router<'_, '_> {
             match self.clear_turns(&at, height_here, &turns, first) {
                 Ok(()) => {
                     self.rise(height_here);
-                    self.push(number_and_name);
-                    self.orient(setup);
+                    self.enter(number, setup);
                     for turn in &turns {
                         self.turn(turn);
                     }
-                    self.visit += 1;
+                    self.visit += u32::from(!turns.is_empty());
                     self.heights = heights;
                     return Ok(Ok(()));
                 }
@@ -202,7 +191,7 @@ impl Router<'_, '_> {
     }
 
     /// The first moves: nobody knows where the machine stands.
-    fn begin(&mut self, setup_step: Step, setup: &Setup, turns: &[Turn], first: &Reached) -> Result<()> {
+    fn begin(&mut self, setup: &Setup, turns: &[Turn], first: &Reached) -> Result<()> {
         let lift = self.lift;
         let anywhere = self.scene.clear_from_anywhere(&lift, &|a| a.range);
         if !anywhere {
@@ -219,12 +208,10 @@ impl Router<'_, '_> {
             }
             self.out.path.start_near = Some(near);
         }
-        self.push(setup_step);
         // half of its range, for want of a place to count from
         let half = |a: AxisName| self.scene.machine.axis(a).map_or(0.0, |a| (a.range[1] - a.range[0]) / 2.0);
         self.clock.rapid(half(lift.axis));
         self.push(Step::Rapid { to: AxisMap::default().with(lift.axis, lift.top) });
-        self.orient(setup);
         for turn in turns {
             self.clock.rotary(half(turn.0));
             self.turn(turn);
@@ -237,72 +224,57 @@ impl Router<'_, '_> {
             self.push(Step::Rapid { to: AxisMap::default().with(axis, at.get(axis)) });
         }
         self.at = Some(at);
+        self.opening = Some((at, self.senses));
         Ok(())
     }
 
-    fn orient(&mut self, setup: &Setup) {
-        let deg = setup.spec.spindle_deg.or(self.spindle_deg).unwrap_or(0.0);
-        if self.spindle_deg != Some(deg) {
-            self.push(Step::OrientSpindle { deg });
-            self.spindle_deg = Some(deg);
-        }
+    /// The set-up begins here: how to come here from the end of the opening, and the spindle in its place.
+    fn enter(&mut self, number: u32, setup: &Setup) {
+        let pose: Vec<String> = setup.pose.iter().map(|(a, v)| format!("{a} {v}")).collect();
+        let says = format!("{}, {}", setup.spec.stage, pose.join(" "));
+        let resume = self.resume();
+        self.push(Step::Setup { number, says, resume });
+        // in every set-up, that it also holds where the program is taken up again
+        let deg = setup.spec.spindle_deg.unwrap_or(0.0);
+        self.push(Step::OrientSpindle { deg });
     }
 
-    /// The turns that bring each rotary axis to the pose in the sense that is wanted.
-    fn turns(&self, setup: &Setup) -> Result<Vec<Turn>, String> {
-        let mut turns = Vec::new();
-        for axis in self.scene.machine.rotary() {
-            let (name, [low, high]) = (axis.name, axis.range);
-            let target = setup.pose.get(name).unwrap_or(0.0);
-            let wanted = setup.spec.from.value.get(name);
-            let past = |sense: f64| {
-                let before = target - sense * self.overshoot_deg;
-                (low..=high).contains(&before).then_some(before).ok_or_else(|| {
-                    format!(
-                        "{name} cannot come to {target} deg with {} angles: its range ends at {}",
-                        if sense > 0.0 { "rising" } else { "falling" },
-                        if sense > 0.0 { low } else { high },
-                    )
-                })
-            };
-            let Some(at) = self.at else {
-                // from an unknown angle: past the pose on one side, then to it in a sense that is known
-                let sense = wanted.unwrap_or(if past(1.0).is_ok() { 1.0 } else { -1.0 });
-                turns.push((name, past(sense)?, None));
-                turns.push((name, target, Some(sense)));
-                continue;
-            };
-            let way = target - at.get(name);
-            if way.abs() < SAME {
-                if let Some(sense) = wanted.filter(|w| self.senses.get(name) != Some(*w)) {
-                    turns.push((name, past(sense)?, Some(-sense)));
-                    turns.push((name, target, Some(sense)));
-                }
-                continue;
-            }
-            let natural = way.signum();
-            match wanted {
-                Some(sense) if sense != natural => {
-                    turns.push((name, past(sense)?, Some(natural)));
-                    turns.push((name, target, Some(sense)));
-                }
-                _ => turns.push((name, target, Some(natural))),
-            }
+    /// The proven way from the end of the opening to here: turns at the top, across, down.
+    fn resume(&self) -> Option<Vec<Step>> {
+        let ((mut at, senses), to) = (self.opening?, self.at?);
+        let mut steps = Vec::new();
+        for (axis, angle, sense) in self.turns(Some((at, senses)), &AxisMap(to.0.map(Some)), &self.senses).ok()? {
+            self.scene.clear_turn(&at, axis, angle).ok()?;
+            at.set(axis, angle);
+            steps.push(turn_step(axis, angle, sense));
         }
-        Ok(turns)
+        let mut rapids = self.lateral(&at, &to).ok()?;
+        if (self.lift.height(&at) - self.lift.height(&to)).abs() > SAME {
+            rapids.push(self.lift.axis);
+        }
+        for axis in rapids {
+            let mut next = at;
+            next.set(axis, to.get(axis));
+            self.scene.clear_straight(&at, &next, Manner::Rapid).ok()?;
+            steps.push(Step::Rapid { to: AxisMap::default().with(axis, to.get(axis)) });
+            at = next;
+        }
+        Some(steps)
+    }
+
+    fn turns(&self, from: Option<(Position, AxisMap)>, pose: &AxisMap, wanted: &AxisMap) -> Result<Vec<Turn>, String> {
+        turns(self.scene.machine, self.overshoot_deg, from, pose, wanted)
     }
 
     fn turn(&mut self, (axis, to, sense): &Turn) {
-        let mut senses = AxisMap::default();
         if let Some(sense) = sense {
-            senses.set(*axis, *sense);
             self.senses.set(*axis, *sense);
         }
         if let Some(at) = &mut self.at {
             self.clock.rotary((to - at.get(*axis)).abs());
             at.set(*axis, *to);
         }
-        self.push(Step::Rotary { to: AxisMap::default().with(*axis, *to), sense: senses });
+        self.push(turn_step(*axis, *to, *sense));
     }
 
     /// The linear axes other than the lift.
@@ -459,7 +431,7 @@ impl Router<'_, '_> {
             time_s: Some(self.clock.rounded_s()),
             visit: Some(self.visit),
             feed_mm_min: Some(measure_feed),
-            spindle_deg: setup.spec.spindle_deg.or(self.spindle_deg.filter(|deg| *deg != 0.0)),
+            spindle_deg: setup.spec.spindle_deg,
             tool_length_mm: None,
             ball_radius_mm: None,
             from: self.senses,
@@ -488,10 +460,4 @@ impl Router<'_, '_> {
 fn linear(at: &Position) -> AxisMap {
     let p = at.xyz_mm();
     AxisMap::xyz(p.x, p.y, p.z)
-}
-
-/// A set-up in words.
-fn setup_says(setup: &Setup) -> String {
-    let pose: Vec<String> = setup.pose.iter().map(|(a, v)| format!("{a} {v}")).collect();
-    format!("{}, {}", setup.spec.stage, pose.join(" "))
 }

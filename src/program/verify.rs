@@ -50,6 +50,7 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
         moves: Vec::new(),
         violations: Vec::new(),
         start_near: path.start_near.as_ref(),
+        opening: None,
         anywhere: None,
     };
     for (i, step) in path.steps.iter().enumerate() {
@@ -110,6 +111,8 @@ struct Walk<'a, 'm> {
     moves: Vec<Move>,
     violations: Vec<Violation>,
     start_near: Option<&'a super::path::StartNear>,
+    /// Where the first set-up began, and the senses in which the rotary axes came there.
+    opening: Option<(AxisMap, AxisMap)>,
     /// Whether moves from an unknown place are proven clear; computed when it is first asked for.
     anywhere: Option<bool>,
 }
@@ -126,12 +129,40 @@ impl Walk<'_, '_> {
             self.in_contact = None;
         }
         match step {
-            Step::Note(_) | Step::Setup { .. } | Step::OrientSpindle { .. } => {}
+            Step::Note(_) => {}
+            Step::OrientSpindle { .. } => self.at_start_of = None,
+            Step::Setup { resume, .. } => self.setup(i, resume.as_deref()),
             Step::Rapid { to } => self.linear(i, to, None),
             Step::Protected { to, feed } => self.linear(i, to, Some(*feed)),
             Step::Rotary { to, sense } => self.rotary(i, to, sense),
             Step::Touch(touch) => self.touch(i, touch),
             Step::Retract { to, feed } => self.retract(i, to, *feed),
+        }
+    }
+
+    /// Proves the way from the end of the opening to a set-up.
+    fn setup(&mut self, i: usize, resume: Option<&[Step]>) {
+        if self.in_contact.is_some() {
+            self.violation(i, "a set-up begins while the ball may press against a block".to_owned());
+        }
+        if self.known().is_none() {
+            self.violation(i, "a set-up begins before the place of every axis is known".to_owned());
+            return;
+        }
+        let here = (self.at, self.senses);
+        let opening = *self.opening.get_or_insert(here);
+        let Some(resume) = resume else { return };
+        (self.at, self.senses) = opening;
+        for step in resume {
+            match step {
+                Step::Rapid { .. } | Step::Rotary { .. } => self.step(i, step),
+                _ => self
+                    .violation(i, "the way to take the program up again holds more than rapids and turns".to_owned()),
+            }
+        }
+        let there = (std::mem::replace(&mut self.at, here.0), std::mem::replace(&mut self.senses, here.1));
+        if !near(&there.0.position(), &here.0.position()) || there.1 != here.1 {
+            self.violation(i, "the way to take the program up again does not end where the set-up begins".to_owned());
         }
     }
 

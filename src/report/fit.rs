@@ -1,13 +1,19 @@
 //! The answer of `identify` as a table with its remarks.
 
 use crate::fit::outcome::{Outcome, Parameter, Status};
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
+use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+
+/// Lines above, below and under the head only: rows are read across, not boxed in.
+const HOUSE: TableStyle = TableStyle::new()
+    .top_border(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// A table in the house's form.
 #[must_use]
 pub fn table(head: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.load_style(HOUSE).set_content_arrangement(ContentArrangement::Dynamic);
     table.set_header(head.iter().map(|h| Cell::new(h)));
     table
 }

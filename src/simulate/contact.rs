@@ -228,7 +228,7 @@ mod tests {
             let gap = |s: f64| distance(way(s), half).0 - r;
             match first_contact(&way, true, half, r) {
                 Contact::Met { at, .. } => {
-                    prop_assert!(gap(at).abs() < 1e-12);
+                    prop_assert!(gap(at).abs() < 1e-13);
                     for i in 0..200 {
                         prop_assert!(gap(at * f64::from(i) / 200.0) > -1e-12);
                     }

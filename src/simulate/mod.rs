@@ -13,7 +13,6 @@ pub mod catalogue;
 mod chain;
 mod contact;
 pub mod control;
-pub mod csv;
 mod noise;
 mod prepare;
 mod rigid;

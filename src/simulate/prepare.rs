@@ -16,6 +16,9 @@ use std::collections::BTreeMap;
 /// What one touch takes when the plan does not say, s.
 const TOUCH_S: f64 = 12.0;
 
+/// No axis stands as far as this, mm or deg: guards against numbers that would not leave any digits for the contact.
+const FAR: f64 = 1e6;
+
 /// The virtual machine with a program in it.
 pub struct Bench<'a> {
     pub chain: Chain,
@@ -154,8 +157,8 @@ fn ready(
     }
     let (start, end) = (touch.start_position(), touch.end_position());
     for name in AxisName::ALL {
-        if !(start.get(name).is_finite() && end.get(name).is_finite()) {
-            return Err(format!("the position of axis {name} is not a number"));
+        if ![start, end].iter().all(|p| p.get(name).abs() < FAR) {
+            return Err(format!("the position of axis {name} is nowhere on a machine"));
         }
         if machine.axis(name).is_none() && (start.get(name) != 0.0 || end.get(name) != 0.0) {
             return Err(format!("{:?} has no axis {name}", machine.name));
@@ -173,10 +176,10 @@ fn ready(
     if !(ball_radius_mm.is_finite() && ball_radius_mm > 0.0) {
         return Err(format!("the ball's radius is {ball_radius_mm} mm"));
     }
-    if !(length_mm.is_finite() && block.centre.iter().all(|x| x.is_finite())) {
-        return Err("its tool length or block centre is not a number".to_owned());
+    if !(length_mm.abs() < FAR && ball_radius_mm < FAR && block.centre.iter().all(|x| x.abs() < FAR)) {
+        return Err("its tool length, ball or block centre is nowhere on a machine".to_owned());
     }
-    if !block.size.iter().all(|&s| s.is_finite() && s > 0.0) {
+    if !block.size.iter().all(|&s| s > 0.0 && s < FAR) {
         return Err(format!("block {:?} has an edge of no length", block.name));
     }
     let stylus = Stylus { length_mm, spindle_deg: touch.spindle_deg.unwrap_or(0.0) };
@@ -251,7 +254,7 @@ fn state(
 #[derive(Default)]
 struct Senses {
     last: [f64; 6],
-    /// Where the axes stood after the last touch.
+    /// Where the axes stood after the last touch: a search ends with the way back to its start.
     stood: Option<Position>,
 }
 
@@ -270,7 +273,7 @@ impl Senses {
                 }
             }
         }
-        self.stood = Some(ready.end);
+        self.stood = Some(ready.start);
         self.last
     }
 }

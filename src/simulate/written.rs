@@ -207,7 +207,7 @@ impl Reader<'_> {
             let mut spans = Vec::new();
             for (name, node) in in_order(table) {
                 if let Some((value, unit)) = self.value(node, name.get_ref()) {
-                    values.push(Value { name: &**name.get_ref(), value, unit });
+                    values.push(Value { name: name.get_ref(), value, unit });
                     spans.push(name.span().start..node.span().end);
                 }
             }

@@ -75,6 +75,9 @@ pub struct Stock {
     /// Its pins, mm.
     #[serde(default)]
     pub pins: BTreeMap<String, f64>,
+    /// How far the workpiece's zero stands off the nominal one in the module's world coordinates, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub workpiece_shift_mm: Option<[f64; 3]>,
     /// To be added to the machine's own `[JOINT_n] HOME_OFFSET`, deg.
     #[serde(default)]
     pub home_offset_deg: BTreeMap<AxisName, f64>,

@@ -2,51 +2,37 @@
 //! what is left out, each with its reason.
 
 use super::compensation::{Compensation, Provenance, Term};
-use super::place::{Dof, Meaning, Place, Spot, meaning};
+use super::place::{Dof, Meaning, Place, Spot, coordinate_off, meaning};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result};
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::geometry::Displacement;
 use crate::machine::{Machine, Side};
-use crate::units::{deg_from_rad, mm_from_um, rad_from_deg, ratio_from_ppm, um_from_mm};
+use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::formula::VARIABLES;
+use crate::units::{deg_from_rad, rad_from_deg, rad_from_mrad, ratio_from_ppm, um_from_mm};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// Effects of the probe, the artefact and the run: they spoil a measurement, not the machine.
-const OF_THE_MEASUREMENT: [&str; 14] = [
-    "block-setup",
-    "block-size",
-    "block-shape",
-    "block-slip",
-    "block-temperature",
-    "artefact-growth",
-    "pretravel",
-    "pretravel-axial",
-    "lobing-2",
-    "lobing-3",
-    "tip-eccentricity",
-    "stylus-sag",
-    "latency",
-    "sign-or-axis-swap",
-];
+/// How much further an axis stands than it shows: coordinate relative to R's origin (mm or deg) and sense (+1 or -1) →
+/// mm or deg.
+pub type CoordinateError = Box<dyn Fn(f64, f64) -> f64>;
 
 /// An identified error of one axis's own position, which depends on nothing but that position and its sense.
 pub struct AxisShape {
-    /// Name of the parameter in the outcome.
+    /// Name of the parameter.
     pub parameter: String,
+    /// Id of its effect.
+    pub effect: String,
     /// The axis.
     pub axis: AxisName,
-    /// Component of the axis's error motion; along (linear) or about (rotary) its direction.
-    pub dof: Dof,
-    /// Names of the variables in its formula.
-    pub variables: Vec<String>,
-    /// Position relative to R's origin (mm or deg) and sense (+1 or -1) → error with the identified value (mm or deg).
-    pub error: Box<dyn Fn(f64, f64) -> f64>,
+    /// With the identified value.
+    pub error: CoordinateError,
 }
 
 impl std::fmt::Debug for AxisShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "AxisShape({} of {} {})", self.parameter, self.axis, self.dof)
+        write!(f, "AxisShape({} ({}) of {})", self.parameter, self.effect, self.axis)
     }
 }
 
@@ -112,18 +98,6 @@ pub fn rounded(value: f64) -> f64 {
     if rounded.is_finite() { rounded + 0.0 } else { value }
 }
 
-/// A value in mm or deg, if the unit is one of a displacement or an angle.
-#[must_use]
-pub fn in_mm_or_deg(value: f64, unit: &str, dof: Dof) -> Option<f64> {
-    match (unit, dof.is_angle()) {
-        ("mm", false) | ("deg", true) => Some(value),
-        ("um", false) => Some(mm_from_um(value)),
-        ("urad", true) => Some(deg_from_rad(ratio_from_ppm(value))),
-        ("mrad", true) => Some(deg_from_rad(ratio_from_ppm(value * 1e3))),
-        _ => None,
-    }
-}
-
 /// How large an error a value leaves at a lever, µm; `None` where its unit says nothing about that.
 #[must_use]
 pub fn left_um(value: f64, unit: &str, lever_mm: f64) -> Option<f64> {
@@ -132,7 +106,7 @@ pub fn left_um(value: f64, unit: &str, lever_mm: f64) -> Option<f64> {
         "mm" => um_from_mm(size),
         "um" => size,
         "deg" => um_from_mm(rad_from_deg(size) * lever_mm),
-        "mrad" => um_from_mm(ratio_from_ppm(size * 1e3) * lever_mm),
+        "mrad" => um_from_mm(rad_from_mrad(size) * lever_mm),
         "urad" | "um/m" => um_from_mm(ratio_from_ppm(size) * lever_mm),
         _ => return None,
     })
@@ -140,6 +114,7 @@ pub fn left_um(value: f64, unit: &str, lever_mm: f64) -> Option<f64> {
 
 struct Collector<'a> {
     machine: &'a Machine,
+    outcome: &'a Outcome,
     identified: BTreeMap<Spot, Term>,
     correction: Correction,
     findings: Findings,
@@ -148,20 +123,20 @@ struct Collector<'a> {
 impl Correction {
     /// Collects what a fit found on top of what was active while its data were measured.
     ///
-    /// Only parameters of status `identified` become corrections. `shapes` says which of the outcome's parameters are
-    /// errors of one axis's own position.
+    /// Only parameters of status `identified` become corrections; the catalogue says what each of them means.
     ///
     /// # Errors
-    /// When the outcome or the active compensation belongs to another machine, or a value or name cannot be used.
+    /// When the outcome belongs to another machine, the catalogue lacks one of its effects, or a value is not a number.
     pub fn collect(
         machine: &Machine,
+        catalogue: &Catalogue,
         outcome: &Outcome,
         active: Option<&Compensation>,
-        shapes: Vec<AxisShape>,
         provenance: Provenance,
     ) -> Result<(Self, Findings)> {
         let mut collector = Collector {
             machine,
+            outcome,
             identified: BTreeMap::new(),
             findings: Findings::default(),
             correction: Self {
@@ -182,9 +157,18 @@ impl Correction {
                 "give the machine that the study names",
             );
         }
-        let mut shapes: BTreeMap<String, AxisShape> = shapes.into_iter().map(|s| (s.parameter.clone(), s)).collect();
         for parameter in &outcome.parameters {
-            collector.take(parameter, shapes.remove(&parameter.name));
+            match catalogue.get(&parameter.effect, machine) {
+                Some(effect) => collector.take(parameter, effect),
+                None => collector.error(
+                    "tables::unknown_effect",
+                    format!(
+                        "{} is of effect {:?}, which machine {:?} has not",
+                        parameter.name, parameter.effect, machine.name
+                    ),
+                    "give the effects file that the study names",
+                ),
+            }
         }
         collector.finish()
     }
@@ -236,8 +220,21 @@ impl Collector<'_> {
         });
     }
 
-    fn take(&mut self, p: &Parameter, shape: Option<AxisShape>) {
-        if OF_THE_MEASUREMENT.contains(&p.effect.as_str()) {
+    fn take(&mut self, p: &Parameter, effect: &Effect) {
+        let named = effect.parameters.iter().position(|known| known.name == p.name);
+        let meaning = match named {
+            Some(index) => meaning(effect, index, self.machine),
+            // a parameter per block carries the block in its name
+            None if effect.per_block => Meaning::Measurement,
+            None => {
+                return self.error(
+                    "tables::unknown_parameter",
+                    format!("effect {:?} has no parameter {:?}", p.effect, p.name),
+                    "the fit and the effects file do not belong together",
+                );
+            }
+        };
+        if meaning == Meaning::Measurement {
             *self.correction.of_measurement.entry(p.effect.clone()).or_default() += 1;
             return;
         }
@@ -254,33 +251,24 @@ impl Collector<'_> {
                 "the fit went wrong: run `axiscal identify` and read its warnings",
             );
         }
-        match meaning(&p.effect, &p.name, self.machine) {
-            Meaning::At(spot) => self.take_term(p, spot),
-            Meaning::Unreadable => self.error(
-                "tables::unknown_parameter",
-                format!("{} of effect {} names no location error of machine {:?}", p.name, p.effect, self.machine.name),
-                "the fit and the machine's description do not belong together",
-            ),
-            Meaning::Other if p.effect == "tool-length" => match in_mm_or_deg(p.value, &p.unit, Dof::Dz) {
-                Some(mm) => self.correction.tool_length_mm = Some(rounded(mm)),
-                None => self.leave_out(p, true, format!("a tool length in {:?}", p.unit)),
-            },
-            Meaning::Other => match shape {
-                Some(shape) => self.take_shape(p, shape),
-                None => self.leave_out(p, true, "no place in a location correction or an axis table holds it"),
-            },
+        match meaning {
+            Meaning::Location(spots) => {
+                for (spot, per_unit) in spots {
+                    self.take_term(p, spot, per_unit);
+                }
+            }
+            Meaning::ToolLength(per_unit) => {
+                let sum = self.correction.tool_length_mm.unwrap_or(0.0) + p.value * per_unit;
+                self.correction.tool_length_mm = Some(rounded(sum));
+            }
+            Meaning::Position(axis) => self.take_shape(p, effect, axis),
+            Meaning::Nothing(why) => self.leave_out(p, true, why),
+            Meaning::Measurement => {}
         }
     }
 
-    fn take_term(&mut self, p: &Parameter, spot: Spot) {
-        let Some(value) = in_mm_or_deg(p.value, &p.unit, spot.dof) else {
-            return self.error(
-                "tables::unit",
-                format!("{} ({}) is in {:?}, expected {:?}", p.name, p.effect, p.unit, spot.dof.unit()),
-                "location errors are stated in mm and deg",
-            );
-        };
-        let sigma = p.sigma.and_then(|s| in_mm_or_deg(s, &p.unit, spot.dof));
+    fn take_term(&mut self, p: &Parameter, spot: Spot, per_unit: f64) {
+        let (value, sigma) = (p.value * per_unit, p.sigma.map(|s| s * per_unit.abs()));
         match self.identified.get_mut(&spot) {
             // two effects at one place add up component by component
             Some(term) => {
@@ -294,29 +282,50 @@ impl Collector<'_> {
         }
     }
 
-    fn take_shape(&mut self, p: &Parameter, shape: AxisShape) {
-        let Some(axis) = self.machine.axis(shape.axis) else {
-            return self.leave_out(p, true, format!("the machine has no axis {}", shape.axis));
+    fn take_shape(&mut self, p: &Parameter, effect: &Effect, name: AxisName) {
+        let Some(axis) = self.machine.axis(name).cloned() else { return };
+        let Some(index) = effect.parameters.iter().position(|known| known.name == p.name) else { return };
+        // a formula may hold other parameters of its effect: they must be known to be used
+        let mut values = Vec::new();
+        for known in &effect.parameters {
+            let found = self.outcome.parameters.iter().find(|o| o.effect == effect.id && o.name == known.name);
+            let usable =
+                found.filter(|o| known.shape.is_none() || matches!(o.status, Status::Identified | Status::Fixed));
+            let Some(other) = usable else {
+                return self.leave_out(p, true, format!("{} in its formula is not known", known.name));
+            };
+            values.push(other.value);
+        }
+        let terms: Vec<_> = effect.terms.iter().filter(|t| t.parameter == index).cloned().collect();
+        let amount = p.value * effect.parameters[index].factor;
+        let error = move |q: f64, sense: f64| -> f64 {
+            let mut state = [0.0; VARIABLES.len()];
+            for (variable, slot) in VARIABLES.iter().zip(&mut state) {
+                if *variable == axis.name.to_string() {
+                    *slot = if axis.name.is_rotary() { rad_from_deg(q) } else { q };
+                } else if *variable == format!("s{}", axis.name) {
+                    *slot = sense;
+                }
+            }
+            let off: f64 =
+                terms.iter().map(|t| coordinate_off(t, &axis, amount * t.formula.eval(&state, &values))).sum();
+            if axis.name.is_rotary() { deg_from_rad(off) } else { off }
         };
-        let along = axis.direction[shape.dof.index() % 3].abs();
-        if shape.dof.is_angle() != shape.axis.is_rotary() || (along - 1.0).abs() > 1e-9 {
-            return self.leave_out(p, true, format!("{} moves {} across its own motion", shape.axis, shape.dof));
+        if !error(0.0, 1.0).is_finite() {
+            return self.leave_out(p, true, "its formula has no value at 0".to_owned());
         }
-        let (own, sense) = (shape.axis.to_string(), format!("s{}", shape.axis));
-        if let Some(other) = shape.variables.iter().find(|v| **v != own && **v != sense) {
-            return self.leave_out(
-                p,
-                true,
-                format!("it depends on {other}, an axis table only on {own} and its sense"),
-            );
-        }
-        self.correction.shapes.push(shape);
+        self.correction.shapes.push(AxisShape {
+            parameter: p.name.clone(),
+            effect: p.effect.clone(),
+            axis: name,
+            error: Box::new(error),
+        });
     }
 
     /// Adds what was active, restated at the new reference point.
     fn finish(mut self) -> Result<(Correction, Findings)> {
         let active: Vec<Term> = match &self.correction.active {
-            Some(active) => restated(active, self.machine, self.correction.reference_mm),
+            Some(active) => restated(&active.terms, self.machine, active.reference_mm, self.correction.reference_mm),
             None => Vec::new(),
         };
         let mut terms = self.identified;
@@ -352,32 +361,42 @@ fn blank(spot: Spot, parameter: &str, effect: &str, identified: f64, sigma: Opti
     }
 }
 
-/// The terms of a compensation with workpiece-side displacements stated at another point.
+/// The terms with the displacements of workpiece-side axes stated at another point: the same transforms, exactly.
 ///
-/// E about c1 by d1 is E about c2 by d1 + (R - 1)(c2 - c1), with R its rotation: exact, so the same transform.
-fn restated(active: &Compensation, machine: &Machine, reference_mm: [f64; 3]) -> Vec<Term> {
-    let mut terms = active.terms.clone();
-    let shift = Vector3::from(reference_mm) - Vector3::from(active.reference_mm);
-    if shift == Vector3::zeros() {
-        return terms;
-    }
+/// E about c1 by d1 is E about c2 by d1 + (R - 1)(c2 - c1), with R its rotation. Only `value` is restated; a displacement
+/// that becomes another number loses its uncertainty, which would need that of the tilts and their covariance.
+#[must_use]
+pub fn restated(terms: &[Term], machine: &Machine, from_mm: [f64; 3], to_mm: [f64; 3]) -> Vec<Term> {
+    let mut out = terms.to_vec();
+    let shift = Vector3::from(to_mm) - Vector3::from(from_mm);
+    let value = |spot: Spot| terms.iter().find(|t| t.spot() == spot).map_or(0.0, |t| t.value);
     for axis in machine.rotary().filter(|a| a.side == Side::Workpiece) {
+        let at = |dof: Dof| Spot { axis: axis.name, place: Place::Before, dof };
         let mut e = Displacement::default();
         for dof in Dof::ALL.into_iter().filter(|d| d.is_angle()) {
-            let value = active.value(Spot { axis: axis.name, place: Place::Before, dof });
-            e.add(dof.index(), rad_from_deg(value));
+            e.add(dof.index(), rad_from_deg(value(at(dof))));
         }
         let moved = e.rotation() * shift - shift;
         for dof in [Dof::Dx, Dof::Dy, Dof::Dz] {
-            let spot = Spot { axis: axis.name, place: Place::Before, dof };
             let by = moved[dof.index()];
-            if let Some(term) = terms.iter_mut().find(|t| t.spot() == spot) {
-                term.value += by;
-            } else if by.abs() > 1e-12 {
-                let parameter = format!("E{}0{}", dof.iso_letter(), axis.name);
-                terms.push(blank(spot, &parameter, "restated reference", by, None));
+            // below the twelve decimals that are written
+            if by.abs() < 5e-13 {
+                continue;
+            }
+            match out.iter_mut().find(|t| t.spot() == at(dof)) {
+                Some(term) => {
+                    term.value += by;
+                    term.sigma = None;
+                }
+                None => {
+                    let parameter = format!("E{}0{}", dof.iso_letter(), axis.name);
+                    let mut term = blank(at(dof), &parameter, "tilt at another point", 0.0, None);
+                    term.value = by;
+                    out.push(term);
+                }
             }
         }
     }
-    terms
+    out.sort_by_key(Term::spot);
+    out
 }

@@ -1,9 +1,11 @@
-//! Where a location error stands in the chain, read from an effect's id and a parameter's name.
+//! Where an error stands in the chain, and what of an effect a correction can hold.
 //!
-//! The table "Meaning of the location errors" of `docs/formats.md` in code; nothing else decides a place.
+//! The effects say it (`at`, `frame`, `dof`, `formula`); nothing here knows one by name but the `zero-…` family.
 
 use crate::axes::AxisName;
-use crate::machine::{Machine, Side};
+use crate::machine::{Axis, Machine, Side};
+use crate::model::catalogue::{Effect, Place as At, Term};
+use crate::units::deg_from_rad;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -94,98 +96,193 @@ pub struct Spot {
     pub dof: Dof,
 }
 
-/// Reads an ISO location symbol such as `EX0C` or `E_AOB`: component and axis.
-#[must_use]
-pub fn iso_location(name: &str) -> Option<(Dof, AxisName)> {
-    let mut letters = name.chars().filter(|c| *c != '_');
-    let (e, what, zero, axis) = (letters.next()?, letters.next()?, letters.next()?, letters.next()?);
-    let known = letters.next().is_none() && e.eq_ignore_ascii_case(&'E') && matches!(zero, '0' | 'O' | 'o');
-    let dof = Dof::ALL.into_iter().find(|d| d.iso_letter() == what.to_ascii_uppercase())?;
-    let axis = AxisName::from_letter(axis)?;
-    (known && axis.is_rotary()).then_some((dof, axis))
-}
-
-/// What an effect's parameter means as a place of the chain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What a parameter of an effect means to a correction.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Meaning {
-    /// A location error at this spot.
-    At(Spot),
-    /// The effect is one of location errors, but the name does not fit it or the machine.
-    Unreadable,
-    /// The effect is not one of location errors.
-    Other,
+    /// Location errors: where, and mm or deg per unit of the parameter.
+    Location(Vec<(Spot, f64)>),
+    /// The tool is longer: mm per unit of the parameter.
+    ToolLength(f64),
+    /// The position of one axis, by that position and its sense only.
+    Position(AxisName),
+    /// Of the probe or the artefact: it spoils a measurement, not the machine.
+    Measurement,
+    /// No correction holds it, for this reason.
+    Nothing(String),
 }
 
-/// The place of a parameter of an effect.
+/// The meaning of a parameter, by the places and formulas of its effect.
 ///
-/// `paper-…` and `double-head-10` stand before the rotation of the axis in the symbol. `location-…` stands before it on
-/// the workpiece side; on the tool side the tilts do and the offsets stand after it. `zero-…` is the axis's own angle.
+/// A constant displacement at a rotary axis is a location error, before or after the rotation as the effect says; a turn
+/// of a `zero-…` effect about the axis itself is one of its angle. A displacement of an axis along (about) its own
+/// direction that depends on nothing but its own position and sense is an error of that position.
 #[must_use]
-pub fn meaning(effect: &str, parameter: &str, machine: &Machine) -> Meaning {
-    let paper = matches!(effect, "paper-head" | "paper-table" | "paper-double-head" | "double-head-10");
-    let of_axis = |prefix: &str| {
-        let mut letters = effect.strip_prefix(prefix)?.chars();
-        let axis = AxisName::from_letter(letters.next()?)?;
-        (letters.next().is_none() && axis.is_rotary()).then_some(axis)
+pub fn meaning(effect: &Effect, parameter: usize, machine: &Machine) -> Meaning {
+    if effect.nuisance || effect.per_block || effect.terms.iter().all(|t| matches!(t.place, At::Block | At::Trigger)) {
+        return Meaning::Measurement;
+    }
+    let terms: Vec<&Term> = effect.terms.iter().filter(|t| t.parameter == parameter).collect();
+    let Some(factor) = effect.parameters.get(parameter).map(|p| p.factor) else {
+        return Meaning::Nothing("the effect has no such parameter".to_owned());
     };
-    let (location, zero) = (of_axis("location-"), of_axis("zero-"));
-    if !paper && location.is_none() && zero.is_none() {
-        return Meaning::Other;
+    if terms.is_empty() {
+        return Meaning::Nothing("it shapes the other parameters of its effect".to_owned());
     }
-    let Some((dof, symbol_axis)) = iso_location(parameter) else { return Meaning::Unreadable };
-    let Some(axis) = machine.axis(symbol_axis) else { return Meaning::Unreadable };
-    if location.or(zero).is_some_and(|named| named != symbol_axis) {
-        return Meaning::Unreadable;
+    if let Some(spots) = terms.iter().map(|t| location(effect, t, factor, machine)).collect() {
+        return Meaning::Location(spots);
     }
-    let place = if zero.is_some() {
-        if !dof.is_angle() {
-            return Meaning::Unreadable;
+    if let [term] = terms.as_slice()
+        && let (At::Tool, 2, Some(k)) = (term.place, term.component, term.formula.constant())
+    {
+        // dz of the tool's frame points from the ball to the spindle
+        return Meaning::ToolLength(-k * factor);
+    }
+    let mut axes = terms.iter().map(|t| own_position(t, machine));
+    match axes.next() {
+        Some(Ok(first)) => match axes.find(|a| *a != Ok(first)) {
+            None => Meaning::Position(first),
+            Some(Ok(_)) => Meaning::Nothing("it moves several axes at once".to_owned()),
+            Some(Err(why)) => Meaning::Nothing(why),
+        },
+        Some(Err(why)) => Meaning::Nothing(why),
+        None => Meaning::Nothing("it moves nothing".to_owned()),
+    }
+}
+
+/// Does this component lie along (about) the axis's direction? +1 or -1 when it does.
+#[must_use]
+pub fn along(axis: &Axis, dof: Dof) -> Option<f64> {
+    let share = axis.direction[dof.index() % 3];
+    ((share.abs() - 1.0).abs() < 1e-9).then_some(share.signum())
+}
+
+fn location(effect: &Effect, term: &Term, factor: f64, machine: &Machine) -> Option<(Spot, f64)> {
+    let (name, place) = match term.place {
+        At::Before(name) => (name, Place::Before),
+        At::After(name) => (name, Place::After),
+        _ => return None,
+    };
+    let axis = machine.axis(name).filter(|a| a.name.is_rotary())?;
+    let dof = *Dof::ALL.get(term.component)?;
+    let amount = term.formula.constant()? * factor;
+    let amount = if dof.is_angle() { deg_from_rad(amount) } else { amount };
+    match along(axis, dof).filter(|_| dof.is_angle() && effect.id.starts_with("zero-")) {
+        Some(sign) => Some((Spot { axis: name, place: Place::Zero, dof }, sign * amount)),
+        None => Some((Spot { axis: name, place, dof }, amount)),
+    }
+}
+
+/// The axis whose own position a term is an error of, or why it is none.
+fn own_position(term: &Term, machine: &Machine) -> Result<AxisName, String> {
+    let name = match term.place {
+        At::Before(name) | At::After(name) => name,
+        At::Reading => *AxisName::ALL.get(term.component).ok_or("it is read on no axis")?,
+        _ => return Err("it is no error of an axis".to_owned()),
+    };
+    let axis = machine.axis(name).ok_or_else(|| format!("the machine has no axis {name}"))?;
+    if term.place != At::Reading {
+        let dof = Dof::ALL.get(term.component).copied().ok_or("it has no direction")?;
+        if dof.is_angle() != name.is_rotary() || along(axis, dof).is_none() {
+            return Err(format!("it moves {name} in {dof}, across its own motion"));
         }
-        Place::Zero
-    } else if location.is_some() && axis.side == Side::Tool && !dof.is_angle() {
-        Place::After
-    } else {
-        Place::Before
-    };
-    Meaning::At(Spot { axis: symbol_axis, place, dof })
+    }
+    let (own, sense) = (name.to_string(), format!("s{name}"));
+    if term.formula.constant().is_some() {
+        return Err(format!("a constant of {name} is a matter of its zero or of the work offset"));
+    }
+    match term.formula.variables().into_iter().find(|v| *v != own && *v != sense) {
+        Some(other) => Err(format!("it depends on {other}, an axis table only on {own} and its sense")),
+        None => Ok(name),
+    }
+}
+
+/// How much further an axis stands than it shows, from the value of a term of [`Meaning::Position`] (mm or rad, a
+/// displacement in R): mm or rad of its coordinate.
+#[must_use]
+pub fn coordinate_off(term: &Term, axis: &Axis, displacement: f64) -> f64 {
+    if term.place == At::Reading {
+        return displacement;
+    }
+    let sign = Dof::ALL.get(term.component).and_then(|dof| along(axis, *dof)).unwrap_or(1.0);
+    match (axis.name.is_rotary(), axis.side) {
+        (true, _) => sign * axis.sense * displacement,
+        // a table that stands further in R has the tool less far over the workpiece
+        (false, Side::Workpiece) => -sign * displacement,
+        (false, Side::Tool) => sign * displacement,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::diag::source;
+    use crate::model::catalogue::Catalogue;
 
-    fn swivel_head() -> Machine {
+    fn machine(name: &str) -> Machine {
         let (machines, _) = crate::machine::load(&source("m", crate::machine::BUILT_IN)).unwrap();
-        machines.into_iter().find(|m| m.name == "swivel-head").unwrap()
+        machines.into_iter().find(|m| m.name == name).unwrap()
     }
 
-    #[test]
-    fn symbols_are_read_in_every_spelling() {
-        for name in ["EX0C", "E_XOC", "ex0c", "E_X0C"] {
-            assert_eq!(iso_location(name), Some((Dof::Dx, AxisName::C)), "{name}");
-        }
-        for name in ["EXX", "EX0X", "EX0CC", "d_xBZ", "", "EÄ0C"] {
-            assert_eq!(iso_location(name), None, "{name}");
-        }
-    }
-
-    #[test]
-    fn the_place_follows_effect_and_side() {
-        let machine = swivel_head();
-        let at = |effect, name| match meaning(effect, name, &machine) {
-            Meaning::At(s) => format!("{} {} {}", s.axis, s.place, s.dof),
+    fn says(catalogue: &Catalogue, machine: &Machine, effect: &str, parameter: &str) -> String {
+        let effect = catalogue.get(effect, machine).unwrap();
+        let index = effect.parameters.iter().position(|p| p.name == parameter).unwrap();
+        match meaning(effect, index, machine) {
+            Meaning::Location(spots) => {
+                let each: Vec<String> =
+                    spots.iter().map(|(s, k)| format!("{} {} {} {k:.3}", s.axis, s.place, s.dof)).collect();
+                each.join(", ")
+            }
+            Meaning::Nothing(why) => why,
             other => format!("{other:?}"),
-        };
-        assert_eq!(at("paper-head", "EX0B"), "B before dx");
-        assert_eq!(at("location-b", "EX0B"), "B after dx");
-        assert_eq!(at("location-b", "EA0B"), "B before rx");
-        assert_eq!(at("location-c", "EX0C"), "C before dx");
-        assert_eq!(at("zero-b", "EB0B"), "B zero ry");
-        assert_eq!(at("zero-b", "EX0B"), "Unreadable");
-        assert_eq!(at("location-c", "EX0B"), "Unreadable");
-        assert_eq!(at("location-a", "EX0A"), "Unreadable");
-        assert_eq!(at("scale-x", "EXX"), "Other");
-        assert_eq!(at("location-x", "EX0X"), "Other");
+        }
+    }
+
+    #[test]
+    fn the_place_of_built_in_effects_is_that_of_formats_md() {
+        let (catalogue, head) = (Catalogue::built_in().unwrap(), machine("swivel-head"));
+        let at = |effect, name| says(&catalogue, &head, effect, name);
+        assert_eq!(at("paper-head", "EX0B"), "B before dx 1.000");
+        assert_eq!(at("paper-head", "EB0B"), "B before ry 1.000");
+        assert_eq!(at("location-b", "EX0B"), "B after dx 1.000");
+        assert_eq!(at("location-b", "EA0B"), "B before rx 1.000");
+        assert_eq!(at("location-c", "EX0C"), "C before dx 1.000");
+        assert_eq!(at("zero-b", "EB0B"), "B zero ry 1.000");
+        assert_eq!(at("tool-length", "dL"), "ToolLength(1.0)");
+        assert_eq!(at("block-setup", "SX"), "Measurement");
+        assert_eq!(at("pretravel", "pretravel"), "Measurement");
+        let table = machine("trunnion");
+        assert_eq!(says(&catalogue, &table, "location-a", "EZ0A"), "A before dz 1.000");
+        let double = machine("double-head");
+        assert_eq!(says(&catalogue, &double, "paper-double-head", "EX0A"), "A before dx 1.000");
+    }
+
+    #[test]
+    fn a_user_s_effect_means_what_its_places_and_formulas_say() {
+        let file = r#"
+[[effect]]
+id = "my-tilt"
+at = "B"
+terms = [ { parameter = "tilt", unit = "urad", dof = "rx", formula = "1" } ]
+[[effect]]
+id = "my-screw"
+at = "X"
+terms = [ { parameter = "k", unit = "um/m", dof = "dx", formula = "X" } ]
+[[effect]]
+id = "my-bend"
+at = "X"
+terms = [ { parameter = "k", unit = "um/m", dof = "dy", formula = "X" } ]
+[[effect]]
+id = "my-growth"
+at = "X"
+terms = [ { parameter = "k", unit = "um/h", dof = "dx", formula = "t" } ]
+"#;
+        let mut catalogue = Catalogue::built_in().unwrap();
+        catalogue.add_file(&source("my-effects.toml", file)).unwrap();
+        let head = machine("swivel-head");
+        let at = |effect, name| says(&catalogue, &head, effect, name);
+        assert!(at("my-tilt", "tilt").starts_with("B before rx 0.000"));
+        assert_eq!(at("my-screw", "k"), "Position(X)");
+        assert_eq!(at("my-bend", "k"), "it moves X in dy, across its own motion");
+        assert_eq!(at("my-growth", "k"), "it depends on t, an axis table only on X and its sense");
     }
 }

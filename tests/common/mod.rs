@@ -1,6 +1,8 @@
 //! What the integration tests share: machines, plans, and touches from the virtual machine.
 #![allow(dead_code)] // each test file uses a part of it
 
+pub mod random;
+
 use axiscal::diag::source;
 use axiscal::fit::{self, Fit, Settings};
 use axiscal::log::{RawTouch, Touch};

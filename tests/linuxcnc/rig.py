@@ -195,6 +195,18 @@ def environment_of(run, warp):
 
 # ---------------------------------------------------------------------------------------------- one run
 
+def read_to_percent(program, last_line):
+    """A program may end with % instead of M2 (which would reset the user's modal state): was its last word executed?"""
+    with open(program, errors="replace") as f:
+        lines = [line.strip() for line in f]
+    while lines and not lines[-1]:
+        lines.pop()
+    if len(lines) < 2 or lines[0] != "%" or lines[-1] != "%" or not last_line:
+        return False
+    words = [n for n, line in enumerate(lines, 1) if line and line[0] not in "%o(;#"]
+    return bool(words) and last_line >= words[-1]
+
+
 def parse_g54(text):
     pairs = re.findall(r"([XYZABCR])\s*([-+]?\d*\.?\d+)", text.upper())
     if not pairs or re.sub(r"[XYZABCR]\s*[-+]?\d*\.?\d+|\s", "", text.upper()):
@@ -352,7 +364,8 @@ def collect(args, run, own, machine):
     offsets = config.read_var(os.path.join(run, "rig.var"))
     seeded = parse_g54(args.g54) if args.g54 else {**{k: v for k, v in G54.items() if k in machine.letters}, "R": G54_ROTATION}
     # the interpreter reads ahead: that it saw M2 means an end there only if nothing stopped the machine before
-    ended = bool(answer.get("read_m2")) and not answer.get("errors") and not answer.get("failure")
+    ended = ((bool(answer.get("read_m2")) or read_to_percent(args.program, answer.get("last_line")))
+             and not answer.get("errors") and not answer.get("failure"))
     def count(pin): return int(pins[pin]) if pin in pins else None
     result = {
         "format": "axiscal-rig/1", "ok": ended, "machine": machine.name, "program": os.path.basename(args.program),
@@ -456,7 +469,7 @@ def main(argv=None):
     for text in [result["failure"], *result["errors"]]:
         if text:
             print(f"rig: {text}", file=sys.stderr)
-    print(f"{result['program']}: {'ended at M2' if result['ok'] else 'DID NOT END NORMALLY'}, {result['touches']} contacts, "
+    print(f"{result['program']}: {'ended normally' if result['ok'] else 'DID NOT END NORMALLY'}, {result['touches']} contacts, "
           f"overtravel {result['max_overtravel_mm'] or 0:.4f} mm, {result['seconds'] or 0:.2f} s")
     if result["ok"]:
         return 0

@@ -13,7 +13,8 @@ use std::process::Command;
 
 fn source(machine: &Machine) -> String {
     let outcome: Outcome = crate::export::outcome(&machine.name, &[]);
-    let (correction, _) = Correction::collect(machine, &outcome, None, vec![], Provenance::default()).unwrap();
+    let (correction, _) =
+        Correction::collect(machine, &crate::support::catalogue(), &outcome, None, Provenance::default()).unwrap();
     component::source(machine, &correction).unwrap()
 }
 

@@ -3,6 +3,7 @@
 use axiscal::axes::{AxisName, Position};
 use axiscal::diag::source;
 use axiscal::machine::{self, Machine};
+use axiscal::model::catalogue::Catalogue;
 use axiscal::tables::compensation::Term;
 use axiscal::tables::place::{Dof, Place};
 use std::path::PathBuf;
@@ -13,6 +14,10 @@ pub const MACHINES: [&str; 4] = ["swivel-head", "double-head", "trunnion", "swiv
 pub fn machine(name: &str) -> Machine {
     let (machines, _) = machine::load(&source("machines.toml", machine::BUILT_IN)).unwrap();
     machines.into_iter().find(|m| m.name == name).unwrap()
+}
+
+pub fn catalogue() -> Catalogue {
+    Catalogue::built_in().unwrap()
 }
 
 /// A linear congruential generator (Knuth's MMIX constants): enough to spread poses.

@@ -9,6 +9,7 @@ use crate::machine::{BUILT_IN, Machine};
 mod forms;
 mod paths;
 mod reach;
+mod scene;
 
 fn machine_of(text: &str, name: &str) -> Machine {
     let (machines, _) = crate::machine::load(&source("machines.toml", text)).unwrap();
@@ -61,50 +62,6 @@ fn basic_is_complete_on_both_table_machines() {
     for name in ["trunnion", "swivel-table-b"] {
         let (_, g) = built_in(name, "basic");
         assert!(g.plan.skipped.is_empty(), "{:?}", super::skipped_groups(&g.plan.skipped));
-        assert!(g.plan.touches.len() > 300);
-    }
-}
-
-#[test]
-#[ignore]
-fn dump() {
-    for (m, p) in [
-        ("swivel-head", "head"),
-        ("swivel-head", "table"),
-        ("double-head", "double-head"),
-        ("trunnion", "basic"),
-        ("swivel-table-b", "basic"),
-    ] {
-        let t = std::time::Instant::now();
-        let (_, g) = built_in(m, p);
-        println!(
-            "== {m} {p}: {} touches {} s, {} steps, {:?}",
-            g.plan.touches.len(),
-            g.path.seconds,
-            g.path.steps.len(),
-            t.elapsed()
-        );
-        for l in &g.path.head {
-            println!("{l}");
-        }
-        let mut last = 0;
-        for (i, s) in g.path.steps.iter().enumerate() {
-            let show = i < 24
-                || matches!(s, super::path::Step::Setup { .. } | super::path::Step::Rotary { .. })
-                || i < last + 8;
-            if matches!(s, super::path::Step::Setup { .. }) {
-                last = i;
-            }
-            if show {
-                match s {
-                    super::path::Step::Touch(t) => {
-                        println!("{i} touch {} {:?} {:?} {:?}", t.id, t.start.0, t.end.0, t.first)
-                    }
-                    super::path::Step::Rapid { to } => println!("{i} rapid {to:?}"),
-                    super::path::Step::Protected { to, .. } => println!("{i} prot {to:?}"),
-                    s => println!("{i} {s:?}"),
-                }
-            }
-        }
+        assert_eq!(g.plan.touches.len(), 4 * 48 + 2 * 40 + 2 * 30);
     }
 }

@@ -300,7 +300,31 @@ fn an_axis_comes_to_the_pose_in_the_sense_that_is_asked_for() {
     let t: Vec<_> = g.plan.touches.iter().map(|t| (t.repeat, t.visit, t.from.get(AxisName::B))).collect();
     assert_eq!(t, [(1, Some(1), Some(1.0)), (2, Some(1), Some(1.0)), (1, Some(2), Some(1.0)), (2, Some(2), Some(1.0))]);
     assert!(g.plan.touches.iter().all(|t| t.spindle_deg == Some(90.0) && t.feed_mm_min == Some(30.0)));
-    assert_eq!(g.path.steps.iter().filter(|s| matches!(s, Step::OrientSpindle { .. })).count(), 1);
+    assert_eq!(g.path.steps.iter().filter(|s| matches!(s, Step::OrientSpindle { deg: 90.0 })).count(), 2);
+}
+
+#[test]
+fn every_set_up_of_the_built_in_programs_can_be_taken_up_again() {
+    for (machine, program) in [
+        ("swivel-head", "head"),
+        ("swivel-head", "table"),
+        ("double-head", "double-head"),
+        ("trunnion", "basic"),
+        ("swivel-table-b", "basic"),
+    ] {
+        let (_, g) = built_in(machine, program);
+        assert!(g.path.steps.iter().all(|s| !matches!(s, Step::Setup { resume: None, .. })), "{machine} {program}");
+    }
+    // a way that is not the proven one is caught
+    says(
+        &after(|s| {
+            let i = place(s, 2, |s| matches!(s, Step::Setup { .. }));
+            if let Step::Setup { resume: Some(moves), .. } = &mut s[i] {
+                moves.pop();
+            }
+        }),
+        "does not end where the set-up begins",
+    );
 }
 
 /// A program of one set-up on the swivel head's bridge.

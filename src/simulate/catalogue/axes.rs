@@ -5,7 +5,6 @@
 //! it stands before the axis's motion (it does not turn with it), for linear axes after (lever arms are counted in
 //! the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
-use super::location::linear_axis;
 use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
@@ -16,6 +15,10 @@ use crate::simulate::terms::{Shape, Target};
 pub const SPAN_MM: f64 = 300.0;
 /// Pitch of a ball screw when none is given, mm.
 const PITCH_MM: f64 = 10.0;
+
+/// Pairs of linear axes that wiring can swap.
+const SWAPS: [(AxisName, AxisName); 3] =
+    [(AxisName::X, AxisName::Y), (AxisName::Y, AxisName::Z), (AxisName::Z, AxisName::X)];
 
 const LINEAR: [char; 3] = ['x', 'y', 'z'];
 const ROTARY: [char; 3] = ['a', 'b', 'c'];
@@ -41,7 +44,7 @@ pub fn ids(_: &Machine) -> Vec<String> {
 /// Parameters of an id of this family.
 pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
     if id == "sign-or-axis-swap" {
-        return Ok(machine.axes.iter().map(|a| flipped(a.name)).collect());
+        return Ok(machine.axes.iter().map(|a| flipped(a.name)).chain(SWAPS.map(swapped)).collect());
     }
     if let Some(found) = axis_of(id, "backlash", machine) {
         return Ok(vec![backlash(found?.1)]);
@@ -50,7 +53,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     if let Some((letter, k)) = rest.split_once('-') {
         let axis = axis_in(letter)?;
         return match (family, k) {
-            ("positioning", "2") if !axis.is_rotary() => Ok(vec![bend(linear_axis(axis, machine)?)]),
+            ("positioning", "2") if !axis.is_rotary() => Ok(vec![bend(axis_here(axis, machine)?.name)]),
             ("positioning", "linear") if axis.is_rotary() => {
                 axis_here(axis, machine)?;
                 Ok(vec![rotary_scale(axis)])
@@ -94,7 +97,7 @@ fn axis_in(letter: &str) -> Result<AxisName, Refusal> {
 
 fn linear_in(letter: &str, machine: &Machine) -> Result<AxisName, Refusal> {
     let axis = axis_in(letter)?;
-    if axis.is_rotary() { Err(Refusal::Unknown) } else { linear_axis(axis, machine) }
+    if axis.is_rotary() { Err(Refusal::Unknown) } else { axis_here(axis, machine).map(|a| a.name) }
 }
 
 /// `yx` → component y of linear axis X.
@@ -112,7 +115,7 @@ fn moved(axis: AxisName, dof: usize) -> Target {
 
 /// The axis moves askew: across its way in proportion to its coordinate.
 fn squareness(axis: AxisName, dof: usize, sign: f64, machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
-    let axis = linear_axis(axis, machine)?;
+    let axis = axis_here(axis, machine)?.name;
     // the turn that does this: about z for Y along x, about x for Z along y, about y for Z along x
     let about = 3 + (3 - along(axis) - dof);
     let name = format!("E{}0{axis}", dof_letter(about));
@@ -184,4 +187,12 @@ fn backlash(axis: AxisName) -> Parameter {
 /// The control counts this axis the wrong way round (value 1).
 fn flipped(axis: AxisName) -> Parameter {
     Parameter::new(format!("flip_{axis}"), One, [(Target::Reading(axis), Shape::Power(axis, 1.0, 1), -2.0)])
+}
+
+/// The control counts these two axes for each other (value 1).
+fn swapped((a, b): (AxisName, AxisName)) -> Parameter {
+    // each stands where the other should
+    let acts = [(a, b, 1.0), (a, a, -1.0), (b, a, 1.0), (b, b, -1.0)];
+    let acts = acts.map(|(axis, by, f)| (Target::Reading(axis), Shape::Power(by, 1.0, 1), f));
+    Parameter::new(format!("swap_{a}{b}"), One, acts)
 }

@@ -1,7 +1,7 @@
 //! Constant errors of place and direction: location of rotary axes, their zeros, the paper's sets, the tool's length.
 
 use super::unit::Unit::{Deg, Mm};
-use super::{Parameter, Refusal, Settings, across, along, axis_here, axis_of, dof_letter, must_stand_on};
+use super::{Parameter, Refusal, Settings, across, along, axis_of, dof_letter, must_stand_on};
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
 use crate::simulate::terms::{Shape, Target};
@@ -27,7 +27,7 @@ pub fn parameters(id: &str, machine: &Machine, _: Settings<'_>) -> Result<Vec<Pa
     let head = AxisName::B;
     match id {
         "tool-length" => {
-            let row = Parameter::at("tool_length", Mm, Target::Length, Shape::Constant).alias("length").alias("dL");
+            let row = Parameter::at("dL", Mm, Target::Length, Shape::Constant).alias("tool_length");
             Ok(vec![row])
         }
         "paper-head" => {
@@ -74,9 +74,4 @@ fn iso(axis: AxisName, dof: usize, after: bool) -> Parameter {
 fn paper(axis: AxisName, suffix: &str, dofs: &[usize]) -> Vec<Parameter> {
     let symbols = ["d_x", "d_y", "d_z", "a_", "b_", "g_"];
     dofs.iter().map(|&dof| iso(axis, dof, false).alias(format!("{}{suffix}", symbols[dof]))).collect()
-}
-
-/// The squareness or zero of an axis needs the axis itself: shared by the other families.
-pub fn linear_axis(name: AxisName, machine: &Machine) -> Result<AxisName, Refusal> {
-    axis_here(name, machine).map(|a| a.name)
 }

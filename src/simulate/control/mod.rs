@@ -33,7 +33,7 @@ enum Kinematics {
     /// Commanded positions are joint positions.
     Identity,
     /// The exported component: its world coordinates are the axis positions of the errorless machine.
-    Component(Component),
+    Component(Box<Component>),
     /// LinuxCNC's own kinematics of a tilting table with a turntable; acts on tool centre point programs only.
     TiltingTable(TiltingTable),
 }

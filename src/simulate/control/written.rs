@@ -96,7 +96,7 @@ impl Compensation {
                 if !reference.iter().all(|x| x.is_finite()) {
                     reader.error("compensation::reference", "reference_mm is no point", UNCHANGED);
                 }
-                Kinematics::Component(Component { chain: Chain::new(machine, reference), known })
+                Kinematics::Component(Box::new(Component { chain: Chain::new(machine, reference), known }))
             }
             "stock" => {
                 reader.home_offsets(&stock, &mut told_less_deg);

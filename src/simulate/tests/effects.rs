@@ -266,3 +266,13 @@ fn a_control_that_counts_backwards_is_a_gross_error() {
     let found = three_faces(&machine, "head", "x+", pose(&[(AxisName::B, -0.1), (AxisName::C, 0.0)]), &scenario);
     close(found[0], 2.0 * L * rad_from_deg(0.1).sin(), 1e-3);
 }
+
+#[test]
+fn a_control_that_swaps_two_axes_meets_nothing() {
+    let machine = machine_named("swivel-head");
+    let scenario = Scenario::flawless().with(&machine, "sign-or-axis-swap", &[("swap_XY", 1.0)]).unwrap();
+    let mut plan = empty_plan(&machine, "head");
+    let at = pose(&[(AxisName::B, 0.0), (AxisName::C, 0.0)]);
+    add_touch(&mut plan, &machine, "x+", [35.0, 0.0, -203.0], [1.0, 0.0, 0.0], at);
+    assert_eq!(run(&machine, &plan, &scenario, None).unwrap().0[0].status, Status::Miss);
+}

@@ -112,26 +112,25 @@ fn a_plan_that_does_not_fit_is_refused_with_its_touch() {
     lame.touches[1].end = lame.touches[1].start;
     let mut blind = plan.clone();
     blind.touches[0].start = AxisMap::default();
-    let mut nan = plan;
+    let mut nan = plan.clone();
     nan.touches[1].start.set(AxisName::X, f64::NAN);
-    for (plan, word) in [(other, "trunnion"), (lame, "touch 2"), (blind, "touch 1"), (nan, "touch 2")] {
+    let mut far = plan.clone();
+    far.blocks[0].centre[1] = 1e300;
+    let mut flat = plan;
+    flat.blocks[0].size[2] = 0.0;
+    let cases = [
+        (other, "trunnion"),
+        (lame, "touch 2"),
+        (blind, "touch 1"),
+        (nan, "touch 2"),
+        (far, "nowhere"),
+        (flat, "no length"),
+    ];
+    for (plan, word) in cases {
         let failure = run(&machine, &plan, &Scenario::flawless(), None).unwrap_err();
         assert!(failure.to_string().contains(word), "{failure}");
         assert!(failure.0[0].help.is_some());
     }
-}
-
-#[test]
-fn the_csv_holds_every_digit() {
-    let (machine, plan) = top_plan(2);
-    let scenario = Scenario::flawless().with_noise(mm_from_um(1.0), 0.0, 1);
-    let (raw, _) = run(&machine, &plan, &scenario, None).unwrap();
-    let text = super::super::csv::text(&machine, &raw);
-    let mut lines = text.lines();
-    assert_eq!(lines.next(), Some("id,X,Y,Z,B,C,status"));
-    let fields: Vec<&str> = lines.next().unwrap().split(',').collect();
-    assert_eq!(fields[3].parse::<f64>().unwrap(), raw[0].position.get(AxisName::Z));
-    assert_eq!((fields[0], fields[6]), ("1", "hit"));
 }
 
 /// `cargo test --release simulate_speed -- --ignored --nocapture`

@@ -6,7 +6,7 @@
 //! overrides `BACKLASH`.
 
 use crate::axes::AxisName;
-use crate::machine::{Axis, Machine, Side};
+use crate::machine::Machine;
 use crate::tables::compensation::AxisTable;
 use crate::tables::correction::{AxisShape, rounded};
 
@@ -17,22 +17,8 @@ pub const MAX_LINES: usize = 256;
 const CLOSE_ENOUGH: f64 = 1e-5;
 
 /// What an axis is to be told more than its nominal coordinate, at a coordinate relative to R's origin.
-fn told_more(axis: &Axis, shapes: &[&AxisShape], q: f64, sense: f64) -> f64 {
-    let stands_off: f64 = shapes
-        .iter()
-        .map(|shape| {
-            // the error is along or about R's axes, the coordinate along or about the axis's direction
-            let along = axis.direction[shape.dof.index() % 3].signum();
-            along * (shape.error)(q, sense)
-        })
-        .sum();
-    // a carried table that stands further in R is a tool that stands less far over the workpiece
-    let coordinate_off = match (axis.name.is_rotary(), axis.side) {
-        (true, _) => axis.sense * stands_off,
-        (false, Side::Workpiece) => -stands_off,
-        (false, Side::Tool) => stands_off,
-    };
-    -coordinate_off
+fn told_more(shapes: &[&AxisShape], q: f64, sense: f64) -> f64 {
+    -shapes.iter().map(|shape| (shape.error)(q, sense)).sum::<f64>()
 }
 
 /// The tables of all axes that have an error of their own position, or had one before. Rows in mm or deg.
@@ -55,7 +41,7 @@ pub fn tables(
         let origin = machine.origin.get(axis.name).unwrap_or(0.0);
         let value = |nominal: f64, sense: f64| {
             let old = before.as_ref().map_or(0.0, |t| t.at(nominal, sense > 0.0));
-            old + told_more(axis, &own, nominal - origin, sense)
+            old + told_more(&own, nominal - origin, sense)
         };
         let rows = rows(axis.range.map(|v| v + origin), value);
         let file = format!("axiscal_comp_{}.txt", axis.name.letter().to_ascii_lowercase());
@@ -100,15 +86,14 @@ pub fn text(axis: AxisName, table: &AxisTable, mm_per_unit: f64) -> String {
 mod tests {
     use super::*;
     use crate::diag::source;
-    use crate::tables::place::Dof;
 
     fn machine(name: &str) -> Machine {
         let (machines, _) = crate::machine::load(&source("m", crate::machine::BUILT_IN)).unwrap();
         machines.into_iter().find(|m| m.name == name).unwrap()
     }
 
-    fn shape(axis: AxisName, dof: Dof, error: fn(f64, f64) -> f64) -> AxisShape {
-        AxisShape { parameter: "k".to_owned(), axis, dof, variables: vec![], error: Box::new(error) }
+    fn shape(axis: AxisName, error: fn(f64, f64) -> f64) -> AxisShape {
+        AxisShape { parameter: "k".to_owned(), effect: "test".to_owned(), axis, error: Box::new(error) }
     }
 
     fn one(machine: &Machine, shape: AxisShape) -> AxisTable {
@@ -123,31 +108,24 @@ mod tests {
     /// Observed on LinuxCNC: rows `-200 0.02 0.02` and `200 -0.02 -0.02` put it right.
     #[test]
     fn a_long_screw_is_told_less() {
-        let table = one(&machine("trunnion"), shape(AxisName::X, Dof::Dx, |x, _| 1e-4 * x));
+        let table = one(&machine("trunnion"), shape(AxisName::X, |x, _| 1e-4 * x));
         assert_eq!(table.rows, [[-300.0, 0.03, 0.03], [0.0, 0.0, 0.0], [300.0, -0.03, -0.03]]);
         assert!((table.at(200.0, true) + 0.02).abs() < 1e-12);
         assert_eq!(table.at(1000.0, true), -0.03);
         assert_eq!(text(AxisName::X, &table, 1.0), "-300 0.03 0.03\n0 0 0\n300 -0.03 -0.03\n");
     }
 
-    /// The same displacement of a table is a coordinate that is too small: the table is told more.
-    #[test]
-    fn a_table_s_displacement_counts_the_other_way() {
-        let table = one(&machine("swivel-head"), shape(AxisName::X, Dof::Dx, |x, _| 1e-4 * x));
-        assert_eq!(table.rows[2], [450.0, 0.045, 0.045]);
-    }
-
     /// An axis that stands 2 µm short of where it is told whatever way it came: half the backlash each way.
     #[test]
     fn backlash_makes_the_two_columns_differ() {
-        let table = one(&machine("trunnion"), shape(AxisName::Y, Dof::Dy, |_, s| -0.002 * s));
+        let table = one(&machine("trunnion"), shape(AxisName::Y, |_, s| -0.002 * s));
         assert_eq!(table.rows[0], [-300.0, 0.002, -0.002]);
     }
 
     /// An encoder that is off centre: 0.01° sin C. At C = 90 the axis stands 0.01° too far and is told 0.01° less.
     #[test]
     fn a_harmonic_is_followed_closely() {
-        let table = one(&machine("trunnion"), shape(AxisName::C, Dof::Rz, |c, _| 0.01 * c.to_radians().sin()));
+        let table = one(&machine("trunnion"), shape(AxisName::C, |c, _| 0.01 * c.to_radians().sin()));
         assert!(table.rows.len() <= MAX_LINES);
         assert!((table.at(90.0, true) + 0.01).abs() < 1e-5);
         for c in -359..360 {
@@ -160,7 +138,7 @@ mod tests {
     fn an_older_table_is_added_to() {
         let old = AxisTable { joint: 7, file: String::new(), rows: vec![[-300.0, 0.01, 0.01], [300.0, 0.01, 0.01]] };
         let machine = machine("trunnion");
-        let new = shape(AxisName::X, Dof::Dx, |x, _| 1e-4 * x);
+        let new = shape(AxisName::X, |x, _| 1e-4 * x);
         let found = tables(&machine, &[new], |a| (a == AxisName::X).then(|| old.clone()), |_| 7);
         assert_eq!(found[0].1.rows[2], [300.0, -0.02, -0.02]);
         // without anything new it stays in force

@@ -207,7 +207,7 @@ impl Packing<'_> {
         let module = active.and_then(|a| a.component.clone().or_else(|| a.stock.as_ref()?.module.clone()));
         match module {
             Some(module) => (format!("{module} coordinates={coordinates}"), true),
-            None => (format!("trivkins coordinates={coordinates} kinstype=BOTH"), false),
+            None => (format!("trivkins coordinates={coordinates}"), false),
         }
     }
 
@@ -313,8 +313,9 @@ impl Packing<'_> {
 
     fn stock(&mut self) -> Result<Way> {
         let (machine, module) = (self.machine, self.module.clone());
+        let (terms, reference_mm) = stock::terms_at_the_workpiece(machine, self.correction);
         let (carried, not): (Vec<Term>, Vec<Term>) =
-            self.correction.terms.iter().cloned().partition(|t| stock::why_not(machine, &module, t).is_none());
+            terms.into_iter().partition(|t| stock::why_not(machine, &module, t).is_none());
         let home = stock::home_offsets(machine, &carried);
         let mut record = Stock { home_offset_deg: home.clone(), axis_tables: self.table_map(), ..Stock::default() };
         let mut kinematics = None;
@@ -322,6 +323,7 @@ impl Packing<'_> {
             let pins = stock::pins(machine, *module, &carried);
             record.module = Some(module.name.to_owned());
             record.pins = pins.pins.clone();
+            record.workpiece_shift_mm = Some(pins.workpiece_shift_mm);
             kinematics = Some(format!("{} coordinates={}", module.name, self.joints.coordinates()));
             let old_pins = match self.active(Mode::Stock).and_then(|a| a.stock.clone()) {
                 Some(old) if !old.pins.is_empty() => old.pins,
@@ -341,7 +343,7 @@ impl Packing<'_> {
         for (path, text) in work_offset::files(machine, self.correction, &carried)? {
             self.put(&path, text);
         }
-        let compensation = self.compensation(Mode::Stock, carried, Some(record));
+        let compensation = Compensation { reference_mm, ..self.compensation(Mode::Stock, carried, Some(record)) };
         let json = compensation.to_json()?;
         self.put("stock/compensation.json", json);
         let mut left = self.left_by_all();

@@ -14,12 +14,11 @@
 //! A machine whose T and C stand off by dT and dC (before their rotations) is exactly such a mapping: P = pC + dT + dC,
 //! P + D = pT + dT, and the workpiece stands at dT + dC. No pin takes a tilt.
 
-use super::CONTROLLER;
 use crate::axes::AxisName;
 use crate::machine::{Axis, Machine, Side};
 use crate::tables::compensation::Term;
-use crate::tables::correction::rounded;
-use crate::tables::place::Place;
+use crate::tables::correction::{Correction, restated, rounded};
+use crate::tables::place::{Place, along};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -101,6 +100,23 @@ fn unit(component: usize) -> Vector3<f64> {
     v
 }
 
+/// The terms of a correction stated where the workpiece is: without tilts an offset is right at one height only, so it
+/// is taken at the block's (`ball` of the machine's reference points).
+#[must_use]
+pub fn terms_at_the_workpiece(machine: &Machine, correction: &Correction) -> (Vec<Term>, [f64; 3]) {
+    let point: [f64; 3] = machine.reference.ball.into();
+    let before: Vec<Term> = correction.terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect();
+    let before = restated(&before, machine, correction.reference_mm, point);
+    let mut terms = restated(&correction.terms, machine, correction.reference_mm, point);
+    for term in &mut terms {
+        let old = before.iter().find(|b| b.spot() == term.spot()).map_or(0.0, |b| b.value);
+        term.value = rounded(term.value);
+        term.active_before = rounded(old);
+        term.identified = rounded(term.value - term.active_before);
+    }
+    (terms, point)
+}
+
 /// Offset of an axis before its rotation, mm.
 fn offset(terms: &[Term], axis: AxisName) -> Vector3<f64> {
     let mut d = Vector3::zeros();
@@ -121,7 +137,7 @@ pub fn pins_carry(module: Module, term: &Term) -> bool {
 #[must_use]
 pub fn home_offset_carries(machine: &Machine, term: &Term) -> bool {
     let Some(axis) = machine.axis(term.axis) else { return false };
-    let own = (axis.direction[term.dof.index() % 3].abs() - 1.0).abs() < 1e-9;
+    let own = along(axis, term.dof).is_some();
     match term.place {
         Place::Zero => true,
         // about its own axis a turn before the rotation and one of the zero position are the same
@@ -168,8 +184,8 @@ pub fn home_offsets(machine: &Machine, terms: &[Term]) -> BTreeMap<AxisName, f64
     for term in terms.iter().filter(|t| home_offset_carries(machine, t) && t.value != 0.0) {
         let Some(axis) = machine.axis(term.axis) else { continue };
         // a zero error is about the axis's direction, a location error about R's axis
-        let along = if term.place == Place::Zero { 1.0 } else { axis.direction[term.dof.index() % 3].signum() };
-        *offsets.entry(axis.name).or_insert(0.0) += along * axis.sense * term.value;
+        let sign = if term.place == Place::Zero { 1.0 } else { along(axis, term.dof).unwrap_or(1.0) };
+        *offsets.entry(axis.name).or_insert(0.0) += sign * axis.sense * term.value;
     }
     offsets.into_iter().map(|(axis, deg)| (axis, rounded(deg))).collect()
 }
@@ -186,7 +202,7 @@ pub fn why_not(machine: &Machine, module: &Result<Module, String>, term: &Term) 
             (true, _) => format!("{} has no pin for a tilt", module.name),
             (false, place) => format!("{} has no pin for an offset {place} the rotation of {}", module.name, term.axis),
         }),
-        Err(reason) => Some(format!("no kinematics module of {CONTROLLER} describes this machine: {reason}")),
+        Err(_) => Some("no stock kinematics module describes this machine".to_owned()),
     }
 }
 
