@@ -154,5 +154,11 @@ fn summary(plan: &Plan, read: &MatchedLog) -> String {
         }
     }
     let end = if read.complete { "the run is complete" } else { "THE RUN IS NOT COMPLETE" };
-    format!("{table}\nprogram {} on {}: {} of {} touches read, {end}", plan.program, plan.machine, read.touches.len(), plan.touches.len())
+    format!(
+        "{table}\nprogram {} on {}: {} of {} touches read, {end}",
+        plan.program,
+        plan.machine,
+        read.touches.len(),
+        plan.touches.len()
+    )
 }

@@ -67,7 +67,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<(Vec<RawTouch>, Findings)> {
     }
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
     if touches.is_empty() {
-        findings.push(Finding::error("log::nothing", format!("{name}: no touch in the file")).help(FORM));
+        findings.push(places.at_line(Finding::error("log::nothing", "no touch in the file").help(FORM), 1));
     }
     findings.finish(touches)
 }

@@ -7,6 +7,7 @@ use super::touch::{RawTouch, Status, Touch};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Finding, Findings, Result};
 use crate::machine::Machine;
+use crate::post::as_written::Role;
 use crate::program::plan::{Plan, PlanTouch};
 use std::collections::BTreeMap;
 
@@ -20,14 +21,15 @@ const POSE_ROOM_DEG: f64 = 0.5;
 /// # Errors
 /// When most touches cannot be this plan's: swapped columns, inches, another origin, another plan.
 pub fn match_to_plan(machine: &Machine, plan: &Plan, raw: Vec<RawTouch>) -> Result<(Vec<Touch>, Findings)> {
-    match_at(machine, plan, raw, None)
+    match_at(machine, plan, raw, &[Role::Search, Role::Release, Role::Measure], None)
 }
 
-/// The same with places in the log for the findings.
+/// The same with places in the log for the findings, and the rows of one touch in a log of columns.
 pub(super) fn match_at(
     machine: &Machine,
     plan: &Plan,
     raw: Vec<RawTouch>,
+    per_touch: &[Role],
     places: Option<&Places<'_>>,
 ) -> Result<(Vec<Touch>, Findings)> {
     let mut findings = Findings::default();
@@ -36,7 +38,7 @@ pub(super) fn match_at(
         None => Finding { message: format!("line {line}: {}", finding.message), ..finding },
     };
     let raw = if raw.iter().any(|t| t.id.is_none()) {
-        let (numbered, row_findings) = rows::number(machine, plan, raw, &at);
+        let (numbered, row_findings) = rows::number(machine, plan, raw, per_touch, &at);
         findings.0.extend(row_findings);
         numbered
     } else {
@@ -52,14 +54,23 @@ pub(super) fn match_at(
         if !by_id.contains_key(&id) {
             unknown.push(|| {
                 let message = format!("touch {id} is not in the plan; it is not used");
-                at(Finding::warning("log::unmatched", message).help("is this the plan that the program was made with?"), line)
+                at(
+                    Finding::warning("log::unmatched", message)
+                        .help("is this the plan that the program was made with?"),
+                    line,
+                )
             });
             continue;
         }
         if let Some(older) = known.insert(id, touch) {
             twice.push(|| {
-                let message = format!("touch {id} stands twice, in lines {} and {line}: the later one is used", older.line);
-                at(Finding::warning("log::twice", message).help("this is as it should be where a set-up was started again"), line)
+                let message =
+                    format!("touch {id} stands twice, in lines {} and {line}: the later one is used", older.line);
+                at(
+                    Finding::warning("log::twice", message)
+                        .help("this is as it should be where a set-up was started again"),
+                    line,
+                )
             });
         }
     }
@@ -71,7 +82,7 @@ pub(super) fn match_at(
     let good: Vec<bool> =
         pairs.iter().map(|(planned, raw)| fits(machine, planned, &complete(planned, raw), raw.present)).collect();
     let bad = good.iter().filter(|g| !**g).count();
-    if bad > 3 && bad * 2 > pairs.len() {
+    if bad > 1 && bad * 2 > pairs.len() {
         let line = pairs.first().map_or(1, |(_, raw)| raw.line);
         findings.push(at(swaps::explain(machine, &pairs, bad), line));
         return findings.finish(Vec::new());
@@ -170,8 +181,10 @@ fn not_here(machine: &Machine, planned: &PlanTouch, position: &Position) -> Find
         "touch {} reads {axis} {found:.3}, expected about {wanted:.3}: too far away to be this touch; it is not used",
         planned.id
     );
-    Finding::warning("log::implausible", message)
-        .help(format!("a touch may lie up to {:.1} mm from its nominal place (overtravel and placement tolerance)", room_mm(machine)))
+    Finding::warning("log::implausible", message).help(format!(
+        "a touch may lie up to {:.1} mm from its nominal place (overtravel and placement tolerance)",
+        room_mm(machine)
+    ))
 }
 
 /// `1-5, 9, 12-14`

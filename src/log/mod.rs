@@ -63,7 +63,8 @@ pub fn read(
         Writer::Controller(post) => parse(bytes, name, post)?,
         Writer::Csv => {
             let (touches, findings) = csv::read(bytes, name)?;
-            (ParsedLog { touches, header: None, complete: true, columns: false, runs: 1 }, findings)
+            let per_touch = Vec::new();
+            (ParsedLog { touches, header: None, complete: true, columns: false, per_touch, runs: 1 }, findings)
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());
@@ -73,8 +74,8 @@ pub fn read(
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
-    let (touches, more) =
-        matching::match_at(machine, plan, parsed.touches, Some(&places)).map_err(|f| joined(&findings, f))?;
+    let (touches, more) = matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places))
+        .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
     Ok((MatchedLog { touches, complete: parsed.complete, runs: parsed.runs }, findings))
 }

@@ -7,7 +7,7 @@ use super::touch::RawTouch;
 use super::words::Fault;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::post::Postprocessor;
-use crate::post::as_written::EndOfLine;
+use crate::post::as_written::{EndOfLine, Role};
 
 /// What a log holds. Positions are the control's own coordinates: [`super::to_axes`] makes axis positions of them.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +20,8 @@ pub struct ParsedLog {
     pub complete: bool,
     /// The log is nothing but columns: touches carry no number and hits look like misses.
     pub columns: bool,
+    /// The rows of one touch, in order, in a log of columns.
+    pub per_touch: Vec<Role>,
     /// How many runs the log holds.
     pub runs: usize,
 }
@@ -85,17 +87,16 @@ pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLo
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
     let count = runs.iter().filter(|r| r.header.is_some() || !r.touches.is_empty()).count();
     let Some(run) = choose(runs, is_columns, &places, &mut findings) else {
-        findings.push(
-            Finding::error(
-                "log::nothing",
-                format!("{name}: no touch in the log ({fault_count} lines are not understood)"),
-            )
-            .help("is this the log that the probing program wrote? is it of this controller?"),
-        );
+        let message = format!("no touch in the log; {fault_count} of its lines are not understood");
+        let finding = Finding::error("log::nothing", message)
+            .help("is this the log that the probing program wrote? is it of this controller?");
+        findings.push(places.at_line(finding, 1));
         return Err(Failure(findings.0));
     };
     let complete = run.end.is_some() && run.header.as_ref().is_none_or(|h| h.setup <= 1);
-    let parsed = ParsedLog { touches: run.touches, header: run.header, complete, columns: is_columns, runs: count };
+    let per_touch = post.log.columns.as_ref().map(|c| c.per_touch.clone()).unwrap_or_default();
+    let parsed =
+        ParsedLog { touches: run.touches, header: run.header, complete, columns: is_columns, per_touch, runs: count };
     findings.finish(parsed)
 }
 

@@ -49,15 +49,20 @@ pub fn record(line: &[u8], line_number: usize, rule: &LogRule) -> Result<Record,
         b'P' => touch(line, rest, line_number, rule).map(Record::Touch),
         b'H' => head(line, rest, line_number).map(Record::Head),
         b'E' => end(line, rest).map(Record::End),
-        _ => Err(Fault::at(line, begin, begin.len(), "log::not_understood", format!(
-            "{} is not a line of this log: a touch begins with P, a run with H, its end with E", show(begin)
-        ))),
+        _ => Err(Fault::at(
+            line,
+            begin,
+            begin.len(),
+            "log::not_understood",
+            format!("{} is not a line of this log: a touch begins with P, a run with H, its end with E", show(begin)),
+        )),
     }
 }
 
 /// A piece of a line for a message.
 fn show(bytes: &[u8]) -> String {
-    let shown: String = bytes.iter().take(40).map(|b| if (b' '..=b'~').contains(b) { *b as char } else { '?' }).collect();
+    let shown: String =
+        bytes.iter().take(40).map(|b| if (b' '..=b'~').contains(b) { *b as char } else { '?' }).collect();
     format!("{shown:?}{}", if bytes.len() > 40 { " ..." } else { "" })
 }
 
@@ -107,7 +112,8 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
         }
         rest = tail;
     }
-    let lacks = |what: &str| Fault::at(line, &line[line.len()..], 1, "log::cut_line", format!("the line ends without {what}"));
+    let lacks =
+        |what: &str| Fault::at(line, &line[line.len()..], 1, "log::cut_line", format!("the line ends without {what}"));
     let id = id.ok_or_else(|| lacks("the number N of its touch"))?;
     let status = status.ok_or_else(|| lacks("its status S"))?;
     for axis in [AxisName::X, AxisName::Y, AxisName::Z] {
@@ -125,15 +131,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
             return Err(Fault::at(line, word, width, "log::sum", message));
         }
     }
-    Ok(RawTouch {
-        id: Some(id),
-        position,
-        present,
-        status,
-        time_s: None,
-        temperature_deg_c: None,
-        line: line_number,
-    })
+    Ok(RawTouch { id: Some(id), position, present, status, time_s: None, temperature_deg_c: None, line: line_number })
 }
 
 fn axis_of(letter: u8) -> Option<AxisName> {
@@ -166,9 +164,7 @@ fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Num
             Ok((rest, n))
         }
         Ok(_) => fault("log::not_a_number", format!("{} is too large", show(&at[..word_length(at)]))),
-        Err(_) => {
-            fault("log::not_a_number", format!("expected a number, found {}", show(&at[..word_length(at)])))
-        }
+        Err(_) => fault("log::not_a_number", format!("expected a number, found {}", show(&at[..word_length(at)]))),
     }
 }
 
@@ -198,7 +194,9 @@ fn end(line: &[u8], rest: &[u8]) -> Result<u64, Fault> {
         .and_then(|digits| number(b'.')(digits).ok())
         .filter(|(tail, _)| blanks(tail).is_empty())
         .and_then(|(_, n)| whole(n))
-        .ok_or_else(|| Fault::at(line, begin, begin.len(), "log::end", "the end of a run is `E N` and the count of touches"))
+        .ok_or_else(|| {
+            Fault::at(line, begin, begin.len(), "log::end", "the end of a run is `E N` and the count of touches")
+        })
 }
 
 fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault> {

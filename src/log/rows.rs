@@ -5,12 +5,13 @@
 //! may be cut. Rows are walked through in the order of the plan; a row belongs to a touch when it lies on the line of
 //! its search. Nothing is invented: what cannot be told is a finding, and the touch is missing.
 
-use super::matching::room_mm;
+use super::matching::ranges;
 use super::place::Capped;
 use super::touch::{RawTouch, Status};
 use crate::axes::Position;
 use crate::diag::Finding;
 use crate::machine::Machine;
+use crate::post::as_written::Role;
 use crate::program::plan::{Plan, PlanTouch};
 
 /// A row lies on the line of a search when it is not further from it than this, mm: the axes follow the line.
@@ -42,10 +43,12 @@ impl Search {
         let off = row.position.xyz_mm() - self.start.xyz_mm();
         let along = off.dot(&self.toward);
         let aside = (off - self.toward * along).norm();
-        let posed = machine.rotary().filter(|a| row.present[a.name.index()]).all(|a| {
-            (row.position.get(a.name) - self.start.get(a.name)).abs() <= POSE_ROOM_DEG
-        });
-        (posed && aside <= LINE_ROOM_MM && along >= -LINE_ROOM_MM && along <= self.length + LINE_ROOM_MM).then_some(along)
+        let posed = machine
+            .rotary()
+            .filter(|a| row.present[a.name.index()])
+            .all(|a| (row.position.get(a.name) - self.start.get(a.name)).abs() <= POSE_ROOM_DEG);
+        (posed && aside <= LINE_ROOM_MM && along >= -LINE_ROOM_MM && along <= self.length + LINE_ROOM_MM)
+            .then_some(along)
     }
 
     fn same_as(&self, other: &Self) -> bool {
@@ -55,11 +58,12 @@ impl Search {
     }
 }
 
-/// Gives the measuring rows the numbers of their touches.
+/// Gives the measuring rows the numbers of their touches. `per_touch`: the rows of one touch, in order.
 pub(super) fn number(
     machine: &Machine,
     plan: &Plan,
     raw: Vec<RawTouch>,
+    per_touch: &[Role],
     at: &dyn Fn(Finding, usize) -> Finding,
 ) -> (Vec<RawTouch>, Vec<Finding>) {
     let searches: Vec<Search> = plan.touches.iter().map(Search::of).collect();
@@ -77,9 +81,9 @@ pub(super) fn number(
         let Some(index) = (next..searches.len()).find(|i| searches[*i].along(machine, &row).is_some()) else {
             unmatched.push(|| {
                 let earlier = searches[..next.min(searches.len())].iter().any(|s| s.along(machine, &row).is_some());
-                let why = if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
-                let message = format!("the row {why}; it is not used");
-                at(Finding::warning("log::unmatched", message), row.line)
+                let why =
+                    if earlier { "lies at a touch that has been made before" } else { "lies on the line of no touch" };
+                at(Finding::warning("log::unmatched", format!("the row {why}; it is not used")), row.line)
             });
             continue;
         };
@@ -87,7 +91,12 @@ pub(super) fn number(
         let alike = searches[index..].iter().take_while(|s| s.same_as(&searches[index])).count().max(1);
         let along = searches[index].along(machine, &row).unwrap_or_default();
         next = index + alike;
-        groups.push(Group { first: index, count: alike, rows: vec![(along, row)] });
+        groups.push(Group { first: index, count: alike, rows: vec![(along, row)], whole: false });
+    }
+    for i in 1..groups.len() {
+        // nothing was lost after a group when the next one begins in the next line
+        let (before, after) = (groups[i - 1].last_line(), groups[i].first_line());
+        groups[i - 1].whole = after == before + 1;
     }
     let mut findings = unmatched.drain("rows at no touch", "log::unmatched");
     let mut unclear = Capped::default();
@@ -95,18 +104,13 @@ pub(super) fn number(
     for group in groups {
         let search = &searches[group.first];
         let ids = plan.touches[group.first..].iter().take(group.count);
-        let lines = group.rows.first().map_or(0, |r| r.1.line)..=group.rows.last().map_or(0, |r| r.1.line);
-        match group.measured(search, machine) {
-            Some(rows) => touches.extend(ids.zip(rows).map(|(t, row)| RawTouch { id: Some(t.id), ..row })),
-            None => unclear.push(|| {
+        match group.measured(search, machine, per_touch) {
+            Ok(rows) => touches.extend(ids.zip(rows).map(|(t, row)| RawTouch { id: Some(t.id), ..row })),
+            Err(why) => unclear.push(|| {
                 let ids: Vec<u64> = ids.map(|t| t.id).collect();
-                let message = format!(
-                    "lines {} to {}: these rows cannot be shared out among touches {} at the same place; they are not used",
-                    lines.start(),
-                    lines.end(),
-                    super::matching::ranges(&ids)
-                );
-                at(Finding::warning("log::ambiguous", message), *lines.start())
+                let (first, last) = (group.first_line(), group.last_line());
+                let message = format!("lines {first} to {last}, touch {}: {why}; they are not used", ranges(&ids));
+                at(Finding::warning("log::ambiguous", message), first)
             }),
         }
     }
@@ -118,19 +122,29 @@ pub(super) fn number(
 struct Group {
     first: usize,
     count: usize,
-    /// How far along the search, mm, and the row.
+    /// How far along the search, mm, and the row. Never empty.
     rows: Vec<(f64, RawTouch)>,
+    /// No row can be missing at its end.
+    whole: bool,
 }
 
 impl Group {
-    /// The measured row of each of the group's touches, or `None` when that cannot be told.
-    fn measured(&self, search: &Search, machine: &Machine) -> Option<Vec<RawTouch>> {
+    fn first_line(&self) -> usize {
+        self.rows.first().map_or(0, |r| r.1.line)
+    }
+
+    fn last_line(&self) -> usize {
+        self.rows.last().map_or(0, |r| r.1.line)
+    }
+
+    /// The measured row of each of the group's touches, or the reason why that cannot be told.
+    fn measured(&self, search: &Search, machine: &Machine, per_touch: &[Role]) -> Result<Vec<RawTouch>, &'static str> {
         // rows well before the deepest one are ends of moves off the face
         let back = machine.probe.back_off / 2.0;
         let deepest = self.rows.iter().map(|r| r.0).fold(f64::NEG_INFINITY, f64::max);
         let mut runs: Vec<Vec<&(f64, RawTouch)>> = vec![Vec::new()];
         for row in &self.rows {
-            if deepest - row.0 > back.min(room_mm(machine)) {
+            if deepest - row.0 > back {
                 if runs.last().is_some_and(|r| !r.is_empty()) {
                     runs.push(Vec::new());
                 }
@@ -143,24 +157,41 @@ impl Group {
             let missed = (search.length - row.0).abs() <= END_ROOM_MM;
             RawTouch { status: if missed { Status::Miss } else { Status::Hit }, ..row.1.clone() }
         };
+        let rows_per_touch = per_touch.len().max(1);
+        let measure = per_touch.iter().position(|r| *r == Role::Measure).unwrap_or(rows_per_touch - 1);
         let pick = |runs: &[Vec<&(f64, RawTouch)>]| match runs {
-            // search, release and measuring touch lie together: the last row is the measured one, also where rows
-            // that equal the one before were dropped
-            [only] => only.last().map(|r| status(r)),
-            // a move off the face stands between search and measuring touch: what follows it begins with the touch
-            [_, .., last] => last.first().map(|r| status(r)),
-            [] => None,
+            // all rows of a touch lie together
+            [run] if run.len() == rows_per_touch => run.get(measure).map(|r| status(r)).ok_or("no row"),
+            // a missed search is the only row of its touch
+            [run] if run.len() == 1 && status(run[0]).status == Status::Miss => Ok(status(run[0])),
+            // rows that equal the one before were not written: the last row still holds the measuring touch, when it
+            // is the last of a touch and nothing is lost behind it
+            [run] if run.len() < rows_per_touch && measure + 1 == rows_per_touch && self.whole => {
+                run.last().map(|r| status(r)).ok_or("no row")
+            }
+            [run] if run.len() < rows_per_touch => Err("the log may be cut here, and the measuring touch be lost"),
+            [_] => Err("there are more rows than a touch has"),
+            // moves off the face are logged too: what follows the last of them begins with the measuring touch
+            [.., last] => {
+                let first = last.first().ok_or("no row")?;
+                let unbroken =
+                    self.rows.windows(2).any(|w| w[1].1.line == first.1.line && w[0].1.line + 1 == first.1.line);
+                if unbroken { Ok(status(first)) } else { Err("a line before the measuring touch is lost") }
+            }
+            [] => Err("no row"),
         };
         if self.count == 1 {
             return pick(&runs).map(|row| vec![row]);
         }
-        // several touches at one place: only whole triples, or whole pairs of runs, can be shared out
-        if runs.len() == 1 && self.rows.len() == 3 * self.count {
-            return runs.first().map(|run| run.chunks(3).filter_map(|c| c.last()).map(|r| status(r)).collect());
+        // several touches at one place: only full sets of rows, or whole pairs of runs, can be shared out
+        if let [run] = &runs[..]
+            && run.len() == rows_per_touch * self.count
+        {
+            return Ok(run.chunks(rows_per_touch).filter_map(|c| c.get(measure)).map(|r| status(r)).collect());
         }
         if runs.len() == 2 * self.count {
-            return Some(runs.chunks(2).filter_map(pick).collect());
+            return runs.chunks(2).map(pick).collect();
         }
-        None
+        Err("the touches are made at the same place, and the rows cannot be shared out among them")
     }
 }

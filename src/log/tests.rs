@@ -36,7 +36,8 @@ fn what_the_machine_would_write_is_read_back() {
             let mut plan = plan(&machine, mounting, "x+");
             plan.controller_frame = frame;
             let text = post().log_text(&machine, &plan, &records(&plan));
-            let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan).unwrap();
+            let (read, findings) =
+                read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan).unwrap();
             assert!(findings.0.is_empty(), "{findings:?}");
             assert!(read.complete && read.runs == 1 && read.touches.len() == 3);
             for (touch, record) in read.touches.iter().zip(records(&plan)) {
@@ -87,7 +88,8 @@ fn simple_mistakes_are_named() {
     let machine = machine("swivel-head");
     // enough touches for "most of them"
     let mut plan = plan(&machine, "head", "x+");
-    let more: Vec<_> = plan.touches.iter().cloned().map(|t| crate::program::plan::PlanTouch { id: t.id + 10, ..t }).collect();
+    let more: Vec<_> =
+        plan.touches.iter().cloned().map(|t| crate::program::plan::PlanTouch { id: t.id + 10, ..t }).collect();
     plan.touches.extend(more);
     let as_csv = |change: &dyn Fn(&mut Position)| {
         let touches: Vec<Touch> = records(&plan)
@@ -159,18 +161,26 @@ fn rows(plan: &Plan, touch: usize, along: &[f64]) -> String {
 fn columns_are_matched_by_place() {
     let machine = machine("swivel-head");
     let plan = plan(&machine, "head", "x+");
-    let cases: [(&str, String, &[(u64, Status)], &[&str]); 6] = [
+    let cases: [(&str, String, &[(u64, Status)], &[&str]); 7] = [
         (
             "search, release, measure",
-            rows(&plan, 0, &[2.010, 1.995, 2.001]) + &rows(&plan, 1, &[2.010, 1.995, 2.001]) + &rows(&plan, 2, &[2.01, 1.99, 2.0]),
+            rows(&plan, 0, &[2.010, 1.995, 2.001])
+                + &rows(&plan, 1, &[2.010, 1.995, 2.001])
+                + &rows(&plan, 2, &[2.01, 1.99, 2.0]),
             &[(1, Status::Hit), (2, Status::Hit), (3, Status::Hit)],
             &[],
         ),
         (
             "duplicates dropped, head cut",
-            rows(&plan, 1, &[2.001]) + &rows(&plan, 2, &[2.01, 2.001]),
+            rows(&plan, 1, &[2.001]) + &rows(&plan, 2, &[2.01, 1.99, 2.001]),
             &[(2, Status::Hit), (3, Status::Hit)],
             &["log::missing"],
+        ),
+        (
+            "cut after the release: the row of the release is not taken for the touch",
+            rows(&plan, 0, &[2.01, 1.99, 2.001]) + &rows(&plan, 1, &[2.01, 1.99]),
+            &[(1, Status::Hit)],
+            &["log::ambiguous", "log::missing"],
         ),
         (
             "a miss that looks like a hit",
@@ -186,13 +196,15 @@ fn columns_are_matched_by_place() {
         ),
         (
             "elsewhere",
-            rows(&plan, 0, &[2.01, 1.99, 2.001]) + "1.000000 2.000000 3.000000 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\n",
+            rows(&plan, 0, &[2.01, 1.99, 2.001])
+                + "1.000000 2.000000 3.000000 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\n",
             &[(1, Status::Hit)],
             &["log::unmatched", "log::missing"],
         ),
         (
             "overwritten in the middle of a number",
-            rows(&plan, 0, &[2.01, 1.99, 2.001]) + "28.00000028.000000 0.000000 8.000000 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\n",
+            rows(&plan, 0, &[2.01, 1.99, 2.001])
+                + "28.00000028.000000 0.000000 8.000000 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\n",
             &[(1, Status::Hit)],
             &["log::in_number", "log::missing"],
         ),
@@ -236,7 +248,10 @@ enum Damage {
 }
 
 fn damage() -> impl Strategy<Value = Damage> {
-    let bytes = prop::collection::vec(prop_oneof![any::<u8>(), prop::sample::select(&b"0123456789-. \n\rPNSXYZBCKHE,"[..])], 1..12);
+    let bytes = prop::collection::vec(
+        prop_oneof![any::<u8>(), prop::sample::select(&b"0123456789-. \n\rPNSXYZBCKHE,"[..])],
+        1..12,
+    );
     prop_oneof![
         any::<usize>().prop_map(Damage::Cut),
         (any::<usize>(), 1..40usize).prop_map(|(a, n)| Damage::Delete(a, n)),

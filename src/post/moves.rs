@@ -6,6 +6,9 @@ use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
 use minijinja::{Value, context};
 
+/// Under a transformation no axis is sent nearer to the end of its range than this, mm.
+const LIMIT_ROOM_MM: f64 = 1e-4;
+
 impl Writer<'_> {
     pub(super) fn number(&self, value: f64) -> String {
         self.post.number.number(value)
@@ -39,7 +42,15 @@ impl Writer<'_> {
 
     /// The control's coordinates of a place; rotary axes that nothing has been said about stand at 0.
     pub(super) fn controller(&self, axes: &AxisMap) -> Position {
-        self.frame.controller_from_axes(&axes.position())
+        let mut position = axes.position();
+        if self.frame.is_tcp() {
+            // rounded world coordinates would carry an axis that stands at the end of its range past it
+            for axis in self.machine.axes.iter().filter(|a| !a.name.is_rotary()) {
+                let [low, high] = [axis.range[0] + LIMIT_ROOM_MM, axis.range[1] - LIMIT_ROOM_MM];
+                position.set(axis.name, position.get(axis.name).max(low).min(high));
+            }
+        }
+        self.frame.controller_from_axes(&position)
     }
 
     /// Words of a move of linear axes. Under a transformation every coordinate may change.

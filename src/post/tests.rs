@@ -103,3 +103,153 @@ fn what_is_shipped_can_be_used() {
     assert!(all[0].unverified.is_empty());
     program_of("swivel-head", "head", "x+", ControllerFrame::Axes);
 }
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    let one = program_of("swivel-head", "head", "x+", ControllerFrame::Axes);
+    assert_eq!(one, program_of("swivel-head", "head", "x+", ControllerFrame::Axes));
+    assert!(one.is_ascii() && one.lines().all(|l| l.len() <= 255) && !one.contains("-0 "));
+}
+
+#[test]
+fn every_label_is_opened_and_closed_once() {
+    for frame in [ControllerFrame::Axes, ControllerFrame::Tcp] {
+        let text = program_of("trunnion", "table", "x+", frame);
+        let mut opened = std::collections::BTreeSet::new();
+        let mut open = Vec::new();
+        for line in text.lines().filter(|l| l.starts_with('o') && !l.starts_with("o<")) {
+            let (label, word) = line.split_once(' ').unwrap();
+            if word.starts_with("if ") {
+                assert!(opened.insert(label), "{label} is used twice");
+                open.push(label);
+            } else if word.starts_with("endif") {
+                assert_eq!(open.pop(), Some(label));
+            } else {
+                assert_eq!(open.last(), Some(&label), "{line}");
+            }
+        }
+        assert!(open.is_empty());
+    }
+}
+
+#[test]
+fn a_touch_is_searched_released_measured_and_logged() {
+    let text = program_of("swivel-head", "head", "x+", ControllerFrame::Axes);
+    let start = text.find("(touch 1:").unwrap();
+    let touch = &text[start..text.find("(touch 2:").unwrap()];
+    let moves: Vec<&str> = touch.lines().filter(|l| l.starts_with('G')).take(6).collect();
+    // first touch of the block: slow search, off the face, slow measuring touch, off the face, back
+    let expected =
+        ["G38.3 Z6 F60", "G38.5 Z#<bz> F300", "G38.3 Z#<bz> F300", "G38.3 Z6 F60", "G38.5 Z10 F300", "G38.3 Z10 F1500"];
+    assert_eq!(moves, expected);
+    assert!(touch.contains("(LOG,P N1 S0 X%.6f#5061 Y%.6f#5062 Z%.6f#5063 B%.6f#5065 C%.6f#5066 K%.6f#<sum>)"));
+    assert!(touch.contains("(LOG,P N1 S1 X%.6f#5061"));
+    assert!(touch.contains("touch 1, block x+ face +Z: missed"));
+    assert!(touch.contains("[ABS[#<off>] GT 1]"), "placement tolerance");
+    assert!(!text[text.find("(touch 2:").unwrap()..].contains("than it should"), "only the first touch of a block");
+}
+
+#[test]
+fn a_second_set_up_can_be_started_by_itself() {
+    let text = program_of("swivel-head", "head", "x+", ControllerFrame::Axes);
+    let first = text.find("G0 Z60").unwrap();
+    assert!(first < text.find("(set-up 1").unwrap(), "the first moves stand before every set-up");
+    let second = &text[text.find("(set-up 2").unwrap()..];
+    let way: Vec<&str> = second.lines().skip(3).take(2).collect();
+    assert_eq!(way, ["G0 X32", "G0 Y1"]);
+}
+
+#[test]
+fn a_user_changes_a_controller_without_code() {
+    let mine = BUILT_IN[0]
+        .1
+        .replace("release_feed = \"300\"", "release_feed = \"77\"")
+        .replace("name = \"linuxcnc\"", "name = \"mine\"");
+    let (post, _) = parse(&source("mine.toml", mine)).unwrap();
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    let program = post.program(&machine, &plan, &path(&plan, &machine.probe)).unwrap();
+    assert!(program.text.contains("F77") && program.text.contains("H AXISCAL 1 MINE "));
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_said_with_its_place() {
+    let cases = [
+        ("axiscal-postprocessor/1", "axiscal-postprocessor/9", "post::format"),
+        ("decimals = 6                             # of", "decimals = 60 # of", "post::decimals"),
+        ("template = \"G0 {{ to | words }}\"\nsource", "template = \"G0 {{ to | words\"\nsource", "post::template"),
+        ("source = \"LinuxCNC manual 11.5.3 G0: coordinated, straight\"", "", "post::no_source"),
+        ("word = \"{axis}{value}\"", "word = \"{axis}\"", "post::word"),
+        ("check_word = \"K\"", "check_word = \"X\"", "post::word"),
+        ("rotary_step = 2.0", "rotary_step = 0.0", "post::rotary_step"),
+        ("axes = [\"X\", \"Y\"", "axes = [\"X\", \"X\"", "post::columns"),
+        ("[write.retract]", "[write.retreat]", "post::not_toml"),
+    ];
+    for (from, to, code) in cases {
+        assert!(BUILT_IN[0].1.contains(from), "{from}");
+        let failure = parse(&source("mine.toml", BUILT_IN[0].1.replacen(from, to, 1))).unwrap_err();
+        let finding = failure.0.iter().find(|f| f.code == code).unwrap_or_else(|| panic!("{code}: {failure}"));
+        assert!(finding.place().is_some() && finding.help.is_some(), "{code}");
+    }
+    let unverified = BUILT_IN[0].1.replacen(
+        "source = \"LinuxCNC manual 11.5.3 G0: coordinated, straight\"",
+        "unverified = \"from memory\"",
+        1,
+    );
+    let (post, _) = parse(&source("mine.toml", unverified)).unwrap();
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    let program = post.program(&machine, &plan, &path(&plan, &machine.probe)).unwrap();
+    assert_eq!(program.findings.0[0].code, "post::unverified");
+    assert!(program.text.contains("NOT VERIFIED on a real control: write.rapid: from memory"));
+    let undefined = BUILT_IN[0].1.replacen("M19 R{{ deg }}", "M19 R{{ degrees }}", 1);
+    let (post, _) = parse(&source("mine.toml", undefined)).unwrap();
+    let mut path = path(&plan, &machine.probe);
+    path.steps.insert(0, Step::OrientSpindle { deg: 0.0 });
+    let failure = post.program(&machine, &plan, &path).unwrap_err();
+    assert!(failure.0[0].message.contains("template orient, line 3"), "{failure}");
+}
+
+#[test]
+fn a_broken_path_is_refused() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    let post = Postprocessor::load_built_in_or_file("linuxcnc").unwrap().0;
+    let good = path(&plan, &machine.probe);
+    let at = good.steps.iter().position(|s| matches!(s, Step::Touch(_))).unwrap();
+    let with = |change: &dyn Fn(&mut path::Path)| {
+        let mut path = good.clone();
+        change(&mut path);
+        post.program(&machine, &plan, &path).map(|_| ())
+    };
+    with(&|_| {}).unwrap();
+    with(&|p| drop(p.steps.remove(at - 1))).unwrap_err();
+    with(&|p| p.steps.insert(0, Step::Rapid { to: AxisMap::default().with(AxisName::X, f64::NAN) })).unwrap_err();
+    with(&|p| p.steps.insert(0, Step::Rapid { to: AxisMap::default().with(AxisName::A, 1.0) })).unwrap_err();
+    with(&|p| p.steps.insert(at, Step::Protected { to: AxisMap::xyz(1.0, 2.0, 3.0), feed: 0.0 })).unwrap_err();
+    with(&|p| {
+        let sense = AxisMap::default().with(AxisName::C, -1.0);
+        p.steps.insert(at, Step::Rotary { to: AxisMap::default().with(AxisName::C, 90.0), sense });
+    })
+    .unwrap_err();
+    with(&|p| {
+        if let Step::Touch(t) = &mut p.steps[at] {
+            t.id = 0
+        }
+    })
+    .unwrap_err();
+    with(&|p| {
+        if let Step::Touch(t) = &mut p.steps[at] {
+            t.end = t.start
+        }
+    })
+    .unwrap_err();
+}
+
+#[test]
+fn under_the_transformation_turns_go_in_steps_that_end_where_the_plan_says() {
+    let text = program_of("trunnion", "table", "x+", ControllerFrame::Tcp);
+    assert!(text.contains("axis A must stand at 0 before the start") && !text.lines().any(|l| l == "G49"));
+    // at rotary zero both frames are the same
+    assert!(text.contains("G38.3 Z6 F60"));
+}
