@@ -479,8 +479,7 @@ fn the_interpreter_takes_the_nc_files() {
     for (b, c) in [(0.0, 0.0), (-90.0, 40.0), (-30.0, 200.0)] {
         write("use.ngc", &format!("G21 G49 G54 G0 B{b} C{c}\no<axiscal_work_offset> call [1] [10] [20] [30]\nM2\n"));
         let canon = interpret("use.ngc");
-        let set =
-            canon.lines().filter(|l| l.contains("SET_G5X_OFFSET(1")).next_back().unwrap_or_else(|| panic!("{canon}"));
+        let set = canon.lines().rfind(|l| l.contains("SET_G5X_OFFSET(1")).unwrap_or_else(|| panic!("{canon}"));
         let numbers: Vec<f64> = set[set.find('(').unwrap() + 1..set.rfind(')').unwrap()]
             .split(',')
             .map(|w| w.trim().parse().unwrap())
@@ -502,11 +501,7 @@ fn the_interpreter_takes_the_nc_files() {
         let canon = interpret("length.ngc");
         // shown in the user's inches or in millimetres, as M72 left it
         let inches = format!("{:.4}", length.parse::<f64>().unwrap() / 25.4);
-        let set = canon
-            .lines()
-            .filter(|l| l.contains("USE_TOOL_LENGTH_OFFSET"))
-            .next_back()
-            .unwrap_or_else(|| panic!("{canon}"));
+        let set = canon.lines().rfind(|l| l.contains("USE_TOOL_LENGTH_OFFSET")).unwrap_or_else(|| panic!("{canon}"));
         assert!(set.contains(length) || set.contains(&inches), "{set}");
     }
 }

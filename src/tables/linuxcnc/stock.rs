@@ -294,7 +294,9 @@ mod tests {
         let head = machine("swivel-head");
         let module = module_of(&head);
         assert!(
-            why_not(&head, &module, &term(AxisName::B, Place::After, Dof::Dx, 0.1)).unwrap().contains("in the head")
+            why_not(&head, &module, &term(AxisName::B, Place::After, Dof::Dx, 0.1))
+                .unwrap()
+                .contains("no stock kinematics")
         );
     }
 }
