@@ -1,6 +1,6 @@
 //! Bad input through the binary: a clear message with the place, exit code 2 (or a warning and 0 where the rest is usable),
 //! never a panic, never a half-written file.
-#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -116,7 +116,7 @@ fn damaged_logs() {
     job.write("binary.log", noise);
     expect(&job.parse("binary.log"), 2, &["binary.log", "help:"]);
 
-    job.write("nan.log", replaced(10, &lines[10].replacen(|c: char| c == 'X', "XNAN ", 1)));
+    job.write("nan.log", replaced(10, &lines[10].replacen('X', "XNAN ", 1)));
     expect(&job.parse("nan.log"), 0, &["nan.log:11:"]);
 
     // a line that somebody edited does not add up any more

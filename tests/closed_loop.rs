@@ -1,6 +1,6 @@
 //! Identified → exported → applied by the virtual machine's control → probed again: the error is gone, or what is left is
 //! what was predicted.
-#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use axiscal::diag::source;

@@ -1,5 +1,5 @@
 //! A compensation as `export` writes it, applied by the virtual machine's control: what it carries is gone.
-#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use axiscal::diag::source;

@@ -1,4 +1,5 @@
 //! The corpus of logs: what is good is read, what is damaged is said with its place. One line of a table per file.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use axiscal::diag::{Finding, Severity, source};
 use axiscal::log::{self, Status, Writer};

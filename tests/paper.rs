@@ -1,4 +1,5 @@
 //! The paper's tables, digit by digit, and the sequence of its section "head, compensate, table, compensate".
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use axiscal::model::catalogue::Catalogue;
@@ -19,7 +20,8 @@ fn tables_have_the_golden_digits() {
     let plans = [plan(&head, "head"), plan(&head, "table"), plan(&double, "double-head")];
     let bench = |machine, plan| Bench { machine, plan, catalogue: &catalogue };
     let tables = all(bench(&head, &plans[0]), bench(&head, &plans[1]), bench(&double, &plans[2])).unwrap();
-    // seed-method section 9, closed forms
+    // seed-method section 9, closed forms: table, set, mode, rows
+    #[allow(clippy::type_complexity)]
     let golden: &[(&str, usize, Option<&str>, &[(&str, f64)])] = &[
         (
             "4-1",

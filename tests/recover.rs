@@ -1,4 +1,5 @@
 //! Plant → touch on the virtual machine → fit: what was planted must come back, and what cannot be told must be said.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use axiscal::fit::Settings;

@@ -1,5 +1,5 @@
 //! `axiscal simulate` from outside: files, exit codes, messages.
-#![allow(clippy::unwrap_used, clippy::panic)] // a panic in a test is a failure with its place
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
 use assert_cmd::Command;

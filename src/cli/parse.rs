@@ -9,7 +9,7 @@ use crate::log::{self, MatchedLog, Status, Touch, Writer};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::CellAlignment;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -111,10 +111,11 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
 
 /// One row per stage and block: what was planned, what was touched, how far off the nominal contact.
 fn summary(plan: &Plan, read: &MatchedLog) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
-    table.set_header(["stage", "block", "planned", "hit", "missed", "not in the log", "off nominal, mm"]);
-    let mut rows: Vec<(&str, &str, Vec<Option<&Touch>>, Vec<f64>)> = Vec::new();
+    /// Stage, block, their touches, and how far each hit is off the nominal contact, mm.
+    type Line<'a> = (&'a str, &'a str, Vec<Option<&'a Touch>>, Vec<f64>);
+    let mut table =
+        crate::report::fit::table(&["stage", "block", "planned", "hit", "missed", "not in the log", "off nominal, mm"]);
+    let mut rows: Vec<Line> = Vec::new();
     let by_id: std::collections::BTreeMap<u64, &Touch> = read.touches.iter().map(|t| (t.id, t)).collect();
     for planned in &plan.touches {
         let touch = by_id.get(&planned.id).copied();

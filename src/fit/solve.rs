@@ -34,6 +34,16 @@ pub struct Observability {
 #[must_use]
 pub fn observe(jacobian: &DMatrix<f64>) -> Observability {
     let p = jacobian.ncols();
+    if p == 0 || jacobian.nrows() == 0 {
+        // every parameter is held, or nothing was touched: there is nothing to see
+        return Observability {
+            scale: DVector::from_element(p, 1.0),
+            rank: 0,
+            condition: 1.0,
+            seen: DMatrix::zeros(p, 0),
+            unseen: (0..p).map(|i| DVector::from_fn(p, |k, _| f64::from(u8::from(k == i)))).collect(),
+        };
+    }
     let mut scaled = jacobian.clone();
     let mut scale = DVector::from_element(p, 1.0);
     let largest = scaled.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
@@ -165,9 +175,10 @@ pub fn minimise(problem: &impl Problem, start: DVector<f64>, seen: &Observabilit
         return Solution {
             theta,
             residual,
-            converged: false,
+            converged: p == 0,
             iterations: 0,
-            stopped: "no unknown leaves a trace in these touches".into(),
+            stopped: if p == 0 { "nothing is left to solve for" } else { "no unknown leaves a trace in these touches" }
+                .into(),
             covariance: DMatrix::zeros(p, p),
             leverage: DVector::zeros(n),
         };
@@ -251,6 +262,13 @@ mod tests {
         assert_eq!(seen.unseen.len(), 1);
         let unscaled = seen.unseen[0].component_div(&seen.scale);
         assert!((a * unscaled).norm() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_to_solve_for_is_no_panic() {
+        assert_eq!(observe(&DMatrix::zeros(5, 0)).rank, 0);
+        assert_eq!(observe(&DMatrix::zeros(0, 2)).unseen.len(), 2);
+        assert_eq!(observe(&DMatrix::zeros(4, 2)).rank, 0);
     }
 
     #[test]

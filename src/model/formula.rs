@@ -50,6 +50,9 @@ impl MakeOperators<f64> for Words {
 
 type Expression = FlatEx<f64, Words>;
 
+/// An expression with the origins of its variables.
+type Compiled = (Expression, Vec<Origin>);
+
 /// Where the value of a variable of an expression comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Origin {
@@ -62,9 +65,9 @@ enum Origin {
 pub struct Formula {
     text: String,
     constant: Option<f64>,
-    value: (Expression, Vec<Origin>),
+    value: Compiled,
     /// One per shape parameter that stands in it; `None` where the crate cannot differentiate (`floor`, `step`, …).
-    partials: Vec<(usize, Option<(Expression, Vec<Origin>)>)>,
+    partials: Vec<(usize, Option<Compiled>)>,
 }
 
 impl Formula {
@@ -138,7 +141,7 @@ impl Formula {
     }
 }
 
-fn evaluate((expression, origins): &(Expression, Vec<Origin>), state: &State, shapes: &[f64]) -> f64 {
+fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
     // formulas are short: their variables fit on the stack
     let mut values = [0.0; 32];
     for (value, origin) in values.iter_mut().zip(origins) {

@@ -125,6 +125,9 @@ pub struct Scratch {
     points: Vec<Vector3<f64>>,
 }
 
+/// An error transform at its place: index of the slot, the point at which offsets are stated (mm), the transform.
+type Placed = (usize, Vector3<f64>, Transform);
+
 impl Model {
     /// Puts effects into a machine's chain.
     #[must_use]
@@ -306,7 +309,7 @@ impl Model {
     fn evaluate(&self, touch: &Observation, scratch: &mut Scratch, derive: bool) -> f64 {
         let set_up = &self.set_ups[touch.set_up];
         let at = self.position(touch, scratch);
-        let at_slot = |slot: Option<usize>, centre: Option<Vector3<f64>>| -> Option<(usize, Vector3<f64>, Transform)> {
+        let at_slot = |slot: Option<usize>, centre: Option<Vector3<f64>>| -> Option<Placed> {
             let i = slot?;
             let centre = centre.unwrap_or(self.slots[i].centre);
             Some((i, centre, scratch.displacement[i].transform_about(&centre)))
@@ -325,14 +328,10 @@ impl Model {
         struct Link<'a> {
             axis: &'a Axis,
             motion: Transform,
-            before: Option<(usize, Vector3<f64>, Transform)>,
-            after: Option<(usize, Vector3<f64>, Transform)>,
+            before: Option<Placed>,
+            after: Option<Placed>,
         }
-        let link = |axis: &'_ Axis| -> (
-            Transform,
-            Option<(usize, Vector3<f64>, Transform)>,
-            Option<(usize, Vector3<f64>, Transform)>,
-        ) {
+        let link = |axis: &'_ Axis| -> (Transform, Option<Placed>, Option<Placed>) {
             (
                 axis.motion(&at),
                 at_slot(self.find(Place::Before(axis.name)), None),
@@ -407,20 +406,17 @@ impl Model {
             gradient[i][0] = 1.0;
         }
         // a place on the workpiece side is undone: q = E⁻¹·p, dq = −Rᵀ·dE·q
-        let undo = |slot: &(usize, Vector3<f64>, Transform),
-                    g: RowVector3<f64>,
-                    behind: &Vector3<f64>,
-                    gradient: &mut [[f64; 6]]|
-         -> RowVector3<f64> {
-            let (i, centre, e) = slot;
-            let g = g * e.rotation.inverse().to_rotation_matrix().matrix();
-            let turned = g * displacement[*i].rotation_derivative(&(behind - centre));
-            for k in 0..3 {
-                gradient[*i][k] -= g[k];
-                gradient[*i][k + 3] -= turned[k];
-            }
-            g
-        };
+        let undo =
+            |slot: &Placed, g: RowVector3<f64>, behind: &Vector3<f64>, gradient: &mut [[f64; 6]]| -> RowVector3<f64> {
+                let (i, centre, e) = slot;
+                let g = g * e.rotation.inverse().to_rotation_matrix().matrix();
+                let turned = g * displacement[*i].rotation_derivative(&(behind - centre));
+                for k in 0..3 {
+                    gradient[*i][k] -= g[k];
+                    gradient[*i][k + 3] -= turned[k];
+                }
+                g
+            };
         let mut g: RowVector3<f64> = touch.normal.transpose();
         if let Some(slot) = &block_slot {
             g = undo(slot, g, &point, gradient);

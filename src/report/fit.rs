@@ -14,7 +14,7 @@ const HOUSE: TableStyle = TableStyle::new()
 pub fn table(head: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(HOUSE).set_content_arrangement(ContentArrangement::Dynamic);
-    table.set_header(head.iter().map(|h| Cell::new(h)));
+    table.set_header(head.iter().map(Cell::new));
     table
 }
 

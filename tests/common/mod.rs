@@ -1,5 +1,6 @@
 //! What the integration tests share: machines, plans, and touches from the virtual machine.
 #![allow(dead_code)] // each test file uses a part of it
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 pub mod random;
 

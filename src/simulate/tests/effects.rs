@@ -1,4 +1,5 @@
 //! Planted effects against what each is by hand, to second order.
+#![allow(clippy::type_complexity)] // tables of cases
 
 use super::*;
 use crate::units::{mm_from_um, rad_from_deg};
