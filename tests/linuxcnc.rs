@@ -13,9 +13,12 @@ use std::process::Command;
 
 type Check = Result<(), String>;
 
+/// A name and what it does.
+type Case = (&'static str, fn() -> Check);
+
 fn main() {
     let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let cases: [(&str, fn() -> Check); 6] = [
+    let cases: [Case; 6] = [
         ("what_must_stop_stops", what_must_stop_stops),
         ("the_papers_order_head_compensate_table_compensate", the_papers_order),
         ("drawn_errors_and_displaced_blocks_in_one_study", drawn_errors),
@@ -90,7 +93,8 @@ fn what_must_stop_stops() -> Check {
         if let Some(harm) = harm {
             return Err(format!("block x- {what}: {harm} is {}", result[*harm]));
         }
-        if !(deep < result["overtravel_allowed_mm"].as_f64().unwrap_or(0.0)) {
+        let allowed = result["overtravel_allowed_mm"].as_f64().unwrap_or(0.0);
+        if deep.is_nan() || deep >= allowed {
             return Err(format!("block x- {what}: overtravel {deep} mm"));
         }
         if result["errors"].as_array().is_none_or(Vec::is_empty) || words.iter().any(|w| !errors.contains(w)) {
