@@ -44,7 +44,18 @@ pub struct Axis {
     pub indexing_repeatability_mm: f64,
 }
 
+/// A program keeps this far off the ends of a linear axis, mm: a loaded compensation moves the joints by up to half a
+/// millimetre against the coordinates that the program names (`export` refuses more), and a control stops at the end.
+pub const END_RESERVE_MM: f64 = 1.0;
+
 impl Axis {
+    /// The coordinates that a program may use, mm or deg relative to R's origin.
+    #[must_use]
+    pub fn program_range(&self) -> [f64; 2] {
+        let [low, high] = self.range;
+        if self.name.is_rotary() { [low, high] } else { [low + END_RESERVE_MM, high - END_RESERVE_MM] }
+    }
+
     /// The motion of what the axis carries, in R.
     #[must_use]
     pub fn motion(&self, at: &Position) -> Transform {

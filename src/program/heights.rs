@@ -61,7 +61,8 @@ impl Scene<'_> {
         let linear = self.machine.axes.iter().filter(|a| !a.name.is_rotary());
         let axis = linear.max_by(|a, b| along(a).abs().total_cmp(&along(b).abs()))?;
         let sense = if along(axis) < 0.0 { -1.0 } else { 1.0 };
-        let top = if sense < 0.0 { axis.range[0] } else { axis.range[1] };
+        let [low, high] = axis.program_range();
+        let top = if sense < 0.0 { low } else { high };
         Some(Lift { axis: axis.name, sense, top })
     }
 

@@ -92,7 +92,7 @@ impl Scene<'_> {
     pub fn inside_limits(&self, at: &Position) -> Result<(), String> {
         for axis in &self.machine.axes {
             let value = at.get(axis.name);
-            let [low, high] = axis.range;
+            let [low, high] = axis.program_range();
             // rounding of the place must not turn a touch at the very limit away
             if !(value >= low - PLACES_MM && value <= high + PLACES_MM) {
                 let origin = self.machine.origin.get(axis.name).unwrap_or(0.0);

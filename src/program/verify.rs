@@ -174,7 +174,7 @@ impl Walk<'_, '_> {
 
     fn inside(&mut self, i: usize, to: &AxisMap) {
         for (name, value) in to.iter() {
-            match self.scene.machine.axis(name).map(|a| a.range) {
+            match self.scene.machine.axis(name).map(crate::machine::Axis::program_range) {
                 None => self.violation(i, format!("the machine has no axis {name}")),
                 Some([low, high]) if value >= low - SAME && value <= high + SAME => {}
                 Some([low, high]) => {
