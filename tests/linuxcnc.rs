@@ -76,7 +76,7 @@ fn what_must_stop_stops() -> Check {
     for (what, raised_mm, words, in_log) in [
         ("too high", 1.6, &["x-"][..], None),
         ("missing", -4.0, &["x-"][..], Some(" S0 ")),
-        ("in the way", 6.0, &[][..], None),
+        ("in the way", 6.0, &["touch"][..], None),
     ] {
         job.scenario(&[], &[("head", "x-", [0.0, 0.0, raised_mm], [0.0; 3])], 0.0, 1)?;
         let log = format!("stop-{}", what.replace(' ', "-"));
@@ -86,7 +86,7 @@ fn what_must_stop_stops() -> Check {
         let out = job.dir.join(format!("rig-{log}"));
         let read = |name: &str| std::fs::read_to_string(out.join(name)).map_err(|e| format!("{name}: {e}: {said}"));
         let result: Value = serde_json::from_str(&read("result.json")?).map_err(|e| e.to_string())?;
-        let errors = result["errors"].to_string();
+        let errors = format!("{} {}", result["messages"], result["errors"]);
         println!("  block x- {what}: {errors}");
         let harm = ["stem_touches", "collisions", "solid_touches"].iter().find(|k| result[**k].as_u64() != Some(0));
         let deep = result["max_overtravel_mm"].as_f64().unwrap_or(f64::NAN);

@@ -74,19 +74,21 @@ proptest! {
             _ => 0.0,
         }));
         let verdict = scene.clear_straight(&place(0.0), &place(1.0), Manner::Guarded);
-        let mut least = f64::MAX;
+        // ball and stem trip the probe: they keep the clearance. Body and head do not: the placement tolerance on top
+        let room = |part: Part| if matches!(part, Part::Ball | Part::Stem) { 0.3 } else { 1.3 };
+        let mut to_spare = f64::MAX;
         for k in 0..=300 {
             let placed = scene.place(&place(f64::from(k) / 300.0));
-            for (_, part) in &scene.parts {
+            for (name, part) in &scene.parts {
                 for obstacle in &scene.obstacles {
-                    least = least.min(scene.gap(part, obstacle, &placed));
+                    to_spare = to_spare.min(scene.gap(part, obstacle, &placed) - room(*name));
                 }
             }
         }
         match verdict {
-            Ok(()) => prop_assert!(least >= 0.3 - 1e-6, "called clear with {least}"),
+            Ok(()) => prop_assert!(to_spare >= -1e-6, "called clear with {to_spare}"),
             // samples stand up to 0.3 mm apart: what is refused may be a little tighter than they show
-            Err(hit) => prop_assert!(least < 0.3 + 0.2 && hit.gap_mm <= least + 1e-6, "{hit} with {least}"),
+            Err(hit) => prop_assert!(to_spare < 0.2, "{hit} with {to_spare} to spare"),
         }
     }
 
@@ -121,7 +123,7 @@ proptest! {
         let machine = machine_of(BUILT_IN, "swivel-head");
         let scene = Scene::new(&machine, machine.mounting("table").unwrap()).unwrap();
         let lift = scene.lift().unwrap();
-        prop_assert_eq!((lift.axis, lift.top), (AxisName::Z, 350.0));
+        prop_assert_eq!((lift.axis, lift.top), (AxisName::Z, 349.0));
         prop_assert!(scene.clear_from_anywhere(&lift, &|a| a.range));
         let placed = scene.place(&Position([x, y, lift.top, 0.0, b, c]));
         for (_, part) in &scene.parts {
