@@ -122,7 +122,7 @@ pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) 
     let odd = |b: &u8| *b == 0 || *b >= 0x80 || (*b < b' ' && !matches!(*b, b'\n' | b'\r' | b'\t'));
     let count = head.iter().filter(|b| odd(b)).count();
     if head.contains(&0) || count * 10 > head.len() {
-        let at = head.iter().position(|b| odd(b)).unwrap_or(0);
+        let at = head.iter().position(odd).unwrap_or(0);
         let finding = Finding::error("log::binary", format!("byte {} is no text: this is a binary file", at + 1))
             .help("take the log that the probing program wrote, unpacked");
         return Err(places.at(finding, at..at + 1).into());
