@@ -2,6 +2,8 @@
 //! user's own settings as they were. And that it can be started again at a set-up. Black box, like `linuxcnc.rs`.
 //!
 //! Needs LinuxCNC: runs when AXISCAL_LINUXCNC is set, says what it leaves out otherwise.
+// a panic in a test is a failure with its place
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -109,29 +109,38 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
     }
 }
 
+/// A stage and block of the summary.
+struct Row<'a> {
+    stage: &'a str,
+    block: &'a str,
+    /// Of each planned touch.
+    touches: Vec<Option<&'a Touch>>,
+    /// Of each hit: how far past the nominal contact, mm.
+    offs: Vec<f64>,
+}
+
 /// One row per stage and block: what was planned, what was touched, how far off the nominal contact.
 fn summary(plan: &Plan, read: &MatchedLog) -> String {
-    /// Stage, block, their touches, and how far each hit is off the nominal contact, mm.
-    type Line<'a> = (&'a str, &'a str, Vec<Option<&'a Touch>>, Vec<f64>);
     let mut table =
         crate::report::fit::table(&["stage", "block", "planned", "hit", "missed", "not in the log", "off nominal, mm"]);
-    let mut rows: Vec<Line> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     let by_id: std::collections::BTreeMap<u64, &Touch> = read.touches.iter().map(|t| (t.id, t)).collect();
     for planned in &plan.touches {
         let touch = by_id.get(&planned.id).copied();
-        let index = rows.iter().position(|r| r.0 == planned.stage && r.1 == planned.block).unwrap_or_else(|| {
-            rows.push((&planned.stage, &planned.block, Vec::new(), Vec::new()));
-            rows.len() - 1
-        });
-        rows[index].2.push(touch);
+        let index =
+            rows.iter().position(|r| r.stage == planned.stage && r.block == planned.block).unwrap_or_else(|| {
+                rows.push(Row { stage: &planned.stage, block: &planned.block, touches: Vec::new(), offs: Vec::new() });
+                rows.len() - 1
+            });
+        rows[index].touches.push(touch);
         if let Some(hit) = touch.filter(|t| t.status == Status::Hit) {
             let off = hit.position.xyz_mm() - planned.nominal_position().xyz_mm();
             let way = planned.end_position().xyz_mm() - planned.start_position().xyz_mm();
             let length = way.norm();
-            rows[index].3.push(if length > 0.0 { off.dot(&way) / length } else { off.norm() });
+            rows[index].offs.push(if length > 0.0 { off.dot(&way) / length } else { off.norm() });
         }
     }
-    for (stage, block, touches, offs) in rows {
+    for Row { stage, block, touches, offs } in rows {
         let count = |status| touches.iter().flatten().filter(|t| t.status == status).count();
         // to the printed digits, so that nothing reads -0.000
         let offs: Vec<f64> = offs.iter().map(|v| (v * 1e3).round() / 1e3 + 0.0).collect();

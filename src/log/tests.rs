@@ -107,7 +107,8 @@ fn simple_mistakes_are_named() {
         read(text.as_bytes(), "t.csv", Writer::Csv, &machine, &plan)
     };
     as_csv(&|_| {}).unwrap();
-    let cases: [(&dyn Fn(&mut Position), &str); 5] = [
+    type Change<'a> = &'a dyn Fn(&mut Position);
+    let cases: [(Change, &str); 5] = [
         (&|p| p.0.swap(0, 2), "the columns X and Z were exchanged"),
         (&|p| p.0[0] = -p.0[0], "the sign of X were the other one"),
         (&|p| p.0[..3].iter_mut().for_each(|v| *v /= 25.4), "the numbers were inches"),
@@ -163,7 +164,9 @@ fn rows(plan: &Plan, touch: usize, along: &[f64]) -> String {
 fn columns_are_matched_by_place() {
     let machine = machine("swivel-head");
     let plan = plan(&machine, "head", "x+");
-    let cases: [(&str, String, &[(u64, Status)], &[&str]); 7] = [
+    /// Name, log, touches that can be used, codes of findings.
+    type Case<'a> = (&'a str, String, &'a [(u64, Status)], &'a [&'a str]);
+    let cases: [Case; 7] = [
         (
             "search, release, measure",
             rows(&plan, 0, &[2.010, 1.995, 2.001])
