@@ -39,9 +39,20 @@ pub fn read_text(path: &Path) -> Result<String> {
 /// When the folder cannot be written; an existing file is then untouched.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<()> {
     let fail = |e: std::io::Error| {
-        Failure::new("file::unwritable", format!("cannot write {}: {e}", path.display()))
-            .help("does the folder exist, and may you write there?")
+        // the reason without the name of the temporary file, which nobody has asked for
+        let reason =
+            e.raw_os_error().map_or_else(|| e.to_string(), |code| std::io::Error::from_raw_os_error(code).to_string());
+        Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display()))
+            .help("is every part of the path a folder, and may you write there?")
     };
+    // a link is followed: the file that it names is the one that is meant
+    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let path = target.as_path();
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        // a device or a pipe cannot be replaced, only written to
+        let mut device = std::fs::OpenOptions::new().write(true).open(path).map_err(fail)?;
+        return device.write_all(contents).and_then(|()| device.flush()).map_err(fail);
+    }
     let folder = match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),

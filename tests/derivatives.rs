@@ -26,7 +26,7 @@ terms = [
   { parameter = "p7", unit = "urad", dof = "ry", formula = "1", at = "workpiece" },
   { parameter = "p8", unit = "um", dof = "r", formula = "mx^2 - my^2", at = "trigger" },
   { parameter = "p9", unit = "um", dof = "X", formula = "sX", at = "reading" },
-  { parameter = "p10", unit = "urad", dof = "Z", formula = "1", at = "reading" },
+  { parameter = "p10", unit = "um", dof = "Z", formula = "1", at = "reading" },
   { parameter = "p11", unit = "um", dof = "Y", formula = "Y", at = "reading" },
 ]
 shape = [
@@ -86,6 +86,7 @@ fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -
         ball_at_zero: machine.tool.ball_at_zero(180.0),
         position,
         state,
+        has_temperature: true,
     }
 }
 

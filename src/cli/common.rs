@@ -3,9 +3,10 @@
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
 use crate::machine::{self, Machine};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a verb answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,6 +15,18 @@ pub enum Answer {
     Done,
     /// Exit code 1: the answer is "no".
     No,
+}
+
+/// Set when something that was printed did not arrive.
+static OUTPUT_LOST: AtomicBool = AtomicBool::new(false);
+
+/// Prints a line; a reader that has gone away (`| head`) is no error, a full disk is.
+pub fn print(text: &str) {
+    if let Err(e) = writeln!(std::io::stdout(), "{text}")
+        && e.kind() != ErrorKind::BrokenPipe
+    {
+        OUTPUT_LOST.store(true, Ordering::Relaxed);
+    }
 }
 
 /// How to print.
@@ -30,10 +43,10 @@ impl Io {
         Self { json }
     }
 
-    /// A line for the person: stdout, or nothing when JSON was asked for. A closed pipe is no error.
+    /// A line for the person: stdout, or nothing when JSON was asked for.
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.json {
-            let _ = writeln!(std::io::stdout(), "{}", text.as_ref());
+            print(text.as_ref());
         }
     }
 
@@ -41,7 +54,7 @@ impl Io {
     pub fn answer(&self, value: &impl serde::Serialize) {
         if self.json {
             let text = serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"));
-            let _ = writeln!(std::io::stdout(), "{text}");
+            print(&text);
         }
     }
 
@@ -79,6 +92,11 @@ impl Io {
     /// Prints what failed and gives the exit code.
     #[must_use]
     pub fn finish(&self, answer: Result<Answer>) -> ExitCode {
+        let lost = std::io::stdout().flush().err().filter(|e| e.kind() != ErrorKind::BrokenPipe).is_some();
+        if lost || OUTPUT_LOST.load(Ordering::Relaxed) {
+            let _ = writeln!(std::io::stderr(), "error: the answer could not be written to stdout: is the disk full?");
+            return ExitCode::from(2);
+        }
         match answer {
             Ok(Answer::Done) => ExitCode::SUCCESS,
             Ok(Answer::No) => ExitCode::from(1),

@@ -109,10 +109,12 @@ fn places(e: &Effect) -> String {
 }
 
 fn show(e: &Effect, io: &Io) {
-    io.say(format!(
-        "{}: {}\n  what it is      {}\n  how to confirm  {}\n  what mends it   {}",
-        e.id, e.name, e.says, e.look, e.mends
-    ));
+    io.say(format!("{}: {}", e.id, e.name));
+    for (word, text) in [("what it is", &e.says), ("how to confirm", &e.look), ("what mends it", &e.mends)] {
+        if !text.is_empty() {
+            io.say(format!("  {word:<15} {text}"));
+        }
+    }
     let mut t = table(&["parameter", "paper", "unit", "typical", "source", "place", "direction", "function"]);
     const DOFS: [&str; 6] = ["dx", "dy", "dz", "rx", "ry", "rz"];
     for term in &e.terms {
@@ -132,6 +134,20 @@ fn show(e: &Effect, io: &Io) {
             dof,
             term.formula.text().to_owned(),
         ]);
+    }
+    for p in e.parameters.iter().filter(|p| p.shape.is_some()) {
+        if let Some((start, low, high)) = p.shape {
+            t.add_row(vec![
+                p.name.clone(),
+                String::new(),
+                p.unit.clone(),
+                format!("{start} ({low} … {high})"),
+                String::new(),
+                "shape".into(),
+                String::new(),
+                String::new(),
+            ]);
+        }
     }
     io.say(t.to_string());
 }

@@ -50,10 +50,26 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         )
         .help("there is: linuxcnc"));
     }
+    if !(args.radius.is_finite() && args.radius > 0.0 && args.radius <= 1e5) {
+        return Err(Failure::new(
+            "export::radius",
+            format!("--radius {:e} mm is no radius of a workpiece", args.radius),
+        )
+        .help("write the distance from the rotary axis in mm, up to 100000"));
+    }
+    if let Some(date) = args.date.as_ref().filter(|d| !is_date(d)) {
+        return Err(Failure::new("export::date", format!("--date {date:?} is no date")).help("write YYYY-MM-DD"));
+    }
     let loaded = load_study(&args.study, io)?;
     let settings = loaded.settings();
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
-    let active = active(&loaded, io)?;
+    let active = loaded.active()?;
+    if active.is_some() {
+        io.report(&[Finding::info(
+            "export::adds",
+            "the identified errors are added to the compensation that was active during the measurement",
+        )]);
+    }
     let date = match &args.date {
         Some(date) => date.clone(),
         None => newest_log(&loaded),
@@ -62,6 +78,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for (name, contents) in &export.files {
         files::write_whole(&args.out.join(name), contents)?;
     }
+    remove_stale(&args.out, &export)?;
     say(&export, args, io);
     io.answer(&json!({
         "controller": args.controller,
@@ -106,37 +123,38 @@ fn export(
     Ok(export)
 }
 
-/// What the control applied while the touches were made: the same for all runs, or the sum has no meaning.
-fn active(loaded: &Loaded, io: &Io) -> Result<Option<Compensation>> {
-    let mut found: Option<(Option<&Path>, Option<Compensation>)> = None;
-    for run in &loaded.runs {
-        let here = match &run.compensation {
-            Some(path) => {
-                let file = if path.is_dir() { path.join("compensation.json") } else { path.clone() };
-                Some(Compensation::read(&source(file.display().to_string(), files::read_text(&file)?))?)
+/// Is it a day of the calendar, YYYY-MM-DD?
+fn is_date(text: &str) -> bool {
+    let parts: Vec<&str> = text.split('-').collect();
+    let [year, month, day] = parts[..] else { return false };
+    if (year.len(), month.len(), day.len()) != (4, 2, 2) {
+        return false;
+    }
+    let (Ok(year), Ok(month), Ok(day)) = (year.parse(), month.parse::<u8>(), day.parse()) else { return false };
+    time::Month::try_from(month).is_ok_and(|m| time::Date::from_calendar_date(year, m, day).is_ok())
+}
+
+/// Files of an earlier export that this one does not have: loaded by mistake they would be a wrong compensation.
+fn remove_stale(out: &Path, export: &Export) -> Result<()> {
+    for folder in ["", "stock"] {
+        let Ok(entries) = std::fs::read_dir(out.join(folder)) else { continue };
+        for entry in entries.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let relative = if folder.is_empty() { name.clone() } else { format!("{folder}/{name}") };
+            let ours = name.starts_with("axiscal") || name.starts_with("restore.") || name == "tool_table.ngc";
+            let is_file = entry.file_type().is_ok_and(|t| t.is_file());
+            if ours && is_file && !export.files.iter().any(|(n, _)| *n == relative) {
+                std::fs::remove_file(entry.path()).map_err(|e| {
+                    Failure::new(
+                        "export::stale",
+                        format!("cannot remove {} of an earlier export: {e}", entry.path().display()),
+                    )
+                    .help("remove it by hand: it does not belong to this compensation")
+                })?;
             }
-            None => None,
-        };
-        match &found {
-            Some((_, first)) if *first != here => {
-                return Err(Failure::new(
-                    "export::two_compensations",
-                    "the runs of the study were measured under different compensations",
-                )
-                .help("the identified errors add to what was active: put runs under one compensation into one study"));
-            }
-            Some(_) => {}
-            None => found = Some((run.compensation.as_deref(), here)),
         }
     }
-    let active = found.and_then(|(_, c)| c);
-    if active.is_some() {
-        io.report(&[Finding::info(
-            "export::adds",
-            "the identified errors are added to the compensation that was active during the measurement",
-        )]);
-    }
-    Ok(active)
+    Ok(())
 }
 
 /// The day on which the newest log was written: the data's own date, not that of the export.

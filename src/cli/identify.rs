@@ -30,6 +30,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
     let mut outcome = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome;
+    if let Some(active) = loaded.active()? {
+        outcome.warnings.push(format!(
+            "a compensation with {} terms was active: the values are what it leaves, not the machine's whole errors",
+            active.terms.len()
+        ));
+    }
     if !args.residuals {
         outcome.residuals = None;
     }

@@ -1,9 +1,9 @@
 //! From a study's path to machine, effects and touches: opens what the study names.
 
 use super::common::{Io, load_machine};
-use crate::diag::{Failure, Finding, Result, source};
+use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::files;
-use crate::fit::Settings;
+use crate::fit::{self, Settings};
 use crate::log::{self, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
@@ -11,6 +11,7 @@ use crate::model::data::Run;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::study::Study;
+use crate::tables::compensation::Compensation;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -73,6 +74,47 @@ impl Loaded {
     }
 }
 
+impl Loaded {
+    /// What the control applied while the touches were made; `None` where nothing was. All runs must agree: the
+    /// identified errors add to it.
+    ///
+    /// # Errors
+    /// When a file is unusable, belongs to another machine, or the runs differ.
+    pub fn active(&self) -> Result<Option<Compensation>> {
+        let mut found: Option<Option<Compensation>> = None;
+        for run in &self.runs {
+            let here = match &run.compensation {
+                Some(path) => Some(load_compensation(path, &self.machine)?),
+                None => None,
+            };
+            match &found {
+                Some(first) if *first != here => {
+                    return Err(Failure::new(
+                        "study::two_compensations",
+                        "the runs of the study were measured under different compensations",
+                    )
+                    .help(
+                        "the identified errors add to what was active: put runs under one compensation into one study",
+                    ));
+                }
+                _ => found = Some(here),
+            }
+        }
+        Ok(found.flatten())
+    }
+}
+
+/// What `export` wrote: the directory, or the compensation.json in it.
+///
+/// # Errors
+/// When it is unusable or belongs to another machine.
+pub fn load_compensation(path: &Path, machine: &Machine) -> Result<Compensation> {
+    let file = if path.is_dir() { path.join("compensation.json") } else { path.to_path_buf() };
+    let compensation = Compensation::read(&source(file.display().to_string(), files::read_text(&file)?))?;
+    compensation.check_belongs(machine, &compensation.controller)?;
+    Ok(compensation)
+}
+
 /// Reads a study and everything that it names; findings that are no errors are printed.
 ///
 /// # Errors
@@ -81,11 +123,12 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     let text = files::read_text(path)?;
     let mut hash = Sha256::new();
     hash.update(text.as_bytes());
-    let (study, findings) = Study::parse(&source(path.display().to_string(), text))?;
+    let src = source(path.display().to_string(), text);
+    let (study, findings) = Study::parse(&src)?;
     io.report(&findings.0);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let machines = study.machines.as_ref().map(|m| folder.join(m));
-    let machine = load_machine(&study.machine, machines.as_deref(), io)?;
+    let machine = located(load_machine(&study.machine, machines.as_deref(), io), &src)?;
     hash.update(machine.sha256.as_bytes());
     let mut catalogue = Catalogue::built_in()?;
     for file in &study.effects_files {
@@ -94,12 +137,23 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
         hash.update(text.as_bytes());
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
+    located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
     let mut runs = Vec::new();
+    let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in &study.data {
         let plan_path = folder.join(&entry.plan);
         let plan = load_plan(&plan_path, &machine, io)?;
         let log_path = folder.join(&entry.log);
         let bytes = files::read_bytes(&log_path)?;
+        let digest = Sha256::digest(&bytes).to_vec();
+        if let Some((first, _)) = seen.iter().find(|(_, d)| *d == digest) {
+            io.report(&[Finding::warning(
+                "study::log_twice",
+                format!("{} and {} hold the same bytes", first.display(), log_path.display()),
+            )
+            .help("a log counted twice makes every uncertainty too small: name each run once")]);
+        }
+        seen.push((log_path.clone(), digest));
         hash.update(plan.to_json().as_bytes());
         hash.update(&bytes);
         let touches = read_log(&bytes, &log_path, &controller_path(&entry.controller, &folder), &machine, &plan, io)?;
@@ -113,6 +167,27 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     }
     let sha256 = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
     Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256 })
+}
+
+/// Findings that name a word of the study get its place.
+fn located<T>(result: Result<T>, study: &Source) -> Result<T> {
+    result.map_err(|Failure(findings)| {
+        let text = study.inner();
+        let place = |f: &Finding| {
+            let quoted = f.message.split('"').nth(1)?;
+            let at = text.rfind(&format!("\"{quoted}\""))?;
+            Some(at..at + quoted.len() + 2)
+        };
+        Failure(
+            findings
+                .into_iter()
+                .map(|f| match place(&f) {
+                    Some(span) if f.source.is_none() => f.at(study, span),
+                    _ => f,
+                })
+                .collect(),
+        )
+    })
 }
 
 /// A controller is a name, or a postprocessor file relative to the study.

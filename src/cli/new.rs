@@ -1,7 +1,7 @@
 //! `axiscal new`: writes a study from plans and logs.
 
 use super::common::MachineArgs;
-use super::load::{load_plan, read_log};
+use super::load::{load_compensation, load_plan, read_log};
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::files;
@@ -74,6 +74,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         read_log(&files::read_bytes(log)?, log, &controller, &machine, &read, io)?;
         let controller =
             if controller.ends_with(".toml") { relative(Path::new(&controller), &folder) } else { controller };
+        if let Some(active) = args.compensation.get(if args.compensation.len() == 1 { 0 } else { i }) {
+            load_compensation(active, &machine)?;
+        }
         let compensation = if args.compensation.is_empty() {
             None
         } else {

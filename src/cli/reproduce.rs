@@ -53,6 +53,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             number(s.rank),
         ]);
     }
+    io.say("\"deviation\" is closed form less given, \"least squ.\" the deviation of the least squares, \"print\" whether both equal the\nprinted line at four decimals\n");
     io.say(format!("What poses can tell (x, y, z of the ball at each):\n{r}"));
     let n_rows = tables.iter().map(|t| t.rows.len()).sum::<usize>();
     let n_equal = tables.iter().flat_map(|t| &t.rows).filter(|r| r.equals_print()).count();
@@ -78,8 +79,7 @@ fn bench(machines: &[Machine], machine: &str, name: &str, z_b: f64) -> Result<(M
 
 fn say(t: &Table, io: &Io) {
     let mode = t.mode.as_ref().map_or_else(String::new, |m| format!(", mode {m}"));
-    let mut out =
-        table(&["parameter", "unit", "given", "closed form", "deviation", "least squares", "deviation", "print"]);
+    let mut out = table(&["parameter", "unit", "given", "closed form", "deviation", "least squ.", "print"]);
     for r in &t.rows {
         out.add_row(vec![
             Cell::new(&r.parameter),
@@ -87,7 +87,6 @@ fn say(t: &Table, io: &Io) {
             number(format!("{:.4}", r.given)),
             number(format!("{:.12}", r.closed_form)),
             number(format!("{:+.3e}", r.closed_form - r.given)),
-            number(format!("{:.12}", r.least_squares)),
             number(format!("{:+.1e}", r.least_squares - r.given)),
             Cell::new(if r.equals_print() { "equal" } else { "differs" }),
         ]);

@@ -2,7 +2,6 @@
 
 use super::{Answer, Io};
 use crate::diag::Result;
-use std::io::Write;
 
 /// Arguments of `schema`.
 #[derive(Debug, clap::Args)]
@@ -41,6 +40,6 @@ pub fn run(args: &Args, _io: &Io) -> Result<Answer> {
     };
     // a schema is JSON with and without --json
     let text = serde_json::to_string_pretty(&schema).unwrap_or_default();
-    let _ = writeln!(std::io::stdout(), "{text}");
+    super::common::print(&text);
     Ok(Answer::Done)
 }

@@ -126,6 +126,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
     let model = Model::new(machine, &effects, &data.set_ups, reference);
     let knowledge = resolve(&model.unknowns, &settings.knowledge)?;
+    every_formula_has_a_value(&effects, &data)?;
     let mut theta = model.start();
     for (value, known) in theta.iter_mut().zip(&knowledge) {
         match known {
@@ -217,6 +218,11 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let undetermined = observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, v)).collect();
     let rms_um = crate::units::um_from_mm((residual_mm.iter().map(|r| r * r).sum::<f64>() / n as f64).sqrt());
     let mut warnings = Vec::new();
+    if data.observations.iter().all(|o| !o.has_temperature) {
+        for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
+            warnings.push(format!("effect {} goes with the temperature T, and no touch carries one", effect.id));
+        }
+    }
     if !solution.converged {
         warnings.push(format!("the search did not converge: {}", solution.stopped));
     }
@@ -226,7 +232,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let chi2_per_dof = if dof > 0 { chi2 / dof as f64 } else { f64::NAN };
     if dof > 0 && chi2_per_dof > noise::chi2_limit(dof) {
         warnings.push(format!(
-            "the touches miss the model by {:.1} times their noise: the uncertainties below count the noise only",
+            "the touches miss the model by {:.1} times their noise: something is missing in it, and the uncertainties count the noise only",
             chi2_per_dof.sqrt()
         ));
     }
@@ -276,6 +282,28 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     Ok(Fit { model, data, theta, residual_mm, covariance, observability, free, outcome })
 }
 
+/// A formula that gives no number at a touch would spoil the whole fit: say which, and where.
+fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Result<()> {
+    let mut findings = Vec::new();
+    for effect in effects {
+        let shapes: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
+        for term in &effect.terms {
+            let bad = |o: &&Observation| !term.formula.eval(&o.state, &shapes).is_finite();
+            let n_bad = data.observations.iter().filter(bad).count();
+            if let Some(first) = data.observations.iter().find(bad) {
+                findings.push(
+                    Finding::error(
+                        "model::no_value",
+                        format!("formula {:?} of effect {} has no value at {n_bad} touches, the first is touch {}", term.formula.text(), effect.id, first.id),
+                    )
+                    .help("a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch"),
+                );
+            }
+        }
+    }
+    if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
+}
+
 /// Which unknowns the user's words mean.
 fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>) -> Result<Vec<Option<Knowledge>>> {
     let mut out = vec![None; unknowns.len()];
@@ -294,9 +322,11 @@ fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>) -> Result<
                 );
             }
         }
+        // a kilometre or a billion degrees is no knowledge of a machine
+        let sane = |v: f64| v.is_finite() && v.abs() < 1e6;
         let bad = match known {
-            Knowledge::Fixed(v) => !v.is_finite(),
-            Knowledge::Prior { value, sigma } => !(value.is_finite() && sigma.is_finite() && *sigma > 0.0),
+            Knowledge::Fixed(v) => !sane(*v),
+            Knowledge::Prior { value, sigma } => !(sane(*value) && sane(*sigma) && *sigma > 0.0),
         };
         if bad {
             findings.push(

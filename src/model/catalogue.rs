@@ -1,6 +1,6 @@
 //! Effects as data: `effects.toml`, built in and of the user's own, as written and checked.
 
-use super::formula::Formula;
+use super::formula::{FUNCTIONS, Formula, VARIABLES};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use crate::machine::{Machine, Side};
@@ -320,12 +320,46 @@ impl Check<'_> {
         self.findings.push(Finding::error(code, message).help(help).at(self.source, span.clone()));
     }
 
+    /// A parameter's name must be a word that a formula can use, and none that means something else there.
+    fn name(&mut self, name: &str, span: &std::ops::Range<usize>) {
+        let word = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !word || VARIABLES.contains(&name) || FUNCTIONS.contains(&name) {
+            self.error(
+                span,
+                "effects::parameter",
+                format!("{name:?} cannot be the name of a parameter"),
+                "letters, digits and _, and none of the variables and functions of formulas",
+            );
+        }
+    }
+
+    /// A constant displacement is a length or an angle; with variables in it the formula may carry the rest of the unit.
+    fn unit_fits(&mut self, t: &TermAsWritten) {
+        let unit = t.unit.get_ref().as_str();
+        let constant = Formula::parse(t.formula.get_ref(), &[]).is_ok_and(|f| f.constant().is_some());
+        let wrong = match t.dof.get_ref().as_str() {
+            "dx" | "dy" | "dz" | "r" | "X" | "Y" | "Z" => !matches!(unit, "um" | "mm"),
+            _ => !matches!(unit, "urad" | "mrad" | "deg"),
+        };
+        if constant && wrong && unit_factor(unit).is_some() {
+            self.error(
+                &t.unit.span(),
+                "effects::unit",
+                format!("a constant {} cannot be in {unit}", t.dof.get_ref()),
+                "lengths in um or mm, angles in urad, mrad or deg",
+            );
+        }
+    }
+
     fn effect(&mut self, w: &EffectAsWritten, side: Option<Side>, built_in: bool) -> Option<Effect> {
         let before = self.findings.0.len();
         let mut parameters: Vec<Parameter> = Vec::new();
         for t in &w.terms {
             let name =
                 t.iso.as_deref().and_then(crate::symbols::canonical).unwrap_or_else(|| t.parameter.get_ref().clone());
+            self.name(t.parameter.get_ref(), &t.parameter.span());
+            self.unit_fits(t);
             let factor = unit_factor(t.unit.get_ref());
             if factor.is_none() {
                 self.error(
@@ -365,6 +399,7 @@ impl Check<'_> {
             }
         }
         for s in &w.shape {
+            self.name(s.parameter.get_ref(), &s.parameter.span());
             let (low, high) = (s.min.unwrap_or(f64::NEG_INFINITY), s.max.unwrap_or(f64::INFINITY));
             if !(s.start.is_finite() && low < high && (low..=high).contains(&s.start)) {
                 self.error(

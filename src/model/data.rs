@@ -114,6 +114,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 ball_radius,
                 ball_at_zero: machine.tool.ball_at_zero(length_mm),
                 position: touch.position,
+                has_temperature: touch.temperature_deg_c.is_some(),
                 state: state(machine, planned, &touch.position, t, touch.temperature_deg_c, &last_sense, &normal),
             };
             let ideal = machine

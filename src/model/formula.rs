@@ -76,8 +76,10 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
+        let plain = plain_numbers(text)?;
+        known_functions(&plain)?;
         let expression =
-            Expression::parse(text).map_err(|e| format!("{} (functions: {})", e.msg(), FUNCTIONS.join(" ")))?;
+            Expression::parse(&plain).map_err(|e| format!("{} (functions: {})", e.msg(), FUNCTIONS.join(" ")))?;
         let origins = origins(&expression, shapes)?;
         let mut partials = Vec::new();
         for (at, origin) in origins.iter().enumerate() {
@@ -139,6 +141,56 @@ impl Formula {
         at[shape] -= 2.0 * step;
         (plus - self.eval(state, &at)) / (2.0 * step)
     }
+}
+
+/// The expression crate reads no exponents: `1.5e-3` is written out as `0.0015`.
+fn plain_numbers(text: &str) -> Result<String, String> {
+    let bytes = text.as_bytes();
+    let (mut out, mut at) = (String::new(), 0);
+    while at < bytes.len() {
+        let in_word = at > 0 && (bytes[at - 1].is_ascii_alphanumeric() || bytes[at - 1] == b'_');
+        let begins = bytes[at].is_ascii_digit() || bytes[at] == b'.';
+        if !begins || in_word {
+            let end = (at + 1..=bytes.len()).find(|i| text.is_char_boundary(*i)).unwrap_or(bytes.len());
+            out.push_str(&text[at..end]);
+            at = end;
+            continue;
+        }
+        let mut end = at;
+        while end < bytes.len() && (bytes[end].is_ascii_digit() || bytes[end] == b'.') {
+            end += 1;
+        }
+        if end < bytes.len() && matches!(bytes[end], b'e' | b'E') {
+            let sign = usize::from(end + 1 < bytes.len() && matches!(bytes[end + 1], b'+' | b'-'));
+            let digits = bytes[end + 1 + sign..].iter().take_while(|b| b.is_ascii_digit()).count();
+            if digits > 0 {
+                end += 1 + sign + digits;
+            }
+        }
+        let word = &text[at..end];
+        let value: f64 = word.parse().map_err(|_| format!("{word:?} is no number"))?;
+        if !value.is_finite() {
+            return Err(format!("{word:?} is too large a number"));
+        }
+        out.push_str(&value.to_string());
+        at = end;
+    }
+    Ok(out)
+}
+
+/// A word in front of a bracket must be a function.
+fn known_functions(text: &str) -> Result<(), String> {
+    let mut rest = text;
+    while let Some(bracket) = rest.find('(') {
+        let before = rest[..bracket].trim_end();
+        let word_from = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).map_or(0, |i| i + 1);
+        let word = before.get(word_from..).unwrap_or_default();
+        if !word.is_empty() && !word.starts_with(|c: char| c.is_ascii_digit()) && !FUNCTIONS.contains(&word) {
+            return Err(format!("unknown function {word:?} (functions: {})", FUNCTIONS.join(" ")));
+        }
+        rest = &rest[bracket + 1..];
+    }
+    Ok(())
 }
 
 fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
@@ -213,6 +265,16 @@ mod tests {
         assert!(Formula::parse("sinh(B)", &[]).is_err());
         assert!(Formula::parse("1 +", &[]).is_err());
         assert!(Formula::parse("", &[]).is_err());
+    }
+
+    #[test]
+    fn numbers_may_have_exponents() {
+        for (text, expected) in [("1e-3", 1e-3), ("2.5E+2 * 1", 250.0), (".5e1", 5.0), ("B*1e3", 500.0)] {
+            let value = Formula::parse(text, &[]).unwrap().eval(&at("B", 0.5), &[]);
+            assert!((value - expected).abs() < 1e-12, "{text}: {value}");
+        }
+        assert!(Formula::parse("1e999", &[]).unwrap_err().contains("too large"));
+        assert!(Formula::parse("sine(B)", &[]).unwrap_err().contains("unknown function \"sine\""));
     }
 
     #[test]

@@ -73,6 +73,8 @@ pub struct Observation {
     pub position: Position,
     /// What formulas see.
     pub state: State,
+    /// True when the touch carries a temperature.
+    pub has_temperature: bool,
 }
 
 /// A displacement of the model with its place resolved.

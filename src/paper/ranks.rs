@@ -52,8 +52,9 @@ fn catalogue() -> Result<Catalogue> {
     let mut text = String::new();
     for (name, at, dof, frame) in UNKNOWNS {
         let frame = if frame.is_empty() { String::new() } else { format!(", frame = \"{frame}\"") };
+        let unit = if dof.starts_with('r') { "mrad" } else { "mm" };
         text += &format!(
-            "[[effect]]\nid = \"{name}\"\nat = \"{at}\"\nterms = [{{ parameter = \"{name}\", unit = \"mm\", dof = \"{dof}\", formula = \"1\"{frame} }}]\n"
+            "[[effect]]\nid = \"{name}\"\nat = \"{at}\"\nterms = [{{ parameter = \"{name}\", unit = \"{unit}\", dof = \"{dof}\", formula = \"1\"{frame} }}]\n"
         );
     }
     let mut catalogue = Catalogue::default();
@@ -95,6 +96,7 @@ fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &
             ball_at_zero: machine.tool.ball_at_zero(machine.tool.length_mm),
             position,
             state: [0.0; crate::model::formula::VARIABLES.len()],
+            has_temperature: false,
         };
         model.gap_and_row(&touch, &model.start(), &mut scratch, &mut row);
         jacobian.row_mut(i).copy_from_slice(&row);

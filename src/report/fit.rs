@@ -43,12 +43,12 @@ pub fn outcome(o: &Outcome) -> String {
         o.machine, o.touches, o.unknowns, o.rank, o.dof, o.condition
     );
     out += &format!(
-        "error left {} um RMS against a noise of {} um per touch ({}); chi2/dof {:.3}\n",
+        "error left {} um RMS; noise of a touch {} um ({}); chi2/dof {:.3}\n",
         significant(o.rms_um),
         significant(o.noise_um),
         match o.noise_source.as_str() {
             "repeats" => "from repeated touches",
-            "declared" => "as the machine file declares it: the plan has no repeats",
+            "declared" => "as the machine file declares it",
             _ => "as the study states it",
         },
         o.chi2_per_dof
@@ -60,12 +60,11 @@ pub fn outcome(o: &Outcome) -> String {
         o.stopped
     );
     let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
-    let mut t = table(&["parameter", "effect", "value", "unit", "std. uncertainty", "95 %", "status"]);
+    let mut t = table(&["parameter", "value", "unit", "std. unc.", "95 %", "status"]);
     for p in results {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |a| format!("{} ({a})", p.name));
         t.add_row(vec![
             Cell::new(name),
-            Cell::new(&p.effect),
             number(if p.status == Status::Undetermined { "?".into() } else { digits(p.value, p.sigma) }),
             Cell::new(&p.unit),
             number(p.sigma.map_or_else(|| "-".into(), significant)),
