@@ -38,7 +38,7 @@ fn largest(machine: &Machine, plan: &Plan, touches: &[axiscal::log::Touch], effe
 
 #[test]
 fn the_papers_sequence_in_simulation_is_exact() {
-    // seed-method sections 8 and 10: head, compensate, table, compensate, with least squares: 1e-10
+    // the method, section 8 and 10: head, compensate, table, compensate, with least squares: 1e-10
     let machine = machine("swivel-head");
     let (head, table) = (plan(&machine, "head"), plan(&machine, "table"));
     for g in GIVEN {

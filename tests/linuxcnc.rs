@@ -484,7 +484,7 @@ impl Job {
     fn run_at(&self, program: &str, log: &str, control: &Control, warp: u32) -> Check {
         let tree = Path::new(env!("CARGO_MANIFEST_DIR"));
         let out = self.dir.join(format!("rig-{log}"));
-        let mut rig = Command::new("python3");
+        let mut rig = Command::new("/usr/bin/python3");
         rig.arg(tree.join("tests/linuxcnc/rig.py"))
             .args(["--machines".as_ref(), tree.join("machines.toml").as_os_str()])
             .args(["--machine", &self.machine, "--latch", control.latch])

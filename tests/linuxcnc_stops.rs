@@ -75,7 +75,7 @@ fn run(change: impl Fn(String) -> String, scenario: &str) -> Outcome {
     std::fs::write(folder.join("head.ngc"), change(text)).unwrap();
     std::fs::write(folder.join("wrong.toml"), scenario).unwrap();
     let out = folder.join("out");
-    let answer = Command::new("python3")
+    let answer = Command::new("/usr/bin/python3")
         .arg(tree().join("tests/linuxcnc/rig.py"))
         .args(["--machines".as_ref(), tree().join("machines.toml").as_os_str()])
         .args(["--machine", "swivel-head", "--no-solids"])

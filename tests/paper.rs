@@ -20,7 +20,7 @@ fn tables_have_the_golden_digits() {
     let plans = [plan(&head, "head"), plan(&head, "table"), plan(&double, "double-head")];
     let bench = |machine, plan| Bench { machine, plan, catalogue: &catalogue };
     let tables = all(bench(&head, &plans[0]), bench(&head, &plans[1]), bench(&double, &plans[2])).unwrap();
-    // seed-method section 9, closed forms: table, set, mode, rows
+    // the method, section 9, closed forms: table, set, mode, rows
     #[allow(clippy::type_complexity)]
     let golden: &[(&str, usize, Option<&str>, &[(&str, f64)])] = &[
         (
@@ -221,7 +221,7 @@ fn the_fourth_decimal_of_dx_depends_on_the_length() {
 
 #[test]
 fn a_wrongly_set_up_block_spoils_the_closed_form_and_not_the_fit() {
-    // seed-method section 9: (0.1, -0.2, 0.05) mm and (0.05, -0.03, 0.1) deg about the centre
+    // the method, section 9: (0.1, -0.2, 0.05) mm and (0.05, -0.03, 0.1) deg about the centre
     let machine = machine("swivel-head");
     let plan = plan(&machine, "table");
     let catalogue = Catalogue::built_in().unwrap();
@@ -251,7 +251,7 @@ fn a_wrongly_set_up_block_spoils_the_closed_form_and_not_the_fit() {
 
 #[test]
 fn without_compensating_the_head_the_table_is_wrong_by_the_heads_displacement() {
-    // seed-method section 8: d_xCY, d_yCY wrong by exactly -delta(0)
+    // the method, section 8: d_xCY, d_yCY wrong by exactly -delta(0)
     let machine = machine("swivel-head");
     let plan = plan(&machine, "table");
     let catalogue = Catalogue::built_in().unwrap();

@@ -100,13 +100,13 @@ fn the_papers_two_runs_have_39_unknowns_of_rank_39() {
         &["location-b", "location-c", "block-setup", "pretravel"],
     );
     assert_eq!((fit.outcome.touches, fit.outcome.unknowns, fit.outcome.rank), (356, 39, 39));
-    // effects.md B.1: 17.3 with the positions stated at the ball
+    // stated at the pivot; at the ball's height offsets and tilts are less correlated
     assert!(fit.outcome.condition < 100.0, "{}", fit.outcome.condition);
 }
 
 #[test]
 fn uncertainties_are_those_of_the_method() {
-    // seed-method section 9: 1 um per touch, known blocks
+    // the method, section 9: 1 um per touch, known blocks
     let machine = machine("swivel-head");
     let settings = || Settings { touch_sigma_mm: Some(1e-3), ..Settings::default() };
     let head = plan(&machine, "head");

@@ -64,6 +64,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let settings = loaded.settings();
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let active = loaded.active()?;
+    free_folder(&args.out, &loaded)?;
     if active.is_some() {
         io.report(&[Finding::info(
             "export::adds",
@@ -132,6 +133,28 @@ fn is_date(text: &str) -> bool {
     }
     let (Ok(year), Ok(month), Ok(day)) = (year.parse(), month.parse::<u8>(), day.parse()) else { return false };
     time::Month::try_from(month).is_ok_and(|m| time::Date::from_calendar_date(year, m, day).is_ok())
+}
+
+/// An export must not overwrite what was active during its own measurement (the next one would add to the wrong values),
+/// nor fill a folder that holds something else.
+fn free_folder(out: &Path, loaded: &Loaded) -> Result<()> {
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    for active in loaded.runs.iter().filter_map(|r| r.compensation.as_deref()) {
+        let folder = if active.is_dir() { active } else { active.parent().unwrap_or(active) };
+        if same(folder, out) || out.parent().is_some_and(|above| same(folder, above)) && out.ends_with("stock") {
+            return Err(Failure::new(
+                "export::active",
+                format!("{} is the compensation that was active during the measurement", out.display()),
+            )
+            .help("write to another folder: the identified errors add to what was active, and its file must stay as it was"));
+        }
+    }
+    let used = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some());
+    if used && !out.join("compensation.json").is_file() {
+        return Err(Failure::new("export::folder", format!("{} is not empty and holds no earlier export", out.display()))
+            .help("name an empty folder: an export is a set of files that belong together"));
+    }
+    Ok(())
 }
 
 /// Files of an earlier export that this one does not have: loaded by mistake they would be a wrong compensation.

@@ -5,7 +5,7 @@ use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::files;
 use crate::fit::{self, Settings};
 use crate::log::{self, Touch};
-use crate::machine::Machine;
+use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
 use crate::post::Postprocessor;
@@ -104,6 +104,32 @@ impl Loaded {
     }
 }
 
+/// A compensation with errors of an axis that does not carry the blocks: the control then corrects what the blocks do not
+/// do, and their readings hold that axis's errors with the other sign.
+#[must_use]
+pub fn beside_the_axis(compensation: &Compensation, machine: &Machine, plan: &Plan) -> Option<Finding> {
+    let side = |axis| machine.axis(axis).map(|a| a.side);
+    let carries = |axis| {
+        plan.blocks.iter().all(|b| {
+            machine.carrier(&b.carrier).is_none_or(|c| machine.carrier_chain(c).iter().any(|a| a.name == axis))
+        })
+    };
+    let term = compensation
+        .terms
+        .iter()
+        .find(|t| t.value != 0.0 && side(t.axis) == Some(Side::Workpiece) && !carries(t.axis))?;
+    Some(
+        Finding::warning(
+            "compensation::beside_the_axis",
+            format!("the compensation holds errors of {}, which does not carry the blocks of program {}", term.axis, plan.program),
+        )
+        .help(format!(
+            "such blocks are read with the errors of {0} the wrong way round: measure them with {0}'s values at 0, or use a program whose blocks {0} carries",
+            term.axis
+        )),
+    )
+}
+
 /// What `export` wrote: the directory, or the compensation.json in it.
 ///
 /// # Errors
@@ -154,6 +180,10 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
             .help("a log counted twice makes every uncertainty too small: name each run once")]);
         }
         seen.push((log_path.clone(), digest));
+        if let Some(path) = &entry.compensation {
+            let active = load_compensation(&folder.join(path), &machine)?;
+            io.report(&beside_the_axis(&active, &machine, &plan).into_iter().collect::<Vec<_>>());
+        }
         hash.update(plan.to_json().as_bytes());
         hash.update(&bytes);
         let touches = read_log(&bytes, &log_path, &controller_path(&entry.controller, &folder), &machine, &plan, io)?;

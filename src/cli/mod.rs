@@ -70,7 +70,7 @@ enum Verb {
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        // clap exits with 2 for a bad call and 0 for --help and --version, which is the contract's too
+        // clap exits with 2 for a bad call and 0 for --help and --version, which is what scripts rely on
         Err(e) => e.exit(),
     };
     let io = Io::new(cli.json);

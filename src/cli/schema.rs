@@ -36,7 +36,7 @@ pub fn run(args: &Args, _io: &Io) -> Result<Answer> {
         What::Programs => crate::program::schema(),
         What::Postprocessors => schemars::schema_for!(crate::post::as_written::File),
         What::Study => schemars::schema_for!(crate::study::AsWritten),
-        What::Effects => schemars::schema_for!(crate::model::catalogue::File),
+        What::Effects => schemars::schema_for!(crate::model::as_written::File),
     };
     // a schema is JSON with and without --json
     let text = serde_json::to_string_pretty(&schema).unwrap_or_default();

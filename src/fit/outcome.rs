@@ -35,8 +35,8 @@ pub struct Outcome {
     pub condition: f64,
     /// √(Σr²/n) over the touches kept, µm.
     pub rms_um: f64,
-    /// RMS on touches that were left out, µm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// RMS on touches that were left out of the fit, µm; null where none were.
+    #[serde(default)]
     pub held_out_rms_um: Option<f64>,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,

@@ -77,6 +77,13 @@ pub fn read(
     let (touches, more) = matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places))
         .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
+    if !touches.iter().any(|t| t.status == Status::Hit) {
+        findings.push(
+            Finding::error("log::no_hit", format!("{name} holds no touch of the plan at which the probe triggered"))
+                .help("is it the log of this program, and did the program run? the findings above say what was not used"),
+        );
+        return Err(Failure(findings.0));
+    }
     Ok((MatchedLog { touches, complete: parsed.complete, runs: parsed.runs }, findings))
 }
 

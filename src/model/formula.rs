@@ -1,7 +1,7 @@
 //! Formulas of effects: parsed once, evaluated at the state of a touch, with partial derivatives for shape parameters.
 //!
 //! The expression crate does the parsing and differentiation; this module fixes the words that a formula may use
-//! (contract section 5) and turns a mistake into a sentence that names it.
+//! (docs/guide/effects.md) and turns a mistake into a sentence that names it.
 
 use exmex::prelude::*;
 use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
@@ -19,7 +19,7 @@ pub type State = [f64; VARIABLES.len()];
 pub const FUNCTIONS: [&str; 15] =
     ["sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "ln", "sqrt", "abs", "sign", "floor", "mod", "step"];
 
-/// The operators of a formula: those of the expression crate that the contract names, and `sign`, `mod`, `step`.
+/// The operators of a formula: those of the expression crate that docs/guide/effects.md names, and `sign`, `mod`, `step`.
 #[derive(Clone, Debug)]
 pub struct Words;
 
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn contract_functions_are_understood() {
+    fn documented_functions_are_understood() {
         for (text, b, expected) in [
             ("1 - cos(B)", 0.5, 1.0 - 0.5f64.cos()),
             ("mod(B, 0.3)", 0.5, 0.2),

@@ -1,5 +1,6 @@
 //! Machine + effects + parameters → the gap between ball and face at a touch, with derivatives.
 
+pub mod as_written;
 pub mod catalogue;
 pub mod data;
 pub mod formula;

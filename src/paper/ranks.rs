@@ -1,4 +1,4 @@
-//! The paper's statements of rank, computed: which unknowns a set of poses can tell (seed-method sections 1 and 7).
+//! The paper's statements of rank, computed: which unknowns a set of poses can tell (the method, section 1 and 7).
 //!
 //! Each pose gives the ball's displacement along x, y and z (or only along the directions of the printed sums), as
 //! touches on three faces of one block do.

@@ -1,4 +1,4 @@
-//! The plan: the touches of a program with their nominal places (`axiscal-plan/1`, contract section 4).
+//! The plan: the touches of a program with their nominal places (`axiscal-plan/1`, docs/formats.md).
 
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Finding, Findings, Result, Source, from_json};

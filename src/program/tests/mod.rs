@@ -1,4 +1,4 @@
-//! The built-in programs on the built-in machines, and what seed-method says can and cannot be reached.
+//! The built-in programs on the built-in machines, and what the method says can and cannot be reached.
 
 use super::plan::Plan;
 use super::{Generated, Options, generate};

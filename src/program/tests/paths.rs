@@ -253,7 +253,7 @@ fn the_first_touch_of_each_block_is_slow_and_the_plan_says_so() {
 }
 
 #[test]
-fn touches_stand_where_the_contract_shows_them() {
+fn touches_stand_where_the_format_shows_them() {
     let (_, g) = built_in("swivel-head", "head");
     let t = &g.plan.touches[0];
     assert_eq!((t.point, t.normal, t.face.as_str()), ([-33.0, -3.0, -197.684], [0.0, 0.0, 1.0], "+Z"));

@@ -1,4 +1,4 @@
-//! What the method's text says can and cannot be reached (seed-method section 6), row by row.
+//! What the method's text says can and cannot be reached (the method, section 6), row by row.
 
 use super::machine_of;
 use crate::diag::source;

@@ -31,7 +31,7 @@ fn all_faces(machine: &Machine, mounting: &str, poses: &[AxisMap], radius: f64) 
     plan
 }
 
-/// `E·q - q` with `E` of seed-method section 1, its rotation written as three turns of a vector, one after another.
+/// `E·q - q` with `E` of the method, section 1, its rotation written as three turns of a vector, one after another.
 fn displacement(set: &[f64; 8], q: Vec3) -> Vec3 {
     let [a, b, g] = [0, 1, 2].map(|i| rad_from_deg(set[i]).sin_cos());
     let [x, y, z] = q;
