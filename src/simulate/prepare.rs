@@ -112,8 +112,11 @@ pub fn bench<'a>(
     for (what, ids) in refused {
         let (which, more) = super::some_of(&ids);
         findings.push(
-            Finding::error("simulate::touch", format!("touch {which}{more} cannot be made: {what}"))
-                .help("make the plan again with `axiscal generate`"),
+            Finding::error(
+                "simulate::touch",
+                format!("{} touches cannot be made (touch {which}{more}): {what}", ids.len()),
+            )
+            .help("make the plan again with `axiscal generate`"),
         );
     }
     let dice = Dice::new(scenario, plan, compensation.is_some());
