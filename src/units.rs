@@ -69,6 +69,21 @@ pub fn mm_from_inch(inch: f64) -> f64 {
     inch * 25.4
 }
 
+/// A number as messages show it: with an exponent where its digits would fill the line.
+#[derive(Debug, Clone, Copy)]
+pub struct Plain(pub f64);
+
+impl std::fmt::Display for Plain {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let size = self.0.abs();
+        if size.is_finite() && size != 0.0 && !(1e-9..=1e9).contains(&size) {
+            write!(f, "{:e}", self.0)
+        } else {
+            write!(f, "{}", self.0)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -176,3 +176,25 @@ fn programs_are_listed_and_shown() {
     let copy = json(axiscal(folder.path()).args(["programs", "show", "copy.toml"]));
     assert_eq!(copy["programs"][0]["setups"], head["programs"][0]["setups"]);
 }
+
+#[test]
+fn a_program_for_other_machines_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let call = ["generate", "--machine", "swivel-head", "--program", "basic", "--controller", "linuxcnc", "--out", "o"];
+    let output = axiscal(folder.path()).args(call).assert().code(2).get_output().stderr.clone();
+    let said = String::from_utf8(output).unwrap();
+    assert!(said.contains("not for swivel-head; for swivel-head there are: head, table"), "{said}");
+    assert_eq!(said.matches("error:").count(), 1, "{said}");
+}
+
+#[test]
+fn the_plan_of_another_machine_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = r#"{ "machine": "trunnion", "program": "table" }"#;
+    std::fs::write(folder.path().join("table.plan.json"), other).unwrap();
+    let call = ["generate", "--machine", "swivel-head", "--program", "table", "--controller", "linuxcnc", "--out", "."];
+    let run = axiscal(folder.path()).args(call).assert().code(2);
+    run.stderr(predicate::str::contains("for machine \"trunnion\""));
+    assert_eq!(std::fs::read_to_string(folder.path().join("table.plan.json")).unwrap(), other);
+    assert!(!folder.path().join("table.ngc").exists());
+}

@@ -39,14 +39,22 @@ fn logs_come_in_the_form_that_was_asked_for() {
     let first = read();
     assert_eq!(first.lines().count(), 203);
     assert!(first.starts_with("id,X,Y,Z,B,C,time_s,status\n1,"));
-    axiscal(folder.path()).args(CALL).args(csv).assert().success();
+    axiscal(folder.path()).args(CALL).arg("--force").args(csv).assert().success();
     assert_eq!(read(), first, "the same seed gives the same log");
-    let answer =
-        axiscal(folder.path()).args(CALL).args(csv).arg("--json").assert().success().get_output().stdout.clone();
+    let answer = axiscal(folder.path())
+        .args(CALL)
+        .arg("--force")
+        .args(csv)
+        .arg("--json")
+        .assert()
+        .success()
+        .get_output()
+        .stdout
+        .clone();
     let answer: serde_json::Value = serde_json::from_slice(&answer).unwrap();
     assert_eq!(answer["touches"], 202);
     assert_eq!(answer["planted"][0]["parameter"], "EA0B");
-    axiscal(folder.path()).args(CALL).args(["--controller", "linuxcnc"]).assert().success();
+    axiscal(folder.path()).args(CALL).arg("--force").args(["--controller", "linuxcnc"]).assert().success();
     assert!(read().starts_with("H AXISCAL 1 LINUXCNC SWIVEL-HEAD HEAD "));
 }
 
@@ -90,4 +98,17 @@ fn a_block_that_is_not_there_gives_misses_and_a_warning() {
         .success()
         .stderr(predicate::str::contains("the search ended without contact: touch 1, 2,"));
     assert!(std::fs::read_to_string(folder.path().join("out.log")).unwrap().contains(",miss\n"));
+}
+
+#[test]
+fn nothing_that_exists_is_lost() {
+    let folder = folder("swivel-head", "head");
+    std::fs::write(folder.path().join("out.log"), "measured").unwrap();
+    axiscal(folder.path()).args(CALL).assert().code(2).stderr(predicate::str::contains("out.log exists"));
+    assert_eq!(std::fs::read_to_string(folder.path().join("out.log")).unwrap(), "measured");
+    let plan = std::fs::read(folder.path().join("plan.json")).unwrap();
+    let over = ["simulate", "--plan", "plan.json", "--machine", "swivel-head", "--out", "./plan.json", "--force"];
+    axiscal(folder.path()).args(over).assert().code(2).stderr(predicate::str::contains("which is read here"));
+    assert_eq!(std::fs::read(folder.path().join("plan.json")).unwrap(), plan);
+    axiscal(folder.path()).args(CALL).arg("--force").assert().success();
 }

@@ -55,6 +55,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     let (post, findings) = Postprocessor::load_built_in_or_file(&word)?;
     io.report(&findings);
+    let plan_file = args.out.join(format!("{}.plan.json", spec.name));
+    keep_other_plans(&plan_file, &machine, &spec)?;
     let options = Options { strict: args.strict, tcp: args.tcp };
     let (generated, findings) = program::generate(&machine, &spec, &options)?;
     let nc = post.program(&machine, &generated.plan, &generated.path)?;
@@ -63,11 +65,47 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     io.report(&findings.0.iter().chain(&nc.findings.0).filter(shown).cloned().collect::<Vec<_>>());
 
     let program_file = args.out.join(format!("{}.{}", spec.name, nc.extension));
-    let plan_file = args.out.join(format!("{}.plan.json", spec.name));
+    let own = [Some(Path::new(&args.program)), args.postprocessor.as_deref(), args.machine.machines.as_deref()];
+    keep_inputs(&program_file, own.into_iter().flatten())?;
     files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
     files::write_whole(&program_file, nc.text.as_bytes())?;
     summary(&machine, &post.name, &generated, [&program_file, &plan_file], io);
     Ok(Answer::Done)
+}
+
+/// Refuses to write over a file that is read.
+///
+/// # Errors
+/// When `out` is one of `inputs`, by whatever name.
+pub(super) fn keep_inputs<'a>(out: &Path, inputs: impl Iterator<Item = &'a Path>) -> Result<()> {
+    // what cannot be resolved does not exist, so it cannot be written over
+    let Ok(real) = out.canonicalize() else { return Ok(()) };
+    for input in inputs {
+        if input.canonicalize().is_ok_and(|i| i == real) {
+            return Err(Failure::new(
+                "cli::over_input",
+                format!("{} would be written over {}, which is read here", out.display(), input.display()),
+            )
+            .help("name another place with --out"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to write over the plan of another machine or program, or over something that is no plan.
+fn keep_other_plans(plan: &Path, machine: &Machine, spec: &ProgramSpec) -> Result<()> {
+    if !plan.exists() {
+        return Ok(());
+    }
+    let old: Option<serde_json::Value> = serde_json::from_slice(&files::read_bytes(plan)?).ok();
+    let word = |key: &str| old.as_ref().and_then(|o| o.get(key)?.as_str());
+    let what = match (word("machine"), word("program")) {
+        (Some(m), Some(p)) if m == machine.name && p == spec.name => return Ok(()),
+        (Some(m), Some(p)) => format!("the plan of program {p:?} for machine {m:?}"),
+        _ => "no plan".to_owned(),
+    };
+    Err(Failure::new("cli::other_plan", format!("{} exists and is {what}: it is not written over", plan.display()))
+        .help("name another folder with --out, or move the file away"))
 }
 
 /// A program by name, or from a file of the user's own when the word ends in `.toml` or holds a `/`.

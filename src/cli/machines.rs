@@ -3,7 +3,7 @@
 use super::common::{load_machine, load_machines};
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::machine::{Carrier, Machine, Side};
+use crate::machine::{Axis, Carrier, Machine, Side};
 use crate::report::fit::{number, table};
 use comfy_table::Cell;
 use serde_json::json;
@@ -56,9 +56,10 @@ fn letters(m: &Machine, side: Side) -> String {
 
 fn show(m: &Machine, io: &Io) {
     io.say(format!("{}: {}\n", m.name, m.says));
-    let mut t = table(&["axis", "side", "direction", "point mm", "sense", "range", "indexing um"]);
+    let mut t = table(&["axis", "side", "direction", "point mm", "sense", "range (machine)", "indexing um"]);
     for a in &m.axes {
         let d = a.direction;
+        let [low, high] = machine_range(m, a);
         t.add_row(vec![
             Cell::new(a.name),
             Cell::new(if a.side == Side::Tool { "tool" } else { "workpiece" }),
@@ -69,7 +70,7 @@ fn show(m: &Machine, io: &Io) {
                 "-".into()
             }),
             number(if a.name.is_rotary() { format!("{:+}", a.sense) } else { "-".into() }),
-            number(format!("{} … {} {}", a.range[0], a.range[1], if a.name.is_rotary() { "deg" } else { "mm" })),
+            number(format!("{low} … {high} {}", if a.name.is_rotary() { "deg" } else { "mm" })),
             number(if a.name.is_rotary() {
                 crate::units::um_from_mm(a.indexing_repeatability_mm).to_string()
             } else {
@@ -78,6 +79,7 @@ fn show(m: &Machine, io: &Io) {
         ]);
     }
     io.say(t.to_string());
+    io.say("ranges in machine coordinates; directions, points and centres in R");
     let p = &m.probe;
     io.say(format!(
         "tool: {} mm from the pivot to the ball's centre\nprobe: ball {} mm, stem {} x {} mm, body {} x {} mm, head {} mm (diameters); repeatability {} um, overtravel {} mm\n       search {} mm/min, measuring touch {} mm/min, protected positioning {} mm/min",
@@ -96,6 +98,13 @@ fn show(m: &Machine, io: &Io) {
     io.answer(&as_json(m));
 }
 
+/// As the file has it: what the control shows.
+fn machine_range(m: &Machine, a: &Axis) -> [f64; 2] {
+    let origin = m.origin.get(a.name).unwrap_or(0.0);
+    // the way to R and back leaves its rounding: no control shows less than a nanometre
+    a.range.map(|end| ((end + origin) * 1e6).round() / 1e6)
+}
+
 fn as_json(m: &Machine) -> serde_json::Value {
     let axes: Vec<_> = m
         .axes
@@ -103,7 +112,8 @@ fn as_json(m: &Machine) -> serde_json::Value {
         .map(|a| {
             json!({ "name": a.name, "side": if a.side == Side::Tool { "tool" } else { "workpiece" },
                 "kind": if a.name.is_rotary() { "rotary" } else { "linear" },
-                "direction": a.direction.as_slice(), "point_mm": a.point.as_slice(), "sense": a.sense, "range": a.range })
+                "direction": a.direction.as_slice(), "point_mm": a.point.as_slice(), "sense": a.sense, "range": a.range,
+                "range_machine": machine_range(m, a) })
         })
         .collect();
     let mountings: Vec<_> = m

@@ -1,9 +1,10 @@
 //! `axiscal simulate`: the virtual machine writes the log that the controller would have written.
 
 use super::common::MachineArgs;
+use super::generate::keep_inputs;
 use super::load::load_plan;
 use super::{Answer, Io};
-use crate::diag::{Findings, Result, source};
+use crate::diag::{Failure, Findings, Result, source};
 use crate::files;
 use crate::log::{self, RawTouch, Status, Touch};
 use crate::machine::Machine;
@@ -34,6 +35,9 @@ pub struct Args {
     /// Where to write the log
     #[arg(long, value_name = "LOG")]
     pub out: PathBuf,
+    /// Write over LOG when it exists
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// A plan of fewer touches is done before a person sees a bar.
@@ -44,6 +48,7 @@ const LONG: usize = 50_000;
 /// # Errors
 /// When an input is unusable or does not fit the machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    keep_existing(args)?;
     let machine = args.machine.load(io)?;
     let plan = load_plan(&args.plan, &machine, io)?;
     let scenario = match &args.scenario {
@@ -94,6 +99,20 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         "planted": scenario.planted,
     }));
     Ok(Answer::Done)
+}
+
+/// A log of a real machine cannot be made again: what exists is written over only when that is asked for, inputs never.
+fn keep_existing(args: &Args) -> Result<()> {
+    let controller = Path::new(&args.controller);
+    let optional = [args.machine.machines.as_deref(), args.scenario.as_deref(), args.compensation.as_deref()];
+    let compensation = args.compensation.as_ref().map(|c| c.join("compensation.json"));
+    let inputs = [args.plan.as_path(), controller].into_iter().chain(optional.into_iter().flatten());
+    keep_inputs(&args.out, inputs.chain(compensation.as_deref()))?;
+    if args.out.exists() && !args.force {
+        return Err(Failure::new("cli::exists", format!("{} exists: it is not written over", args.out.display()))
+            .help("name a new file with --out, or add --force if it may be lost"));
+    }
+    Ok(())
 }
 
 fn reported<T>((value, findings): (T, Findings), io: &Io) -> T {

@@ -282,7 +282,8 @@ pub struct Mounting {
     /// What to do at the machine, in one line.
     #[serde(default)]
     pub says: String,
-    /// `table` (the linear axes' table) or the letter of a rotary axis of the workpiece side.
+    /// `table` (the linear axes' table; without a linear axis on the workpiece side: what stands on the base) or the
+    /// letter of an axis of the workpiece side. Not `base`.
     #[schemars(with = "String")]
     pub carrier: Spanned<String>,
     /// What each block stands on.

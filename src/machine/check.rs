@@ -3,12 +3,19 @@
 use super::as_written::{self as w, AxisKind};
 use super::{Axis, Block, Carrier, Machine, Mounting, Reference, Shape, Side, Solid, Tool};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use crate::units::Plain;
 use nalgebra::{Unit, Vector3};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 const FORMAT: &str = "axiscal-machines/1";
+
+/// No coordinate is larger than this (100 m, or deg): more is a slip of the pen.
+const LARGEST: f64 = 1e5;
+
+/// Two linear axes further off square than this are a slip of the pen, deg: real ones are off by some hundredths.
+const LARGEST_SQUARENESS_DEG: f64 = 0.1;
 
 /// Reads and checks a machines file.
 ///
@@ -72,6 +79,13 @@ impl Check<'_> {
         let name = m.name.get_ref();
         let here = m.name.span();
         let loose: Vec<Loose> = m.axis.iter().filter_map(|a| self.axis(name, a)).collect();
+        // an axis that was refused has said why: what names it says nothing more
+        let refused: Vec<String> = m
+            .axis
+            .iter()
+            .map(|a| a.name.get_ref().to_string())
+            .filter(|letter| !loose.iter().any(|l| &l.axis.name.to_string() == letter))
+            .collect();
         for (i, a) in loose.iter().enumerate() {
             if loose[..i].iter().any(|b| b.axis.name == a.axis.name) {
                 self.error(
@@ -86,10 +100,10 @@ impl Check<'_> {
         let tool = self.exactly_one(&here, name, "tool", m.tool.all());
         let mut axes = Vec::new();
         if let Some(workpiece) = workpiece {
-            axes.extend(self.chain(name, &loose, &workpiece.parent, Side::Workpiece));
+            axes.extend(self.chain(name, &loose, &refused, &workpiece.parent, Side::Workpiece));
         }
         if let Some(tool) = tool {
-            let tool_side = self.chain(name, &loose, &tool.parent, Side::Tool);
+            let tool_side = self.chain(name, &loose, &refused, &tool.parent, Side::Tool);
             for a in &tool_side {
                 if axes.iter().any(|b: &Axis| b.name == a.name) {
                     self.error(
@@ -114,6 +128,7 @@ impl Check<'_> {
                 }
             }
             self.linear_axes_span_space(&here, name, &axes);
+            self.linear_axes_square(name, &loose);
             let n_rotary = axes.iter().filter(|a| a.name.is_rotary()).count();
             if n_rotary == 0 || n_rotary > 2 {
                 self.error(
@@ -124,7 +139,15 @@ impl Check<'_> {
                 );
             }
         }
-        for (axis, _) in m.origin.iter() {
+        for (axis, value) in m.origin.iter() {
+            if !(value.abs() <= LARGEST) {
+                self.error(
+                    &here,
+                    "machine::too_large",
+                    format!("origin of axis {axis} of {name:?} is {}", Plain(value)),
+                    format!("write mm or deg, up to {LARGEST}"),
+                );
+            }
             if !axes.iter().any(|a| a.name == axis) && self.findings.0.len() == before {
                 self.error(
                     &here,
@@ -169,6 +192,7 @@ impl Check<'_> {
                     .map(|a| Carrier::Axis(a.name)),
             }
         };
+        let carriers = Carriers { of: &carriers, cut: !refused.is_empty() };
         let solids = m.solid.iter().filter_map(|s| self.solid(name, s, &carriers)).collect();
         let mountings: Vec<Mounting> = m.mounting.iter().filter_map(|x| self.mounting(name, x, &carriers)).collect();
         for (i, x) in m.mounting.iter().enumerate() {
@@ -189,7 +213,9 @@ impl Check<'_> {
                 "machine::probe_too_long",
                 format!(
                     "stem {} mm and body {} mm are longer than the tool length {} mm",
-                    p.stem_length, p.body_length, tool.length_mm
+                    Plain(p.stem_length),
+                    Plain(p.body_length),
+                    Plain(tool.length_mm)
                 ),
                 "tool.length is measured from the pivot to the ball's centre",
             );
@@ -349,13 +375,27 @@ impl Check<'_> {
             }
             Some(r) => {
                 let [low, high] = *r.get_ref();
-                if low.is_finite() && high.is_finite() && low < high {
+                if low.abs() <= LARGEST && high.abs() <= LARGEST && low < high {
                     Some([low, high])
+                } else if low < high {
+                    self.error(
+                        &r.span(),
+                        "machine::too_large",
+                        format!("range of axis {name} is [{}, {}]", Plain(low), Plain(high)),
+                        format!(
+                            "write how far the axis goes, at most {LARGEST} mm or deg; an endless axis: [-9999, 9999]"
+                        ),
+                    );
+                    None
                 } else {
                     self.error(
                         &r.span(),
                         "machine::range",
-                        format!("range of axis {name} is [{low}, {high}], expected lowest before highest"),
+                        format!(
+                            "range of axis {name} is [{}, {}], expected lowest before highest",
+                            Plain(low),
+                            Plain(high)
+                        ),
                         "swap the two numbers",
                     );
                     None
@@ -367,7 +407,7 @@ impl Check<'_> {
             self.error(
                 &span,
                 "machine::repeatability",
-                format!("indexing repeatability of axis {name} is {repeatability} um"),
+                format!("indexing repeatability of axis {name} is {} um", Plain(repeatability)),
                 "it is a standard deviation: 0 or more",
             );
         }
@@ -387,15 +427,25 @@ impl Check<'_> {
     }
 
     /// From an end (workpiece or tool) down to the base; the answer begins at the base.
-    fn chain(&mut self, machine: &str, loose: &[Loose], end: &toml::Spanned<String>, side: Side) -> Vec<Axis> {
+    fn chain(
+        &mut self,
+        machine: &str,
+        loose: &[Loose],
+        refused: &[String],
+        end: &toml::Spanned<String>,
+        side: Side,
+    ) -> Vec<Axis> {
         let mut out: Vec<Axis> = Vec::new();
         let (mut word, mut span) = (end.get_ref().clone(), end.span());
         while word != "base" {
+            if refused.contains(&word) {
+                break;
+            }
             let Some(found) = loose.iter().find(|l| l.axis.name.to_string() == word) else {
                 self.error(
                     &span,
                     "machine::unknown_parent",
-                    format!("parent {word:?} is no (usable) axis of {machine:?}"),
+                    format!("parent {word:?} is no axis of {machine:?}"),
                     "a parent is \"base\" or the letter of an axis of this machine",
                 );
                 break;
@@ -430,13 +480,48 @@ impl Check<'_> {
         }
     }
 
-    fn finite3(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Vector3<f64>> {
-        if v.iter().all(|x| x.is_finite()) {
-            Some(v.into())
-        } else {
-            self.error(span, "machine::not_finite", format!("{what} is {v:?}"), "write three finite numbers");
-            None
+    /// Every pair of linear axes, in the order of their letters.
+    fn linear_axes_square(&mut self, machine: &str, loose: &[Loose]) {
+        for (i, a) in loose.iter().enumerate().filter(|(_, a)| !a.axis.name.is_rotary()) {
+            for b in loose[..i].iter().filter(|b| !b.axis.name.is_rotary() && b.axis.name != a.axis.name) {
+                let off = crate::units::deg_from_rad(a.axis.direction.dot(&b.axis.direction).clamp(-1.0, 1.0).asin());
+                if off.abs() > LARGEST_SQUARENESS_DEG {
+                    self.findings.push(
+                        Finding::warning(
+                            "machine::not_square",
+                            format!(
+                                "axes {} and {} of {machine:?} are {:.3} degrees off square",
+                                b.axis.name,
+                                a.axis.name,
+                                off.abs()
+                            ),
+                        )
+                        .help(
+                            "write the axes as they are meant to be, square to each other: that they are not quite is \
+                             an error to be identified, not a part of the description",
+                        )
+                        .at(self.source, a.span.clone()),
+                    );
+                }
+            }
         }
+    }
+
+    fn finite3(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Vector3<f64>> {
+        if !v.iter().all(|x| x.is_finite()) {
+            self.error(span, "machine::not_finite", format!("{what} is {v:?}"), "write three finite numbers");
+            return None;
+        }
+        if v.iter().any(|x| x.abs() > LARGEST) {
+            self.error(
+                span,
+                "machine::too_large",
+                format!("{what} is {v:?}"),
+                format!("write millimetres in R, up to {LARGEST}"),
+            );
+            return None;
+        }
+        Some(v.into())
     }
 
     fn direction(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Unit<Vector3<f64>>> {
@@ -461,7 +546,7 @@ impl Check<'_> {
             self.error(
                 &t.length.span(),
                 "machine::tool_length",
-                format!("tool length of {machine:?} is {length} mm"),
+                format!("tool length of {machine:?} is {} mm", Plain(length)),
                 "from the pivot to the ball's centre, more than 0",
             );
         }
@@ -501,7 +586,7 @@ impl Check<'_> {
                 self.error(
                     &probe.span(),
                     "machine::probe",
-                    format!("{field} of the probe of {machine:?} is {value}"),
+                    format!("{field} of the probe of {machine:?} is {}", Plain(value)),
                     "write a number greater than 0",
                 );
             }
@@ -512,7 +597,8 @@ impl Check<'_> {
                 "machine::probe",
                 format!(
                     "the stem of {machine:?} (radius {} mm) is not thinner than the ball ({} mm)",
-                    p.stem_radius, p.ball_radius
+                    Plain(p.stem_radius),
+                    Plain(p.ball_radius)
                 ),
                 "check the two radii: the ball must touch first",
             );
@@ -523,7 +609,8 @@ impl Check<'_> {
                 "machine::overtravel",
                 format!(
                     "a search ends {} mm past the nominal contact, the probe of {machine:?} can be pushed {} mm",
-                    p.search, p.overtravel
+                    Plain(p.search),
+                    Plain(p.overtravel)
                 ),
                 "lower search, or correct overtravel from the probe's data sheet",
             );
@@ -534,7 +621,7 @@ impl Check<'_> {
                 "machine::placement_tolerance",
                 format!(
                     "placement tolerance {} mm of {machine:?} is larger than approach or search",
-                    p.placement_tolerance
+                    Plain(p.placement_tolerance)
                 ),
                 "a block within the tolerance must be met by the search",
             );
@@ -543,7 +630,11 @@ impl Check<'_> {
             self.error(
                 &probe.span(),
                 "machine::back_off",
-                format!("back_off {} mm of {machine:?} is not less than approach {} mm", p.back_off, p.approach),
+                format!(
+                    "back_off {} mm of {machine:?} is not less than approach {} mm",
+                    Plain(p.back_off),
+                    Plain(p.approach)
+                ),
                 "the ball must stay within the cleared approach",
             );
         }
@@ -551,34 +642,42 @@ impl Check<'_> {
             self.error(
                 &probe.span(),
                 "machine::feed",
-                format!("slow_feed {} is above fast_feed {}", p.slow_feed, p.fast_feed),
+                format!("slow_feed {} is above fast_feed {}", Plain(p.slow_feed), Plain(p.fast_feed)),
                 "swap the two feeds",
             );
         }
     }
 
-    fn solid(&mut self, machine: &str, s: &w::Solid, carriers: &dyn Fn(&str) -> Option<Carrier>) -> Option<Solid> {
+    fn solid(&mut self, machine: &str, s: &w::Solid, carriers: &Carriers) -> Option<Solid> {
         let name = s.name.get_ref();
         let carrier = self.carrier(machine, name, &s.carrier, carriers);
         let shape = match (s.cuboid, s.cylinder) {
             (Some(b), None)
-                if b.size.iter().all(|x| x.is_finite() && *x > 0.0) && b.centre.iter().all(|x| x.is_finite()) =>
+                if b.size.iter().all(|x| *x <= LARGEST && *x > 0.0) && b.centre.iter().all(|x| x.abs() <= LARGEST) =>
             {
                 Some(Shape::Box { centre: b.centre.into(), size: b.size.into() })
             }
             (None, Some(c))
                 if c.radius > 0.0
                     && c.height > 0.0
-                    && c.radius.is_finite()
-                    && c.height.is_finite()
-                    && c.foot.iter().all(|x| x.is_finite()) =>
+                    && c.radius <= LARGEST
+                    && c.height <= LARGEST
+                    && c.foot.iter().all(|x| x.abs() <= LARGEST) =>
             {
                 self.direction(&s.name.span(), "direction of the cylinder", c.direction).map(|direction| {
                     Shape::Cylinder { foot: c.foot.into(), direction, radius: c.radius, height: c.height }
                 })
             }
             _ => {
-                self.error(&s.name.span(), "machine::shape", format!("solid {name:?} of {machine:?} has no usable shape"), "give either box = { centre, size } or cylinder = { foot, direction, radius, height }, with positive sizes");
+                self.error(
+                    &s.name.span(),
+                    "machine::shape",
+                    format!("solid {name:?} of {machine:?} has no usable shape"),
+                    format!(
+                        "give either box = {{ centre, size }} or cylinder = {{ foot, direction, radius, height }}, \
+                         with positive sizes and no number above {LARGEST} mm"
+                    ),
+                );
                 None
             }
         };
@@ -590,10 +689,10 @@ impl Check<'_> {
         machine: &str,
         what: &str,
         word: &toml::Spanned<String>,
-        carriers: &dyn Fn(&str) -> Option<Carrier>,
+        carriers: &Carriers,
     ) -> Option<Carrier> {
-        let found = carriers(word.get_ref());
-        if found.is_none() {
+        let found = (carriers.of)(word.get_ref());
+        if found.is_none() && !carriers.cut {
             self.error(
                 &word.span(),
                 "machine::carrier",
@@ -607,13 +706,18 @@ impl Check<'_> {
         found
     }
 
-    fn mounting(
-        &mut self,
-        machine: &str,
-        x: &w::Mounting,
-        carriers: &dyn Fn(&str) -> Option<Carrier>,
-    ) -> Option<Mounting> {
+    fn mounting(&mut self, machine: &str, x: &w::Mounting, carriers: &Carriers) -> Option<Mounting> {
         let name = x.name.get_ref();
+        if x.carrier.get_ref() == "base" {
+            self.error(
+                &x.carrier.span(),
+                "machine::block_carrier",
+                format!("mounting {name:?} of {machine:?} is carried by \"base\", which bears solids but no blocks"),
+                "write \"table\": on a machine without a linear axis on the workpiece side that is what stands on the \
+                 base",
+            );
+            return None;
+        }
         let carrier = self.carrier(machine, name, &x.carrier, carriers)?;
         let mut solids: Vec<Solid> = x.solid.iter().filter_map(|s| self.solid(machine, s, carriers)).collect();
         let mut blocks: Vec<Block> = Vec::new();
@@ -629,23 +733,38 @@ impl Check<'_> {
             }
             let centre = self.finite3(&b.centre.span(), &format!("centre of block {block:?}"), *b.centre.get_ref())?;
             let size = *b.size.get_ref();
-            if !size.iter().all(|s| s.is_finite() && *s > 0.0) {
+            if !size.iter().all(|s| *s <= LARGEST && *s > 0.0) {
                 self.error(
                     &b.size.span(),
                     "machine::block_size",
                     format!("size of block {block:?} is {size:?}"),
-                    "write three edges in mm, more than 0",
+                    format!("write three edges in mm, more than 0 and up to {LARGEST}"),
                 );
                 continue;
             }
+            let size = Vector3::from(size);
+            // blocks may touch, not stand in each other
+            let within = |o: &Block| ((o.size + size) / 2.0 - (o.centre - centre).abs()).min();
+            if let Some(other) = blocks.iter().find(|o| within(o) > 1e-6) {
+                self.error(
+                    &b.centre.span(),
+                    "machine::blocks_overlap",
+                    format!(
+                        "blocks {:?} and {block:?} of mounting {name:?} stand {:.3} mm in each other",
+                        other.name,
+                        within(other)
+                    ),
+                    "check the two centres and sizes",
+                );
+            }
             let riser = b.riser.or(x.riser);
             if let Some(r) = riser {
-                if !(r.height > 0.0 && r.size.iter().all(|s| *s > 0.0)) {
+                if !(r.height > 0.0 && r.height <= LARGEST && r.size.iter().all(|s| *s > 0.0 && *s <= LARGEST)) {
                     self.error(
                         &b.name.span(),
                         "machine::riser",
-                        format!("riser of block {block:?} has no size"),
-                        "write height and size in mm, more than 0",
+                        format!("riser of block {block:?} has no usable size"),
+                        format!("write height and size in mm, more than 0 and up to {LARGEST}"),
                     );
                 }
                 let mut under = centre;
@@ -656,7 +775,7 @@ impl Check<'_> {
                     shape: Shape::Box { centre: under, size: Vector3::new(r.size[0], r.size[1], r.height) },
                 });
             }
-            blocks.push(Block { name: block.clone(), centre, size: size.into(), riser });
+            blocks.push(Block { name: block.clone(), centre, size, riser });
         }
         if blocks.is_empty() {
             self.error(
@@ -668,6 +787,13 @@ impl Check<'_> {
         }
         Some(Mounting { name: name.clone(), says: x.says.clone(), carrier, blocks, solids })
     }
+}
+
+/// What can bear a solid or a mounting.
+struct Carriers<'a> {
+    of: &'a dyn Fn(&str) -> Option<Carrier>,
+    /// An axis was refused, so the chain may lack axes that the file has: a missing carrier is not worth saying.
+    cut: bool,
 }
 
 struct HexDigest(Vec<u8>);
@@ -695,5 +821,57 @@ mod tests {
         let text = crate::machine::BUILT_IN.replacen("origin = { X = 0.0", "origin = { X = 100.0", 1);
         let (machines, _) = super::load(&source("machines.toml", text)).unwrap();
         assert_eq!(machines[0].axis(AxisName::X).unwrap().range, [-550.0, 350.0]);
+    }
+
+    /// Codes of what is wrong with the built-in machines when `from` is written as `to`, once.
+    fn codes(from: &str, to: &str) -> Vec<&'static str> {
+        let text = crate::machine::BUILT_IN.replacen(from, to, 1);
+        assert_ne!(text, crate::machine::BUILT_IN, "{from}");
+        match super::load(&source("m.toml", text)) {
+            Ok((_, findings)) => findings.0.iter().map(|f| f.code).collect(),
+            Err(failure) => failure.0.iter().map(|f| f.code).collect(),
+        }
+    }
+
+    #[test]
+    fn one_slip_is_one_finding() {
+        let range = "range = [-450.0, 450.0]";
+        let cases = [
+            (range, "range = [-1e300, 1e300]", "machine::too_large"),
+            (range, "range = [450.0, -450.0]", "machine::range"),
+            ("direction = [1.0, 0.0, 0.0]", "direction = [0.0, 0.0, 0.0]", "machine::zero_direction"),
+            ("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.005, 0.0]", "machine::not_square"),
+            ("origin = { X = 0.0", "origin = { X = 1e7", "machine::too_large"),
+            ("pivot = [0.0, 0.0, 0.0]", "pivot = [1e7, 0.0, 0.0]", "machine::too_large"),
+            ("carrier = \"table\"\nriser", "carrier = \"base\"\nriser", "machine::block_carrier"),
+        ];
+        for (from, to, code) in cases {
+            assert_eq!(codes(from, to), [code], "{to}");
+        }
+    }
+
+    #[test]
+    fn a_direction_a_little_off_square_is_left_alone() {
+        assert_eq!(codes("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.001, 0.0]"), [] as [&str; 0]);
+    }
+
+    #[test]
+    fn blocks_may_touch_but_not_overlap() {
+        let block = |x: f64| {
+            format!(
+                "[[machine.mounting.block]]\nname = \"more\"\ncentre = [{x:?}, 0.0, 900.0]\nsize = [10.0, 10.0, 10.0]\n"
+            )
+        };
+        let at = "[[machine.mounting.block]]";
+        let two = |gap: f64| format!("{}{}{at}", block(0.0), block(gap).replace("more", "less"));
+        assert_eq!(codes(at, &two(9.0)), ["machine::blocks_overlap"]);
+        assert_eq!(codes(at, &two(10.0)), [] as [&str; 0]);
+    }
+
+    #[test]
+    fn numbers_of_another_world_are_said_shortly() {
+        let text = crate::machine::BUILT_IN.replacen("range = [-450.0, 450.0]", "range = [-1e300, 1e300]", 1);
+        let failure = super::load(&source("m.toml", text)).unwrap_err();
+        assert!(failure.to_string().ends_with("range of axis X is [-1e300, 1e300]"), "{failure}");
     }
 }

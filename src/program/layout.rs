@@ -6,6 +6,7 @@ use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, SetupSp
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Finding, Findings, Result};
 use crate::machine::{Block, Machine, Mounting};
+use crate::units::Plain;
 use nalgebra::{Rotation3, Vector3};
 
 /// A point that is to be touched, in the carrier's frame, mm.
@@ -133,7 +134,12 @@ impl<'a> Check<'a> {
                 self.error(
                     &spec.pose,
                     "program::pose_outside",
-                    format!("{} = {angle} deg is outside the range of {} ({low} … {high})", axis.name, machine.name),
+                    format!(
+                        "{} = {} deg is outside the range of {} ({low} … {high})",
+                        axis.name,
+                        Plain(angle),
+                        machine.name
+                    ),
                     "choose an angle inside the range, or correct the range in the machine's file".to_owned(),
                 );
             }
@@ -181,10 +187,19 @@ impl<'a> Check<'a> {
         let (u, v) = face.tangents();
         let along = [face.normal(), u, v].map(|d| axis_of(&(to_carrier * d)));
         let [Some(normal), Some(u), Some(v)] = along else {
+            let message = match along[0] {
+                None => format!("no face of block {:?} looks along machine {face} in this pose", block.name),
+                Some(own) => format!(
+                    "face {} of block {:?} looks along machine {face} in this pose, but its edges do not run along \
+                     machine directions: the grid cannot be laid on it",
+                    Face::from_normal(&own),
+                    block.name
+                ),
+            };
             self.error(
                 &named.face,
                 "program::skew_face",
-                format!("no face of block {:?} looks along machine {face} in this pose", block.name),
+                message,
                 "name faces in machine directions only where the carrier stands at a multiple of 90 degrees, \
                  else write faces_in = \"block\""
                     .to_owned(),
@@ -200,10 +215,11 @@ impl<'a> Check<'a> {
             };
             let to_edge = (half(&u) - along_u.abs()).min(half(&v) - along_v.abs());
             if to_edge < 0.0 {
+                let past = if to_edge < -1e9 { format!("{:e}", -to_edge) } else { format!("{:.3}", -to_edge) };
                 self.error(
                     &named.grid,
                     "program::off_face",
-                    format!("grid {:?} reaches {:.3} mm past the edge of face {face}", named.grid.value, -to_edge),
+                    format!("grid {:?} reaches {past} mm past the edge of face {face}", named.grid.value),
                     format!("block {:?} measures {:?} mm: keep the points on it", block.name, block.size.as_slice()),
                 );
                 continue;

@@ -25,23 +25,29 @@ pub fn built_in() -> Result<Vec<ProgramSpec>> {
 }
 
 /// Chooses the program of a name for a machine: the one that was written for it, else the only one that names no axis
-/// which the machine lacks and whose mounting it has.
+/// which the machine lacks and whose mounting and blocks it has.
 ///
 /// # Errors
 /// When there is none, or several fit; the message lists what there is.
 pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &Machine) -> Result<ProgramSpec> {
     let mut names: Vec<String> = specs.iter().map(|s| s.name.clone()).collect();
     names.dedup();
-    let named: Vec<ProgramSpec> = specs.into_iter().filter(|s| s.name == name).collect();
-    if named.is_empty() {
+    if !specs.iter().any(|s| s.name == name) {
         return Err(Failure::new("program::unknown", format!("no program is called {name:?}"))
             .help(format!("there are: {}; a file of your own goes with --program FILE.toml", names.join(", "))));
     }
+    let for_it: Vec<String> = specs_for(machine, &specs);
+    let named: Vec<ProgramSpec> = specs.into_iter().filter(|s| s.name == name).collect();
     let written_for: Vec<String> = named.iter().filter_map(|s| s.machine.as_ref().map(|m| m.value.clone())).collect();
     let written_for_it = |s: &ProgramSpec| s.machine.as_ref().is_none_or(|m| m.value == machine.name);
     let fits = |s: &ProgramSpec| {
-        machine.mounting(&s.mounting.value).is_some()
-            && s.setups.iter().all(|x| x.pose.value.iter().all(|(a, _)| machine.axis(a).is_some()))
+        machine.mounting(&s.mounting.value).is_some_and(|mounting| {
+            let has_block = |name: &String| mounting.blocks.iter().any(|b| &b.name == name);
+            s.setups.iter().all(|x| {
+                x.pose.value.iter().all(|(a, _)| machine.axis(a).is_some())
+                    && x.blocks.iter().flatten().all(|b| has_block(&b.value))
+            })
+        })
     };
     if let Some(spec) = named.iter().find(|s| written_for_it(s)) {
         return Ok(spec.clone());
@@ -51,10 +57,25 @@ pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &Machine) -> Result<
         (Some(only), None) => Ok(only),
         _ => Err(Failure::new(
             "program::other_machine",
-            format!("program {name:?} is written for {}, not for {}", written_for.join(", "), machine.name),
+            format!(
+                "program {name:?} is written for {}, not for {}{}",
+                written_for.join(", "),
+                machine.name,
+                if for_it.is_empty() {
+                    String::new()
+                } else {
+                    format!("; for {} there are: {}", machine.name, for_it.join(", "))
+                }
+            ),
         )
         .help(
             "`axiscal programs` lists which program is for which machine; copy the nearest one and adapt it to yours",
         )),
     }
+}
+
+/// Names of the programs that were written for a machine.
+fn specs_for(machine: &Machine, specs: &[ProgramSpec]) -> Vec<String> {
+    let written_for_it = |s: &&ProgramSpec| s.machine.as_ref().is_some_and(|m| m.value == machine.name);
+    specs.iter().filter(written_for_it).map(|s| s.name.clone()).collect()
 }

@@ -5,6 +5,7 @@
 use super::as_written::{self as w, FacesIn};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use crate::units::Plain;
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -210,7 +211,7 @@ impl Check<'_> {
             self.error(
                 o.span(),
                 "program::overshoot",
-                format!("overshoot_deg is {overshoot_deg}"),
+                format!("overshoot_deg is {}", Plain(overshoot_deg)),
                 "write an angle above 0 and up to 90",
             );
         }
@@ -320,7 +321,7 @@ impl Check<'_> {
             self.error(
                 feed.span(),
                 "program::feed",
-                format!("feed is {} mm/min", feed.get_ref()),
+                format!("feed is {} mm/min", Plain(*feed.get_ref())),
                 "write the feed of the measuring touch, more than 0",
             );
         }
@@ -328,7 +329,7 @@ impl Check<'_> {
             self.error(
                 angle.span(),
                 "program::spindle",
-                format!("the spindle is to be oriented to {} degrees", angle.get_ref()),
+                format!("the spindle is to be oriented to {} degrees", Plain(*angle.get_ref())),
                 "write an angle from -360 to 360",
             );
         }

@@ -79,18 +79,21 @@ pub fn run_with_progress(
     findings.finish(outcomes.into_iter().map(|o| o.raw).collect())
 }
 
+/// The first of many numbers, and how many more there are.
+fn some_of(ids: &[u64]) -> (String, String) {
+    const SHOWN: usize = 10;
+    let shown = ids.iter().take(SHOWN).map(u64::to_string).collect::<Vec<_>>().join(", ");
+    let more = if ids.len() > SHOWN { format!(" and {} more", ids.len() - SHOWN) } else { String::new() };
+    (shown, more)
+}
+
 /// One finding for each kind of remark, with the touches that it is about.
 fn remarks(mut findings: Findings, outcomes: &[Outcome]) -> Findings {
     let mut say = |kind: fn(&Remark) -> bool, code, what: &str, help: &str| {
-        let ids: Vec<String> = outcomes
-            .iter()
-            .filter(|o| o.remark.as_ref().is_some_and(kind))
-            .map(|o| o.raw.id.map_or_else(String::new, |id| id.to_string()))
-            .collect();
+        let ids: Vec<u64> =
+            outcomes.iter().filter(|o| o.remark.as_ref().is_some_and(kind)).filter_map(|o| o.raw.id).collect();
         if !ids.is_empty() {
-            const SHOWN: usize = 10;
-            let shown = ids.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
-            let more = if ids.len() > SHOWN { format!(" and {} more", ids.len() - SHOWN) } else { String::new() };
+            let (shown, more) = some_of(&ids);
             findings.push(Finding::warning(code, format!("{what}: touch {shown}{more}")).help(help));
         }
     };

@@ -92,6 +92,7 @@ pub fn bench<'a>(
     let mut senses = Senses::default();
     let mut visits = Visits::default();
     let mut touches = Vec::with_capacity(plan.touches.len());
+    let mut refused: BTreeMap<String, Vec<u64>> = BTreeMap::new();
     for (i, touch) in plan.touches.iter().enumerate() {
         match ready(machine, plan, scenario, &chain, touch) {
             Ok(mut ready) => {
@@ -105,11 +106,18 @@ pub fn bench<'a>(
                 ready.visit = visits.next(touch, plan, &ready);
                 touches.push(ready);
             }
-            Err(what) => findings.push(
-                Finding::error("simulate::touch", format!("touch {} cannot be made: {what}", touch.id))
-                    .help("make the plan again with `axiscal generate`"),
-            ),
+            Err(what) => refused.entry(what).or_default().push(touch.id),
         }
+    }
+    for (what, ids) in refused {
+        let (which, more) = super::some_of(&ids);
+        findings.push(
+            Finding::error(
+                "simulate::touch",
+                format!("{} touches cannot be made (touch {which}{more}): {what}", ids.len()),
+            )
+            .help("make the plan again with `axiscal generate`"),
+        );
     }
     let dice = Dice::new(scenario, plan, compensation.is_some());
     let rounding_mm = scenario.noise.rounding_mm;

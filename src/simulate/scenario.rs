@@ -7,6 +7,7 @@ use super::terms::Term;
 use crate::axes::AxisName;
 use crate::diag::{Failure, Findings, Result, Source};
 use crate::machine::Machine;
+use crate::units::Plain;
 
 pub use super::written::parse;
 
@@ -136,7 +137,10 @@ impl Scenario {
                     value: None,
                     code: "scenario::effect",
                     message: format!("no effect is called {id:?}"),
-                    help: format!("there are: {}", catalogue::ids(machine).join(", ")),
+                    help: format!(
+                        "did you mean {}? `axiscal effects` lists all",
+                        nearest(id, catalogue::ids(machine)).join(", ")
+                    ),
                 },
                 Refusal::NotHere(why) => Misfit {
                     value: None,
@@ -154,11 +158,16 @@ impl Scenario {
                 misfits.push(Misfit { value: Some(i), code, message, help });
             };
             let Some(row) = rows.iter().find(|r| r.is_called(value.name)) else {
-                let names: Vec<String> = rows.iter().map(Parameter::written).collect();
+                // those with the nearest names, as they are written
+                let near = nearest(value.name, rows.iter().map(|r| r.name.clone()).collect());
+                let names: Vec<String> =
+                    near.iter().filter_map(|n| rows.iter().find(|r| &r.name == n)).map(Parameter::written).collect();
+                let more = rows.len() - names.len();
+                let more = if more > 0 { format!(" and {more} more: `axiscal effects`") } else { String::new() };
                 bad(
                     "scenario::parameter",
                     format!("effect {id:?} has no parameter {:?}", value.name),
-                    format!("it has: {}", names.join(", ")),
+                    format!("it has: {}{more}", names.join(", ")),
                 );
                 continue;
             };
@@ -180,7 +189,7 @@ impl Scenario {
             if !value.value.is_finite() {
                 bad(
                     "scenario::value",
-                    format!("{} of {id:?} is {}, expected a finite number", row.name, value.value),
+                    format!("{} of {id:?} is {}, expected a finite number", row.name, Plain(value.value)),
                     "write a number".to_owned(),
                 );
             }
@@ -192,7 +201,7 @@ impl Scenario {
                 Role::Setting(_) if value.value > 0.0 => {}
                 Role::Setting(_) => bad(
                     "scenario::setting",
-                    format!("{} of {id:?} is {}, expected more than 0", row.name, value.value),
+                    format!("{} of {id:?} is {}, expected more than 0", row.name, Plain(value.value)),
                     "write a positive number".to_owned(),
                 ),
             }
@@ -255,6 +264,15 @@ impl Parameter {
         let aliases = vec![format!("{name}_h"), format!("{name}_mm")];
         Self { name: name.to_owned(), aliases, unit: Unit::One, role: Role::Setting(None) }
     }
+}
+
+/// Up to ten of the names, the likeliest meant first.
+fn nearest(word: &str, mut names: Vec<String>) -> Vec<String> {
+    const SHOWN: usize = 10;
+    let likeness = |name: &String| strsim::jaro_winkler(word, name);
+    names.sort_by(|a, b| likeness(b).total_cmp(&likeness(a)));
+    names.truncate(SHOWN);
+    names
 }
 
 /// The mounting and block names of a machine, for messages.

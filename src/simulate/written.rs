@@ -6,10 +6,22 @@ use super::scenario::{BlockError, Misfit, Scenario, Value, axis_named, blocks_of
 use super::terms::{Shape, Target, Term};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use crate::machine::Machine;
-use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
+use crate::units::{Plain, mm_from_um, rad_from_deg, ratio_from_ppm};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
+
+/// No scatter, order or length in µm is larger than this (1 m).
+const LARGEST_NUMBER: f64 = 1e6;
+
+/// A block that stands further off (1 m) stands on another machine.
+const LARGEST_SHIFT_MM: f64 = 1e3;
+
+/// A clock shows seconds since anything up to the year 1 (64e9 s ago).
+const CLOCK_S: [f64; 2] = [0.0, 1e11];
+
+/// A workshop, with room to play.
+const WEATHER_DEG_C: [f64; 2] = [-273.15, 1000.0];
 
 type Table<'a> = DeTable<'a>;
 type Node<'a> = Spanned<DeValue<'a>>;
@@ -142,15 +154,39 @@ impl Reader<'_> {
         }
     }
 
+    /// A number from `low` to `high`; `help` says what it is.
+    fn within(&mut self, node: &Node<'_>, name: &str, [low, high]: [f64; 2], help: &str) -> Option<f64> {
+        let value = self.number(node, name)?;
+        if (low..=high).contains(&value) {
+            return Some(value);
+        }
+        self.error(
+            node.span(),
+            "scenario::range",
+            format!("{name} is {}, expected {} to {}", Plain(value), Plain(low), Plain(high)),
+            help,
+        );
+        None
+    }
+
     fn not_negative(&mut self, node: &Node<'_>, name: &str) -> f64 {
         match self.number(node, name) {
+            Some(v) if v > LARGEST_NUMBER => {
+                self.error(
+                    node.span(),
+                    "scenario::range",
+                    format!("{name} is {}, expected up to {LARGEST_NUMBER}", Plain(v)),
+                    "is the unit the right one?",
+                );
+                0.0
+            }
             Some(v) if v >= 0.0 => v,
             Some(v) => {
                 self.error(
                     node.span(),
                     "scenario::negative",
-                    format!("{name} is {v}, expected 0 or more"),
-                    "it is a standard deviation or a share: write it without the sign",
+                    format!("{name} is {}, expected 0 or more", Plain(v)),
+                    "write it without the sign",
                 );
                 0.0
             }
@@ -158,7 +194,8 @@ impl Reader<'_> {
         }
     }
 
-    fn three(&mut self, node: &Node<'_>, name: &str) -> Vec3 {
+    /// Three numbers, none of them larger than `most`.
+    fn three(&mut self, node: &Node<'_>, name: &str, most: f64) -> Vec3 {
         let array = node.get_ref().as_array().filter(|a| a.len() == 3);
         let Some(array) = array else {
             self.error(
@@ -171,7 +208,7 @@ impl Reader<'_> {
         };
         let mut out = [0.0; 3];
         for (slot, element) in out.iter_mut().zip(array.iter()) {
-            *slot = self.number(element, name).unwrap_or(0.0);
+            *slot = self.within(element, name, [-most, most], "is the unit the right one?").unwrap_or(0.0);
         }
         out
     }
@@ -268,9 +305,9 @@ impl Reader<'_> {
             match &**key.get_ref() {
                 "mounting" => mounting = self.word(node, "mounting").map(|w| (w.to_owned(), node.span())),
                 "name" => name = self.word(node, "name").map(|w| (w.to_owned(), node.span())),
-                "shift" => block.shift_mm = self.three(node, "shift"),
-                "tilt" => block.tilt_rad = self.three(node, "tilt").map(rad_from_deg),
-                "size_um" => block.size_mm = self.three(node, "size_um").map(mm_from_um),
+                "shift" => block.shift_mm = self.three(node, "shift", LARGEST_SHIFT_MM),
+                "tilt" => block.tilt_rad = self.three(node, "tilt", 360.0).map(rad_from_deg),
+                "size_um" => block.size_mm = self.three(node, "size_um", LARGEST_NUMBER).map(mm_from_um),
                 other => self.unknown_key(key.span(), "block", other, "mounting, name, shift, tilt, size_um"),
             }
         }
@@ -373,7 +410,10 @@ impl Reader<'_> {
             match word {
                 "touch_um" => out.noise.touch_mm = mm_from_um(self.not_negative(node, word)),
                 "visit_um" => out.noise.visit_mm = mm_from_um(self.not_negative(node, word)),
-                "outlier_share" => out.noise.outlier_share = self.not_negative(node, word).min(1.0),
+                "outlier_share" => {
+                    let help = "it is the share of touches that are disturbed: 0.05 for 5 %";
+                    out.noise.outlier_share = self.within(node, word, [0.0, 1.0], help).unwrap_or(0.0);
+                }
                 "outlier_um" => out.noise.outlier_mm = mm_from_um(self.not_negative(node, word)),
                 "rounding_um" => out.noise.rounding_mm = mm_from_um(self.not_negative(node, word)),
                 other => self.unknown_key(
@@ -387,12 +427,13 @@ impl Reader<'_> {
     }
 
     fn time(&mut self, out: &mut Scenario, node: &Node<'_>) {
+        let clock = "seconds on the clock that the whole study shares, from 0 on";
         let Some(table) = self.table(node, "time") else { return };
         for (key, node) in in_order(table) {
             let word = &**key.get_ref();
             match word {
-                "started_s" => out.clock.started_s = self.number(node, word).unwrap_or(0.0),
-                "first_touch_s" => out.clock.first_touch_s = self.number(node, word),
+                "started_s" => out.clock.started_s = self.within(node, word, CLOCK_S, clock).unwrap_or(0.0),
+                "first_touch_s" => out.clock.first_touch_s = self.within(node, word, CLOCK_S, clock),
                 other => self.unknown_key(key.span(), "time", other, "started_s, first_touch_s"),
             }
         }
@@ -403,7 +444,8 @@ impl Reader<'_> {
         for (key, node) in in_order(table) {
             match &**key.get_ref() {
                 "constant_degC" => {
-                    out.temperature.extend(self.number(node, "constant_degC").map(|t| (0.0, t)));
+                    let degrees = self.within(node, "constant_degC", WEATHER_DEG_C, "degrees Celsius");
+                    out.temperature.extend(degrees.map(|t| (0.0, t)));
                 }
                 "profile" => {
                     let points: Vec<&Node<'_>> =
@@ -420,8 +462,10 @@ impl Reader<'_> {
                             );
                             continue;
                         };
-                        let (Some(h), Some(t)) = (self.number(hours, "hours"), self.number(degrees, "temperature"))
-                        else {
+                        let (Some(h), Some(t)) = (
+                            self.within(hours, "hours", [-LARGEST_NUMBER, LARGEST_NUMBER], "hours"),
+                            self.within(degrees, "temperature", WEATHER_DEG_C, "degrees Celsius"),
+                        ) else {
                             continue;
                         };
                         if out.temperature.last().is_some_and(|last| h <= last.0) {

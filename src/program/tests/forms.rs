@@ -89,11 +89,15 @@ fn machine_directions_need_a_square_carrier() {
     let failure = run(&text).unwrap_err();
     assert!(failure.to_string().contains("no face of block \"x+\" looks along machine +X"), "{failure}");
     assert_eq!(run(&text.replace("C = 30.0", "C = -90.0")).unwrap(), 1);
+    // the top face looks up at every C; only its edges do not run along X and Y
+    let failure = run(&text.replace("+X", "+Z").replace("C = 30.0", "C = 37.0")).unwrap_err();
+    assert!(failure.to_string().contains("face +Z of block \"x+\" looks along machine +Z"), "{failure}");
+    assert_eq!(run(&text.replace("+X", "+Z").replace("C = 30.0", "C = 90.0")).unwrap(), 1);
 }
 
 #[test]
 fn lengths_of_another_world_are_refused() {
-    let huge = BUILT_IN.replacen("range = [-450.0, 450.0]", "range = [-1e300, 1e300]", 1);
+    let huge = BUILT_IN.replacen("head_radius = ", "head_radius = 1e9 # ", 1);
     let machine = machine_of(&huge, "swivel-head");
     let (spec, _) = load(&source("mine.toml", GOOD)).unwrap();
     assert!(generate(&machine, &spec, &Options::default()).unwrap_err().to_string().contains("reaches"));

@@ -64,6 +64,12 @@ fn what_is_wrong_is_said_with_place_and_remedy() {
         ("[effects.block-slip]\ndx = 1", "scenario::effect_not_here", "s.toml:1:10"),
         ("[effects.warm-up]\nwx = 1\ntau = 0", "scenario::setting", "s.toml:3:1"),
         ("[noise]\ntouch_um = -1", "scenario::negative", "s.toml:2:12"),
+        ("[noise]\noutlier_share = 2", "scenario::range", "s.toml:2:17"),
+        ("[noise]\ntouch_um = 1e300", "scenario::range", "s.toml:2:12"),
+        ("[time]\nstarted_s = -5", "scenario::range", "s.toml:2:13"),
+        ("[time]\nfirst_touch_s = 1e300", "scenario::range", "s.toml:2:17"),
+        ("[temperature]\nconstant_degC = -300", "scenario::range", "s.toml:2:17"),
+        ("[[block]]\nmounting = \"head\"\nname = \"x-\"\nshift = [1e9, 0, 0]", "scenario::range", "s.toml:4:10"),
         ("[noise]\ntuch_um = 1", "scenario::unknown", "s.toml:2:1"),
         ("noise = 1", "scenario::table", "s.toml:1:9"),
         ("sed = 1", "scenario::unknown", "s.toml:1:1"),
@@ -83,6 +89,15 @@ fn what_is_wrong_is_said_with_place_and_remedy() {
         assert!(found.contains(&(code, Some(place.to_owned()))), "{text}: {found:?}");
         assert!(failure.0.iter().all(|f| f.help.is_some()), "{text}");
     }
+}
+
+#[test]
+fn an_unknown_effect_is_answered_with_the_nearest_names() {
+    let machine = machine_named("swivel-head");
+    let failure = parse_text("[effects.papr-haed]\na_BZ = 1", &machine).unwrap_err();
+    let help = failure.0[0].help.clone().unwrap();
+    assert!(help.starts_with("did you mean paper-head"), "{help}");
+    assert_eq!(help.matches(", ").count(), 9, "{help}");
 }
 
 #[test]
