@@ -11,14 +11,30 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[path = "linuxcnc/stops.rs"]
+mod stops;
+
 type Check = Result<(), String>;
 
 /// A name and what it does.
 type Case = (&'static str, fn() -> Check);
 
+/// A case that asserts: its panic is the reason.
+fn unpanicked(case: fn()) -> Check {
+    std::panic::catch_unwind(case).map_err(|e| match e.downcast::<String>() {
+        Ok(text) => *text,
+        Err(e) => e.downcast::<&str>().map_or_else(|_| "panicked".to_owned(), |text| (*text).to_owned()),
+    })
+}
+
 fn main() {
     let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let cases: [Case; 5] = [
+    let cases: [Case; 8] = [
+        ("rs274_accepts_every_program", || unpanicked(stops::rs274_accepts_every_program)),
+        ("it_stops_with_the_name_of_the_touch", || {
+            unpanicked(stops::it_stops_with_the_name_of_the_touch_and_gives_the_settings_back)
+        }),
+        ("it_can_be_started_again_at_a_set_up", || unpanicked(stops::it_can_be_started_again_at_a_set_up)),
         ("the_papers_order_head_compensate_table_compensate", the_papers_order),
         ("drawn_errors_and_displaced_blocks_in_one_study", drawn_errors),
         ("plain_servo_latch_with_pretravel_in_the_model", servo_latch),

@@ -140,7 +140,7 @@ impl Check<'_> {
             }
         }
         for (axis, value) in m.origin.iter() {
-            if !(value.abs() <= LARGEST) {
+            if value.is_nan() || value.abs() > LARGEST {
                 self.error(
                     &here,
                     "machine::too_large",

@@ -1,9 +1,7 @@
 //! How an emitted program behaves on a real LinuxCNC when something is wrong: it stops, names the touch, and leaves the
 //! user's own settings as they were. And that it can be started again at a set-up. Black box, like `linuxcnc.rs`.
 //!
-//! Needs LinuxCNC: runs when AXISCAL_LINUXCNC is set, says what it leaves out otherwise.
-// a panic in a test is a failure with its place
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+//! Cases of `tests/linuxcnc.rs`, which runs them one after the other.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -14,14 +12,6 @@ const USER: &str = "T1 M6\nG43.1 Z7\n#5381=1.5\n#5390=2.5\nG54\nG59.3\nG92 X1 Z2
 /// Everything of it that a program can read.
 const STATE: &str = "(LOG,%.6f#5220 #5210 #5211 #5213 #<_tool_offset> #5381 #5390 #<_metric> #<_absolute> #<_feed>)\n";
 
-fn wanted() -> bool {
-    let wanted = std::env::var_os("AXISCAL_LINUXCNC").is_some();
-    if !wanted {
-        println!("left out: this needs LinuxCNC; ./run-tests installs it and runs this");
-    }
-    wanted
-}
-
 fn tree() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -29,8 +19,7 @@ fn tree() -> &'static Path {
 /// `generate` into a new folder; the folder and the program's text.
 fn generate(machine: &str, program: &str, more: &[&str]) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
-    assert_cmd::Command::cargo_bin("axiscal")
-        .unwrap()
+    assert_cmd::Command::new(env!("CARGO_BIN_EXE_axiscal"))
         .args(["generate", "--machine", machine, "--program", program, "--controller", "linuxcnc", "--out"])
         .arg(folder.path())
         .args(more)
@@ -70,6 +59,17 @@ impl Outcome {
 
 /// Runs the paper's `head` program, changed, on a machine with this scenario.
 fn run(change: impl Fn(String) -> String, scenario: &str) -> Outcome {
+    let warp: u32 = std::env::var("AXISCAL_WARP").ok().and_then(|w| w.parse().ok()).unwrap_or(10);
+    let first = run_at(&change, scenario, warp);
+    // LinuxCNC itself can lose a race on a busy computer: no verdict on the program
+    if first.list("errors").contains("Queue is not empty after probing") {
+        run_at(&change, scenario, warp.div_ceil(4))
+    } else {
+        first
+    }
+}
+
+fn run_at(change: &impl Fn(String) -> String, scenario: &str, warp: u32) -> Outcome {
     let (keep, text) = generate("swivel-head", "head", &[]);
     let folder = keep.path().to_path_buf();
     std::fs::write(folder.join("head.ngc"), change(text)).unwrap();
@@ -79,7 +79,7 @@ fn run(change: impl Fn(String) -> String, scenario: &str) -> Outcome {
         .arg(tree().join("tests/linuxcnc/rig.py"))
         .args(["--machines".as_ref(), tree().join("machines.toml").as_os_str()])
         .args(["--machine", "swivel-head", "--no-solids"])
-        .args(["--warp", &std::env::var("AXISCAL_WARP").unwrap_or_else(|_| "10".into())])
+        .args(["--warp", &warp.to_string()])
         .args(["--plan".as_ref(), folder.join("head.plan.json").as_os_str()])
         .args(["--program".as_ref(), folder.join("head.ngc").as_os_str()])
         .args(["--scenario".as_ref(), folder.join("wrong.toml").as_os_str()])
@@ -96,11 +96,7 @@ fn moved(shift: [f64; 3]) -> String {
     format!("[[block]]\nname = \"x-\"\nshift = {shift:?}\n")
 }
 
-#[test]
-fn it_stops_with_the_name_of_the_touch_and_gives_the_settings_back() {
-    if !wanted() {
-        return;
-    }
+pub fn it_stops_with_the_name_of_the_touch_and_gives_the_settings_back() {
     let cases = [
         ([0.0, 0.0, -5.5], "touch 1, block x- face +Z: missed"),
         ([0.0, 0.0, 1.2], "block x- face +Z: the block stands -1.200 mm further along the approach"),
@@ -119,11 +115,7 @@ fn it_stops_with_the_name_of_the_touch_and_gives_the_settings_back() {
     }
 }
 
-#[test]
-fn it_can_be_started_again_at_a_set_up() {
-    if !wanted() {
-        return;
-    }
+pub fn it_can_be_started_again_at_a_set_up() {
     let again = |text: String| {
         let text = after_a_users_settings(&text);
         assert_eq!(text.matches("#<_axiscal_from> = 1\n").count(), 1);
@@ -140,13 +132,7 @@ fn it_can_be_started_again_at_a_set_up() {
     assert_eq!((log.lines().count(), last), (48 + 2, "E N202"));
 }
 
-#[test]
-fn rs274_accepts_every_program() {
-    let needed = std::env::var_os("AXISCAL_LINUXCNC").is_some();
-    if !needed && Command::new("rs274").arg("-h").output().is_err() {
-        println!("left out: rs274 comes with LinuxCNC; ./run-tests installs it and runs this");
-        return;
-    }
+pub fn rs274_accepts_every_program() {
     let programs = [
         ("swivel-head", "head", &[][..]),
         ("swivel-head", "table", &[]),
