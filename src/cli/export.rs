@@ -151,8 +151,11 @@ fn free_folder(out: &Path, loaded: &Loaded) -> Result<()> {
     }
     let used = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some());
     if used && !out.join("compensation.json").is_file() {
-        return Err(Failure::new("export::folder", format!("{} is not empty and holds no earlier export", out.display()))
-            .help("name an empty folder: an export is a set of files that belong together"));
+        return Err(Failure::new(
+            "export::folder",
+            format!("{} is not empty and holds no earlier export", out.display()),
+        )
+        .help("name an empty folder: an export is a set of files that belong together"));
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
+use crate::tables::linuxcnc;
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -57,6 +58,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     io.report(&findings);
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;
+    if args.tcp
+        && args.controller.as_deref() == Some(linuxcnc::CONTROLLER)
+        && let Err(why) = linuxcnc::stock::module_of(&machine)
+    {
+        return Err(Failure::new("generate::no_transformation", format!("{} cannot run under a transformation of LinuxCNC's own: {why}", machine.name))
+            .help("generate without --tcp: under the kinematics component that `export` writes, coordinates stay axis positions"));
+    }
     let options = Options { strict: args.strict, tcp: args.tcp };
     let (generated, findings) = program::generate(&machine, &spec, &options)?;
     let nc = post.program(&machine, &generated.plan, &generated.path)?;

@@ -80,7 +80,9 @@ pub fn read(
     if !touches.iter().any(|t| t.status == Status::Hit) {
         findings.push(
             Finding::error("log::no_hit", format!("{name} holds no touch of the plan at which the probe triggered"))
-                .help("is it the log of this program, and did the program run? the findings above say what was not used"),
+                .help(
+                    "is it the log of this program, and did the program run? the findings above say what was not used",
+                ),
         );
         return Err(Failure(findings.0));
     }

@@ -262,9 +262,15 @@ fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static
     let rule = comment.clone();
     env.add_filter("note", move |text: String| rule.note(&text));
     env.add_filter("words", |words: minijinja::Value| -> Result<String, minijinja::Error> {
+        // a mistyped name would make a motion line without words: a move that is not made
         let words: Result<Vec<String>, _> =
             words.try_iter()?.map(|w| w.get_attr("word").map(|word| word.to_string())).collect();
-        Ok(words?.join(" "))
+        let words = words?;
+        if words.is_empty() || words.iter().any(|w| w.is_empty() || w == "undefined") {
+            let what = "`words` was given nothing: is the name before it mistyped, or the move empty?";
+            return Err(minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what));
+        }
+        Ok(words.join(" "))
     });
     let rule = comment.clone();
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {

@@ -5,7 +5,7 @@ use super::plan::{PlanTouch, Skipped};
 use super::route::Routed;
 use super::spec::ProgramSpec;
 use crate::axes::{AxisMap, AxisName, Position};
-use crate::machine::{Block, Machine, Mounting};
+use crate::machine::{Block, Machine, Mounting, Side};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,7 +33,7 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
             "  each block within {} mm of its place, its faces along the machine's axes",
             probe.placement_tolerance
         ),
-        "  the first touch of each block stops the program where it stands outside of that".to_owned(),
+        "  a touch that is further off stops the program; the first of each block is made slowly".to_owned(),
         format!(
             "  probe with ball {} mm across, stem {} mm; {} mm from the pivot or gauge line to the ball's centre",
             2.0 * probe.ball_radius,
@@ -44,6 +44,11 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
         "Before the start:".to_owned(),
         "  probe in the spindle, spindle stopped, nothing that touches the stylus".to_owned(),
     ]);
+    lines.extend(sense_lines(machine, layout));
+    if !routed.skipped.is_empty() {
+        lines.push(format!("  {} touches of the program were left out: they cannot be reached", routed.skipped.len()));
+        lines.extend(losses(layout, &routed.touches, &routed.skipped).into_iter().map(|note| format!("    {note}")));
+    }
     if let Some(near) = &routed.path.start_near {
         lines.push(format!(
             "  turn the rotary axes to {}, within {} deg: not every angle is clear at the top",
@@ -66,6 +71,50 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
     }
     lines.retain(|l| !l.trim().is_empty());
     lines
+}
+
+/// How each rotary axis must turn: a machine that counts the other way would lay the stylus on the other side.
+fn sense_lines(machine: &Machine, layout: &Layout) -> Vec<String> {
+    let mut lines = Vec::new();
+    for axis in machine.rotary() {
+        let angles = layout.setups.iter().filter_map(|s| s.pose.get(axis.name));
+        // half a turn shows no sense
+        let Some(angle) =
+            angles.filter(|a| (a % 180.0).abs() > 1.0).max_by(|a, b| a.abs().min(90.0).total_cmp(&b.abs().min(90.0)))
+        else {
+            continue;
+        };
+        let mut at = Position::default();
+        at.set(axis.name, angle);
+        let turn = axis.motion(&at).rotation;
+        lines.push(if axis.side == Side::Tool {
+            format!(
+                "  check the sense: at {} {angle} the ball stands towards {} of the pivot",
+                axis.name,
+                towards(&(turn * -machine.tool.direction.into_inner()))
+            )
+        } else {
+            let across = if axis.direction.x.abs() > 0.9 { Vector3::y() } else { Vector3::x() };
+            format!(
+                "  check the sense: at {} {angle} what stood towards {} stands towards {}",
+                axis.name,
+                towards(&across),
+                towards(&(turn * across))
+            )
+        });
+    }
+    lines
+}
+
+/// A direction in words: +X, or between +X and -Z.
+fn towards(direction: &Vector3<f64>) -> String {
+    let words: Vec<String> = [AxisName::X, AxisName::Y, AxisName::Z]
+        .iter()
+        .zip(direction.iter())
+        .filter(|(_, d)| d.abs() > 0.2)
+        .map(|(a, d)| format!("{}{a}", if *d > 0.0 { "+" } else { "-" }))
+        .collect();
+    words.join(" ")
 }
 
 fn block_lines(machine: &Machine, mounting: &Mounting, block: &Block) -> Vec<String> {
