@@ -6,7 +6,7 @@
 //! must agree, and that is tested.
 //!
 //! A touch: the commanded position runs on the straight line from `start` to `end` ([`control`] turns it into axis
-//! positions), the chain says where ball and block really are ([`chain`], [`terms`]), [`contact`] finds where they
+//! positions), the chain says where ball and block really are (`chain`, `terms`), `contact` finds where they
 //! first meet, and pre-travel, lobing, latency and noise make the trigger that much later along the commanded line.
 
 pub mod catalogue;

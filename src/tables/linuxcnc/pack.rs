@@ -243,6 +243,16 @@ impl Packing<'_> {
                     Some(ini) => ini.home_offset.get(&joint).copied().unwrap_or(0.0),
                     None => active,
                 };
+                if self.options.ini.is_none() {
+                    let changed = plain(rounded(change));
+                    new.entry((1, joint)).or_default().push(format!(
+                        "# assumed: the old line is HOME_OFFSET = {} (no INI file was given); is it another one, add {changed} to it",
+                        plain(was)
+                    ));
+                    old.entry((1, joint))
+                        .or_default()
+                        .push("# assumed: put back the line that you replaced".to_owned());
+                }
                 new.entry((1, joint)).or_default().push(format!("HOME_OFFSET = {}", plain(rounded(was + change))));
                 old.entry((1, joint)).or_default().push(format!("HOME_OFFSET = {}", plain(was)));
             }
@@ -302,7 +312,10 @@ impl Packing<'_> {
                     (Some(file), _) => lines(file, "1").to_vec(),
                     (None, Some((file, kind))) => lines(file, kind).to_vec(),
                     (None, None) => {
-                        vec!["# take out the lines COMP_FILE and COMP_FILE_TYPE: there was no table".to_owned()]
+                        vec![
+                            "# take out the lines COMP_FILE and COMP_FILE_TYPE (assumed: there was no table before)"
+                                .to_owned(),
+                        ]
                     }
                 });
             }

@@ -25,7 +25,7 @@ pub const SUBROUTINE: &str = "axiscal_work_offset";
 /// The nine numbers reproduce the offset to this, mm: a hundredth of a micrometre.
 const CLOSE_ENOUGH: f64 = 1e-5;
 
-/// Offset of X, Y, Z as Σ c[i][j] f_i(first) f_j(second) with f = 1, cos, sin.
+/// Offset of X, Y, Z as `Σ c[i][j] f_i(first) f_j(second)` with f = 1, cos, sin.
 pub struct Offset<'a> {
     /// The rotary axes.
     pub axes: [&'a Axis; 2],
