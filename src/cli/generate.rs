@@ -1,12 +1,18 @@
 //! `axiscal generate`: the NC program and its plan, written only when the whole path is proven clear.
 
 use super::common::MachineArgs;
+use super::new::default_effects;
 use super::{Answer, Io};
 use crate::axes::AxisMap;
 use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
+use crate::fit;
+use crate::log::{Status, Touch};
 use crate::machine::Machine;
+use crate::model::catalogue::Catalogue;
+use crate::model::data::{Run, assemble};
 use crate::post::Postprocessor;
+use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
 use crate::tables::linuxcnc;
@@ -66,7 +72,15 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             .help("generate without --tcp: under the kinematics component that `export` writes, coordinates stay axis positions"));
     }
     let options = Options { strict: args.strict, tcp: args.tcp };
-    let (generated, findings) = program::generate(&machine, &spec, &options)?;
+    let (mut generated, findings) = program::generate(&machine, &spec, &options)?;
+    if !generated.plan.skipped.is_empty() {
+        let lost = lost_parameters(&machine, &spec, &generated.plan)?;
+        if !lost.is_empty() {
+            let note = format!("without the touches that were left out these cannot be told: {}", lost.join(", "));
+            generated.path.head.push(format!("  {note}"));
+            generated.plan.notes.push(note);
+        }
+    }
     let nc = post.program(&machine, &generated.plan, &generated.path)?;
     // the summary shows what was left out; with --json it goes to stderr, finding by finding
     let shown = |f: &&Finding| io.json || !matches!(f.code, "program::unreachable" | "program::lost");
@@ -79,6 +93,33 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     files::write_whole(&program_file, nc.text.as_bytes())?;
     summary(&machine, &post.name, &generated, [&program_file, &plan_file], io);
     Ok(Answer::Done)
+}
+
+/// Location errors that the whole program could tell, with blocks of unknown set-up, and the touches that are left cannot.
+fn lost_parameters(machine: &Machine, spec: &ProgramSpec, plan: &Plan) -> Result<Vec<String>> {
+    let catalogue = Catalogue::built_in()?;
+    let effects = default_effects(machine, false);
+    let unseen = |plan: &Plan| -> Result<Vec<String>> {
+        let touches: Vec<Touch> = plan
+            .touches
+            .iter()
+            .map(|t| Touch {
+                id: t.id,
+                position: t.nominal_position(),
+                status: Status::Hit,
+                time_s: None,
+                temperature_deg_c: None,
+                line: 0,
+            })
+            .collect();
+        let data = assemble(machine, &[Run { plan, touches: &touches, mounting: None, started_s: None }]);
+        let (model, seen) = fit::observe_plan(machine, &catalogue, &data, &effects)?;
+        let blind = |i: usize| seen.unseen.iter().any(|v| v[i].abs() > 1e-6);
+        Ok((0..model.n_unknowns()).filter(|i| blind(*i)).map(|i| model.unknowns[i].name.clone()).collect())
+    };
+    let before = unseen(&program::plan_without_path(machine, spec)?)?;
+    let after = unseen(plan)?;
+    Ok(after.into_iter().filter(|name| !before.contains(name) && !name.contains('@')).collect())
 }
 
 /// Refuses to write over a file that is read.
