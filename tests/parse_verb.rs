@@ -22,7 +22,7 @@ fn a_log_becomes_a_csv_that_reads_the_same() {
         .arg(&out)
         .assert()
         .success()
-        .stdout(predicate::str::contains("3 of 3 touches read, the run is complete"))
+        .stdout(predicate::str::contains("3 of 3 planned touches read; the log has its end line"))
         .stderr("");
     assert!(std::fs::read_to_string(&out).unwrap().starts_with("id,X,Y,Z,B,C,status\n1,28,0,8,0,0,hit\n"));
     let answer = |log: &str, controller: &str| -> Value {
@@ -69,7 +69,33 @@ fn warnings_leave_the_rest_usable_and_errors_write_nothing() {
 }
 
 #[test]
+fn the_last_line_says_what_was_read_and_how_the_log_ends() {
+    for (log, says) in [
+        ("good/probeopen.log", "3 of 3 planned touches read; a log of this form has no end line"),
+        ("bad/truncated.log", "2 of 3 planned touches read (1 NOT READ: the warnings say why); THE LOG IS CUT OFF"),
+        ("bad/nan.log", "2 of 3 planned touches read (1 NOT READ: the warnings say why); the log has its end line"),
+    ] {
+        let mut command = axiscal();
+        command.args(["parse", log, "--controller", "linuxcnc", "--plan", "t.plan.json"]);
+        command.assert().success().stdout(predicate::str::contains(says));
+    }
+    let mut command = axiscal();
+    command.args(["parse", "bad/nan.log", "--controller", "linuxcnc", "--plan", "t.plan.json"]);
+    let says = "1 of the plan's 3 touches are in the log, but their lines are not used (see above): 2";
+    command
+        .assert()
+        .success()
+        .stderr(predicate::str::contains(says).and(predicate::str::contains("not in the log").not()));
+}
+
+#[test]
 fn controllers_are_listed_and_shown_as_files_to_change() {
+    let listed = axiscal().args(["controllers", "--json"]).assert().success().get_output().stdout.clone();
+    let listed: Value = serde_json::from_slice(&listed).unwrap();
+    assert_eq!(
+        (&listed["format"], &listed["controllers"][0]["name"]),
+        (&"axiscal-controllers/1".into(), &"linuxcnc".into())
+    );
     axiscal().arg("controllers").assert().success().stdout(predicate::str::contains("linuxcnc"));
     let shown = axiscal().args(["controllers", "show", "linuxcnc"]).assert().success().get_output().stdout.clone();
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,6 @@
 use super::{Answer, Io};
 use crate::diag::Result;
 use crate::post::Postprocessor;
-use comfy_table::{Table, presets};
 
 /// Arguments of `controllers`.
 #[derive(Debug, clap::Args)]
@@ -29,14 +28,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     match &args.what {
         None => {
             let all = Postprocessor::built_in()?;
-            let mut table = Table::new();
-            table.load_style(presets::NOTHING);
+            let mut table = crate::report::fit::table(&["controller", "what it is"]);
             for post in &all {
                 table.add_row([&post.name, &post.says]);
             }
             io.say(table.to_string());
             io.say("`axiscal controllers show NAME > mine.toml` gives a file to change; use it with --controller mine.toml");
-            io.answer(&all.iter().map(facts).collect::<Vec<_>>());
+            io.answer(&serde_json::json!({
+                "format": "axiscal-controllers/1",
+                "controllers": all.iter().map(facts).collect::<Vec<_>>(),
+            }));
         }
         Some(What::Show { name }) => {
             let (post, findings) = Postprocessor::load_built_in_or_file(name)?;

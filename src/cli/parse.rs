@@ -5,7 +5,7 @@ use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::{Result, source};
 use crate::files;
-use crate::log::{self, MatchedLog, Status, Touch, Writer};
+use crate::log::{self, Ending, MatchedLog, Status, Touch, Writer};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
@@ -38,7 +38,9 @@ struct Parsed<'a> {
     format: &'static str,
     machine: &'a str,
     program: &'a str,
+    /// Every planned touch is read, and the log is not cut off.
     complete: bool,
+    end: String,
     runs: usize,
     planned: usize,
     hits: usize,
@@ -100,6 +102,7 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
         machine: &plan.machine,
         program: &plan.program,
         complete: read.complete,
+        end: end_says(read),
         runs: read.runs,
         planned: plan.touches.len(),
         hits,
@@ -122,7 +125,7 @@ struct Row<'a> {
 /// One row per stage and block: what was planned, what was touched, how far off the nominal contact.
 fn summary(plan: &Plan, read: &MatchedLog) -> String {
     let mut table =
-        crate::report::fit::table(&["stage", "block", "planned", "hit", "missed", "not in the log", "off nominal, mm"]);
+        crate::report::fit::table(&["stage", "block", "planned", "hit", "missed", "not read", "off nominal, mm"]);
     let mut rows: Vec<Row> = Vec::new();
     let by_id: std::collections::BTreeMap<u64, &Touch> = read.touches.iter().map(|t| (t.id, t)).collect();
     for planned in &plan.touches {
@@ -163,12 +166,23 @@ fn summary(plan: &Plan, read: &MatchedLog) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    let end = if read.complete { "the run is complete" } else { "THE RUN IS NOT COMPLETE" };
+    let (done, planned) = (read.touches.len(), plan.touches.len());
+    let lacks =
+        if done < planned { format!(" ({} NOT READ: the warnings say why)", planned - done) } else { String::new() };
     format!(
-        "{table}\nprogram {} on {}: {} of {} touches read, {end}",
+        "{table}\nprogram {} on {}: {done} of {planned} planned touches read{lacks}; {}",
         plan.program,
         plan.machine,
-        read.touches.len(),
-        plan.touches.len()
+        end_says(read)
     )
+}
+
+/// How the log ends: whether touches are lacking is another question.
+fn end_says(read: &MatchedLog) -> String {
+    match read.ending {
+        Ending::Line => "the log has its end line".to_owned(),
+        Ending::Later(setup) => format!("the log has its end line, but BEGINS AT SET-UP {setup}"),
+        Ending::CutOff => "THE LOG IS CUT OFF BEFORE ITS END, or the program was stopped".to_owned(),
+        Ending::Unmarked => "a log of this form has no end line".to_owned(),
+    }
 }

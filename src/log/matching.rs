@@ -1,5 +1,6 @@
 //! Raw touches → touches of the plan: by number where there is one, otherwise by place. What does not match is said.
 
+use super::parse::Rejected;
 use super::place::{Capped, Places};
 use super::rows;
 use super::swaps;
@@ -21,7 +22,7 @@ const POSE_ROOM_DEG: f64 = 0.5;
 /// # Errors
 /// When most touches cannot be this plan's: swapped columns, inches, another origin, another plan.
 pub fn match_to_plan(machine: &Machine, plan: &Plan, raw: Vec<RawTouch>) -> Result<(Vec<Touch>, Findings)> {
-    match_at(machine, plan, raw, &[Role::Search, Role::Release, Role::Measure], None)
+    match_at(machine, plan, raw, &[Role::Search, Role::Release, Role::Measure], None, &Rejected::default())
 }
 
 /// The same with places in the log for the findings, and the rows of one touch in a log of columns.
@@ -31,22 +32,25 @@ pub(super) fn match_at(
     raw: Vec<RawTouch>,
     per_touch: &[Role],
     places: Option<&Places<'_>>,
+    rejected: &Rejected,
 ) -> Result<(Vec<Touch>, Findings)> {
     let mut findings = Findings::default();
     let at = |finding: Finding, line: usize| match places {
         Some(places) => places.at_line(finding, line),
         None => Finding { message: format!("line {line}: {}", finding.message), ..finding },
     };
+    let mut rejected = rejected.clone();
     let raw = if raw.iter().any(|t| t.id.is_none()) {
-        let (numbered, row_findings) = rows::number(machine, plan, raw, per_touch, &at);
+        let (numbered, unclear, row_findings) = rows::number(machine, plan, raw, per_touch, &at);
         findings.0.extend(row_findings);
+        rejected.ids.extend(unclear);
         numbered
     } else {
         raw
     };
     let by_id: BTreeMap<u64, &PlanTouch> = plan.touches.iter().map(|t| (t.id, t)).collect();
     let mut unknown = Capped::default();
-    let mut twice = Capped::default();
+    let mut twice = Capped::few();
     let mut known: BTreeMap<u64, RawTouch> = BTreeMap::new();
     for touch in raw {
         let line = touch.line;
@@ -87,7 +91,10 @@ pub(super) fn match_at(
         findings.push(at(swaps::explain(machine, &pairs, bad), line));
         return findings.finish(Vec::new());
     }
-    let mut implausible = Capped::default();
+    if let Some(finding) = swaps::hint(machine, &pairs, &good) {
+        findings.push(finding);
+    }
+    let mut implausible = Capped::few();
     let mut touches = Vec::with_capacity(pairs.len());
     let mut missed = Capped::default();
     for ((planned, raw), good) in pairs.iter().zip(good) {
@@ -120,12 +127,7 @@ pub(super) fn match_at(
     let have: std::collections::BTreeSet<u64> = pairs.iter().map(|(t, _)| t.id).collect();
     let missing: Vec<u64> = plan.touches.iter().map(|t| t.id).filter(|id| !have.contains(id)).collect();
     if !missing.is_empty() {
-        let message = format!(
-            "{} of the plan's {} touches are not in the log: {}",
-            missing.len(),
-            plan.touches.len(),
-            ranges(&missing)
-        );
+        let message = not_read(&missing, plan.touches.len(), &rejected);
         findings.push(
             Finding::warning("log::missing", message)
                 .help("the rest is used; what can no longer be told from it, the fit will say"),
@@ -138,6 +140,28 @@ pub(super) fn match_at(
         );
     }
     findings.finish(touches)
+}
+
+/// Touches without a usable line: those whose line is there but was rejected, and those that are not there.
+fn not_read(missing: &[u64], planned: usize, rejected: &Rejected) -> String {
+    let (damaged, absent): (Vec<u64>, Vec<u64>) = missing.iter().partition(|id| rejected.ids.contains(id));
+    let mut parts = Vec::new();
+    if !damaged.is_empty() {
+        parts.push(format!(
+            "{} of the plan's {planned} touches are in the log, but their lines are not used (see above): {}",
+            damaged.len(),
+            ranges(&damaged)
+        ));
+    }
+    if !absent.is_empty() {
+        let unless = if rejected.unnamed { ", or only in lines that are not used (see above)" } else { "" };
+        parts.push(format!(
+            "{} of the plan's {planned} touches are not in the log{unless}: {}",
+            absent.len(),
+            ranges(&absent)
+        ));
+    }
+    parts.join("; ")
 }
 
 /// The axis positions of a touch; axes that the log lacks stand at the plan's pose.

@@ -16,7 +16,7 @@ pub mod touch;
 mod words;
 
 pub use matching::match_to_plan;
-pub use parse::{ParsedLog, parse};
+pub use parse::{Ending, ParsedLog, Rejected, parse};
 pub use record::LogHeader;
 pub use touch::{RawTouch, Status, Touch};
 
@@ -41,8 +41,10 @@ pub enum Writer<'a> {
 pub struct MatchedLog {
     /// In the order of the plan, each once; missed touches are among them.
     pub touches: Vec<Touch>,
-    /// The run came to its end (always true for a CSV).
+    /// Every touch of the plan is read, and the log is not cut off.
     pub complete: bool,
+    /// How the log ends.
+    pub ending: Ending,
     /// How many runs the log holds.
     pub runs: usize,
 }
@@ -64,7 +66,10 @@ pub fn read(
         Writer::Csv => {
             let (touches, findings) = csv::read(bytes, name)?;
             let per_touch = Vec::new();
-            (ParsedLog { touches, header: None, complete: true, columns: false, per_touch, runs: 1 }, findings)
+            let unnamed = findings.0.iter().any(|f| f.code == "log::not_understood");
+            let rejected = Rejected { ids: Vec::new(), unnamed };
+            let ending = Ending::Unmarked;
+            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: 1 }, findings)
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());
@@ -74,8 +79,9 @@ pub fn read(
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
-    let (touches, more) = matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places))
-        .map_err(|f| joined(&findings, f))?;
+    let (touches, more) =
+        matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places), &parsed.rejected)
+            .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
     if !touches.iter().any(|t| t.status == Status::Hit) {
         findings.push(
@@ -86,7 +92,8 @@ pub fn read(
         );
         return Err(Failure(findings.0));
     }
-    Ok((MatchedLog { touches, complete: parsed.complete, runs: parsed.runs }, findings))
+    let complete = touches.len() == plan.touches.len() && parsed.ending != Ending::CutOff;
+    Ok((MatchedLog { touches, complete, ending: parsed.ending, runs: parsed.runs }, findings))
 }
 
 /// Is this the log of the plan's program?

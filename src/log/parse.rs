@@ -2,7 +2,7 @@
 
 use super::lines::{Line, LineEnds, Lines, blanks};
 use super::place::{Capped, Places};
-use super::record::{LogHeader, Record, record, row};
+use super::record::{LogHeader, Record, named, record, row};
 use super::touch::RawTouch;
 use super::words::Fault;
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -16,14 +16,38 @@ pub struct ParsedLog {
     pub touches: Vec<RawTouch>,
     /// The head of that run.
     pub header: Option<LogHeader>,
-    /// The run came to its end.
-    pub complete: bool,
+    /// How the log ends.
+    pub ending: Ending,
+    /// Lines of that run that are not used.
+    pub rejected: Rejected,
     /// The log is nothing but columns: touches carry no number and hits look like misses.
     pub columns: bool,
     /// The rows of one touch, in order, in a log of columns.
     pub per_touch: Vec<Role>,
     /// How many runs the log holds.
     pub runs: usize,
+}
+
+/// How a log ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// With the line of its end, and it began with the first set-up.
+    Line,
+    /// With the line of its end, but it began with this later set-up.
+    Later(u64),
+    /// Without the line of its end.
+    CutOff,
+    /// A log of this form has no such line: columns, CSV.
+    Unmarked,
+}
+
+/// Lines that are not used because they are not understood.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Rejected {
+    /// Touches that such lines name.
+    pub ids: Vec<u64>,
+    /// There are some that name none.
+    pub unnamed: bool,
 }
 
 /// One run in a log.
@@ -50,6 +74,7 @@ pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLo
     let is_columns = post.log.columns.is_some() && looks_like_columns(lines.clone());
     let mut faults = Capped::default();
     let mut runs = vec![Run::default()];
+    let mut rejected: Vec<(Option<u64>, usize)> = Vec::new();
     for line in lines {
         let outcome = match post.log.columns.as_ref().filter(|_| is_columns) {
             Some(columns) => {
@@ -57,6 +82,14 @@ pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLo
             }
             None => record(line.bytes, line.number, &post.log),
         };
+        let unusable = match &outcome {
+            Ok(Record::Touch(_)) => !line.ended && (is_columns || post.log.check_word.is_none()),
+            Ok(_) => false,
+            Err(_) => is_columns || blanks(line.bytes).first().is_some_and(|b| b.eq_ignore_ascii_case(&b'P')),
+        };
+        if unusable {
+            rejected.push((named(line.bytes), line.number));
+        }
         match outcome {
             // without a check word a number that was cut may look whole
             Ok(Record::Touch(_)) if !line.ended && (is_columns || post.log.check_word.is_none()) => {
@@ -93,10 +126,27 @@ pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLo
         findings.push(places.at_line(finding, 1));
         return Err(Failure(findings.0));
     };
-    let complete = run.end.is_some() && run.header.as_ref().is_none_or(|h| h.setup <= 1);
+    let ending = match (&run.header, &run.end) {
+        _ if is_columns => Ending::Unmarked,
+        (_, None) => Ending::CutOff,
+        (Some(header), Some(_)) if header.setup > 1 => Ending::Later(header.setup),
+        _ => Ending::Line,
+    };
+    let first = run.header.as_ref().map_or(0, |h| h.line);
+    let last = run.end.map_or(usize::MAX, |(_, line)| line);
+    rejected.retain(|(_, line)| (first..=last).contains(line));
+    let unnamed = rejected.iter().any(|(id, _)| id.is_none());
+    let rejected = Rejected { ids: rejected.into_iter().filter_map(|(id, _)| id).collect(), unnamed };
     let per_touch = post.log.columns.as_ref().map(|c| c.per_touch.clone()).unwrap_or_default();
-    let parsed =
-        ParsedLog { touches: run.touches, header: run.header, complete, columns: is_columns, per_touch, runs: count };
+    let parsed = ParsedLog {
+        touches: run.touches,
+        header: run.header,
+        ending,
+        rejected,
+        columns: is_columns,
+        per_touch,
+        runs: count,
+    };
     findings.finish(parsed)
 }
 

@@ -59,19 +59,29 @@ impl<'a> Places<'a> {
 }
 
 /// Findings of one kind: the first few in full, the rest counted.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Capped {
     shown: Vec<Finding>,
     more: usize,
+    limit: usize,
+}
+
+impl Default for Capped {
+    fn default() -> Self {
+        Self { shown: Vec::new(), more: 0, limit: 20 }
+    }
 }
 
 impl Capped {
-    /// So many are shown.
-    pub const SHOWN: usize = 20;
+    /// For findings that come in floods and say the same: three are enough.
+    #[must_use]
+    pub fn few() -> Self {
+        Self { limit: 3, ..Self::default() }
+    }
 
     /// Adds one; `make` is called only when it will be shown.
     pub fn push(&mut self, make: impl FnOnce() -> Finding) {
-        if self.shown.len() < Self::SHOWN {
+        if self.shown.len() < self.limit {
             self.shown.push(make());
         } else {
             self.more += 1;

@@ -59,6 +59,14 @@ pub fn record(line: &[u8], line_number: usize, rule: &LogRule) -> Result<Record,
     }
 }
 
+/// The touch that a line names which is not understood as a whole; the line may be damaged there too.
+pub fn named(line: &[u8]) -> Option<u64> {
+    let rest = blanks(line).strip_prefix(b"P")?;
+    let at = rest.iter().position(|b| *b == b'N')?;
+    let (tail, n) = number(b'.')(&rest[at + 1..]).ok()?;
+    whole(n).filter(|_| tail.first().is_none_or(|b| *b == b' ' || *b == b'\t'))
+}
+
 /// A piece of a line for a message.
 fn show(bytes: &[u8]) -> String {
     let shown: String =

@@ -58,14 +58,14 @@ impl Search {
     }
 }
 
-/// Gives the measuring rows the numbers of their touches. `per_touch`: the rows of one touch, in order.
+/// Gives the measuring rows the numbers of their touches; and the touches whose rows are there but not clear. `per_touch`: the rows of one touch, in order.
 pub(super) fn number(
     machine: &Machine,
     plan: &Plan,
     raw: Vec<RawTouch>,
     per_touch: &[Role],
     at: &dyn Fn(Finding, usize) -> Finding,
-) -> (Vec<RawTouch>, Vec<Finding>) {
+) -> (Vec<RawTouch>, Vec<u64>, Vec<Finding>) {
     let searches: Vec<Search> = plan.touches.iter().map(Search::of).collect();
     let mut unmatched = Capped::default();
     let mut groups: Vec<Group> = Vec::new();
@@ -101,21 +101,25 @@ pub(super) fn number(
     let mut findings = unmatched.drain("rows at no touch", "log::unmatched");
     let mut unclear = Capped::default();
     let mut touches = Vec::new();
+    let mut not_clear = Vec::new();
     for group in groups {
         let search = &searches[group.first];
         let ids = plan.touches[group.first..].iter().take(group.count);
         match group.measured(search, machine, per_touch) {
             Ok(rows) => touches.extend(ids.zip(rows).map(|(t, row)| RawTouch { id: Some(t.id), ..row })),
-            Err(why) => unclear.push(|| {
+            Err(why) => {
                 let ids: Vec<u64> = ids.map(|t| t.id).collect();
-                let (first, last) = (group.first_line(), group.last_line());
-                let message = format!("lines {first} to {last}, touch {}: {why}; they are not used", ranges(&ids));
-                at(Finding::warning("log::ambiguous", message), first)
-            }),
+                not_clear.extend(&ids);
+                unclear.push(|| {
+                    let (first, last) = (group.first_line(), group.last_line());
+                    let message = format!("lines {first} to {last}, touch {}: {why}; they are not used", ranges(&ids));
+                    at(Finding::warning("log::ambiguous", message), first)
+                });
+            }
         }
     }
     findings.extend(unclear.drain("groups of rows that are not clear", "log::ambiguous"));
-    (touches, findings)
+    (touches, not_clear, findings)
 }
 
 /// Rows, one after the other, on the line of one search.

@@ -16,13 +16,39 @@ struct Mistake {
     undo: Box<dyn Fn(Position) -> Position>,
 }
 
+/// The finding where some touches (not most) lie far from their places and one simple mistake explains nearly all of them
+/// without harm to the rest: the sign of a rotary axis shows only in the poses where it is not 0.
+pub(super) fn hint(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], good: &[bool]) -> Option<Finding> {
+    let bad = good.iter().filter(|g| !**g).count();
+    if bad < 3 {
+        return None;
+    }
+    mistakes(machine).into_iter().find_map(|mistake| {
+        let right = |(planned, raw): &(&PlanTouch, RawTouch)| {
+            fits(machine, planned, &(mistake.undo)(whole(raw, planned)), raw.present)
+        };
+        let mended = pairs.iter().zip(good).filter(|(pair, good)| !**good && right(pair)).count();
+        let all = pairs.iter().filter(|pair| right(pair)).count();
+        (mended * 10 >= bad * 9 && all * 10 >= pairs.len() * 9).then(|| {
+            let message = format!(
+                "{bad} of {} touches are far from their places; {all} would be right if {}",
+                pairs.len(),
+                mistake.says
+            );
+            Finding::warning("log::swapped", message).help(mistake.help)
+        })
+    })
+}
+
+/// The axis positions of a touch; axes that the log lacks stand at the plan's pose.
+fn whole(raw: &RawTouch, planned: &PlanTouch) -> Position {
+    let mut position = planned.nominal_position();
+    AxisName::ALL.into_iter().filter(|a| raw.present[a.index()]).for_each(|a| position.set(a, raw.position.get(a)));
+    position
+}
+
 /// The finding for a log of which `bad` touches are not where the plan has them.
 pub(super) fn explain(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], bad: usize) -> Finding {
-    let whole = |raw: &RawTouch, planned: &PlanTouch| {
-        let mut position = planned.nominal_position();
-        AxisName::ALL.into_iter().filter(|a| raw.present[a.index()]).for_each(|a| position.set(a, raw.position.get(a)));
-        position
-    };
     for mistake in mistakes(machine).into_iter().chain(shift(pairs, whole)) {
         let good = pairs
             .iter()
