@@ -64,7 +64,8 @@ const SET_2: [(&str, f64); 5] =
 #[test]
 fn displacements_of_the_swivelling_head() {
     let machine = machine("swivel-head");
-    // the method, section 9: exact | first order
+    // the method, section 9: exact, first order
+    #[allow(clippy::type_complexity)] // a table
     let table: [(&[(&str, f64)], f64, [(f64, f64); 3]); 6] = [
         (&SET_1, 0.0, [(0.065356506, 0.065375031), (0.078074891, 0.078062547), (0.000010033, 0.0)]),
         (&SET_1, -90.0, [(0.029984565, 0.030000000), (0.095750060, 0.095750063), (0.035375031, 0.035375031)]),
