@@ -1,7 +1,8 @@
 //! From `machines.toml` as written to machines that can be relied on; all findings at once.
 
 use super::as_written::{self as w, AxisKind};
-use super::{Axis, Block, Carrier, Machine, Mounting, Reference, Shape, Side, Solid, Tool};
+use super::check_parts::Carriers;
+use super::{Axis, Carrier, Machine, Mounting, Reference, Side};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use crate::units::Plain;
 use nalgebra::{Unit, Vector3};
@@ -12,10 +13,10 @@ use std::ops::Range;
 const FORMAT: &str = "axiscal-machines/1";
 
 /// No coordinate is larger than this (100 m, or deg): more is a slip of the pen.
-const LARGEST: f64 = 1e5;
+pub(super) const LARGEST: f64 = 1e5;
 
 /// Two linear axes further off square than this are a slip of the pen, deg: real ones are off by some hundredths.
-const LARGEST_SQUARENESS_DEG: f64 = 0.1;
+pub(super) const LARGEST_SQUARENESS_DEG: f64 = 0.1;
 
 /// Reads and checks a machines file.
 ///
@@ -57,7 +58,7 @@ pub fn load(source: &Source) -> Result<(Vec<Machine>, Findings)> {
     check.findings.finish(machines)
 }
 
-struct Check<'a> {
+pub(super) struct Check<'a> {
     source: &'a Source,
     findings: Findings,
 }
@@ -70,7 +71,13 @@ struct Loose {
 }
 
 impl Check<'_> {
-    fn error(&mut self, span: &Range<usize>, code: &'static str, message: impl Into<String>, help: impl Into<String>) {
+    pub(super) fn error(
+        &mut self,
+        span: &Range<usize>,
+        code: &'static str,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
         self.findings.push(Finding::error(code, message).help(help).at(self.source, span.clone()));
     }
 
@@ -507,7 +514,7 @@ impl Check<'_> {
         }
     }
 
-    fn finite3(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Vector3<f64>> {
+    pub(super) fn finite3(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Vector3<f64>> {
         if !v.iter().all(|x| x.is_finite()) {
             self.error(span, "machine::not_finite", format!("{what} is {v:?}"), "write three finite numbers");
             return None;
@@ -524,7 +531,7 @@ impl Check<'_> {
         Some(v.into())
     }
 
-    fn direction(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Unit<Vector3<f64>>> {
+    pub(super) fn direction(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Unit<Vector3<f64>>> {
         let v = self.finite3(span, what, v)?;
         let unit = Unit::try_new(v, 1e-9);
         if unit.is_none() {
@@ -537,263 +544,6 @@ impl Check<'_> {
         }
         unit
     }
-
-    fn tool(&mut self, machine: &str, t: &w::Tool) -> Option<Tool> {
-        let direction = self.direction(&t.direction.span(), "direction of the tool", *t.direction.get_ref());
-        let pivot = self.finite3(&t.parent.span(), "pivot of the tool", t.pivot);
-        let length = *t.length.get_ref();
-        if !(length.is_finite() && length > 0.0) {
-            self.error(
-                &t.length.span(),
-                "machine::tool_length",
-                format!("tool length of {machine:?} is {} mm", Plain(length)),
-                "from the pivot to the ball's centre, more than 0",
-            );
-        }
-        if t.spindle_sense.abs() != 1 {
-            self.error(
-                &t.parent.span(),
-                "machine::sense",
-                format!("spindle_sense is {}, expected 1 or -1", t.spindle_sense),
-                "1: M19 counts right-handed about direction",
-            );
-        }
-        Some(Tool { pivot: pivot?, direction: direction?, length_mm: length, spindle_sense: t.spindle_sense as f64 })
-    }
-
-    fn probe(&mut self, machine: &str, probe: &toml::Spanned<w::Probe>) {
-        let p = probe.get_ref();
-        let positive = [
-            ("ball_radius", p.ball_radius),
-            ("stem_radius", p.stem_radius),
-            ("stem_length", p.stem_length),
-            ("body_radius", p.body_radius),
-            ("body_length", p.body_length),
-            ("head_radius", p.head_radius),
-            ("repeatability_um", p.repeatability_um),
-            ("overtravel", p.overtravel),
-            ("approach", p.approach),
-            ("search", p.search),
-            ("clearance", p.clearance),
-            ("placement_tolerance", p.placement_tolerance),
-            ("fast_feed", p.fast_feed),
-            ("slow_feed", p.slow_feed),
-            ("position_feed", p.position_feed),
-            ("back_off", p.back_off),
-        ];
-        for (field, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                self.error(
-                    &probe.span(),
-                    "machine::probe",
-                    format!("{field} of the probe of {machine:?} is {}", Plain(value)),
-                    "write a number greater than 0",
-                );
-            }
-        }
-        if p.stem_radius >= p.ball_radius {
-            self.error(
-                &probe.span(),
-                "machine::probe",
-                format!(
-                    "the stem of {machine:?} (radius {} mm) is not thinner than the ball ({} mm)",
-                    Plain(p.stem_radius),
-                    Plain(p.ball_radius)
-                ),
-                "check the two radii: the ball must touch first",
-            );
-        }
-        if p.search > p.overtravel {
-            self.error(
-                &probe.span(),
-                "machine::overtravel",
-                format!(
-                    "a search ends {} mm past the nominal contact, the probe of {machine:?} can be pushed {} mm",
-                    Plain(p.search),
-                    Plain(p.overtravel)
-                ),
-                "lower search, or correct overtravel from the probe's data sheet",
-            );
-        }
-        if p.placement_tolerance > p.approach.min(p.search) {
-            self.error(
-                &probe.span(),
-                "machine::placement_tolerance",
-                format!(
-                    "placement tolerance {} mm of {machine:?} is larger than approach or search",
-                    Plain(p.placement_tolerance)
-                ),
-                "a block within the tolerance must be met by the search",
-            );
-        }
-        if p.back_off >= p.approach {
-            self.error(
-                &probe.span(),
-                "machine::back_off",
-                format!(
-                    "back_off {} mm of {machine:?} is not less than approach {} mm",
-                    Plain(p.back_off),
-                    Plain(p.approach)
-                ),
-                "the ball must stay within the cleared approach",
-            );
-        }
-        if p.slow_feed > p.fast_feed {
-            self.error(
-                &probe.span(),
-                "machine::feed",
-                format!("slow_feed {} is above fast_feed {}", Plain(p.slow_feed), Plain(p.fast_feed)),
-                "swap the two feeds",
-            );
-        }
-    }
-
-    fn solid(&mut self, machine: &str, s: &w::Solid, carriers: &Carriers) -> Option<Solid> {
-        let name = s.name.get_ref();
-        let carrier = self.carrier(machine, name, &s.carrier, carriers);
-        let shape = match (s.cuboid, s.cylinder) {
-            (Some(b), None)
-                if b.size.iter().all(|x| *x <= LARGEST && *x > 0.0) && b.centre.iter().all(|x| x.abs() <= LARGEST) =>
-            {
-                Some(Shape::Box { centre: b.centre.into(), size: b.size.into() })
-            }
-            (None, Some(c))
-                if c.radius > 0.0
-                    && c.height > 0.0
-                    && c.radius <= LARGEST
-                    && c.height <= LARGEST
-                    && c.foot.iter().all(|x| x.abs() <= LARGEST) =>
-            {
-                self.direction(&s.name.span(), "direction of the cylinder", c.direction).map(|direction| {
-                    Shape::Cylinder { foot: c.foot.into(), direction, radius: c.radius, height: c.height }
-                })
-            }
-            _ => {
-                self.error(
-                    &s.name.span(),
-                    "machine::shape",
-                    format!("solid {name:?} of {machine:?} has no usable shape"),
-                    format!(
-                        "give either box = {{ centre, size }} or cylinder = {{ foot, direction, radius, height }}, \
-                         with positive sizes and no number above {LARGEST} mm"
-                    ),
-                );
-                None
-            }
-        };
-        Some(Solid { name: name.clone(), carrier: carrier?, shape: shape? })
-    }
-
-    fn carrier(
-        &mut self,
-        machine: &str,
-        what: &str,
-        word: &toml::Spanned<String>,
-        carriers: &Carriers,
-    ) -> Option<Carrier> {
-        let found = (carriers.of)(word.get_ref());
-        if found.is_none() && !carriers.cut {
-            self.error(
-                &word.span(),
-                "machine::carrier",
-                format!(
-                    "{what:?} of {machine:?} is carried by {:?}, which is no part of the workpiece side",
-                    word.get_ref()
-                ),
-                "write \"base\", \"table\" or the letter of an axis on the workpiece side",
-            );
-        }
-        found
-    }
-
-    fn mounting(&mut self, machine: &str, x: &w::Mounting, carriers: &Carriers) -> Option<Mounting> {
-        let name = x.name.get_ref();
-        if x.carrier.get_ref() == "base" {
-            self.error(
-                &x.carrier.span(),
-                "machine::block_carrier",
-                format!("mounting {name:?} of {machine:?} is carried by \"base\", which bears solids but no blocks"),
-                "write \"table\": on a machine without a linear axis on the workpiece side that is what stands on the \
-                 base",
-            );
-            return None;
-        }
-        let carrier = self.carrier(machine, name, &x.carrier, carriers)?;
-        let mut solids: Vec<Solid> = x.solid.iter().filter_map(|s| self.solid(machine, s, carriers)).collect();
-        let mut blocks: Vec<Block> = Vec::new();
-        for b in &x.block {
-            let block = b.name.get_ref();
-            if blocks.iter().any(|o| &o.name == block) {
-                self.error(
-                    &b.name.span(),
-                    "machine::block_twice",
-                    format!("block {block:?} stands twice in mounting {name:?}"),
-                    "give each block a name of its own",
-                );
-            }
-            let centre = self.finite3(&b.centre.span(), &format!("centre of block {block:?}"), *b.centre.get_ref())?;
-            let size = *b.size.get_ref();
-            if !size.iter().all(|s| *s <= LARGEST && *s > 0.0) {
-                self.error(
-                    &b.size.span(),
-                    "machine::block_size",
-                    format!("size of block {block:?} is {size:?}"),
-                    format!("write three edges in mm, more than 0 and up to {LARGEST}"),
-                );
-                continue;
-            }
-            let size = Vector3::from(size);
-            // blocks may touch, not stand in each other
-            let within = |o: &Block| ((o.size + size) / 2.0 - (o.centre - centre).abs()).min();
-            if let Some(other) = blocks.iter().find(|o| within(o) > 1e-6) {
-                self.error(
-                    &b.centre.span(),
-                    "machine::blocks_overlap",
-                    format!(
-                        "blocks {:?} and {block:?} of mounting {name:?} stand {:.3} mm in each other",
-                        other.name,
-                        within(other)
-                    ),
-                    "check the two centres and sizes",
-                );
-            }
-            let riser = b.riser.or(x.riser);
-            if let Some(r) = riser {
-                if !(r.height > 0.0 && r.height <= LARGEST && r.size.iter().all(|s| *s > 0.0 && *s <= LARGEST)) {
-                    self.error(
-                        &b.name.span(),
-                        "machine::riser",
-                        format!("riser of block {block:?} has no usable size"),
-                        format!("write height and size in mm, more than 0 and up to {LARGEST}"),
-                    );
-                }
-                let mut under = centre;
-                under.z -= size[2] / 2.0 + r.height / 2.0;
-                solids.push(Solid {
-                    name: format!("riser of {block}"),
-                    carrier,
-                    shape: Shape::Box { centre: under, size: Vector3::new(r.size[0], r.size[1], r.height) },
-                });
-            }
-            blocks.push(Block { name: block.clone(), centre, size, riser });
-        }
-        if blocks.is_empty() {
-            self.error(
-                &x.name.span(),
-                "machine::no_block",
-                format!("mounting {name:?} of {machine:?} has no block"),
-                "add [[machine.mounting.block]] tables",
-            );
-        }
-        Some(Mounting { name: name.clone(), says: x.says.clone(), carrier, blocks, solids })
-    }
-}
-
-/// What can bear a solid or a mounting.
-struct Carriers<'a> {
-    of: &'a dyn Fn(&str) -> Option<Carrier>,
-    /// An axis was refused, so the chain may lack axes that the file has: a missing carrier is not worth saying.
-    cut: bool,
 }
 
 struct HexDigest(Vec<u8>);

@@ -6,6 +6,7 @@
 
 pub mod as_written;
 mod check;
+mod check_parts;
 
 pub use check::load;
 

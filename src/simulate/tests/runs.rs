@@ -132,21 +132,3 @@ fn a_plan_that_does_not_fit_is_refused_with_its_touch() {
         assert!(failure.0[0].help.is_some());
     }
 }
-
-/// `cargo test --release simulate_speed -- --ignored --nocapture`
-#[test]
-#[ignore = "prints a rate; says nothing on a busy computer"]
-fn simulate_speed() {
-    let (machine, plan) = top_plan(200_000);
-    let scenario = Scenario::flawless()
-        .with_noise(mm_from_um(1.0), mm_from_um(0.5), 1)
-        .with(&machine, "paper-table", &[("a_CY", 0.01), ("d_xCY", 0.02)])
-        .and_then(|s| s.with(&machine, "paper-head", &[("a_BZ", 0.01), ("d_xBZ", 0.02)]))
-        .unwrap();
-    let moving = scenario.clone().with(&machine, "scale-x", &[("EXX", 10.0)]).unwrap();
-    for (what, scenario) in [("constant errors", scenario), ("errors along the axes", moving)] {
-        let begun = std::time::Instant::now();
-        let (raw, _) = run(&machine, &plan, &scenario, None).unwrap();
-        println!("{what}: {:.0} touches/s", raw.len() as f64 / begun.elapsed().as_secs_f64());
-    }
-}
