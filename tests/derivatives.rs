@@ -22,6 +22,8 @@ terms = [
   { parameter = "p3", unit = "um", dof = "dz", formula = "1 - exp(-t/tau)", at = "Z" },
   { parameter = "p4", unit = "mm", dof = "dx", formula = "cos(k*X)", at = "tool" },
   { parameter = "p5", unit = "mrad", dof = "rx", formula = "ny", at = "tool" },
+  { parameter = "p12", unit = "um/h", dof = "dy", formula = "t", at = "base" },
+  { parameter = "p13", unit = "urad", dof = "rx", formula = "nz", at = "base" },
   { parameter = "p6", unit = "um", dof = "dx", formula = "T - 20", at = "workpiece" },
   { parameter = "p7", unit = "urad", dof = "ry", formula = "1", at = "workpiece" },
   { parameter = "p8", unit = "um", dof = "r", formula = "mx^2 - my^2", at = "trigger" },

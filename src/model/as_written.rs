@@ -34,7 +34,7 @@ pub struct EffectAsWritten {
     /// What mends it.
     #[serde(default)]
     pub mends: String,
-    /// An axis of the chain, or tool, workpiece, block, trigger, reading.
+    /// An axis of the chain, or base, tool, workpiece, block, trigger, reading.
     #[schemars(with = "String")]
     pub at: Spanned<String>,
     /// Applies where the axis stands on this side only.

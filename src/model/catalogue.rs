@@ -17,6 +17,8 @@ pub enum Place {
     Before(AxisName),
     /// Error of an axis, after its motion.
     After(AxisName),
+    /// Of the tool's chain against the workpiece's, in R.
+    Base,
     /// In the tool's frame.
     Tool,
     /// In the frame of what bears the workpiece.
@@ -309,7 +311,7 @@ impl Check<'_> {
                     &at.span(),
                     "effects::at",
                     format!("unknown place {:?}", at.get_ref()),
-                    "places: X Y Z A B C, tool, workpiece, block, trigger, reading",
+                    "places: X Y Z A B C, base, tool, workpiece, block, trigger, reading",
                 );
                 continue;
             };
@@ -407,6 +409,7 @@ fn default_typical(unit: &str) -> f64 {
 
 fn place(at: &str, frame: Option<Frame>) -> Option<Place> {
     Some(match at {
+        "base" => Place::Base,
         "tool" => Place::Tool,
         "workpiece" => Place::Workpiece,
         "block" => Place::Block,

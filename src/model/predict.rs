@@ -4,7 +4,7 @@
 //! centre in the frame of the real block, n and p the nominal normal and contact point, the gap is
 //!
 //! ```text
-//! g(θ) = n·(q − p) − r + trigger(θ)        q = E_block⁻¹ · (carrier chain)⁻¹ · (tool chain) · ball
+//! g(θ) = n·(q − p) − r + trigger(θ)        q = E_block⁻¹ · (carrier chain)⁻¹ · E_base · (tool chain) · ball
 //! ```
 //!
 //! and g = 0 at the true parameters θ. With θ = 0 it is the reading of the method (recorded less nominal, along the
@@ -359,7 +359,11 @@ impl Model {
                 point = apply(e, &point);
             }
         }
+        let base_slot = at_slot(self.find(Place::Base), None);
         let in_r = point;
+        if let Some((_, _, e)) = &base_slot {
+            point = apply(e, &point);
+        }
 
         // --- from R into the frame of the touched block
         let workpiece: Vec<Link> = self.workpiece[..self.carrier_length(set_up.carrier)]
@@ -439,7 +443,10 @@ impl Model {
                 g = undo(slot, g, after_before, gradient);
             }
         }
-        debug_assert!(in_r.iter().all(|x| x.is_finite()) || gap.is_nan());
+        if let Some((i, centre, e)) = &base_slot {
+            add(&mut gradient[*i], &g, &displacement[*i], &(in_r - centre));
+            g *= e.rotation.to_rotation_matrix().matrix();
+        }
         let mut at_point = behind.len();
         for l in &tool {
             at_point -= 1;
