@@ -5,7 +5,7 @@ use axiscal::axes::{AxisName, Position};
 use axiscal::diag::source;
 use axiscal::machine::{self, Carrier, Machine, Side};
 use axiscal::model::catalogue::Catalogue;
-use axiscal::model::formula::VARIABLES;
+use axiscal::model::formula::{VARIABLES, slot};
 use axiscal::model::predict::{Model, Observation, SetUp};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

@@ -4,7 +4,7 @@
 
 mod common;
 use axiscal::diag::source;
-use axiscal::model::catalogue::{Catalogue, Effect};
+use axiscal::model::catalogue::{Catalogue, Effect, Parameter};
 use axiscal::model::data::{Run, assemble};
 use axiscal::model::predict::Model;
 use axiscal::simulate;
@@ -15,9 +15,11 @@ use rand_chacha::ChaCha8Rng;
 
 /// Random values of an effect's parameters, in their units: usual size, shape parameters in their range.
 fn random_values(effect: &Effect, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    let draw = |p: &axiscal::model::catalogue::Parameter, rng: &mut ChaCha8Rng| match p.shape {
+    let draw = |p: &Parameter, rng: &mut ChaCha8Rng| match p.shape {
         Some((start, ..)) => start * rng.random_range(0.8..1.2),
-        None => p.typical * rng.random_range(-1.0..1.0),
+        // a supposition is planted as a trace: at its full size no touch would meet its face
+        None if effect.discrete => 1e-4 * rng.random_range(-1.0..1.0),
+        None => p.typical * rng.random_range(0.3..1.0) * if rng.random_bool(0.5) { 1.0 } else { -1.0 },
     };
     effect.parameters.iter().map(|p| draw(p, rng)).collect()
 }
@@ -52,7 +54,9 @@ fn what_is_planted_is_what_is_predicted() {
                 let data = assemble(&machine, &[run]);
                 let model = Model::new(&machine, &[effect], &data.set_ups, reference);
                 let mut scratch = model.scratch();
-                let zero = vec![0.0; theta.len()];
+                // without the effect: its parameters are zero, but those inside its formulas stay
+                let without = |(p, &v): (&Parameter, &f64)| if p.shape.is_some() { v } else { 0.0 };
+                let zero: Vec<f64> = effect.parameters.iter().zip(&theta).map(without).collect();
                 let (mut largest, mut left) = (0.0_f64, 0.0_f64);
                 for observation in &data.observations {
                     largest = largest.max(model.gap(observation, &zero, &mut scratch).abs());

@@ -2,6 +2,7 @@
 
 pub mod as_written;
 pub mod catalogue;
+mod check;
 pub mod data;
 pub mod formula;
 pub mod predict;
