@@ -123,7 +123,7 @@ pub fn unmodelled<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) ->
     };
     catalogue
         .iter()
-        .filter(|e| e.applies_to(machine) && !e.paper && !e.per_block && !held(e))
+        .filter(|e| e.applies_to(machine) && !e.paper && !e.per_block && !e.discrete && !held(e))
         .collect()
 }
 

@@ -19,6 +19,9 @@ const TOUCH_S: f64 = 12.0;
 /// No axis stands as far as this, mm or deg: guards against numbers that would not leave any digits for the contact.
 const FAR: f64 = 1e6;
 
+/// An axis that goes less far than this (mm or deg) stands still: the rest is rounding of the plan's numbers.
+const STILL: f64 = 1e-9;
+
 /// The virtual machine with a program in it.
 pub struct Bench<'a> {
     pub chain: Chain,
@@ -275,7 +278,7 @@ impl Senses {
             // the search itself, else the forced sense of indexing, else the way from the last touch
             let forced = touch.from.get(name).unwrap_or(0.0);
             for motion in [searched, forced, came] {
-                if motion != 0.0 && motion.is_finite() {
+                if motion.abs() > STILL && motion.is_finite() {
                     self.last[i] = motion.signum();
                     break;
                 }
