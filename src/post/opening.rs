@@ -1,4 +1,4 @@
-//! The first moves of a program, and the way back in when it starts again at a later set-up.
+//! The first moves of a program, its stops, and the way back in when it starts again at a later set-up.
 //!
 //! The first moves bring the machine from anywhere to a known place with the lift at its top, where nothing can meet
 //! whatever the other axes do: the path has proven that. A run that starts again makes the same moves, then goes up
@@ -6,10 +6,11 @@
 
 use super::emit::Writer;
 use crate::axes::{AxisMap, AxisName};
+use crate::diag::Failure;
 use crate::diag::Result;
 use crate::machine::Machine;
-use crate::program::path::{Path, Step};
-use minijinja::Value;
+use crate::program::path::{Path, Step, Stop};
+use minijinja::{Value, context};
 
 /// The first moves.
 #[derive(Debug, Clone, Default)]
@@ -63,6 +64,19 @@ impl Opening {
 }
 
 impl Writer<'_> {
+    /// Blocks or stylus are changed. It belongs to the set-up before it: a run that starts again behind it does not stop.
+    pub(super) fn stop(&mut self, stop: &Stop) -> Result<()> {
+        if !self.post.can_stop() {
+            return Err(Failure::new(
+                "post::no_stop",
+                format!("controller {} does not say how a program waits for a person", self.post.name),
+            )
+            .help("describe it under [write.stop] in the postprocessor file, or make a program with one mounting and stylus"));
+        }
+        self.mounted.clone_from(&stop.mounted);
+        self.render("stop", context! { says => stop.says.clone() })
+    }
+
     /// Remembers where the first moves have brought the machine.
     pub(super) fn opened(&mut self) {
         if self.opening.lift.is_some() && self.path.start_near.is_none() {
