@@ -217,6 +217,7 @@ impl<'a> Writer<'a> {
             head => head,
             start_near => near.unwrap_or_default(),
             setups => setups,
+            stops => self.path.steps.iter().any(|s| matches!(s, Step::Stop(_))),
             origin => map(origin),
             slow_feed => self.number(self.machine.probe.slow_feed),
             log_name => self.post.log_name(self.plan)?,

@@ -4,6 +4,7 @@
 //! whatever the other axes do: the path has proven that. A run that starts again makes the same moves, then goes up
 //! there to where its set-up begins, rotary axes first and in the sense in which they would have come, the lift last.
 
+use super::Frame;
 use super::emit::Writer;
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::Failure;
@@ -74,7 +75,11 @@ impl Writer<'_> {
             .help("describe it under [write.stop] in the postprocessor file, or make a program with one mounting and stylus"));
         }
         self.mounted.clone_from(&stop.mounted);
-        self.render("stop", context! { says => stop.says.clone() })
+        // all rotary axes stand at 0, where the control's coordinates are the same for every length
+        self.frame = Frame::new(self.machine, self.plan.controller_frame, stop.tool_length_mm);
+        let longer = self.number(stop.tool_length_mm - self.plan.tool_length_mm);
+        let origin_z = self.number(self.machine.origin.get(AxisName::Z).unwrap_or(0.0));
+        self.render("stop", context! { says => stop.says.clone(), longer, origin_z })
     }
 
     /// Remembers where the first moves have brought the machine.
@@ -88,6 +93,10 @@ impl Writer<'_> {
     /// path proves none.
     pub(super) fn resume(&self, way: Option<&[Step]>) -> Result<Option<Vec<Value>>> {
         let (Some(opening), Some(way)) = (self.opening.place, way) else { return Ok(None) };
+        // the first moves are written for the length of the first stylus, and turn
+        if self.frame.is_tcp() && self.frame.length_mm().to_bits() != self.plan.tool_length_mm.to_bits() {
+            return Ok(None);
+        }
         let (mut stands, mut places) = (opening, Vec::new());
         for step in way {
             match step {
