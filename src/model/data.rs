@@ -99,6 +99,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             };
             let mounting = planned.mounting.as_deref().unwrap_or(&run.plan.mounting);
             let set_up_label = match (&label, mounting) {
+                // a program with several mountings keeps them apart under the study's name too
+                (Some(label), _) if planned.mounting.is_some() => format!("{label}/{mounting}/{}", planned.block),
                 (Some(label), _) => format!("{label}/{}", planned.block),
                 (None, "") => planned.block.clone(),
                 (None, mounting) => format!("{mounting}/{}", planned.block),
@@ -290,6 +292,8 @@ fn repeat_group(data: &Data, plan: &Plan, touch: &PlanTouch, run: usize) -> usiz
                 && p.point == touch.point
                 && p.normal == touch.normal
                 && p.visit == touch.visit
+                && p.spindle_deg == touch.spindle_deg
+                && p.feed_mm_min == touch.feed_mm_min
         });
     if same { group } else { group + 1 }
 }
