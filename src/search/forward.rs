@@ -1,8 +1,10 @@
-//! Adding effects one by one on the linearised level: project the leader out, test again, stop where Holm stops.
+//! Adding effects one by one on the linearised level: project the leader out, test again, stop where Holm or the
+//! held-out error stops.
 
 use super::basis::Basis;
 use super::distributions::ln_p_of_f;
 use super::groups::{ADDS_NOTHING, Group};
+use super::held_out::{Choice, HeldOut, held_out};
 use super::library::Library;
 use super::moments::KEPT;
 use super::score::{PureError, Question, Search};
@@ -21,6 +23,19 @@ pub struct Step {
     pub p_adjusted: f64,
     /// Root mean square of the whitened residual over all rows after it.
     pub rms: f64,
+    /// The nested hold-out that let it pass.
+    pub held_out: Option<HeldOut>,
+}
+
+/// A leader that Holm would have proposed and the held-out touches do not bear out.
+#[derive(Debug, Clone)]
+pub struct Refused {
+    /// Its group.
+    pub group: Group,
+    /// Its Holm-adjusted p-value.
+    pub p_adjusted: f64,
+    /// The hold-out that it failed.
+    pub held_out: HeldOut,
 }
 
 /// Where the loop ended.
@@ -28,6 +43,8 @@ pub struct Step {
 pub struct Forward {
     /// The effects in the order in which they were added.
     pub steps: Vec<Step>,
+    /// What stopped the loop, where it was the hold-out.
+    pub refused: Option<Refused>,
     /// Indices of steps whose effect says nothing any more next to the later ones (Wald p above 5 %).
     pub dropped: Vec<usize>,
     /// Whitened residual of the last model.
@@ -44,24 +61,35 @@ impl Forward {
     }
 }
 
-/// Runs the loop for at most `at_most` effects.
+/// Runs the loop for at most `at_most` effects. With `groups` (see [`held_out`]) each must also lower the error of
+/// touches that had no part in its choice.
 #[must_use]
-pub fn forward(question: Question, library: &Library, at_most: usize) -> Forward {
+pub fn forward(question: Question, library: &Library, at_most: usize, groups: Option<&[usize]>) -> Forward {
     let mut basis = question.base.clone();
     let mut residual = basis.project(question.residual);
     let mut steps: Vec<Step> = Vec::new();
+    let mut refused = None;
     while steps.len() < at_most {
-        let search = Search::new(Question { residual: &residual, base: &basis, pure: question.pure }, library);
+        let now = Question { residual: &residual, base: &basis, pure: question.pure };
+        let search = Search::new(now, library);
         let Some(leader) = search.leader() else { break };
         let group = search.group_of(leader, &search.ranking());
         let added = group.first();
         let (variant, p_adjusted) = (search.scores[added].variant, search.scores[leader].p_adjusted);
+        let judged = groups.map(|g| held_out(now, library, g, Choice::Redone));
+        match judged {
+            Some(held_out) if !held_out.falls() => {
+                refused = Some(Refused { group, p_adjusted, held_out });
+                break;
+            }
+            _ => {}
+        }
         if basis.extend(&library.columns(added, variant), KEPT) == 0 {
             break;
         }
         residual = basis.project(&residual);
         let rms = (residual.norm_squared() / residual.len() as f64).sqrt();
-        steps.push(Step { group, added, variant, p_adjusted, rms });
+        steps.push(Step { group, added, variant, p_adjusted, rms, held_out: judged });
     }
     let mut dropped = Vec::new();
     loop {
@@ -79,7 +107,7 @@ pub fn forward(question: Question, library: &Library, at_most: usize) -> Forward
                     }
                     residual = basis.project(question.residual);
                 }
-                return Forward { steps, dropped, residual, basis };
+                return Forward { steps, refused, dropped, residual, basis };
             }
         }
     }

@@ -166,7 +166,7 @@ fn fold(
     let training = Moments { n: whole.n - rows.len(), p: into.nrows(), rr: rr.max(0.0), jr, qj, blocks };
     let scores = score(&training, library, question.pure);
     let chosen = match choice {
-        Choice::Redone => leader(&scores),
+        Choice::Redone => leader(&scores, library),
         Choice::Given(c) => scores[c].visible().then_some(c),
     };
 

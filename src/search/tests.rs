@@ -18,13 +18,18 @@ fn ask<'a>(residual: &'a DVector<f64>, base: &'a Basis) -> Question<'a> {
     Question { residual, base, pure: None }
 }
 
-/// Candidates of 1 to 3 columns that resemble each other: mixtures of few directions.
+/// Candidates of 1 to 3 columns that resemble each other strongly: mixtures of few directions.
 fn correlated_library(rng: &mut ChaCha8Rng, rows: usize, count: usize) -> Library {
+    mixtures(rng, rows, count, 0.7)
+}
+
+/// The larger `own` beside √12, the less they have in common.
+fn mixtures(rng: &mut ChaCha8Rng, rows: usize, count: usize, own: f64) -> Library {
     let roots = noise_matrix(rng, rows, 12);
     let mut library = Library::new(rows);
     for i in 0..count {
-        let own = noise_matrix(rng, rows, 1 + i % 3);
-        let mixed = &roots * noise_matrix(rng, 12, 1 + i % 3) + own * 0.7;
+        let apart = noise_matrix(rng, rows, 1 + i % 3) * own;
+        let mixed = &roots * noise_matrix(rng, 12, 1 + i % 3) + apart;
         library.push(format!("c{i}"), Origin::Catalogue, &mixed);
     }
     library
@@ -230,7 +235,7 @@ fn minimal_detectable_size_has_noncentrality_25() {
 fn the_loop_finds_two_and_stops() {
     let mut rng = rng(17);
     let base = Basis::new(&noise_matrix(&mut rng, ROWS, 10));
-    let library = correlated_library(&mut rng, ROWS, 60);
+    let library = mixtures(&mut rng, ROWS, 60, 4.0);
     let (mut both, mut more, runs) = (0, 0, 60);
     for run in 0..runs {
         let truth = [run % 60, (run * 7 + 5) % 60];
@@ -242,7 +247,7 @@ fn the_loop_finds_two_and_stops() {
             let wanted = 49.0 + 30.0 * rng.random::<f64>();
             r -= columns * theta * (wanted / trace.norm_squared()).sqrt();
         }
-        let end = forward(ask(&r, &base), &library, 6);
+        let end = forward(ask(&r, &base), &library, 6, None);
         both += usize::from(truth.iter().all(|c| end.steps.iter().any(|s| s.group.holds(*c))));
         more += usize::from(end.chosen().len() > 2);
         // whatever was chosen, the result is that of the model with exactly those columns
@@ -345,7 +350,7 @@ fn held_out_error_of_noise_does_not_fall_and_of_an_effect_does() {
     assert!(naive > 60, "choosing on all touches first would have looked like an improvement: {naive}");
 }
 
-/// A small plan: nine angles of C at three of B, two blocks, five faces each, C revisited; 2.2 h.
+/// A small plan: nine angles of C, six of B in changing order, two blocks, five faces each touched twice; 2.2 h.
 fn table_of_touches(rng: &mut ChaCha8Rng) -> Features {
     let mut f = Features::default();
     let (mut x, mut b_angle, mut c_angle, mut t, mut sense) = (vec![], vec![], vec![], vec![], vec![]);
@@ -353,7 +358,7 @@ fn table_of_touches(rng: &mut ChaCha8Rng) -> Features {
     let mut clock = 0.0;
     for visit in 0..27usize {
         let c = [0.0, 130.0, 45.0, 270.0, 90.0, 315.0, 200.0, 160.0, 20.0][visit % 9] * TAU / 360.0;
-        let b = [0.0, -60.0, -25.0][visit / 9] * TAU / 360.0;
+        let b = [0.0, -60.0, -25.0, -90.0, -40.0, -10.0][(visit * 5 + visit / 9) % 6] * TAU / 360.0;
         clock += 0.03;
         for block in 0..2usize {
             for face in 0..5usize {
@@ -451,7 +456,7 @@ fn shapes_of_no_catalogue_are_named_by_their_variable() {
     assert_eq!(first.terms[0].formula.as_deref(), Some("cos(7*C)"));
     let amplitude = first.terms[0].size.hypot(first.terms[1].size);
     assert!((amplitude - 5.0).abs() < 0.5, "{amplitude}");
-    assert!(first.share > 0.8 && first.curve.len() > 100);
+    assert!(first.share > 0.6 && first.curve.len() > 100);
     let peak = first.curve.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
     assert!((peak - amplitude).abs() < 0.05 * amplitude);
     // the cycle by its period, as a number that a fit may refine
