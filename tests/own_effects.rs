@@ -130,11 +130,10 @@ fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaC
     let touches = touch(machine, &plan, &scenario, None);
     let data = assemble(machine, &[run(&touches)]);
     let model = Model::new(machine, &[effect], &data.set_ups, machine.reference.pivot);
-    let mut scratch = model.scratch();
     let shape = |i: usize| effect.parameters[i % effect.parameters.len()].shape.is_some();
     let without: Vec<f64> = theta.iter().enumerate().map(|(i, v)| if shape(i) { *v } else { 0.0 }).collect();
     data.observations.iter().fold((0.0, 0.0), |(largest, left): (f64, f64), o| {
-        let (bare, planted) = (model.gap(o, &without, &mut scratch), model.gap(o, &theta, &mut scratch));
+        let (bare, planted) = (model.gap(o, &without), model.gap(o, &theta));
         assert!(bare.is_finite() && planted.is_finite());
         (largest.max(bare.abs()), left.max(planted.abs()))
     })

@@ -19,6 +19,12 @@ pub struct Args {
     /// With the residual of every touch
     #[arg(long)]
     pub residuals: bool,
+    /// With the covariance matrix of the results (--json)
+    #[arg(long)]
+    pub covariance: bool,
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations
+    #[arg(long)]
+    pub quick: bool,
 }
 
 /// Runs `identify`.
@@ -29,7 +35,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
-    let mut outcome = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome;
+    settings.quick = args.quick;
+    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let covariance = args.covariance.then(|| fit::uncertainty::results_covariance(&fit));
+    let mut outcome = fit.outcome;
+    outcome.covariance = covariance;
     if let Some(active) = loaded.active()? {
         outcome.warnings.push(format!(
             "a compensation with {} terms was active: the values are what it leaves, not the machine's whole errors",

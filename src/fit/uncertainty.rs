@@ -3,7 +3,7 @@
 
 use super::candidates::columns;
 use super::normal::Touches;
-use super::outcome::{Combination, Correlation};
+use super::outcome::{Combination, Correlation, Covariance};
 use super::{Fit, Knowledge};
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
@@ -246,6 +246,16 @@ pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
         });
     }
     out
+}
+
+/// Covariance of the results (no set-ups of blocks), type A.
+#[must_use]
+pub fn results_covariance(fit: &Fit) -> Covariance {
+    let results: Vec<usize> = fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance).collect();
+    Covariance {
+        names: results.iter().map(|&i| fit.model.unknowns[i].name.clone()).collect(),
+        matrix: results.iter().map(|&i| results.iter().map(|&j| fit.covariance[(i, j)]).collect()).collect(),
+    }
 }
 
 /// Names and values of the priors that entered the fit.
