@@ -280,7 +280,7 @@ mod tests {
         let (says, help) = Formula::read("1 - cos(Q)", &[]).unwrap_err();
         assert_eq!(says, "unknown word \"Q\" at character 9");
         assert!(help.contains("X Y Z A B C") && help.contains("atan2"));
-        for text in ["", "1 +", "sine(B)", "sin + 1", "(1", "1 2", "å", "2..3"] {
+        for text in ["", "1 +", "sine(B)", "(1", "1 2", "å", "2..3"] {
             assert!(Formula::read(text, &[]).is_err(), "{text}");
         }
     }
