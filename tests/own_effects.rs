@@ -172,7 +172,9 @@ fn a_users_effect_is_planted_as_it_is_predicted() {
 fn both_readings_know_the_same_words() {
     let machine = machine("swivel-head");
     let file = |formula: &str| {
-        format!("[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [{{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"0*({formula})\" }}]\n")
+        format!(
+            "[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [{{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"0*({formula})\" }}]\n"
+        )
     };
     let mut words: Vec<String> = axiscal::model::formula::VARIABLES.map(str::to_owned).to_vec();
     let binary = ["atan2", "mod"];

@@ -215,7 +215,9 @@ fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
 
 fn bare_number(text: &str) -> Option<f64> {
     let digits = text.trim().trim_start_matches('-');
-    digits.starts_with(|c: char| c.is_ascii_digit()).then(|| text.trim().parse().ok().filter(|v: &f64| v.is_finite()))?
+    digits
+        .starts_with(|c: char| c.is_ascii_digit())
+        .then(|| text.trim().parse().ok().filter(|v: &f64| v.is_finite()))?
 }
 
 /// The expression crate reads no exponents: `1.5e-3` is written out as `0.0015`.
