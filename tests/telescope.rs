@@ -79,7 +79,7 @@ fn named(data: &[Pointing]) -> Library {
 }
 
 /// sin and cos of k·El and k·Az up to k = 9, on either residual: the repertoire that over-fits.
-fn harmonics(data: &[Pointing], library: &mut Library) {
+fn harmonics(data: &[Pointing], library: &mut Library, origin: Origin) {
     for k in 1..=9 {
         for (axis, word) in [("Az", "A"), ("El", "E")] {
             for on in ["S", "E"] {
@@ -90,7 +90,7 @@ fn harmonics(data: &[Pointing], library: &mut Library) {
                         if on == "S" { (value, 0.0) } else { (0.0, value) }
                     });
                     let name = format!("H{on}{}{word}{k}", if sine { "S" } else { "C" });
-                    library.push(name, Origin::Generic, &DMatrix::from_columns(&[c]));
+                    library.push(name, origin, &DMatrix::from_columns(&[c]));
                 }
             }
         }
@@ -152,18 +152,26 @@ fn cancelling_harmonics_are_refused_and_the_reason_is_shown() {
     let Some(data) = pointings() else { return };
     let r = column(&data, |p| (p.d_azimuth * p.elevation.cos(), p.d_elevation));
     let mut library = named(&data);
-    harmonics(&data, &mut library);
+    harmonics(&data, &mut library, Origin::Generic);
     let base = model(&data, &TILT);
     let question = Question { residual: &r, base: &base, pure: None };
+    let cell = |el: f64, az: f64| -> Vec<usize> { data.iter().flat_map(|p| [(p.elevation.to_degrees() / el) as usize * 100 + (p.azimuth.to_degrees() / az) as usize; 2]).collect() };
+    for origin in [Origin::Generic, Origin::Catalogue] {
+    let mut library = named(&data);
+    harmonics(&data, &mut library, origin);
     for (name, groups) in [
         ("none", None),
-        ("az", Some(data.iter().flat_map(|p| [(p.azimuth.to_degrees() / 45.0) as usize; 2]).collect::<Vec<_>>())),
-        ("el", Some(data.iter().flat_map(|p| [(p.elevation.to_degrees() / 10.0) as usize; 2]).collect())),
-        ("el15", Some(data.iter().flat_map(|p| [(p.elevation.to_degrees() / 15.0) as usize; 2]).collect())),
-        ("elaz", Some(data.iter().flat_map(|p| [(p.elevation.to_degrees() / 15.0) as usize * 10 + (p.azimuth.to_degrees() / 90.0) as usize; 2]).collect())),
+        ("az45", Some(cell(360.0, 45.0))),
+        ("az90", Some(cell(360.0, 90.0))),
+        ("el10", Some(cell(10.0, 400.0))),
+        ("el15", Some(cell(15.0, 400.0))),
+        ("el15az90", Some(cell(15.0, 90.0))),
+        ("el10az90", Some(cell(10.0, 90.0))),
+        ("el30az90", Some(cell(30.0, 90.0))),
+        ("el30az45", Some(cell(30.0, 45.0))),
     ] {
         let end = axiscal::search::forward::forward(question, &library, 12, groups.as_deref());
-        println!("--- {name}");
+        println!("--- {origin:?} {name}");
         for s in &end.steps {
             let g: Vec<&str> = s.group.members.iter().map(|m| id(&library, m.candidate)).collect();
             println!("{} p {:.2e} rms {:.2} {g:?}", id(&library, s.added), s.p_adjusted, s.rms * 2f64.sqrt());
@@ -171,9 +179,16 @@ fn cancelling_harmonics_are_refused_and_the_reason_is_shown() {
         }
         if let Some(s) = &end.refused {
             let g: Vec<&str> = s.group.members.iter().map(|m| id(&library, m.candidate)).collect();
-            let h = &s.held_out;
-            println!("refused p {:.2e} {g:?} {:.2} {:.2} gain {:.0} se {:.0} of {} {:?}", s.p_adjusted, h.before, h.after, h.gain, h.standard_error, h.scored, h.folds.iter().map(|f| f.chosen.map(|c| id(&library, c))).collect::<Vec<_>>());
+            println!("refused p {:.2e} {g:?} {:?} {}", s.p_adjusted, s.sizes, if let axiscal::search::forward::Reason::HeldOut(h) = &s.reason { format!("{:.2} {:.2} gain {:.0} se {:.0} of {} {:?}", h.before, h.after, h.gain, h.standard_error, h.scored, h.folds.iter().map(|f| f.chosen.map_or("-", |c| id(&library, c))).collect::<Vec<_>>()) } else { "no cause".into() });
         }
+        let q = Question { residual: &end.residual, base: &end.basis, pure: None };
+        for el in [5.0, 10.0, 15.0] {
+            if let (Some(c), Some(g)) = (library.position("HESE8"), Some(cell(el, 400.0))) {
+                let h = held_out(q, &library, &g, Choice::Given(c));
+                println!("HESE8 by elevation {el}: {:.2} {:.2} gain {:.0} se {:.0} of {}", h.before, h.after, h.gain, h.standard_error, h.scored);
+            }
+        }
+    }
     }
     let end = axiscal::search::forward::forward(question, &library, 12, None);
     let chosen: Vec<&str> = end.chosen().into_iter().map(|c| id(&library, c)).collect();
