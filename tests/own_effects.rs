@@ -253,3 +253,32 @@ fn a_users_effect_goes_from_simulation_to_identification() {
     let run = axiscal(folder.path()).args(call).args(["--out", "other.log"]).assert().code(2);
     run.stderr(predicate::str::contains("effect \"head-sag\" exists already"));
 }
+
+#[test]
+fn effects_are_listed_and_shown_at_eighty_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("mine.toml"), OWN).unwrap();
+    let said = |arguments: &[&str]| {
+        let run = axiscal(folder.path()).arg("effects").args(arguments).assert().success();
+        let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+        let longest = text.lines().map(|l| l.chars().count()).max().unwrap();
+        assert!(longest <= 80 || arguments.contains(&"--json"), "{arguments:?}: {longest} columns");
+        text
+    };
+    let all = said(&["--effects-file", "mine.toml"]);
+    for part in ["wobble", "radial-c-1", "EXC EYC", "2.2 um", "own-base"] {
+        assert!(all.contains(part), "{part}");
+    }
+    let here = said(&["--machine", "trunnion"]);
+    assert!(here.contains("tilt-a-3") && !here.contains("head-sag") && !here.contains("location-b"));
+    let one = said(&["show", "warm-up"]);
+    for part in ["ISO 230-3", "1 - exp(-t/tau)", "how to confirm", "what mends it", "every machine", "tried: 0.1 "] {
+        assert!(one.contains(part), "{part}: {one}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&said(&["show", "pitch-x", "--json"])).unwrap();
+    let row = &json["effects"][0];
+    assert_eq!(row["family"], "linear");
+    assert_eq!(row["parameters"][2]["shape"]["scan"].as_array().unwrap().len(), 7);
+    assert_eq!(row["parameters"][0]["iso"], "EXX");
+    axiscal(folder.path()).args(["effects", "show", "head-sag", "-m", "trunnion"]).assert().code(2);
+}

@@ -59,12 +59,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             }
             let machines = load_machines(args.machines.as_deref(), io)?;
             let texts: Vec<String> = rows.iter().map(|e| show(e, &machines)).collect();
-            io.say(texts.join("\n"));
+            io.say(texts.join("\n").trim_end());
             io.answer(&json!({ "effects": rows.iter().map(|e| as_json(e)).collect::<Vec<_>>() }));
         }
         None => {
             let rows: Vec<&Effect> = catalogue.iter().filter(here).collect();
-            io.say(list(&rows, machine.as_ref()));
+            io.say(list(&rows, machine.as_ref()).trim_end());
             io.answer(&json!({ "effects": rows.iter().map(|e| as_json(e)).collect::<Vec<_>>() }));
         }
     }
@@ -143,7 +143,7 @@ fn list(rows: &[&Effect], machine: Option<&Machine>) -> String {
             ]);
         }
     }
-    let where_ = machine.map_or("on some machine (--machine M: those of one)".to_owned(), |m| format!("on {}", m.name));
+    let where_ = machine.map_or("(--machine M: those of one)".to_owned(), |m| format!("on {}", m.name));
     out + &format!("{} effects {where_}; `axiscal effects show ID` prints one\n", seen.len())
 }
 

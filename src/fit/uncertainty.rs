@@ -86,7 +86,7 @@ pub(super) fn type_b(
         let Some((effect, which)) = owner else {
             findings.push(
                 Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
-                    .help("`axiscal effects` lists them, for instance sX (block-size), dL (tool-length), expansion (ambient-scale)"),
+                    .help("`axiscal effects` lists them, for instance size_X (block-size), dL (tool-length), expansion (ambient-scale)"),
             );
             continue;
         };
