@@ -193,7 +193,6 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
             }
         }
     }
-    drop(columns);
     let white = whiten(raw);
     let mut out = Generics { library: Library::new(white.nrows()), shapes: Vec::new() };
     let mut at = 0;
