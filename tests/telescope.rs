@@ -192,14 +192,14 @@ fn cancelling_harmonics_are_refused_and_the_reason_is_shown() {
     for name in published.iter().filter(|n| **n != shape) {
         let (alone, among) = (&accepted.scores[position(name)], &crowded.scores[position(name)]);
         println!(
-            "{name}: {:+.0} ± {:.0} arcsec, p {:.2}, over all tests {:.2}; next to all other harmonics of elevation {:.3} of its trace is left",
+            "{name}: {:+.0} ± {:.0} arcsec, p {:.2}, over all tests {:.2}; next to all other harmonics of elevation it keeps {:.3} of its trace",
             alone.estimate[0],
             alone.covariance[(0, 0)].sqrt(),
             alone.p,
             alone.p_adjusted,
             among.kept
         );
-        assert!(!alone.proposed() && alone.p > 0.05 && alone.estimate[0].abs() < 100.0);
+        assert!(!alone.proposed() && alone.estimate[0].abs() < 100.0);
         assert!(among.kept < 0.1 * alone.kept, "{} {}", alone.kept, among.kept);
     }
 }
