@@ -115,7 +115,8 @@ pub fn forward(question: Question, library: &Library, at_most: usize, groups: Op
     let mut dropped = Vec::new();
     loop {
         let kept: Vec<usize> = (0..steps.len()).filter(|i| !dropped.contains(i)).collect();
-        let columns: Vec<DMatrix<f64>> = kept.iter().map(|&i| library.columns(steps[i].added, steps[i].variant)).collect();
+        let columns: Vec<DMatrix<f64>> =
+            kept.iter().map(|&i| library.columns(steps[i].added, steps[i].variant)).collect();
         let p = wald(question, &columns);
         let worst = (0..kept.len()).filter(|&i| p[i] > ADDS_NOTHING).max_by(|&a, &b| p[a].total_cmp(&p[b]));
         match worst {
