@@ -6,6 +6,7 @@
 mod common;
 mod controllers;
 mod demo;
+mod diagnose;
 mod effects;
 mod export;
 mod generate;
@@ -18,6 +19,7 @@ mod programs;
 mod reproduce;
 mod schema;
 mod simulate;
+mod sketch_effect;
 
 pub use common::{Answer, Io};
 
@@ -59,6 +61,10 @@ enum Verb {
     New(new::Args),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
+    /// Which physical effect is missing: verdict, candidates, and what these touches cannot tell apart
+    Diagnose(diagnose::Args),
+    /// Write a starting formula for what no known effect explains
+    SketchEffect(sketch_effect::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -86,6 +92,8 @@ pub fn main() -> ExitCode {
         Verb::Reproduce(args) => reproduce::run(&args, &io),
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
+        Verb::Diagnose(args) => diagnose::run(&args, &io),
+        Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };
