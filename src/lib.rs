@@ -14,6 +14,7 @@ pub mod symbols;
 pub mod units;
 
 pub mod cli;
+pub mod compare;
 pub mod fit;
 pub mod log;
 pub mod machine;

@@ -4,6 +4,7 @@
 //! "no", 2 the input or the call was unusable.
 
 mod common;
+mod compare;
 mod controllers;
 mod demo;
 mod effects;
@@ -59,6 +60,8 @@ enum Verb {
     New(new::Args),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
+    /// Model against measurement: where it fails, and on what that depends
+    Compare(compare::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -86,6 +89,7 @@ pub fn main() -> ExitCode {
         Verb::Reproduce(args) => reproduce::run(&args, &io),
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
+        Verb::Compare(args) => compare::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

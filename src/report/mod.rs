@@ -1,3 +1,5 @@
 //! What a person sees in the terminal: formats, never computes.
 
+pub mod compare;
 pub mod fit;
+pub mod plot;
