@@ -15,6 +15,7 @@ pub mod units;
 
 pub mod cli;
 pub mod diagnose;
+pub mod compare;
 pub mod fit;
 pub mod log;
 pub mod machine;

@@ -4,6 +4,7 @@
 //! "no", 2 the input or the call was unusable.
 
 mod common;
+mod compare;
 mod controllers;
 mod demo;
 mod diagnose;
@@ -65,6 +66,8 @@ enum Verb {
     Diagnose(diagnose::Args),
     /// Write a starting formula for what no known effect explains
     SketchEffect(sketch_effect::Args),
+    /// Model against measurement: where it fails, and on what that depends
+    Compare(compare::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -94,6 +97,7 @@ pub fn main() -> ExitCode {
         Verb::Identify(args) => identify::run(&args, &io),
         Verb::Diagnose(args) => diagnose::run(&args, &io),
         Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
+        Verb::Compare(args) => compare::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

@@ -7,6 +7,7 @@
 
 mod answer;
 pub mod candidates;
+pub mod held_out;
 mod knowledge;
 pub mod noise;
 pub mod normal;

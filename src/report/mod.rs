@@ -1,4 +1,6 @@
 //! What a person sees in the terminal: formats, never computes.
 
 pub mod diagnosis;
+pub mod compare;
 pub mod fit;
+pub mod plot;
