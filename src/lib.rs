@@ -14,6 +14,7 @@ pub mod symbols;
 pub mod units;
 
 pub mod cli;
+pub mod design;
 pub mod fit;
 pub mod log;
 pub mod machine;

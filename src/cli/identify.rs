@@ -2,6 +2,7 @@
 
 use super::load::load_study;
 use super::{Answer, Io};
+use crate::design;
 use crate::diag::{Failure, Result};
 use crate::fit;
 use crate::machine::Machine;
@@ -29,7 +30,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
-    let mut outcome = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome;
+    let mut fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
+    let mut outcome = fit.outcome;
     if let Some(active) = loaded.active()? {
         outcome.warnings.push(format!(
             "a compensation with {} terms was active: the values are what it leaves, not the machine's whole errors",
