@@ -108,7 +108,8 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     }
     let mut parameters = parameters;
     for p in &mut parameters {
-        let equal = effects.iter().filter(|e| !e.visible && e.absorbed_by.len() == 1 && e.absorbed_by[0] == p.name && e.habits.is_empty());
+        let equal =
+            effects.iter().filter(|e| !e.visible && e.habits.is_empty() && held_by(&e.absorbed_by) == Some(p.name.as_str()));
         p.holds = equal.map(|e| e.effect.clone()).collect();
     }
     let groups = groups(&effects);
@@ -215,13 +216,22 @@ impl Absorbed {
         let mut out: Vec<String> = Vec::new();
         for r in order {
             let u = &view.model.unknowns[view.free[r]];
-            let name = if u.set_up.is_some() { "the set-up of the blocks".to_owned() } else { u.name.clone() };
+            let name = if u.set_up.is_some() { SET_UPS.to_owned() } else { u.name.clone() };
             if !out.contains(&name) {
                 out.push(name);
             }
         }
         out
     }
+}
+
+/// The blocks' set-up among the parameters that take an effect.
+const SET_UPS: &str = "the set-up of the blocks";
+
+/// The one parameter, beside the set-up of the blocks, that takes an effect.
+fn held_by(absorbed_by: &[String]) -> Option<&str> {
+    let mut results = absorbed_by.iter().filter(|n| *n != SET_UPS);
+    results.next().filter(|_| results.next().is_none()).map(String::as_str)
 }
 
 fn minutes(seconds: f64) -> String {
@@ -248,8 +258,11 @@ fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String]) -> (S
             let says = format!("not observable with this plan: {why}; {} (+{}){more}", first.habit.says, minutes(first.habit.seconds));
             (says, found.iter().map(|t| t.habit.id.clone()).collect())
         }
-        None if absorbed_by.len() == 1 => {
-            (format!("not observable with any touches: it is one number with {}, which holds it", absorbed_by[0]), Vec::new())
+        None if held_by(absorbed_by).is_some() => {
+            (format!("not observable with these or any varied touches: it is one number with {}", absorbed_by.join(" and ")), Vec::new())
+        }
+        None if view.library.columns(c, 0).norm() == 0.0 => {
+            ("these touches cannot be disturbed by it: nothing that it acts on is touched".into(), Vec::new())
         }
         None => (format!("not observable with this plan: {why}; no single variation of the touches shows it"), Vec::new()),
     }

@@ -9,11 +9,12 @@ const NOISE_SHARE: f64 = 0.25;
 /// A good plan knows location errors to this share of their typical size whatever else acts.
 const UNMODELLED_SHARE: f64 = 1.0;
 
-/// A good plan leaves at most so many effects without a trace, those that equal a parameter not counted …
+/// A good plan leaves at most so many effects without a trace, those not counted that equal a parameter with any touches
+/// or do not move these touches at all …
 const MOST_INVISIBLE: usize = 4;
 
-/// … and at most so many pairs of effects that cannot be told apart.
-const MOST_PAIRS: usize = 12;
+/// … and at most so many pairs of effects that cannot be told apart, for each effect.
+const PAIRS_PER_EFFECT: f64 = 0.5;
 
 /// Score and reason.
 pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
@@ -60,11 +61,11 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         reasons.push(format!("effects that are not in the model could shift {} by more than its usual size", open.join(", ")));
     }
     let equal = |id: &str| a.parameters.iter().any(|p| p.holds.iter().any(|h| h == id));
-    let invisible = a.effects.iter().filter(|e| !e.visible && !equal(&e.effect)).count();
+    let invisible = a.effects.iter().filter(|e| !e.visible && e.typical_um > 0.0 && !equal(&e.effect)).count();
     if invisible > MOST_INVISIBLE {
         reasons.push(format!("{invisible} effects leave no trace"));
     }
-    if a.alias_pairs > MOST_PAIRS {
+    if a.alias_pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
         reasons.push(format!("{} pairs of effects cannot be told apart", a.alias_pairs));
     }
     if reasons.is_empty() {

@@ -4,6 +4,9 @@ use super::fit::{number, significant, table};
 use crate::design::record::{Assessment, Seen};
 use comfy_table::Cell;
 
+/// Effects that contain another one are listed up to so many.
+const MOST_INSIDE: usize = 3;
+
 /// Touches that would help, and what they help, are listed up to so many.
 const MOST_SHOWN: usize = 6;
 
@@ -43,14 +46,13 @@ fn one(a: &Assessment, out: &mut String) {
     }
     let visible = a.effects.iter().filter(|e| e.visible).count();
     *out += &format!("\neffects that are not in the model: {visible} of {} leave a trace\n", a.effects.len());
-    let mut t = table(&["effect", "found from (um)", "usual (um)", "cannot be told from", "what would tell"]);
+    let mut t = table(&["effect", "found from (um)", "usual (um)", "cannot be told from"]);
     for e in a.effects.iter().filter(|e| e.visible) {
         t.add_row(vec![
             Cell::new(&e.effect),
             number(e.minimal_detectable_um.map_or_else(|| "never".into(), significant)),
             number(significant(e.typical_um)),
-            Cell::new(short(e)),
-            Cell::new(&e.tell_apart),
+            Cell::new(short(e, a)),
         ]);
     }
     *out += &format!("{t}\n");
@@ -63,8 +65,11 @@ fn one(a: &Assessment, out: &mut String) {
     }
     if !a.alias_groups.is_empty() {
         *out += &format!("\nnot to be told apart ({} pairs in all, those included that explain each other one way):\n", a.alias_pairs);
-        for g in &a.alias_groups {
-            *out += &format!("  {}\n", g.join(" = "));
+        for (g, number) in a.alias_groups.iter().zip(1..) {
+            *out += &format!("  group {number}: {}\n", g.join(" = "));
+            if let Some(how) = group_parted(g, a) {
+                *out += &format!("    {how}\n");
+            }
         }
     }
     if !a.advice.is_empty() {
@@ -128,10 +133,26 @@ fn side_by_side(first: &Assessment, out: &mut String) {
 }
 
 /// What an effect cannot be told from, shortened.
-fn short(e: &Seen) -> String {
-    let mut words: Vec<String> = e.same_as.iter().map(|s| format!("= {s}")).collect();
-    words.extend(e.contained_in.iter().map(|s| format!("in {s}")));
-    listed(&words)
+fn short(e: &Seen, a: &Assessment) -> String {
+    let group = a.alias_groups.iter().position(|g| g.contains(&e.effect));
+    let mut words: Vec<String> = group.iter().map(|i| format!("group {}", i + 1)).collect();
+    let others = e.contained_in.iter().filter(|s| !group.is_some_and(|g| a.alias_groups[g].contains(s)));
+    words.extend(others.map(|s| format!("in {s}")));
+    if words.len() > MOST_INSIDE {
+        return format!("{} and {} more", words[..MOST_INSIDE].join(", "), words.len() - MOST_INSIDE);
+    }
+    words.join(", ")
+}
+
+/// What parts a group: the variation that helps most of its members.
+fn group_parted(group: &[String], a: &Assessment) -> Option<String> {
+    let members: Vec<&Seen> = a.effects.iter().filter(|e| group.contains(&e.effect)).collect();
+    let helps = |habit: &str| members.iter().filter(|e| e.habits.iter().any(|h| h == habit)).count();
+    let best = a.advice.iter().max_by_key(|x| helps(&x.habit)).filter(|x| helps(&x.habit) > 0);
+    match best {
+        Some(x) => Some(format!("{} (+{}) parts {} of {}", x.says, time(x.time_s), helps(&x.habit), members.len())),
+        None => members.iter().map(|e| &e.tell_apart).find(|t| !t.is_empty()).cloned(),
+    }
 }
 
 fn listed(words: &[String]) -> String {
