@@ -65,8 +65,10 @@ fn angles_tell_harmonics_apart() {
         let machine = common::machine(name);
         let plan = generated(&machine).plan;
         for axis in machine.rotary() {
-            let angles: Vec<f64> =
-                distinct(plan.touches.iter().filter_map(|t| t.pose.get(axis.name))).iter().map(|a| *a as f64 / 1e3).collect();
+            let angles: Vec<f64> = distinct(plan.touches.iter().filter_map(|t| t.pose.get(axis.name)))
+                .iter()
+                .map(|a| *a as f64 / 1e3)
+                .collect();
             assert!(angles.len() >= 8, "{name} {}: {angles:?}", axis.name);
             assert!(angles.iter().any(|a| *a > 0.0) && (axis.name == AxisName::C || angles.iter().any(|a| *a < 0.0)));
             for k in 1..=8 {
@@ -143,7 +145,8 @@ fn set_ups_come_back_and_visits_are_counted() {
         let numbers: Vec<u32> = visits.iter().map(|t| t.visit.unwrap()).collect();
         assert_eq!(numbers, (1..=visits.len() as u32).collect::<Vec<_>>(), "{name}");
         for w in plan.touches.windows(2) {
-            let moved = w[0].pose != w[1].pose || w[0].from != w[1].from || length(&plan, &w[0]) != length(&plan, &w[1]);
+            let moved =
+                w[0].pose != w[1].pose || w[0].from != w[1].from || length(&plan, &w[0]) != length(&plan, &w[1]);
             // the same pose in the same sense may be a visit of its own only if the axis went away between
             assert!(!moved || w[0].visit != w[1].visit, "{name}: touch {}", w[1].id);
         }
@@ -181,8 +184,12 @@ fn the_program_stops_says_what_to_do_and_can_be_taken_up_behind_each_stop() {
         let g = generated(&machine);
         let text = post.program(&machine, &g.plan, &g.path).unwrap().text;
         let lines: Vec<&str> = text.lines().collect();
-        let stops: Vec<usize> =
-            lines.iter().enumerate().filter(|(_, l)| l.contains("(DEBUG,axiscal: change to the")).map(|(i, _)| i).collect();
+        let stops: Vec<usize> = lines
+            .iter()
+            .enumerate()
+            .filter(|(_, l)| l.contains("(DEBUG,axiscal: change to the"))
+            .map(|(i, _)| i)
+            .collect();
         assert_eq!(stops.len(), 2, "{name}");
         for (at, stylus) in stops.iter().zip(["stylus long", "own stylus"]) {
             let around = lines[at - 6..at + 6].join("\n");
@@ -214,9 +221,22 @@ fn every_touch_hits_and_is_read_back() {
             let output = command.current_dir(folder.path()).args(args).arg("--json").assert().success();
             serde_json::from_slice::<serde_json::Value>(&output.get_output().stdout).unwrap()
         };
-        let made = call(&["generate", "--machine", name, "--program", "full", "--controller", "linuxcnc", "--out", name]);
+        let made =
+            call(&["generate", "--machine", name, "--program", "full", "--controller", "linuxcnc", "--out", name]);
         let (plan, log) = (format!("{name}/full.plan.json"), format!("{name}/full.log"));
-        let done = call(&["simulate", "--plan", &plan, "--machine", name, "--scenario", "wrong.toml", "--controller", "linuxcnc", "--out", &log]);
+        let done = call(&[
+            "simulate",
+            "--plan",
+            &plan,
+            "--machine",
+            name,
+            "--scenario",
+            "wrong.toml",
+            "--controller",
+            "linuxcnc",
+            "--out",
+            &log,
+        ]);
         assert_eq!(done["touches"], made["touches"], "{name}");
         let read = call(&["parse", "--controller", "linuxcnc", "--plan", &plan, &log]);
         assert_eq!((&read["hits"], &read["misses"]), (&made["touches"], &0.into()), "{name}: {read}");
@@ -327,7 +347,10 @@ fn a_path_that_forgets_what_is_mounted_is_refused() {
     let left_out = says(&|steps| {
         steps.remove(stop(steps));
     });
-    assert!(left_out.contains("its mounting is not the one that is up") && left_out.contains("its stylus"), "{left_out}");
+    assert!(
+        left_out.contains("its mounting is not the one that is up") && left_out.contains("its stylus"),
+        "{left_out}"
+    );
     let other_stylus = says(&|steps| {
         let at = stop(steps);
         if let Step::Stop(stop) = &mut steps[at] {
@@ -345,7 +368,8 @@ fn a_path_that_forgets_what_is_mounted_is_refused() {
     // the long stylus reaches 100 mm further down
     let crash = says(&|steps| {
         let at = stop(steps);
-        let down = steps[at..].iter().position(|s| matches!(s, Step::Rapid { to } if to.get(AxisName::Z).is_some())).unwrap();
+        let down =
+            steps[at..].iter().position(|s| matches!(s, Step::Rapid { to } if to.get(AxisName::Z).is_some())).unwrap();
         if let Step::Rapid { to } = &mut steps[at + down] {
             to.set(AxisName::Z, to.get(AxisName::Z).unwrap() - 60.0);
         }
@@ -355,7 +379,8 @@ fn a_path_that_forgets_what_is_mounted_is_refused() {
 
 #[test]
 fn a_fixed_block_in_the_way_of_the_turntable_is_refused() {
-    let text = axiscal::machine::BUILT_IN.replacen("centre = [0.0, -140.0, -202.684]", "centre = [0.0, -40.0, -202.684]", 1);
+    let text =
+        axiscal::machine::BUILT_IN.replacen("centre = [0.0, -140.0, -202.684]", "centre = [0.0, -40.0, -202.684]", 1);
     assert_ne!(text, axiscal::machine::BUILT_IN);
     let (machines, _) = axiscal::machine::load(&source("m.toml", text)).unwrap();
     let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
@@ -374,6 +399,13 @@ fn a_controller_without_a_stop_and_a_machine_without_the_stylus_say_so() {
     let (post, _) = axiscal::post::parse(&source("mine.toml", format!("{}{}", &text[..begin], &text[end..]))).unwrap();
     let failure = post.program(&machine, &g.plan, &g.path).unwrap_err();
     assert!(failure.to_string().contains("how a program waits for a person"), "{failure}");
+
+    // the first part cannot be touched at all: the ball would have to come from below
+    let below = SEVERAL.replacen("touch = [{ faces = [\"+Z\"]", "touch = [{ faces = [\"-Z\"]", 1);
+    let (spec, _) = program::load(&source("s.toml", below)).unwrap();
+    let failure = program::generate(&machine, &spec, &Options::default()).unwrap_err();
+    let why = |words: &str| failure.0.iter().any(|f| f.message.contains(words));
+    assert!(why("in the part with which the program begins") && why("nothing of \"several\""), "{failure:?}");
 
     let (spec, _) = program::load(&source("s.toml", SEVERAL.replace("\"long\"", "\"longer\""))).unwrap();
     let failure = program::generate(&machine, &spec, &Options::default()).unwrap_err();

@@ -29,7 +29,7 @@ fn unpanicked(case: fn()) -> Check {
 
 fn main() {
     let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let cases: [Case; 8] = [
+    let cases: [Case; 9] = [
         ("rs274_accepts_every_program", || unpanicked(stops::rs274_accepts_every_program)),
         ("it_stops_with_the_name_of_the_touch", || {
             unpanicked(stops::it_stops_with_the_name_of_the_touch_and_gives_the_settings_back)
@@ -38,6 +38,7 @@ fn main() {
         ("the_papers_order_head_compensate_table_compensate", the_papers_order),
         ("drawn_errors_and_displaced_blocks_in_one_study", drawn_errors),
         ("plain_servo_latch_with_pretravel_in_the_model", servo_latch),
+        ("full_with_two_styli_and_its_stops", full_program),
         ("stock_kinematics_of_a_trunnion", stock_trunnion),
         ("stock_kinematics_of_a_swivel_table", stock_swivel_table),
     ];
@@ -51,7 +52,7 @@ fn main() {
         .collect();
     if std::env::var_os("AXISCAL_LINUXCNC").is_none() {
         println!(
-            "\nleft out: {} tests on a real LinuxCNC. They take a quarter of an hour and need Debian's linuxcnc-uspace;",
+            "\nleft out: {} tests on a real LinuxCNC. They take twenty minutes and need Debian's linuxcnc-uspace;",
             chosen.len()
         );
         println!("./run-tests installs it and runs them (AXISCAL_LINUXCNC=required cargo test --test linuxcnc)\n");
@@ -163,6 +164,30 @@ fn servo_latch() -> Check {
     let late_um = 1e3 * (found - truth.effects[2].1[0].1);
     if !(0.2..0.8).contains(&late_um) {
         return Err(format!("the latch comes {late_um:.2} um late on average, expected about 0.5"));
+    }
+    Ok(())
+}
+
+/// One run of `full`: the operator changes the stylus at both stops. The zero of B and the place of its axis, which are
+/// one number with a single stylus, come apart.
+fn full_program() -> Check {
+    let job = Job::new("swivel-head")?;
+    let noise_um = 0.05;
+    job.generate("full", &[])?;
+    let effects: [(&str, &[(&str, f64)]); 4] = [
+        ("location-b", &[("EX0B", 0.02), ("EZ0B", -0.015), ("EA0B", 0.004), ("EC0B", -0.006)]),
+        ("location-c", &[("EX0C", 0.012), ("EY0C", -0.02), ("EA0C", -0.002), ("EB0C", 0.003)]),
+        ("zero-b", &[("EB0B", 0.003)]),
+        ("pretravel", &[("pretravel", 0.004)]),
+    ];
+    let blocks = [("full", "a", [0.2, -0.1, 0.15], [0.05, -0.1, 0.08])];
+    job.scenario(&effects, &blocks, noise_um, 5)?;
+    job.run("full", "full", &Control::plain())?;
+    let study =
+        Study::new(&["full"], &["full"], &["location-b", "location-c", "zero-b", "block-setup", "pretravel"], noise_um);
+    let fit = job.identify("full", &study)?;
+    for (_, values) in &effects {
+        within(&fit, values, None)?;
     }
     Ok(())
 }

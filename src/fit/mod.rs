@@ -222,6 +222,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let solution = search.without_strangers(solution, 0.0);
     let noise = noise::estimate(&search.samples(&solution), &known);
     search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+    let first_steps = solution.iterations;
     let solution = solve::minimise(&search.touches, solution.theta, &observability);
     let before = search.touches.weights().to_vec();
     let mut solution = search.without_strangers(solution, noise.dof.unwrap_or(0.0));
@@ -233,6 +234,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         solution = solve::minimise(&search.touches, solution.theta, &observability);
         noise
     };
+    solution.iterations += first_steps;
     let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
     let snoop = Snoop::new(
         &search.touches,

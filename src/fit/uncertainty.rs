@@ -3,7 +3,7 @@
 
 use super::candidates::columns;
 use super::normal::Touches;
-use super::outcome::{Combination, Correlation};
+use super::outcome::{Combination, Correlation, Covariance};
 use super::{Fit, Knowledge};
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
@@ -87,7 +87,7 @@ pub(super) fn type_b(
         let Some((effect, which)) = owner else {
             findings.push(
                 Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
-                    .help("`axiscal effects` lists them, for instance sX (block-size), dL (tool-length), expansion (ambient-scale)"),
+                    .help("`axiscal effects` lists them, for instance size_X (block-size), dL (tool-length), expansion (ambient-scale)"),
             );
             continue;
         };
@@ -255,6 +255,16 @@ pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
         });
     }
     out
+}
+
+/// Covariance of the results (no set-ups of blocks), type A.
+#[must_use]
+pub fn results_covariance(fit: &Fit) -> Covariance {
+    let results: Vec<usize> = fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance).collect();
+    Covariance {
+        names: results.iter().map(|&i| fit.model.unknowns[i].name.clone()).collect(),
+        matrix: results.iter().map(|&i| results.iter().map(|&j| fit.covariance[(i, j)]).collect()).collect(),
+    }
 }
 
 /// Names and values of the priors that entered the fit.

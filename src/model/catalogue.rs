@@ -6,6 +6,7 @@ use super::formula::Formula;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source, from_toml};
 use crate::machine::{Machine, Side};
+use std::sync::OnceLock;
 
 /// The effects that are built in.
 pub const BUILT_IN: &str = include_str!("../../effects.toml");
@@ -108,9 +109,8 @@ impl Effect {
     /// True when a machine has what the effect needs.
     #[must_use]
     pub fn applies_to(&self, machine: &Machine) -> bool {
-        let here = |name: &AxisName| {
-            machine.axis(*name).is_some_and(|axis| self.side.is_none_or(|side| axis.side == side))
-        };
+        let here =
+            |name: &AxisName| machine.axis(*name).is_some_and(|axis| self.side.is_none_or(|side| axis.side == side));
         self.needs.iter().all(here) && !self.unless.iter().any(here)
     }
 
@@ -125,21 +125,44 @@ impl Effect {
     }
 }
 
+/// A row of the built-in file: read when it is asked for, because a study takes a few of the many.
+#[derive(Debug, Clone)]
+struct Row {
+    id: &'static str,
+    /// The row's own text.
+    text: &'static str,
+    effect: OnceLock<Option<Effect>>,
+}
+
+impl Row {
+    fn effect(&self) -> Option<&Effect> {
+        let read = || {
+            let source = crate::diag::source("effects.toml (built in)", format!("{HEAD}{}", self.text));
+            read(&source, true, &|_| false).ok().and_then(|(effects, _)| effects.into_iter().next())
+        };
+        self.effect.get_or_init(read).as_ref()
+    }
+}
+
+/// What begins a row.
+const HEAD: &str = "[[effect]]";
+
 /// All effects that exist.
 #[derive(Debug, Clone, Default)]
 pub struct Catalogue {
-    effects: Vec<Effect>,
+    rows: Vec<Row>,
+    own: Vec<Effect>,
 }
 
 impl Catalogue {
     /// The built-in effects.
     ///
     /// # Errors
-    /// Never for a released program: a test reads the built-in file.
+    /// Never for a released program: a test reads the built-in file as a user's is read.
     pub fn built_in() -> Result<Self> {
-        let mut catalogue = Self::default();
-        catalogue.read(&crate::diag::source("effects.toml (built in)", BUILT_IN), true)?;
-        Ok(catalogue)
+        let id = |text: &'static str| text.split('"').nth(1).unwrap_or_default();
+        let row = |text| Row { id: id(text), text, effect: OnceLock::new() };
+        Ok(Self { rows: BUILT_IN.split(HEAD).skip(1).map(row).collect(), own: Vec::new() })
     }
 
     /// Adds a user's effects.
@@ -147,47 +170,48 @@ impl Catalogue {
     /// # Errors
     /// When the file is unusable; every finding has its place, and says which words exist.
     pub fn add_file(&mut self, source: &Source) -> Result<Findings> {
-        self.read(source, false)
-    }
-
-    fn read(&mut self, source: &Source, built_in: bool) -> Result<Findings> {
-        let file: File = toml::from_str(source.inner())
-            .map_err(|e| from_toml(&e, source, "effects::not_toml").help("`axiscal schema effects` prints the form"))?;
-        let mut check = Check::new(source, built_in);
-        check.format(&file);
-        let mut fresh: Vec<Effect> = Vec::new();
-        for written in &file.effect {
-            let Some(effect) = check.effect(written) else { continue };
-            let same = |e: &&Effect| e.id == effect.id;
-            let clash = |e: &&Effect| same(e) && !e.excludes(&effect);
-            if self.effects.iter().any(|e| same(&e) && e.built_in && !built_in)
-                || self.effects.iter().chain(&fresh).any(|e| clash(&e))
-            {
-                check.twice(written);
-            }
-            fresh.push(effect);
-        }
-        let ((), findings) = check.findings.finish(())?;
-        self.effects.extend(fresh);
+        let (fresh, findings) = read(source, false, &|effect| {
+            self.rows.iter().any(|row| row.id == effect.id)
+                || self.own.iter().any(|own| own.id == effect.id && !own.excludes(effect))
+        })?;
+        self.own.extend(fresh);
         Ok(findings)
     }
 
     /// All effects, built-in ones first.
     pub fn iter(&self) -> impl Iterator<Item = &Effect> {
-        self.effects.iter()
+        self.rows.iter().filter_map(Row::effect).chain(&self.own)
     }
 
     /// The effect of that id that applies to a machine.
     #[must_use]
     pub fn get(&self, id: &str, machine: &Machine) -> Option<&Effect> {
-        self.effects.iter().find(|e| e.id == id && e.applies_to(machine))
+        let rows = self.rows.iter().filter(|row| row.id == id).filter_map(Row::effect);
+        rows.chain(self.own.iter().filter(|e| e.id == id)).find(|e| e.applies_to(machine))
     }
 
     /// True when an effect of that id exists for some machine.
     #[must_use]
     pub fn knows(&self, id: &str) -> bool {
-        self.effects.iter().any(|e| e.id == id)
+        self.rows.iter().any(|row| row.id == id) || self.own.iter().any(|e| e.id == id)
     }
+}
+
+/// The effects of a file; `taken` says that an effect of that id exists already.
+fn read(source: &Source, built_in: bool, taken: &dyn Fn(&Effect) -> bool) -> Result<(Vec<Effect>, Findings)> {
+    let file: File = toml::from_str(source.inner())
+        .map_err(|e| from_toml(&e, source, "effects::not_toml").help("`axiscal schema effects` prints the form"))?;
+    let mut check = Check::new(source, built_in);
+    check.format(&file);
+    let mut fresh: Vec<Effect> = Vec::new();
+    for written in &file.effect {
+        let Some(effect) = check.effect(written) else { continue };
+        if taken(&effect) || fresh.iter().any(|e| e.id == effect.id && !e.excludes(&effect)) {
+            check.twice(written);
+        }
+        fresh.push(effect);
+    }
+    check.findings.finish(fresh)
 }
 
 #[cfg(test)]
@@ -204,6 +228,11 @@ mod tests {
         assert!(
             catalogue.knows("location-b") && catalogue.knows("paper-double-head") && catalogue.knows("block-setup")
         );
+        // the same rows are found one by one, when they are asked for
+        let lazy = Catalogue::built_in().unwrap();
+        let ids = |c: &Catalogue| c.iter().map(|e| e.id.clone()).collect::<Vec<_>>();
+        assert_eq!(ids(&lazy), ids(&catalogue));
+        assert!(lazy.rows.iter().all(|row| row.effect().is_some_and(|e| e.id == row.id)));
         for e in catalogue.iter() {
             let said = [&e.name, &e.says, &e.look, &e.mends, &e.family];
             assert!(said.iter().all(|text| !text.is_empty()), "{}", e.id);

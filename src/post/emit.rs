@@ -166,6 +166,7 @@ impl<'a> Writer<'a> {
             axes => names(&self.axes),
             rotary => names(&rotary),
             tcp => self.frame.is_tcp(),
+            stops => !self.path.mounted.is_empty(),
             program => self.plan.program.clone(),
             machine => self.machine.name.clone(),
         };
@@ -217,7 +218,6 @@ impl<'a> Writer<'a> {
             head => head,
             start_near => near.unwrap_or_default(),
             setups => setups,
-            stops => self.path.steps.iter().any(|s| matches!(s, Step::Stop(_))),
             origin => map(origin),
             slow_feed => self.number(self.machine.probe.slow_feed),
             log_name => self.post.log_name(self.plan)?,

@@ -78,7 +78,8 @@ fn parts_lines(layout: &Layout) -> Vec<String> {
                 lines.extend(block_lines(&part.machine, block));
             }
         }
-        lines.push(format!("  probe with {}", part.stylus_says()));
+        let says = if part.stylus.is_some() { part.stylus_says() } else { part.probe_says() };
+        lines.push(format!("  probe with {says}"));
     }
     lines
 }

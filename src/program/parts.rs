@@ -109,12 +109,18 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Ball and length of the stylus, in words.
+    /// Name, ball and length of the stylus, in words.
     #[must_use]
     pub fn stylus_says(&self) -> String {
-        let name = self.stylus.map_or_else(|| "own stylus".to_owned(), |s| format!("stylus {}", s.name));
+        let name = self.stylus.map_or_else(|| "probe's own stylus".to_owned(), |s| format!("stylus {}", s.name));
+        format!("{name}: {}", self.probe_says())
+    }
+
+    /// Ball and length of the stylus, in words.
+    #[must_use]
+    pub fn probe_says(&self) -> String {
         format!(
-            "{name}: ball {} mm across, stem {} mm, {} mm from the pivot or gauge line to the ball's centre",
+            "ball {} mm across, stem {} mm, {} mm from the pivot or gauge line to the ball's centre",
             2.0 * self.machine.probe.ball_radius,
             self.machine.probe.stem_length,
             self.machine.tool.length_mm

@@ -72,26 +72,27 @@ impl Search<'_> {
         out
     }
 
-    /// The group of a leader among candidates (the leader included).
+    /// The group of a leader among candidates (the leader included). Effects with a name and generic shapes do not
+    /// stand in one group: a shape is no cause.
     #[must_use]
     pub fn group_of(&self, leader: usize, among: &[usize]) -> Group {
         let trace = self.trace(leader);
         // ŵ: the direction in the data that speaks for the leader
         let direction = -(&trace.left * &self.scores[leader].estimate);
         let length = direction.norm();
-        let unit = DMatrix::from_column_slice(direction.len(), 1, (direction / length.max(f64::MIN_POSITIVE)).as_slice());
+        let unit =
+            DMatrix::from_column_slice(direction.len(), 1, (direction / length.max(f64::MIN_POSITIVE)).as_slice());
         let along_direction = Moments::cross(&unit, self.library);
         let cross = Moments::cross(&trace.left, self.library);
+        let generic = |c: usize| self.library.candidates()[c].origin == Origin::Generic;
         let mut members: Vec<Member> = among
             .iter()
+            .filter(|&&j| generic(j) == generic(leader))
             .filter_map(|&j| {
                 let span = self.span(j);
                 let block = self.block(j);
-                let alignment = block
-                    .whitener
-                    .tr_mul(&along_direction.columns(span.0, span.1).transpose())
-                    .norm_squared()
-                    .min(1.0);
+                let alignment =
+                    block.whitener.tr_mul(&along_direction.columns(span.0, span.1).transpose()).norm_squared().min(1.0);
                 if j != leader && alignment < RIVAL {
                     return None;
                 }
@@ -113,10 +114,10 @@ impl Search<'_> {
     }
 
     /// Sorts members: what comes first is named first.
-    fn rank_of(&self, m: &Member) -> (bool, bool, usize, bool, bool, f64) {
+    fn rank_of(&self, m: &Member) -> (bool, usize, bool, bool, f64) {
         let score = &self.scores[m.candidate];
         let origin = self.library.candidates()[m.candidate].origin;
-        (!m.stays, origin == Origin::Generic, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
+        (!m.stays, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
     }
 
     fn span(&self, candidate: usize) -> (usize, usize) {
@@ -194,4 +195,3 @@ pub fn alias_pairs(base: &super::Basis, library: &super::Library) -> Vec<AliasPa
     }
     out
 }
-

@@ -113,16 +113,22 @@ impl<'a> Search<'a> {
         Self { question, library, scores, moments, first_variant }
     }
 
-    /// Indices of the visible candidates, most significant first.
+    /// Indices of the visible candidates: those with a name first, then generic shapes; each by significance.
     #[must_use]
     pub fn ranking(&self) -> Vec<usize> {
-        ranking(&self.scores)
+        ranking(&self.scores, self.library)
     }
 
-    /// The most significant candidate that passes Holm's test.
+    /// The most significant effect with a name that passes Holm's test.
     #[must_use]
     pub fn leader(&self) -> Option<usize> {
-        leader(&self.scores)
+        leader(&self.scores, self.library, false)
+    }
+
+    /// The most significant generic shape that passes Holm's test.
+    #[must_use]
+    pub fn leading_shape(&self) -> Option<usize> {
+        leader(&self.scores, self.library, true)
     }
 
     /// What is left of a candidate's best variant.
@@ -151,16 +157,21 @@ pub(super) fn first_variants(library: &Library) -> Vec<usize> {
         .collect()
 }
 
-pub(super) fn ranking(scores: &[Score]) -> Vec<usize> {
+pub(super) fn ranking(scores: &[Score], library: &Library) -> Vec<usize> {
+    let generic = |i: usize| library.candidates()[i].origin == Origin::Generic;
     let mut order: Vec<usize> = (0..scores.len()).filter(|&i| scores[i].visible()).collect();
     order.sort_by(|&a, &b| {
-        scores[a].ln_p.total_cmp(&scores[b].ln_p).then(scores[b].delta_ss.total_cmp(&scores[a].delta_ss))
+        generic(a)
+            .cmp(&generic(b))
+            .then(scores[a].ln_p.total_cmp(&scores[b].ln_p))
+            .then(scores[b].delta_ss.total_cmp(&scores[a].delta_ss))
     });
     order
 }
 
-pub(super) fn leader(scores: &[Score]) -> Option<usize> {
-    ranking(scores).into_iter().find(|&i| scores[i].proposed())
+pub(super) fn leader(scores: &[Score], library: &Library, generic: bool) -> Option<usize> {
+    let wanted = |i: usize| (library.candidates()[i].origin == Origin::Generic) == generic;
+    ranking(scores, library).into_iter().find(|&i| wanted(i) && scores[i].proposed())
 }
 
 /// All score tests from inner products.
