@@ -2,6 +2,7 @@
 
 use super::load::load_study;
 use super::{Answer, Io};
+use crate::design;
 use crate::diag::{Failure, Result};
 use crate::fit;
 use crate::machine::Machine;
@@ -36,7 +37,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
     settings.quick = args.quick;
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let mut fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    if !settings.quick {
+        design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
+    }
     let covariance = args.covariance.then(|| fit::uncertainty::results_covariance(&fit));
     let mut outcome = fit.outcome;
     outcome.covariance = covariance;

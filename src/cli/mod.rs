@@ -3,6 +3,7 @@
 //! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
 //! "no", 2 the input or the call was unusable.
 
+mod assess;
 mod common;
 mod compare;
 mod controllers;
@@ -50,6 +51,8 @@ enum Verb {
     Controllers(controllers::Args),
     /// List the probing programs that are built in or found, or show one
     Programs(programs::Args),
+    /// Before the first touch: what a plan will be able to tell, and what it cannot
+    Assess(assess::Args),
     /// Write an NC probing program and its plan
     Generate(generate::Args),
     /// The virtual machine: write the log that the controller would have written
@@ -89,6 +92,7 @@ pub fn main() -> ExitCode {
         Verb::Effects(args) => effects::run(&args, &io),
         Verb::Controllers(args) => controllers::run(&args, &io),
         Verb::Programs(args) => programs::run(&args, &io),
+        Verb::Assess(args) => assess::run(&args, &io),
         Verb::Generate(args) => generate::run(&args, &io),
         Verb::Simulate(args) => simulate::run(&args, &io),
         Verb::Parse(args) => parse::run(&args, &io),

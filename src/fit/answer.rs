@@ -95,7 +95,7 @@ pub(super) fn outcome(
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
-        undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, v)).collect(),
+        undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, effects, v)).collect(),
         weak: if settings.quick { Vec::new() } else { uncertainty::weak(fit) },
         parameters,
         correlations: uncertainty::correlations(fit),

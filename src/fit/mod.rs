@@ -14,7 +14,7 @@ pub mod normal;
 pub mod outcome;
 pub mod snoop;
 pub mod solve;
-mod statement;
+pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
@@ -290,7 +290,8 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
 
 /// Scatter of the ball's place from one index to the next as the machine file declares it, mm: of the rotary axes that
 /// stand at more than one place in these touches.
-fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
+#[must_use]
+pub fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
     let moved = |name| {
         let mut places = observations.iter().map(|o| o.position.get(name));
         let first = places.next();

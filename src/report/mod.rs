@@ -2,5 +2,6 @@
 
 pub mod diagnosis;
 pub mod compare;
+pub mod assess;
 pub mod fit;
 pub mod plot;
