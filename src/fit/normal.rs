@@ -182,6 +182,30 @@ impl<'a> Touches<'a> {
         *columns /= self.sigma_mm;
     }
 
+    /// Gaps and rows of all touches with only the free unknowns that they see.
+    #[must_use]
+    pub(super) fn short_rows(&self, free: &DVector<f64>) -> ShortRows {
+        let theta = self.full(free);
+        let at = self.batch.at(&theta);
+        let column_of = self.columns();
+        let layout = self.batch.model().layout();
+        // places of the free unknowns in the rows of each block, and their columns
+        let kept: Vec<(Vec<usize>, Vec<usize>)> = (0..layout.own.len())
+            .map(|s| layout.row(s).enumerate().filter_map(|(place, u)| Some((place, column_of[u]?))).unzip())
+            .collect();
+        let mut out = ShortRows { columns: kept.iter().map(|k| k.1.clone()).collect(), ..ShortRows::default() };
+        let mut scratch = self.batch.scratch();
+        let mut row = Vec::new();
+        for (i, o) in self.batch.observations().iter().enumerate() {
+            row.resize(layout.row_length(o.set_up), 0.0);
+            out.gap.push(at.gap_and_row(i, &mut scratch, &mut row));
+            out.set_up.push(o.set_up);
+            out.start.push(out.values.len());
+            out.values.extend(kept[o.set_up].0.iter().map(|&place| row[place]));
+        }
+        out
+    }
+
     /// Gaps, mm, and Jacobian of the free unknowns, mm per unit; touches only.
     #[must_use]
     pub fn unwhitened(&self, free: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
@@ -313,6 +337,20 @@ impl<'a> Touches<'a> {
         }
         part
     }
+}
+
+/// Rows one after the other, each with the free unknowns that its touch sees.
+#[derive(Debug, Default)]
+pub(super) struct ShortRows {
+    /// Free columns of the rows of each block.
+    pub columns: Vec<Vec<usize>>,
+    /// Block of each touch.
+    pub set_up: Vec<usize>,
+    /// Where each row begins.
+    pub start: Vec<usize>,
+    pub values: Vec<f64>,
+    /// Gaps, mm.
+    pub gap: Vec<f64>,
 }
 
 /// Sums over one visit.

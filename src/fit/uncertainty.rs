@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 /// Correlations above this are worth a line.
 const WORTH_NAMING: f64 = 0.8;
 
+/// With more touches the columns of the whole catalogue would need gigabytes.
+pub(super) const MOST_UNMODELLED: usize = 20_000;
+
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
 
