@@ -15,6 +15,7 @@ mod load;
 mod machines;
 mod new;
 mod parse;
+mod plan_next;
 mod programs;
 mod reproduce;
 mod schema;
@@ -62,6 +63,8 @@ enum Verb {
     New(new::Args),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
+    /// The probing program that best separates what the data cannot tell apart
+    PlanNext(plan_next::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -90,6 +93,7 @@ pub fn main() -> ExitCode {
         Verb::Reproduce(args) => reproduce::run(&args, &io),
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
+        Verb::PlanNext(args) => plan_next::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };
