@@ -7,7 +7,7 @@ use crate::design::bundle::{Bundle, as_plan, bundles, program_text, without};
 use crate::design::next::{Design, Separation};
 use crate::design::questions::Questions;
 use crate::design::{Noise, Planned, Task, View};
-use crate::diag::{Failure, Result, source};
+use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
 use crate::fit::{self, Fit, effects_of};
 use crate::machine::{Machine, Mounting};
@@ -26,6 +26,9 @@ const MOST_ROUNDS: usize = 5;
 
 /// A program may take this much longer than the time that was given.
 const OVER: f64 = 1.02;
+
+/// Other blocks are worth the trouble when they part effects so many times better.
+const WORTH_MOVING: f64 = 1.5;
 
 /// Arguments of `plan-next`.
 #[derive(Debug, clap::Args)]
@@ -99,13 +102,21 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some((mounting, label)) = &stands {
         best = setting.choose(mounting, label.as_deref(), &effects, &questions, budget_s, &name).ok();
     }
-    // other blocks only where those that stand there cannot settle it
-    if !best.as_ref().is_some_and(|b| b.least() >= SEEN) && (stands.is_none() || args.moved) {
-        for mounting in &loaded.machine.mountings {
-            if let Ok(other) = setting.choose(mounting, None, &effects, &questions, budget_s, &name)
-                && best.as_ref().is_none_or(|b| other.least() > 1.1 * b.least())
-            {
+    // other blocks only where those that stand there cannot settle it, and only if they may be put up
+    if !best.as_ref().is_some_and(|b| b.least() >= SEEN) {
+        let others = loaded.machine.mountings.iter();
+        let others = others.filter_map(|m| setting.choose(m, None, &effects, &questions, budget_s, &name).ok());
+        let better = others.filter(|o| best.as_ref().is_none_or(|b| o.least() > WORTH_MOVING * b.least()));
+        let most = better.max_by(|a, b| a.least().total_cmp(&b.least()));
+        if let Some(other) = most {
+            if args.moved || stands.is_none() {
                 best = Some(other);
+            } else {
+                io.report(&[Finding::info(
+                    "next::other_blocks",
+                    format!("with mounting {:?} put up anew the least separation would be {}", other.generated.plan.mounting, significant(other.least())),
+                )
+                .help("add --moved for that program")]);
             }
         }
     }
@@ -236,7 +247,8 @@ impl<'a> Setting<'a> {
                     found = Some(now);
                 }
             }
-            if !lost && (0.85..=OVER).contains(&over) {
+            let settled = found.as_ref().is_some_and(|f| f.least() >= 2.0 * SEEN);
+            if !lost && (settled || (0.85..=OVER).contains(&over)) {
                 break;
             }
             if lost {

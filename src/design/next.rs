@@ -205,24 +205,33 @@ impl Design {
     pub fn choose(&self, pool: &[Bundle], budget_s: f64) -> Vec<usize> {
         let mut best: Vec<usize> = Vec::new();
         let mut worth = self.worth(&self.given);
-        // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
-        for start in [self.greedy(pool, budget_s, |m| self.d_s(m)), self.greedy(pool, budget_s, |m| self.worth(m))] {
-            let chosen = self.exchange(pool, budget_s, start);
-            let now = self.worth(&self.information(&chosen));
-            if now > worth {
-                (best, worth) = (chosen, now);
+        let all: Vec<usize> = (0..pool.len()).collect();
+        // changing the stylus costs as much as many touches: what can be done without it is a start of its own
+        let own: Vec<usize> = all.iter().copied().filter(|&i| pool[i].manner.stylus.is_none()).collect();
+        let pools = if own.len() < all.len() { vec![all, own] } else { vec![all] };
+        for among in &pools {
+            // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
+            let by_d_s = self.greedy(pool, among, budget_s, |m| self.d_s(m));
+            let by_worth = self.greedy(pool, among, budget_s, |m| self.worth(m));
+            for start in [by_d_s, by_worth] {
+                let chosen = self.exchange(pool, among, budget_s, start);
+                let now = self.worth(&self.information(&chosen));
+                if now > worth {
+                    (best, worth) = (chosen, now);
+                }
             }
         }
         self.thinned(pool, best)
     }
 
-    fn greedy(&self, pool: &[Bundle], budget_s: f64, value: impl Fn(&DMatrix<f64>) -> f64 + Sync) -> Vec<usize> {
+    fn greedy(&self, pool: &[Bundle], among: &[usize], budget_s: f64, value: impl Fn(&DMatrix<f64>) -> f64 + Sync) -> Vec<usize> {
         let mut chosen: Vec<usize> = Vec::new();
         loop {
             let now = self.information(&chosen);
             let (here, spent) = (value(&now), cost_s(pool, &chosen));
-            let best = (0..pool.len())
-                .into_par_iter()
+            let best = among
+                .par_iter()
+                .copied()
                 .filter(|i| !chosen.contains(i))
                 .filter_map(|i| {
                     let with: Vec<usize> = chosen.iter().copied().chain([i]).collect();
@@ -240,13 +249,14 @@ impl Design {
     }
 
     /// Fedorov's exchange: one out, one in, while it pays.
-    fn exchange(&self, pool: &[Bundle], budget_s: f64, mut chosen: Vec<usize>) -> Vec<usize> {
+    fn exchange(&self, pool: &[Bundle], among: &[usize], budget_s: f64, mut chosen: Vec<usize>) -> Vec<usize> {
         for _ in 0..MOST_PASSES {
             let now = self.information(&chosen);
             let here = self.worth(&now);
             // what helps most beside the present choice is what is worth a place in it
-            let mut fresh: Vec<(f64, usize)> = (0..pool.len())
-                .into_par_iter()
+            let mut fresh: Vec<(f64, usize)> = among
+                .par_iter()
+                .copied()
                 .filter(|i| !chosen.contains(i))
                 .map(|i| (self.worth(&(&now + &self.adds[i])), i))
                 .collect();

@@ -7,7 +7,7 @@ use crate::fit::candidates::columns;
 use crate::fit::uncertainty::unmodelled_by;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
-use crate::search::groups::alias_pairs;
+use crate::search::groups::{PLAUSIBLE, alias_pairs};
 use crate::search::power::power;
 use crate::search::{Basis, Library, Origin, Question, Search};
 use nalgebra::DVector;
@@ -79,11 +79,14 @@ impl Questions {
         let id = |c: usize| library.candidates()[c].id.clone();
         let Some(leader) = search.leader() else { return Ok(Self::of_plan(view)) };
         let group = search.group_of(leader, &search.ranking());
-        let mut rivals: Vec<usize> = group.members.iter().filter(|m| m.stays && m.candidate != leader).map(|m| m.candidate).collect();
+        let mut rivals: Vec<usize> = group.members.iter().filter(|m| m.candidate != leader).map(|m| m.candidate).collect();
         rivals.truncate(MOST_PAIRS);
         let mut sizes = BTreeMap::new();
         for c in rivals.iter().copied().chain([leader]) {
-            sizes.insert(id(c), search.scores[c].estimate.clone());
+            // a size beyond belief is that of a trace which hardly differs from the model's: not to be counted on
+            if search.scores[c].relative_size() <= PLAUSIBLE {
+                sizes.insert(id(c), search.scores[c].estimate.clone());
+            }
         }
         if rivals.is_empty() {
             return Ok(Self {
