@@ -17,6 +17,7 @@ mod load;
 mod machines;
 mod new;
 mod parse;
+mod plan_next;
 mod programs;
 mod reproduce;
 mod schema;
@@ -71,6 +72,8 @@ enum Verb {
     SketchEffect(sketch_effect::Args),
     /// Model against measurement: where it fails, and on what that depends
     Compare(compare::Args),
+    /// The probing program that best separates what the data cannot tell apart
+    PlanNext(plan_next::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -102,6 +105,7 @@ pub fn main() -> ExitCode {
         Verb::Diagnose(args) => diagnose::run(&args, &io),
         Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
         Verb::Compare(args) => compare::run(&args, &io),
+        Verb::PlanNext(args) => plan_next::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

@@ -134,7 +134,7 @@ fn pick<T: Clone>(all: &[T], i: usize, option: &str) -> Result<T> {
 }
 
 /// A path as the study's folder sees it; absolute where it is not below a common folder.
-fn relative(path: &Path, folder: &Path) -> String {
+pub(super) fn relative(path: &Path, folder: &Path) -> String {
     let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_path_buf());
     let (path_abs, folder_abs) =
         (absolute(path), absolute(if folder.as_os_str().is_empty() { Path::new(".") } else { folder }));

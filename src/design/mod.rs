@@ -5,9 +5,12 @@
 //! that part what a fit cannot tell apart. All verdicts are computed from the varied touches, none is looked up.
 
 mod assess;
+pub mod bundle;
 mod explain;
 pub mod habits;
+pub mod next;
 pub mod record;
+pub mod questions;
 mod score;
 pub mod vary;
 pub mod view;

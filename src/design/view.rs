@@ -127,6 +127,16 @@ impl View {
         Ok(view)
     }
 
+    /// Looks at planned runs, with the named effects only.
+    ///
+    /// # Errors
+    /// When no touch can be used.
+    pub fn with_effects(task: &Task, runs: &[Planned], noise: Noise, effects: &[&Effect]) -> Result<Self> {
+        let mut view = Self::of_model(task, runs, &[], noise)?;
+        view.add(task, effects);
+        Ok(view)
+    }
+
     /// Looks at planned runs, without the effects that the model leaves out.
     ///
     /// # Errors

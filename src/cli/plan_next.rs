@@ -1,0 +1,387 @@
+//! `axiscal plan-next`: the probing program that best separates what the data of a study cannot tell apart.
+
+use super::load::{Loaded, load_study, read_log};
+use super::new::relative;
+use super::{Answer, Io};
+use crate::design::bundle::{Bundle, as_plan, bundles, program_text, without};
+use crate::design::next::{Design, Separation};
+use crate::design::questions::Questions;
+use crate::design::{Noise, Planned, Task, View};
+use crate::diag::{Failure, Finding, Result, source};
+use crate::files;
+use crate::fit::{self, Fit, effects_of};
+use crate::machine::{Machine, Mounting};
+use crate::model::catalogue::Effect;
+use crate::post::Postprocessor;
+use crate::program::plan::Plan;
+use crate::program::{self, Generated, Options};
+use crate::report::fit::significant;
+use crate::search::power::SEEN;
+use crate::study;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Rounds of choosing, generating and leaving out what cannot be reached.
+const MOST_ROUNDS: usize = 5;
+
+/// A program may take this much longer than the time that was given.
+const OVER: f64 = 1.02;
+
+/// Other blocks are worth the trouble when they part effects so many times better.
+const WORTH_MOVING: f64 = 1.5;
+
+/// Arguments of `plan-next`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The study
+    pub study: PathBuf,
+    /// Folder for the program and its plan
+    #[arg(long, short, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Name of the controller, or a postprocessor file
+    #[arg(long, short)]
+    pub controller: String,
+    /// How long the program may take, minutes (putting up other blocks not counted)
+    #[arg(long, default_value_t = 10.0)]
+    pub minutes: f64,
+    /// The effects that are to be told apart (default: what the data leave open)
+    #[arg(long, value_delimiter = ',')]
+    pub effects: Vec<String>,
+    /// The blocks were put up anew since the last run, or will be: their set-up is unknown again
+    #[arg(long)]
+    pub moved: bool,
+    /// Put this log of the program into the study as its next run, instead of writing a program
+    #[arg(long, value_name = "LOG")]
+    pub join: Option<PathBuf>,
+}
+
+/// Runs `plan-next`.
+///
+/// # Errors
+/// When the study is unusable, an effect is unknown, or nothing can be reached.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let loaded = load_study(&args.study, io)?;
+    let name = format!("next-{}", loaded.study.data.len() + 1);
+    let plan_file = args.out.join(format!("{name}.plan.json"));
+    if let Some(log) = &args.join {
+        return join(args, &loaded, &plan_file, log, io);
+    }
+    if !(args.minutes.is_finite() && args.minutes > 0.0 && args.minutes < 1e5) {
+        return Err(Failure::new("next::minutes", "the time is no usable number").help("write --minutes more than 0"));
+    }
+    let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
+    io.report(&findings);
+    let mut settings = loaded.settings();
+    settings.effects.retain(|e| !args.effects.contains(e));
+    settings.quick = true;
+    let named = effects_of(&args.effects, &loaded.catalogue, &loaded.machine)?;
+    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let setting = Setting::new(&loaded, &settings.effects, &fit)?;
+    let questions = if named.is_empty() {
+        let view = View::new(&setting.task, &setting.runs, &[], setting.noise)?;
+        Questions::of_fit(&fit, &loaded.machine, &loaded.catalogue, &view)?
+    } else {
+        Questions::named(&args.effects)
+    };
+    if questions.pairs.is_empty() {
+        io.say("the touches of this study tell every effect from every other: no further program is needed");
+        io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": "nothing is confounded" }));
+        return Ok(Answer::Done);
+    }
+    let asked: Vec<String> =
+        questions.pairs.iter().flat_map(|p| std::iter::once(p.one.clone()).chain(p.other.clone())).collect();
+    let mut effects: Vec<&Effect> = Vec::new();
+    for id in &asked {
+        if let Some(e) = loaded.catalogue.get(id, &loaded.machine).filter(|e| effects.iter().all(|o| o.id != e.id)) {
+            effects.push(e);
+        }
+    }
+    let budget_s = 60.0 * args.minutes;
+    let stands = setting.stands(&loaded.machine, args.moved);
+    let mut best: Option<Chosen> = None;
+    if let Some((mounting, label)) = &stands {
+        best = setting.choose(mounting, label.as_deref(), &effects, &questions, budget_s, &name).ok();
+    }
+    // other blocks only where those that stand there cannot settle it, and only if they may be put up
+    if !best.as_ref().is_some_and(|b| b.least() >= SEEN) {
+        let others = loaded.machine.mountings.iter();
+        let others = others.filter_map(|m| setting.choose(m, None, &effects, &questions, budget_s, &name).ok());
+        let better = others.filter(|o| best.as_ref().is_none_or(|b| o.least() > WORTH_MOVING * b.least()));
+        let most = better.max_by(|a, b| a.least().total_cmp(&b.least()));
+        if let Some(other) = most {
+            if args.moved || stands.is_none() {
+                best = Some(other);
+            } else {
+                io.report(&[Finding::info(
+                    "next::other_blocks",
+                    format!("with mounting {:?} put up anew the least separation would be {}", other.generated.plan.mounting, significant(other.least())),
+                )
+                .help("add --moved for that program")]);
+            }
+        }
+    }
+    let Some(chosen) = best else {
+        return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time")
+            .help("give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)"));
+    };
+    write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
+}
+
+/// A program that was chosen and proven.
+struct Chosen {
+    text: String,
+    generated: Generated,
+    separations: Vec<Separation>,
+    /// The study's name for the blocks as they stand; `None`: put up anew.
+    label: Option<String>,
+}
+
+impl Chosen {
+    fn least(&self) -> f64 {
+        self.separations.iter().map(|s| s.after).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The study as a design sees it.
+struct Setting<'a> {
+    task: Task<'a>,
+    runs: Vec<Planned>,
+    noise: Noise,
+}
+
+impl<'a> Setting<'a> {
+    fn new(loaded: &'a Loaded, effects: &[String], fit: &Fit) -> Result<Self> {
+        let runs = loaded
+            .runs
+            .iter()
+            .enumerate()
+            .map(|(i, r)| {
+                let mut plan = r.plan.clone();
+                // only what was measured tells anything
+                plan.touches.retain(|t| fit.data.observations.iter().any(|o| o.run == i && o.id == t.id));
+                Planned { plan, mounting: r.mounting.clone(), started_s: r.started_s }
+            })
+            .collect();
+        let task = Task {
+            machine: &loaded.machine,
+            catalogue: &loaded.catalogue,
+            effects: effects_of(effects, &loaded.catalogue, &loaded.machine)?,
+            held: loaded.study.knowledge.iter().filter(|(_, k)| matches!(k, fit::Knowledge::Fixed(_))).map(|(n, _)| n.clone()).collect(),
+            reference: loaded.machine.reference.pivot,
+            temperature: fit.data.observations.iter().any(|o| o.has_temperature),
+        };
+        Ok(Self { task, runs, noise: Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: fit.noise.tau_test_mm } })
+    }
+
+    /// The mounting that stands there since the last run, with the study's name for it (`None` where it is put up anew).
+    fn stands(&self, machine: &'a Machine, moved: bool) -> Option<(&'a Mounting, Option<String>)> {
+        let last = self.runs.last()?;
+        let own = last.plan.touches.last()?.mounting.clone();
+        let mounting = machine.mounting(own.as_deref().unwrap_or(&last.plan.mounting))?;
+        let run = last.mounting.clone().unwrap_or_else(|| format!("{}-{}", last.plan.mounting, self.runs.len()));
+        let label = own.map_or(run.clone(), |m| format!("{run}/{m}"));
+        Some((mounting, (!moved).then_some(label)))
+    }
+
+    /// The runs with a further one, whose blocks stand as the last run left them where a label is given.
+    fn with(&self, plan: Plan, label: Option<&str>) -> Vec<Planned> {
+        let mut runs = self.runs.clone();
+        if let (Some(label), Some(last)) = (label, runs.last_mut()) {
+            last.mounting = Some(label.split('/').next().unwrap_or(label).to_owned());
+        }
+        let mut plan = plan;
+        if label.is_none() && runs.iter().any(|r| r.mounting.is_some() || r.plan.mounting == plan.mounting) {
+            plan.mounting = format!("{} anew", plan.mounting);
+        }
+        runs.push(Planned { plan, mounting: label.map(str::to_owned), started_s: None });
+        runs
+    }
+
+    fn design(&self, plan: &Plan, label: Option<&str>, effects: &[&Effect], pool: &[Bundle], q: &Questions) -> Result<Design> {
+        let view = View::with_effects(&self.task, &self.with(plan.clone(), label), self.noise, effects)?;
+        let n_given = self.runs.iter().map(|r| r.plan.touches.len()).sum();
+        Ok(Design::new(&view, n_given, pool, q))
+    }
+
+    /// Chooses touches on a mounting and proves their program, again without what cannot be reached.
+    fn choose(
+        &self,
+        mounting: &Mounting,
+        label: Option<&str>,
+        effects: &[&Effect],
+        questions: &Questions,
+        budget_s: f64,
+        name: &str,
+    ) -> Result<Chosen> {
+        let machine = self.task.machine;
+        let nothing = || Failure::new("next::nothing", "nothing can be touched");
+        let mut pool = bundles(machine, mounting);
+        let mut scale = 1.0;
+        let mut found: Option<Chosen> = None;
+        for _ in 0..MOST_ROUNDS {
+            if pool.is_empty() {
+                break;
+            }
+            let planned = as_plan(machine, mounting, &pool, budget_s / 2.0);
+            let design = self.design(&planned, label, effects, &pool, questions)?;
+            let chosen = design.choose(&pool, budget_s * scale);
+            if chosen.is_empty() {
+                break;
+            }
+            let text = program_text(machine, mounting, name, &says(questions), &pool, &chosen);
+            let (spec, _) = program::load(&source("plan-next", text.clone()))?;
+            let (generated, _) = match program::generate(machine, &spec, &Options::default()) {
+                Ok(done) => done,
+                // nothing of it can be reached: what was chosen is no choice
+                Err(_) => {
+                    pool = pool.into_iter().enumerate().filter(|(i, _)| !chosen.contains(i)).map(|(_, b)| b).collect();
+                    continue;
+                }
+            };
+            let over = generated.path.seconds / budget_s;
+            let lost = !generated.plan.skipped.is_empty();
+            if over <= OVER {
+                let separations = self.told(&generated.plan, label, effects, questions)?;
+                let now = Chosen { text, generated: generated.clone(), separations, label: label.map(str::to_owned) };
+                if found.as_ref().is_none_or(|f| now.least() > f.least()) {
+                    found = Some(now);
+                }
+            }
+            let settled = found.as_ref().is_some_and(|f| f.least() >= 2.0 * SEEN);
+            if !lost && (settled || (0.85..=OVER).contains(&over)) {
+                break;
+            }
+            if lost {
+                pool = without(&pool, &generated.plan.skipped);
+            }
+            scale = (scale / over * 0.97).clamp(0.1, 10.0);
+        }
+        found.ok_or_else(nothing)
+    }
+
+    /// What the proven program will be able to tell.
+    fn told(&self, plan: &Plan, label: Option<&str>, effects: &[&Effect], questions: &Questions) -> Result<Vec<Separation>> {
+        let touches = plan.touches.clone();
+        let Some(first) = touches.first() else { return Ok(Vec::new()) };
+        let manner = crate::design::bundle::Manner {
+            pose: first.pose,
+            from: first.from,
+            spindle_deg: 0.0,
+            feed_mm_min: 0.0,
+            stylus: None,
+        };
+        let all = Bundle { manner, block: String::new(), faces: Vec::new(), touches };
+        let pool = [all];
+        Ok(self.design(plan, label, effects, &pool, questions)?.separated(&[0]))
+    }
+}
+
+fn says(questions: &Questions) -> String {
+    let pair = |p: &crate::design::questions::Pair| match &p.other {
+        Some(other) => format!("{} from {other}", p.one),
+        None => p.one.clone(),
+    };
+    format!("tells {}", questions.pairs.iter().map(pair).collect::<Vec<_>>().join(", "))
+}
+
+/// Writes program, plan and program file, and says what they will tell.
+fn write(
+    args: &Args,
+    loaded: &Loaded,
+    post: &Postprocessor,
+    plan_file: &Path,
+    questions: &Questions,
+    chosen: &Chosen,
+    io: &Io,
+) -> Result<Answer> {
+    let plan = &chosen.generated.plan;
+    let nc = post.program(&loaded.machine, plan, &chosen.generated.path)?;
+    io.report(&nc.findings.0);
+    let program_file = args.out.join(format!("{}.{}", plan.program, nc.extension));
+    let form_file = args.out.join(format!("{}.toml", plan.program));
+    files::write_whole(plan_file, plan.to_json().as_bytes())?;
+    files::write_whole(&form_file, chosen.text.as_bytes())?;
+    files::write_whole(&program_file, nc.text.as_bytes())?;
+    let seconds = chosen.generated.path.seconds;
+    io.say(&questions.says);
+    io.say(format!("{} touches on mounting {:?}, about {}", plan.touches.len(), plan.mounting, program::duration(seconds)));
+    match &chosen.label {
+        Some(_) => io.say("leave the blocks as the last run left them"),
+        None => io.say("put the blocks up first; the time for it is not counted"),
+    }
+    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "told apart"]);
+    for s in &chosen.separations {
+        t.add_row(vec![
+            s.one.clone(),
+            s.other.clone().unwrap_or_else(|| "nothing".into()),
+            significant(s.before),
+            significant(s.after),
+            (if s.after >= SEEN { "yes" } else if s.after >= 9.0 { "likely" } else { "no" }).into(),
+        ]);
+    }
+    io.say(format!("{t}\n(25 and more tells them apart nearly always)"));
+    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
+    let log = args.out.join(format!("{}.log", plan.program));
+    io.say(format!("written: {}\n         {}\n         {}", program_file.display(), plan_file.display(), form_file.display()));
+    io.say(format!(
+        "when it has run: axiscal plan-next {} --out {} --controller {} {}--join {}\nor by hand:\n\n{}",
+        args.study.display(),
+        args.out.display(),
+        args.controller,
+        if args.moved { "--moved " } else { "" },
+        log.display(),
+        entry(&relative(plan_file, &folder), &relative(&log, &folder), &args.controller, chosen.label.as_deref())
+    ));
+    io.answer(&json!({
+        "format": "axiscal-next/1",
+        "says": questions.says,
+        "pairs": chosen.separations,
+        "touches": plan.touches.len(),
+        "time_s": seconds,
+        "mounting": chosen.label,
+        "program": program_file.display().to_string(),
+        "plan": plan_file.display().to_string(),
+    }));
+    Ok(Answer::Done)
+}
+
+/// The study's table of the run, as a person would write it.
+fn entry(plan: &str, log: &str, controller: &str, label: Option<&str>) -> String {
+    let mounting = label.map_or_else(String::new, |l| {
+        let before = l.split('/').next().unwrap_or(l);
+        format!("mounting = \"{l}\"        # and in the [[data]] before it: mounting = \"{before}\"\n")
+    });
+    format!("[[data]]\nplan = \"{plan}\"\nlog = \"{log}\"\ncontroller = \"{controller}\"\n{mounting}")
+}
+
+/// Puts the log of the program into the study.
+fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> Result<Answer> {
+    let plan = super::load::load_plan(plan_file, &loaded.machine, io)?;
+    let touches = read_log(&files::read_bytes(log)?, log, &args.controller, &loaded.machine, &plan, io)?;
+    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
+    let mut runs: Vec<Planned> = Vec::new();
+    for r in &loaded.runs {
+        runs.push(Planned { plan: r.plan.clone(), mounting: r.mounting.clone(), started_s: r.started_s });
+    }
+    let stood = runs.last().and_then(|last| {
+        let own = last.plan.touches.last()?.mounting.clone();
+        let same = own.as_deref().unwrap_or(&last.plan.mounting).split('#').next() == Some(plan.mounting.as_str());
+        let run = last.mounting.clone().unwrap_or_else(|| format!("{}-{}", last.plan.mounting, runs.len()));
+        (same && !args.moved).then(|| (run.clone(), own.map_or(run.clone(), |m| format!("{run}/{m}"))))
+    });
+    let joined = study::Joined {
+        plan: relative(plan_file, &folder),
+        log: relative(log, &folder),
+        controller: if args.controller.ends_with(".toml") {
+            relative(Path::new(&args.controller), &folder)
+        } else {
+            args.controller.clone()
+        },
+        stood,
+    };
+    let text = study::join(&files::read_text(&args.study)?, &joined)?;
+    files::write_whole(&args.study, text.as_bytes())?;
+    io.say(format!("{}: run {} with {} touches", args.study.display(), loaded.runs.len() + 1, touches.len()));
+    io.answer(&json!({ "study": args.study.display().to_string(), "runs": loaded.runs.len() + 1, "touches": touches.len() }));
+    Ok(Answer::Done)
+}

@@ -1,0 +1,106 @@
+//! A pair that the paper's plan cannot tell apart, the program that parts it, its log in the study, and the answer.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
+
+mod common;
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn axiscal(dir: &Path, args: &[&str]) -> std::process::Output {
+    Command::cargo_bin("axiscal").unwrap().current_dir(dir).args(args).output().unwrap()
+}
+
+fn ok(dir: &Path, args: &[&str]) -> String {
+    let out = axiscal(dir, args);
+    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8(out.stdout).unwrap()
+}
+
+fn json(dir: &Path, args: &[&str]) -> serde_json::Value {
+    serde_json::from_str(&ok(dir, args)).unwrap()
+}
+
+/// The paper's two runs of a machine with hidden errors, and their study.
+fn study(dir: &Path, hidden: &str) {
+    let scenario = format!("seed = 5\n{hidden}\n[noise]\ntouch_um = 1.0\n");
+    std::fs::write(dir.join("hidden.toml"), scenario).unwrap();
+    for p in ["head", "table"] {
+        ok(dir, &["generate", "--machine", "swivel-head", "--program", p, "--controller", "linuxcnc", "--out", "."]);
+        simulate(dir, p);
+    }
+    ok(dir, &["new", "--machine", "swivel-head", "--plan", "head.plan.json", "--log", "head.log", "--plan", "table.plan.json", "--log", "table.log"]);
+}
+
+fn simulate(dir: &Path, name: &str) {
+    let (plan, log) = (format!("{name}.plan.json"), format!("{name}.log"));
+    ok(dir, &["simulate", "--plan", &plan, "--machine", "swivel-head", "--scenario", "hidden.toml", "--controller", "linuxcnc", "--out", &log]);
+}
+
+fn separation(answer: &serde_json::Value, key: &str) -> f64 {
+    answer["pairs"][0][key].as_f64().unwrap()
+}
+
+#[test]
+fn a_hidden_pair_is_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    study(dir, "[effects.radial-c-1]\nEXC1c = 5.0\nEYC1s = 5.0");
+    let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
+    std::fs::write(dir.join("study.toml"), format!("# a comment of mine\n{text}")).unwrap();
+    let next = ["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc"];
+    let asked = ["--effects", "radial-c-1,radial-c-3", "--minutes", "10", "--json"];
+    let before = json(dir, &[&next[..], &asked[..]].concat());
+    // four positions of C alias once per turn with three times
+    assert!(separation(&before, "before") < 0.1, "{before}");
+    assert!(separation(&before, "after") > 25.0, "{before}");
+    assert!(before["time_s"].as_f64().unwrap() <= 1.02 * 600.0, "{before}");
+    // the program is an ordinary one: the virtual machine runs it, its log joins the study
+    simulate(dir, "next-3");
+    ok(dir, &[&next[..], &["--join", "next-3.log"]].concat());
+    let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
+    assert!(text.contains("# a comment of mine") && text.matches("[[data]]").count() == 3, "{text}");
+    let after = json(dir, &[&next[..], &asked[..]].concat());
+    let (told, promised) = (separation(&after, "before"), separation(&before, "after"));
+    assert!(told > 25.0 && (0.5..2.0).contains(&(told / promised)), "{told} against {promised}");
+    // the block stood still: it has one set-up in both runs, six unknowns and not twelve
+    let fit = json(dir, &["identify", "study.toml", "--json"]);
+    let names: Vec<&str> = fit["parameters"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
+    assert_eq!(names.iter().filter(|n| n.starts_with("SX@")).count(), 5, "{names:?}");
+    // and the right one of the pair fits, the wrong one does not
+    let chi2 = |effect: &str| {
+        let with = text.replace("\"pretravel\"]", &format!("\"pretravel\", \"{effect}\"]"));
+        std::fs::write(dir.join("with.toml"), with).unwrap();
+        json(dir, &["identify", "with.toml", "--json"])["chi2_per_dof"].as_f64().unwrap()
+    };
+    let (right, wrong) = (chi2("radial-c-1"), chi2("radial-c-3"));
+    assert!(right < 1.25 && wrong > 1.1 * right, "{right} {wrong}");
+}
+
+#[test]
+fn moved_blocks_get_a_set_up_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    study(dir, "[effects.tip-eccentricity]\nex = 6.0");
+    let next = ["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--moved"];
+    let answer = json(dir, &[&next[..], &["--effects", "tip-eccentricity", "--json"]].concat());
+    assert!(answer["mounting"].is_null() && separation(&answer, "after") > 25.0, "{answer}");
+    simulate(dir, "next-3");
+    ok(dir, &[&next[..], &["--join", "next-3.log"]].concat());
+    let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
+    assert!(!text.contains("mounting"), "{text}");
+}
+
+#[test]
+fn what_cannot_be_asked_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    study(dir, "");
+    let out = axiscal(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--effects", "no-such"]);
+    assert_eq!(out.status.code(), Some(2));
+    let out = axiscal(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--minutes", "0"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("--minutes"));
+    // nothing is hidden: the pairs that the plan confounds are asked for
+    let answer = json(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--json"]);
+    assert!(answer["pairs"].as_array().is_some_and(|p| !p.is_empty()), "{answer}");
+}
