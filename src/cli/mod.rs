@@ -3,6 +3,7 @@
 //! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
 //! "no", 2 the input or the call was unusable.
 
+mod add;
 mod common;
 mod compare;
 mod controllers;
@@ -19,6 +20,7 @@ mod programs;
 mod reproduce;
 mod schema;
 mod simulate;
+mod verify;
 
 pub use common::{Answer, Io};
 
@@ -62,6 +64,14 @@ enum Verb {
     Identify(identify::Args),
     /// Model against measurement: where it fails, and on what that depends
     Compare(compare::Args),
+    /// Put effects into the study's model, refit, and say what that changed
+    Add(add::Args),
+    /// Take effects out of the study's model, refit, and say what that changed
+    Remove(add::Args),
+    /// The ladder: every model tried, with its error on the touches and on touches left out
+    History(add::HistoryArgs),
+    /// Two studies side by side: did the compensation work, has the machine changed?
+    Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -90,6 +100,10 @@ pub fn main() -> ExitCode {
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
         Verb::Compare(args) => compare::run(&args, &io),
+        Verb::Add(args) => add::add(&args, &io),
+        Verb::Remove(args) => add::remove(&args, &io),
+        Verb::History(args) => add::history(&args, &io),
+        Verb::Verify(args) => verify::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

@@ -2,4 +2,5 @@
 
 pub mod compare;
 pub mod fit;
+pub mod ladder;
 pub mod plot;

@@ -3,6 +3,9 @@
 //! Reading gives checked records with the findings' places; writing edits the text in place, so that the user's comments
 //! and order stay. Nothing here opens the files that a study names: `cli` does.
 
+pub mod edit;
+pub mod history;
+
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
 use crate::fit::{Knowledge, Mask};
 use schemars::JsonSchema;
