@@ -18,6 +18,10 @@ fn axiscal(folder: &Path) -> Command {
 
 const EFFECTS: [&str; 4] = ["location-b", "location-c", "block-setup", "pretravel"];
 
+fn scenario(text: &str, machine: &axiscal::machine::Machine) -> Scenario {
+    axiscal::simulate::scenario::parse(&axiscal::diag::source("s.toml", text), machine).unwrap().0
+}
+
 /// A folder with both programs of the paper's machine touched under a scenario, and the study.
 fn folder(scenario: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -50,8 +54,8 @@ fn json(folder: &Path, arguments: &[&str]) -> serde_json::Value {
 fn the_held_out_error_is_that_of_real_refits() {
     let machine = machine("swivel-head");
     let (head, table) = (plan(&machine, "head"), plan(&machine, "table"));
-    let scenario = Scenario::parse(&axiscal::diag::source("s.toml", HIDDEN), &machine).unwrap().0;
-    let (a, b) = (touch(&machine, &head, &scenario, None), touch(&machine, &table, &scenario, None));
+    let wrong = scenario(HIDDEN, &machine);
+    let (a, b) = (touch(&machine, &head, &wrong, None), touch(&machine, &table, &wrong, None));
     let runs = [(&head, &a[..]), (&table, &b[..])];
     let stated = || Settings { touch_sigma_mm: Some(5e-4), visit_sigma_mm: Some(0.0), quick: true, ..Settings::default() };
     let all = identify_with(&machine, &runs, &EFFECTS, stated());
@@ -85,8 +89,8 @@ fn pure_noise_goes_with_nothing() {
     let (mut high, mut n) = (0, 0);
     for seed in 0..12 {
         let text = format!("seed = {seed}\n[noise]\ntouch_um = 1.0\n");
-        let scenario = Scenario::parse(&axiscal::diag::source("s.toml", text), &machine).unwrap().0;
-        let (a, b) = (touch(&machine, &head, &scenario, None), touch(&machine, &table, &scenario, None));
+        let wrong = scenario(&text, &machine);
+        let (a, b) = (touch(&machine, &head, &wrong, None), touch(&machine, &table, &wrong, None));
         let stated = Settings { touch_sigma_mm: Some(1e-3), quick: true, ..Settings::default() };
         let c = compare(&identify_with(&machine, &[(&head, &a), (&table, &b)], &EFFECTS, stated));
         assert!(c.explained_by_noise, "{}", c.says);
@@ -244,8 +248,8 @@ fn a_time_constant_is_found_although_it_leaves_no_trace_at_size_zero() {
     let machine = machine("swivel-head");
     let plan = plan(&machine, "full");
     let text = "seed = 3\n[effects.warm-up]\nwx = 12.0\nwy = -9.0\nwz = 15.0\ntau = 0.3\n[noise]\ntouch_um = 0.5\n";
-    let scenario = Scenario::parse(&axiscal::diag::source("s.toml", text), &machine).unwrap().0;
-    let touches = touch(&machine, &plan, &scenario, None);
+    let wrong = scenario(text, &machine);
+    let touches = touch(&machine, &plan, &wrong, None);
     let mut effects = EFFECTS.to_vec();
     effects.push("warm-up");
     let fit = identify_with(&machine, &[(&plan, &touches)], &effects, Settings { quick: true, ..Settings::default() });
