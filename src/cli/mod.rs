@@ -4,6 +4,7 @@
 //! "no", 2 the input or the call was unusable.
 
 mod assess;
+mod add;
 mod common;
 mod compare;
 mod controllers;
@@ -23,6 +24,7 @@ mod reproduce;
 mod schema;
 mod simulate;
 mod sketch_effect;
+mod verify;
 
 pub use common::{Answer, Io};
 
@@ -74,6 +76,14 @@ enum Verb {
     Compare(compare::Args),
     /// The probing program that best separates what the data cannot tell apart
     PlanNext(plan_next::Args),
+    /// Put effects into the study's model, refit, and say what that changed
+    Add(add::Args),
+    /// Take effects out of the study's model, refit, and say what that changed
+    Remove(add::Args),
+    /// The ladder: every model tried, with its error on the touches and on touches left out
+    History(add::HistoryArgs),
+    /// Two studies side by side: did the compensation work, has the machine changed?
+    Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -106,6 +116,10 @@ pub fn main() -> ExitCode {
         Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
         Verb::Compare(args) => compare::run(&args, &io),
         Verb::PlanNext(args) => plan_next::run(&args, &io),
+        Verb::Add(args) => add::add(&args, &io),
+        Verb::Remove(args) => add::remove(&args, &io),
+        Verb::History(args) => add::history(&args, &io),
+        Verb::Verify(args) => verify::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

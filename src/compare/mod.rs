@@ -2,8 +2,10 @@
 //!
 //! [`compare`] is a pure function of a fit. What it returns is what the terminal, the report and the workbench draw.
 
+pub mod change;
 mod factors;
 mod share;
+pub mod verify;
 
 pub use share::Share;
 

@@ -12,17 +12,19 @@ mod knowledge;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
+pub mod shapes;
 pub mod snoop;
 pub mod solve;
 pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
+pub use shapes::start_shapes;
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
 use crate::model::batch::Batch;
-use crate::model::catalogue::Catalogue;
+use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::{Data, Run, assemble};
 use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation};
@@ -173,15 +175,62 @@ pub fn identify(machine: &Machine, catalogue: &Catalogue, runs: &[Run], settings
 /// As [`identify`].
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
+    let starts = starts(machine, catalogue, &effects, &data, settings)?;
+    let fit = identify_from(machine, catalogue, &effects, data, settings, &starts)?;
+    let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
+    let mut held_settings = settings.clone();
+    held_settings.knowledge.insert(name.clone(), held);
+    let mut fit = identify_from(machine, catalogue, &effects, fit.data, &held_settings, &starts)?;
+    fit.outcome.warnings.push(format!("{name} ran out of its range in the search and is held at the end of it"));
+    Ok(fit)
+}
+
+/// Where the search begins for effects with shape parameters, by name of the unknown.
+fn starts(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    data: &Data,
+    settings: &Settings,
+) -> Result<BTreeMap<String, f64>> {
+    let mut out = BTreeMap::new();
+    let shaped: Vec<&Effect> =
+        effects.iter().copied().filter(|e| !e.per_block && e.parameters.iter().any(|p| p.shape.is_some())).collect();
+    if shaped.is_empty() || data.observations.is_empty() {
+        return Ok(out);
+    }
+    let base = shapes::without(settings, &shaped);
+    let others = effects_of(&base.effects, catalogue, machine)?;
+    let fit = identify_from(machine, catalogue, &others, data.clone(), &base, &out)?;
+    for effect in shaped {
+        if let Some(start) = shapes::start_shapes(&fit, machine, effect) {
+            out.extend(effect.parameters.iter().zip(start.values).map(|(p, v)| (p.name.clone(), v)));
+        }
+    }
+    Ok(out)
+}
+
+/// Fits a model from given starts.
+fn identify_from(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    data: Data,
+    settings: &Settings,
+    starts: &BTreeMap<String, f64>,
+) -> Result<Fit> {
     if data.observations.is_empty() {
         return Err(Failure::new("fit::no_touches", "no touch can be used")
             .help("does the log belong to this plan? `axiscal parse` lists what it holds"));
     }
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
-    let model = Model::new(machine, &effects, &data.set_ups, reference);
+    let model = Model::new(machine, effects, &data.set_ups, reference);
     let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
-    knowledge::every_formula_has_a_value(&effects, &data)?;
+    knowledge::every_formula_has_a_value(effects, &data)?;
     let mut theta = model.start();
+    for (value, u) in theta.iter_mut().zip(&model.unknowns) {
+        *value = starts.get(&u.name).copied().unwrap_or(*value);
+    }
     for (value, known) in theta.iter_mut().zip(&knowledge) {
         match known {
             Some(Knowledge::Fixed(v)) | Some(Knowledge::Prior { value: v, .. }) => *value = *v,
@@ -284,7 +333,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         dof,
         outcome: Outcome::default(),
     };
-    fit.outcome = answer::outcome(&fit, machine, catalogue, &effects, settings, &solution, condition)?;
+    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition)?;
     Ok(fit)
 }
 

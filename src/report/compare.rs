@@ -63,7 +63,7 @@ fn groups(s: &Split, paper: Paper) -> String {
 }
 
 fn worst(c: &Comparison, paper: Paper) -> String {
-    let mut t = table(&["run", "touch", "log line", "residual um", "standardised", "block", "face", "pose", ""]);
+    let mut t = table(&["run", "touch", "log line", "residual um", "sigmas", "block", "face", "pose", ""]);
     for w in &c.worst {
         let pose: Vec<String> = w.pose.iter().map(|(a, v)| format!("{a}{v:.1}")).collect();
         t.add_row(vec![

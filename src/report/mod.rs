@@ -4,4 +4,5 @@ pub mod diagnosis;
 pub mod compare;
 pub mod assess;
 pub mod fit;
+pub mod ladder;
 pub mod plot;
