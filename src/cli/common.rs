@@ -35,13 +35,21 @@ pub fn print(text: &str) {
 pub struct Io {
     /// One JSON object on stdout, messages on stderr.
     pub json: bool,
+    /// A verb that another one calls: it says and answers nothing, findings go to stderr all the same.
+    pub within: bool,
 }
 
 impl Io {
     /// For a call with or without `--json`.
     #[must_use]
     pub fn new(json: bool) -> Self {
-        Self { json }
+        Self { json, within: false }
+    }
+
+    /// For a verb that this one calls: the caller answers.
+    #[must_use]
+    pub fn inner(&self) -> Self {
+        Self { within: self.json, ..*self }
     }
 
     /// What plots and wide tables are drawn on: the terminal as it is; in a pipe 80 columns of ASCII.
@@ -57,14 +65,14 @@ impl Io {
 
     /// A line for the person: stdout, or nothing when JSON was asked for.
     pub fn say(&self, text: impl AsRef<str>) {
-        if !self.json {
+        if !self.json && !self.within {
             print(text.as_ref());
         }
     }
 
     /// The answer as one JSON object, when it was asked for.
     pub fn answer(&self, value: &impl serde::Serialize) {
-        if self.json {
+        if self.json && !self.within {
             let text = serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"));
             print(&text);
         }

@@ -3,8 +3,8 @@
 //! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
 //! "no", 2 the input or the call was unusable.
 
-mod assess;
 mod add;
+mod assess;
 mod common;
 mod compare;
 mod controllers;
@@ -24,6 +24,7 @@ mod reproduce;
 mod schema;
 mod simulate;
 mod sketch_effect;
+mod solve;
 mod verify;
 
 pub use common::{Answer, Io};
@@ -70,6 +71,8 @@ enum Verb {
     Identify(identify::Args),
     /// Which physical effect is missing: verdict, candidates, and what these touches cannot tell apart
     Diagnose(diagnose::Args),
+    /// The loop, step by step: diagnose, add, look again, until nothing is left to find
+    Solve(solve::Args),
     /// Write a starting formula for what no known effect explains
     SketchEffect(sketch_effect::Args),
     /// Model against measurement: where it fails, and on what that depends
@@ -113,6 +116,7 @@ pub fn main() -> ExitCode {
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
         Verb::Diagnose(args) => diagnose::run(&args, &io),
+        Verb::Solve(args) => solve::run(&args, &io),
         Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
         Verb::Compare(args) => compare::run(&args, &io),
         Verb::PlanNext(args) => plan_next::run(&args, &io),
