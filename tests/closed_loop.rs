@@ -116,9 +116,8 @@ fn predicted(fit: &Fit, machine: &Machine, plan: &Plan) -> f64 {
     let catalogue = Catalogue::built_in().unwrap();
     let (model, _) = axiscal::fit::observe_plan(machine, &catalogue, &data, &location).unwrap();
     let theta: Vec<f64> = model.unknowns.iter().map(|u| value(fit, &u.name)).collect();
-    let mut scratch = model.scratch();
-    let gap = |o: &Observation, scratch: &mut _| model.gap(o, &theta, scratch);
-    let squares: f64 = data.observations.iter().map(|o| gap(o, &mut scratch).powi(2)).sum();
+    let gap = |o: &Observation| model.gap(o, &theta);
+    let squares: f64 = data.observations.iter().map(|o| gap(o).powi(2)).sum();
     (squares / data.observations.len() as f64).sqrt()
 }
 

@@ -44,9 +44,9 @@ fn gap(
         state: [0.0; VARIABLES.len()],
         has_temperature: false,
     };
-    let (mut scratch, mut row) = (model.scratch(), vec![0.0; theta.len()]);
-    let exact = model.gap(&touch, &theta, &mut scratch);
-    model.gap_and_row(&touch, &model.start(), &mut scratch, &mut row);
+    let mut row = vec![0.0; theta.len()];
+    let exact = model.gap(&touch, &theta);
+    model.gap_and_row(&touch, &model.start(), &mut row);
     (exact, row.iter().zip(&theta).map(|(r, t)| r * t).sum())
 }
 

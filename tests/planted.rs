@@ -51,12 +51,11 @@ fn what_is_planted_is_what_is_predicted() {
                 let run = Run { plan: &plan, touches: &touches, mounting: None, started_s: None };
                 let data = assemble(&machine, &[run]);
                 let model = Model::new(&machine, &[effect], &data.set_ups, reference);
-                let mut scratch = model.scratch();
                 let zero = vec![0.0; theta.len()];
                 let (mut largest, mut left) = (0.0_f64, 0.0_f64);
                 for observation in &data.observations {
-                    largest = largest.max(model.gap(observation, &zero, &mut scratch).abs());
-                    left = left.max(model.gap(observation, &theta, &mut scratch).abs());
+                    largest = largest.max(model.gap(observation, &zero).abs());
+                    left = left.max(model.gap(observation, &theta).abs());
                 }
                 // to second order: what is left is a small part of the effect, or rounding
                 let allowed = 1e-3 * largest + 1e-12;

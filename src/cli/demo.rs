@@ -190,7 +190,7 @@ impl<'a> Bench<'a> {
         let runs: Vec<Run> =
             runs.iter().map(|(plan, touches)| Run { plan, touches, mounting: None, started_s: None }).collect();
         let effects = location.iter().copied().chain(["block-setup", "pretravel"]).map(str::to_owned).collect();
-        let settings = Settings { effects, touch_sigma_mm: Some(self.scenario.noise.touch_mm), ..Settings::default() };
+        let settings = Settings { effects, touch_sigma_mm: Some(self.scenario.noise.touch_mm), visit_sigma_mm: Some(0.0), ..Settings::default() };
         fit::identify(&self.machine, &self.catalogue, &runs, &settings)
     }
 
@@ -211,6 +211,9 @@ impl<'a> Bench<'a> {
             effects: fit.outcome.effects.clone(),
             knowledge: std::collections::BTreeMap::new(),
             touch_sigma_mm: Some(self.scenario.noise.touch_mm),
+            visit_sigma_mm: Some(0.0),
+            type_b: std::collections::BTreeMap::new(),
+            masked: Vec::new(),
         };
         self.write("study.toml", study.fresh()?.as_bytes())
     }

@@ -99,6 +99,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects: effects.clone(),
         knowledge: std::collections::BTreeMap::new(),
         touch_sigma_mm: None,
+        visit_sigma_mm: None,
+        type_b: std::collections::BTreeMap::new(),
+        masked: Vec::new(),
     };
     files::write_whole(&args.out, study.fresh()?.as_bytes())?;
     io.say(format!("{}: {} run(s), model: {}", args.out.display(), args.plan.len(), effects.join(", ")));

@@ -1,20 +1,35 @@
-//! Identification: weighted nonlinear least squares over the model, with rank, covariance and what cannot be told.
+//! Identification: weighted nonlinear least squares over the model, with noise, outliers, rank, covariance and what
+//! cannot be told.
 //!
-//! [`identify`] is a pure function: machine, effects, runs and settings in, [`Fit`] out.
+//! [`identify`] is a pure function: machine, effects, runs and settings in, [`Fit`] out. In its order: rank on the
+//! nominal touches, a first fit with white noise, a robust start and data snooping, the noise from repeats and revisits,
+//! the fit with that noise, snooping again, and the answer.
 
-mod noise;
+mod answer;
+pub mod candidates;
+mod knowledge;
+pub mod noise;
+pub mod normal;
 pub mod outcome;
+pub mod snoop;
 pub mod solve;
 mod statement;
+pub mod uncertainty;
 
-use crate::diag::{Failure, Finding, Result};
+pub use knowledge::effects_of;
+
+use crate::diag::{Failure, Result};
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::batch::Batch;
+use crate::model::catalogue::Catalogue;
 use crate::model::data::{Data, Run, assemble};
-use crate::model::predict::{Model, Observation, Unknown};
+use crate::model::predict::{Model, Observation};
 use nalgebra::{DMatrix, DVector, Vector3};
-use outcome::{Outcome, Parameter, Rejected, Residual, Status};
-use std::collections::BTreeMap;
+use noise::{Known, Noise, Sample};
+use normal::{Prior, Touches};
+use outcome::Outcome;
+use snoop::Snoop;
+use std::collections::{BTreeMap, HashMap};
 
 /// What the user decided about one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +45,17 @@ pub enum Knowledge {
     },
 }
 
+/// A touch that the user took out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mask {
+    /// Which run, from 0.
+    pub run: usize,
+    /// Number in the plan.
+    pub id: u64,
+    /// Why.
+    pub reason: String,
+}
+
 /// What a fit is asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Settings {
@@ -39,8 +65,17 @@ pub struct Settings {
     pub knowledge: BTreeMap<String, Knowledge>,
     /// Standard deviation of a touch, mm, where the user states it.
     pub touch_sigma_mm: Option<f64>,
+    /// Standard deviation of each component of a visit's displacement, mm, where the user states it.
+    pub visit_sigma_mm: Option<f64>,
     /// Where location errors of workpiece-side axes are stated, mm in R (default: the machine's pivot).
     pub reference: Option<Vector3<f64>>,
+    /// What the measurement itself is uncertain about: parameters of effects that are not in the model, by name, with a
+    /// standard uncertainty in their unit. They widen the uncertainties and are not solved for.
+    pub type_b: BTreeMap<String, f64>,
+    /// Touches that are not to be used.
+    pub masked: Vec<Mask>,
+    /// Without the figures that need the whole catalogue (uncertainty with unmodelled effects, type B rows).
+    pub quick: bool,
 }
 
 /// A fit with everything that later rooms need.
@@ -54,54 +89,71 @@ pub struct Fit {
     pub theta: Vec<f64>,
     /// Measured less model along the outward normal, mm, per observation.
     pub residual_mm: Vec<f64>,
+    /// Externally studentised residuals, per observation; 0 for touches that are not used.
+    pub studentised: Vec<f64>,
+    /// 1 for each touch that is used, else 0.
+    pub weight: Vec<f64>,
+    /// Why a touch is not used, by observation.
+    pub rejected: BTreeMap<usize, String>,
     /// Covariance of all unknowns, in their units; zero rows for held ones.
     pub covariance: DMatrix<f64>,
     /// What the nominal touches say about the free unknowns.
     pub observability: solve::Observability,
     /// Indices of the free unknowns.
     pub free: Vec<usize>,
+    /// Priors, by unknown.
+    pub priors: Vec<Prior>,
+    /// What the user said, by unknown.
+    pub knowledge: Vec<Option<Knowledge>>,
+    /// The noise.
+    pub noise: Noise,
+    /// χ² of the touches and priors.
+    pub chi2: f64,
+    /// Degrees of freedom.
+    pub dof: usize,
     /// The answer.
     pub outcome: Outcome,
 }
 
-/// The effects of a model, in order.
-///
-/// # Errors
-/// When an id is unknown, stands twice, or the machine lacks the axis that it needs.
-pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machine) -> Result<Vec<&'c Effect>> {
-    let mut findings = Vec::new();
-    let mut effects: Vec<&Effect> = Vec::new();
-    for id in ids {
-        match catalogue.get(id, machine) {
-            Some(effect) if effects.iter().any(|e| e.id == effect.id) => {
-                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} stands twice in the model")).help("name each effect once"));
-            }
-            Some(effect) => effects.push(effect),
-            None if catalogue.knows(id) => findings.push(
-                Finding::error("model::effect_not_here", format!("effect {id:?} does not apply to machine {:?}", machine.name))
-                    .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` tells which"),
-            ),
-            None => {
-                let known: Vec<&str> = catalogue.iter().filter(|e| e.applies_to(machine)).map(|e| e.id.as_str()).collect();
-                findings.push(Finding::error("model::unknown_effect", format!("no effect is called {id:?}")).help(format!("for this machine there are: {}", known.join(", "))));
-            }
-        }
+/// A fit linearised at its minimum: rows are the touches and then the priors, in units of their noise. Rows of touches
+/// that are not used are zero.
+#[derive(Debug, Clone)]
+pub struct Linear {
+    /// Whitened residuals.
+    pub residual: DVector<f64>,
+    /// Whitened Jacobian of the free unknowns.
+    pub jacobian: DMatrix<f64>,
+}
+
+impl Fit {
+    /// The free unknowns.
+    #[must_use]
+    pub fn free_theta(&self) -> DVector<f64> {
+        DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| self.theta[i]))
     }
-    // two effects may not bring the same parameter: their columns would be equal and the names would clash
-    for (i, a) in effects.iter().enumerate() {
-        for b in &effects[..i] {
-            if let Some(p) = a.parameters.iter().find(|p| b.parameters.iter().any(|q| q.name == p.name)) {
-                findings.push(
-                    Finding::error(
-                        "model::parameter_twice",
-                        format!("effects {:?} and {:?} both bring the parameter {}", b.id, a.id, p.name),
-                    )
-                    .help("take one of the two out of the model"),
-                );
-            }
-        }
+
+    /// Calls `f` with the touches as a problem at the given τ, mm.
+    pub fn with_touches<T>(&self, tau_mm: f64, f: impl FnOnce(&Touches) -> T) -> T {
+        let batch = self.model.prepare(&self.data.observations);
+        let noise = (self.noise.sigma_mm, tau_mm);
+        let mut touches =
+            Touches::new(&batch, &self.data.visits, self.theta.clone(), &self.free, &self.priors, noise);
+        touches.set_weights(self.weight.clone());
+        f(&touches)
     }
-    if findings.is_empty() { Ok(effects) } else { Err(Failure(findings)) }
+
+    /// The fit linearised, with the given τ, mm (tests for missing effects use the noise's upper bound).
+    #[must_use]
+    pub fn linear(&self, tau_mm: f64) -> Linear {
+        let (residual, jacobian) = self.with_touches(tau_mm, |t| t.dense(&self.free_theta()));
+        Linear { residual, jacobian }
+    }
+
+    /// Number of touches that are used.
+    #[must_use]
+    pub fn n_used(&self) -> usize {
+        self.weight.iter().filter(|w| **w > 0.0).count()
+    }
 }
 
 /// Fits a model to runs.
@@ -125,8 +177,8 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     }
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
     let model = Model::new(machine, &effects, &data.set_ups, reference);
-    let knowledge = resolve(&model.unknowns, &settings.knowledge)?;
-    every_formula_has_a_value(&effects, &data)?;
+    let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
+    knowledge::every_formula_has_a_value(&effects, &data)?;
     let mut theta = model.start();
     for (value, known) in theta.iter_mut().zip(&knowledge) {
         match known {
@@ -135,207 +187,289 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         }
     }
     let free: Vec<usize> = (0..theta.len()).filter(|&i| !matches!(knowledge[i], Some(Knowledge::Fixed(_)))).collect();
-    let priors: Vec<(usize, f64, f64)> = free
+    let priors: Vec<Prior> = free
         .iter()
-        .enumerate()
-        .filter_map(|(column, &i)| match knowledge[i] {
-            Some(Knowledge::Prior { value, sigma }) => Some((column, value, sigma)),
+        .filter_map(|&i| match knowledge[i] {
+            Some(Knowledge::Prior { value, sigma }) => Some((i, value, sigma)),
             _ => None,
         })
         .collect();
-
-    let declared = crate::units::mm_from_um(machine.probe.repeatability_um);
-    let first_sigma = settings.touch_sigma_mm.unwrap_or(declared);
-    let nominal = nominal_jacobian(&model, &data.nominal, &theta, &free, &priors, first_sigma);
-    let observability = solve::observe(&nominal);
-    let mut problem = Touches {
-        model: &model,
-        observations: &data.observations,
-        theta: theta.clone(),
-        free: &free,
-        priors: &priors,
-        sigma: first_sigma,
+    let known = Known {
+        declared_sigma_mm: crate::units::mm_from_um(machine.probe.repeatability_um),
+        declared_tau_mm: declared_tau_mm(machine, &data.observations),
+        stated_sigma_mm: settings.touch_sigma_mm,
+        stated_tau_mm: settings.visit_sigma_mm,
     };
+    let first_noise = (settings.touch_sigma_mm.unwrap_or(known.declared_sigma_mm), 0.0);
+    let (observability, condition) = {
+        let nominal = model.prepare(&data.nominal);
+        observe(&nominal, &data.visits, &theta, &free, &priors, first_noise)
+    };
+    let batch = model.prepare(&data.observations);
     let start = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
-    let mut solution = solve::minimise(&problem, start, &observability);
-    let gaps = |solution: &solve::Solution, sigma: f64| -> Vec<f64> {
-        solution.residual.iter().take(data.observations.len()).map(|r| r * sigma).collect()
-    };
-    let noise = noise::estimate(&gaps(&solution, first_sigma), &data.repeats, declared, settings.touch_sigma_mm);
-    if !priors.is_empty() && (noise.sigma_mm - first_sigma).abs() > 1e-12 {
-        // the weight of a prior against the touches depends on the noise that has just been found
-        problem.sigma = noise.sigma_mm;
-        let nominal = nominal_jacobian(&model, &data.nominal, &theta, &free, &priors, noise.sigma_mm);
-        let again = solve::observe(&nominal);
-        solution = solve::minimise(&problem, solution.theta.clone(), &again);
-    } else {
-        let ratio = first_sigma / noise.sigma_mm;
-        solution.residual *= ratio;
-        solution.covariance /= ratio * ratio;
-        problem.sigma = noise.sigma_mm;
+    let touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &priors, first_noise);
+    let mut search = Search { data: &data, observability: &observability, touches, masked: vec![false; batch.len()] };
+    for mask in &settings.masked {
+        let is = |o: &Observation| o.run == mask.run && o.id == mask.id;
+        if let Some(i) = data.observations.iter().position(is) {
+            search.masked[i] = true;
+        }
     }
+    search.touches.set_weights(search.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
+    let solution = solve::minimise(&search.touches, start, &observability);
+    // the scale of the first pass is that of the residuals themselves: the noise is not known yet
+    let solution = search.without_strangers(solution, 0.0);
+    let noise = noise::estimate(&search.samples(&solution), &known);
+    search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+    let solution = solve::minimise(&search.touches, solution.theta, &observability);
+    let before = search.touches.weights().to_vec();
+    let mut solution = search.without_strangers(solution, noise.dof.unwrap_or(0.0));
+    let noise = if search.touches.weights() == before {
+        noise
+    } else {
+        let noise = noise::estimate(&search.samples(&solution), &known);
+        search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+        solution = solve::minimise(&search.touches, solution.theta, &observability);
+        noise
+    };
+    let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
+    let snoop = Snoop::new(
+        &search.touches,
+        &solution.theta,
+        &solution.covariance,
+        (solution.chi2, dof),
+        noise.dof.unwrap_or(0.0),
+    );
     for (column, &i) in free.iter().enumerate() {
         theta[i] = solution.theta[column];
     }
-    let residual_mm = gaps(&solution, noise.sigma_mm);
+    let residual_mm = search.touches.gaps(&solution.theta);
+    let mut rejected = search.reasons(&solution);
+    for mask in &settings.masked {
+        let is = |o: &Observation| o.run == mask.run && o.id == mask.id;
+        if let Some(i) = data.observations.iter().position(is) {
+            rejected.insert(i, format!("taken out: {}", mask.reason));
+        }
+    }
+    let weight = search.touches.weights().to_vec();
     let mut covariance = DMatrix::zeros(theta.len(), theta.len());
     for (a, &i) in free.iter().enumerate() {
         for (b, &j) in free.iter().enumerate() {
             covariance[(i, j)] = solution.covariance[(a, b)];
         }
     }
-    let n = data.observations.len();
-    let dof = (n + priors.len()).saturating_sub(observability.rank);
-    let chi2 = solution.residual.norm_squared();
-    let unseen_share = |column: usize| observability.unseen.iter().map(|v| v[column].abs()).fold(0.0, f64::max);
-    let parameters = (0..theta.len()).map(|i| {
-        let u = &model.unknowns[i];
-        let column = free.iter().position(|&f| f == i);
-        let sigma = covariance[(i, i)].sqrt();
-        let status = match (column, &knowledge[i]) {
-            (None, _) => Status::Fixed,
-            (Some(c), _) if unseen_share(c) > 1e-6 => Status::Undetermined,
-            // the data halve the prior's variance at least, or the value is the prior's rather than theirs
-            (Some(_), Some(Knowledge::Prior { sigma: prior, .. })) if sigma * sigma > 0.5 * prior * prior => {
-                Status::PriorDominated
-            }
-            _ => Status::Identified,
-        };
-        let has_sigma = matches!(status, Status::Identified | Status::PriorDominated);
-        Parameter {
-            name: u.name.clone(),
-            alias: u.alias.clone(),
-            effect: u.effect.clone(),
-            value: theta[i],
-            unit: u.unit.clone(),
-            sigma: has_sigma.then_some(sigma),
-            expanded: has_sigma.then_some(sigma * noise.coverage_factor),
-            status,
-        }
-    });
-    let parameters: Vec<Parameter> = parameters.collect();
-    let free_unknowns: Vec<&Unknown> = free.iter().map(|&i| &model.unknowns[i]).collect();
-    let undetermined = observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, v)).collect();
-    let rms_um = crate::units::um_from_mm((residual_mm.iter().map(|r| r * r).sum::<f64>() / n as f64).sqrt());
-    let mut warnings = Vec::new();
-    if data.observations.iter().all(|o| !o.has_temperature) {
-        for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
-            warnings.push(format!("effect {} goes with the temperature T, and no touch carries one", effect.id));
-        }
-    }
-    if !solution.converged {
-        warnings.push(format!("the search did not converge: {}", solution.stopped));
-    }
-    if dof == 0 {
-        warnings.push("as many unknowns as touches: nothing is left over to judge the model by".into());
-    }
-    let chi2_per_dof = if dof > 0 { chi2 / dof as f64 } else { f64::NAN };
-    if dof > 0 && chi2_per_dof > noise::chi2_limit(dof) {
-        warnings.push(format!(
-            "the touches miss the model by {:.1} times their noise: something is missing in it, and the uncertainties count the noise only",
-            chi2_per_dof.sqrt()
-        ));
-    }
-    let residuals = (0..n).map(|i| {
-        let o = &data.observations[i];
-        let redundancy = 1.0 - solution.leverage[i];
-        // externally studentised: the touch's own share is taken out of the variance
-        let w = if redundancy > 1e-9 && dof > 1 {
-            let e = solution.residual[i] / redundancy.sqrt();
-            let rest = ((chi2 - e * e) / (dof as f64 - 1.0)).max(0.0);
-            if rest > 0.0 { e / rest.sqrt() } else { 0.0 }
-        } else {
-            0.0
-        };
-        Residual { id: o.id, run: o.run + 1, residual_um: crate::units::um_from_mm(residual_mm[i]), standardised: w }
-    });
-    let residuals = residuals.collect();
-    let outcome = Outcome {
-        format: outcome::FORMAT.into(),
-        machine: machine.name.clone(),
-        effects: settings.effects.clone(),
-        converged: solution.converged,
-        iterations: solution.iterations,
-        stopped: solution.stopped.clone(),
-        touches: n + data.unusable.len(),
-        rejected: data
-            .unusable
-            .iter()
-            .map(|u| Rejected { id: u.id, run: u.run + 1, reason: format!("{} (line {})", u.reason, u.line) })
-            .collect(),
-        unknowns: free.len(),
-        rank: observability.rank,
+    let studentised = snoop.studentised();
+    drop(search);
+    drop(batch);
+    let chi2 = solution.chi2;
+    let mut fit = Fit {
+        model,
+        data,
+        theta,
+        residual_mm,
+        studentised,
+        weight,
+        rejected,
+        covariance,
+        observability,
+        free,
+        priors,
+        knowledge,
+        noise,
+        chi2,
         dof,
-        condition: observability.condition,
-        rms_um,
-        held_out_rms_um: None,
-        noise_um: crate::units::um_from_mm(noise.sigma_mm),
-        noise_source: noise.source.into(),
-        visit_um: 0.0,
-        chi2_per_dof,
-        undetermined,
-        parameters,
-        reference_mm: reference.into(),
-        residuals: Some(residuals),
-        warnings,
+        outcome: Outcome::default(),
     };
-    Ok(Fit { model, data, theta, residual_mm, covariance, observability, free, outcome })
+    fit.outcome = answer::outcome(&fit, machine, catalogue, &effects, settings, &solution, condition)?;
+    Ok(fit)
 }
 
-/// A formula that gives no number at a touch would spoil the whole fit: say which, and where.
-fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Result<()> {
-    let mut findings = Vec::new();
-    for effect in effects {
-        let shapes: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
-        for term in &effect.terms {
-            let bad = |o: &&Observation| !term.formula.eval(&o.state, &shapes).is_finite();
-            let n_bad = data.observations.iter().filter(bad).count();
-            if let Some(first) = data.observations.iter().find(bad) {
-                findings.push(
-                    Finding::error(
-                        "model::no_value",
-                        format!("formula {:?} of effect {} has no value at {n_bad} touches, the first is touch {}", term.formula.text(), effect.id, first.id),
-                    )
-                    .help("a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch"),
-                );
-            }
-        }
+/// Scatter of the ball's place from one index to the next as the machine file declares it, mm: of the rotary axes that
+/// stand at more than one place in these touches.
+fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
+    let moved = |name| {
+        let mut places = observations.iter().map(|o| o.position.get(name));
+        let first = places.next();
+        places.any(|p| first.is_some_and(|f| (p - f).abs() > 1e-3))
+    };
+    let axes = machine.axes.iter().filter(|a| a.name.is_rotary() && moved(a.name));
+    axes.map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt()
+}
+
+/// A fit that is being made.
+struct Search<'a> {
+    data: &'a Data,
+    observability: &'a solve::Observability,
+    touches: Touches<'a>,
+    masked: Vec<bool>,
+}
+
+impl Search<'_> {
+    fn gaps(&self, solution: &solve::Solution) -> Vec<f64> {
+        self.touches.gaps(&solution.theta)
     }
-    if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
-}
 
-/// Which unknowns the user's words mean.
-fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>) -> Result<Vec<Option<Knowledge>>> {
-    let mut out = vec![None; unknowns.len()];
-    let mut findings = Vec::new();
-    for (word, known) in words {
-        let matches: Vec<usize> = (0..unknowns.len())
-            .filter(|&i| crate::symbols::same(&unknowns[i].name, word) || unknowns[i].alias.as_deref() == Some(word))
-            .collect();
-        match matches[..] {
-            [i] => out[i] = Some(*known),
-            _ => {
-                let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
-                findings.push(
-                    Finding::error("model::unknown_parameter", format!("no parameter of the model is called {word:?}"))
-                        .help(format!("there are: {}", names.join(", "))),
-                );
+    /// The touches that are used, as the noise sees them.
+    fn samples(&self, solution: &solve::Solution) -> Vec<Sample> {
+        let mut points: HashMap<[u64; 8], usize> = HashMap::new();
+        let gaps = self.gaps(solution);
+        let mut out = Vec::with_capacity(gaps.len());
+        for (i, o) in self.data.observations.iter().enumerate() {
+            let bits = |x: f64| x.to_bits();
+            let key = [
+                o.set_up as u64,
+                bits(o.point.x),
+                bits(o.point.y),
+                bits(o.point.z),
+                bits(o.normal.x),
+                bits(o.normal.y),
+                bits(o.normal.z),
+                bits(o.state[20]),
+            ];
+            let n = points.len();
+            let point = *points.entry(key).or_insert(n);
+            if self.touches.weights()[i] > 0.0 {
+                let visit = self.data.visits[i];
+                out.push(Sample {
+                    residual_mm: gaps[i],
+                    normal: Vector3::new(o.state[8], o.state[9], o.state[10]),
+                    repeat: self.data.repeats[i],
+                    visit,
+                    pose: self.data.poses[visit],
+                    point,
+                });
             }
         }
-        // a kilometre or a billion degrees is no knowledge of a machine
-        let sane = |v: f64| v.is_finite() && v.abs() < 1e6;
-        let bad = match known {
-            Knowledge::Fixed(v) => !sane(*v),
-            Knowledge::Prior { value, sigma } => !(sane(*value) && sane(*sigma) && *sigma > 0.0),
+        out
+    }
+
+    fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
+        self.touches.set_weights(weights);
+        solve::minimise(&self.touches, from.theta.clone(), self.observability)
+    }
+
+    /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do
+    /// get it back. `noise_dof` is that of σ.
+    fn without_strangers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
+        let n = self.data.observations.len();
+        let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
+        let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
+        let judge = |search: &Self, s: &solve::Solution| {
+            let dof = solve::Problem::n_rows(&search.touches).saturating_sub(search.observability.rank);
+            Snoop::new(&search.touches, &s.theta, &s.covariance, (s.chi2, dof), noise_dof)
         };
-        if bad {
-            findings.push(
-                Finding::error("model::knowledge", format!("what is said of {word} is not usable"))
-                    .help("value must be a number and sigma greater than 0"),
-            );
+        let first = judge(self, &solution).dropped();
+        if first.is_empty() {
+            return solution;
+        }
+        // several bad touches hide each other: let the rest vote first
+        let most = (snoop::MOST_SHARE * n as f64).ceil() as usize;
+        let mut out = self.robust_strangers(&solution, &all);
+        if out.is_empty() || out.len() > most {
+            out = first;
+        }
+        for _ in 0..4 {
+            let mut weights = all.clone();
+            out.iter().for_each(|&i| weights[i] = 0.0);
+            solution = self.refit(weights, &solution);
+            // back in what belongs, out what does not
+            let scale2 = self.scale2(&solution, noise_dof);
+            let back: Vec<usize> =
+                out.iter().copied().filter(|&i| snoop::belongs(self.off(&solution, i, scale2).1)).collect();
+            let more: Vec<usize> = judge(self, &solution).dropped();
+            if back.is_empty() && (more.is_empty() || out.len() >= most) {
+                break;
+            }
+            out.retain(|i| !back.contains(i));
+            out.extend(more);
+            out.truncate(most.max(1));
+        }
+        // touches of one face that miss together say something in common: that is no matter of chips
+        let normals: Vec<[i8; 3]> = self
+            .data
+            .observations
+            .iter()
+            .map(|o| [o.normal.x, o.normal.y, o.normal.z].map(|x| (10.0 * x).round() as i8))
+            .collect();
+        let face = |i: usize| (self.data.visits[i], self.data.observations[i].set_up, normals[i]);
+        for cluster in snoop::clusters(&out, face, n) {
+            out.retain(|i| !cluster.contains(i));
+        }
+        let mut weights = all;
+        out.iter().for_each(|&i| weights[i] = 0.0);
+        if weights == self.touches.weights() { solution } else { self.refit(weights, &solution) }
+    }
+
+    /// Touches further than 4 robust standard deviations off a fit in which far touches count little.
+    fn robust_strangers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
+        let (sigma, _) = self.touches.noise_mm();
+        let mut solution = plain.clone();
+        let mut gaps = self.gaps(&solution);
+        let mut scale = gaps.iter().map(|r| r.abs()).fold(0.0, f64::max);
+        loop {
+            let mut weights = snoop::robust_weights(&gaps, scale);
+            weights.iter_mut().zip(all).for_each(|(w, a)| *w = (*w * a).max(1e-6 * a));
+            solution = self.refit(weights, &solution);
+            gaps = self.gaps(&solution);
+            let floor = 3.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+            if scale <= floor {
+                break;
+            }
+            scale = (scale / 3.0).max(floor);
+        }
+        let limit = 4.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+        (0..gaps.len()).filter(|&i| all[i] > 0.0 && gaps[i].abs() > limit).collect()
+    }
+
+    fn scale2(&self, solution: &solve::Solution, noise_dof: f64) -> f64 {
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank) as f64;
+        (solution.chi2 + noise_dof) / (dof + noise_dof).max(1.0)
+    }
+
+    /// How far touch i is off what the fit says, mm and in standard deviations.
+    fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
+        let (gap, row) = self.touches.row(&solution.theta, i);
+        let (sigma, tau) = self.touches.noise_mm();
+        snoop::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
+    }
+
+    /// The rejected touches with their reasons.
+    fn reasons(&self, solution: &solve::Solution) -> BTreeMap<usize, String> {
+        let scale2 = self.scale2(solution, 0.0);
+        let weights = self.touches.weights();
+        (0..weights.len())
+            .filter(|&i| weights[i] == 0.0 && !self.masked[i])
+            .map(|i| {
+                let (off_mm, standardised) = self.off(solution, i, scale2);
+                (i, snoop::Rejection { touch: i, off_mm, standardised }.reason())
+            })
+            .collect()
+    }
+}
+
+/// Rank and null directions of a model at nominal touches, and its condition where the unknowns are least correlated.
+fn observe(
+    nominal: &Batch,
+    visits: &[usize],
+    theta: &[f64],
+    free: &[usize],
+    priors: &[Prior],
+    noise: (f64, f64),
+) -> (solve::Observability, f64) {
+    let touches = Touches::new(nominal, visits, theta.to_vec(), free, priors, noise);
+    let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
+    let gram = solve::Problem::normal(&touches, &at, true).gram;
+    let seen = solve::observe_gram(&gram)
+        .unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+    let least = nominal.model().least_correlated(nominal.observations());
+    let mut change = DMatrix::identity(free.len(), free.len());
+    for (offset, tilt, lever) in least {
+        if let (Ok(o), Ok(t)) = (free.binary_search(&offset), free.binary_search(&tilt)) {
+            change[(o, t)] += lever;
         }
     }
-    if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
+    let condition = solve::condition(&(change.tr_mul(&gram) * &change), seen.rank);
+    (seen, condition)
 }
 
 /// Rank of a model on given (nominal) touches, without measurements: what a plan can tell.
@@ -352,71 +486,6 @@ pub fn observe_plan(
     let model = Model::new(machine, &effects, &data.set_ups, machine.reference.pivot);
     let theta = model.start();
     let free: Vec<usize> = (0..theta.len()).collect();
-    let jacobian = nominal_jacobian(&model, &data.nominal, &theta, &free, &[], 1.0);
-    let seen = solve::observe(&jacobian);
+    let seen = observe(&model.prepare(&data.nominal), &data.visits, &theta, &free, &[], (1.0, 0.0)).0;
     Ok((model, seen))
-}
-
-fn nominal_jacobian(
-    model: &Model,
-    nominal: &[Observation],
-    theta: &[f64],
-    free: &[usize],
-    priors: &[(usize, f64, f64)],
-    sigma: f64,
-) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(nominal.len() + priors.len(), free.len());
-    let mut scratch = model.scratch();
-    let mut row = vec![0.0; theta.len()];
-    for (i, touch) in nominal.iter().enumerate() {
-        model.gap_and_row(touch, theta, &mut scratch, &mut row);
-        for (column, &f) in free.iter().enumerate() {
-            jacobian[(i, column)] = row[f];
-        }
-    }
-    for (i, (column, _, prior)) in priors.iter().enumerate() {
-        jacobian[(nominal.len() + i, *column)] = sigma / prior;
-    }
-    jacobian
-}
-
-/// The touches as a least-squares problem: residuals in units of σ.
-struct Touches<'a> {
-    model: &'a Model,
-    observations: &'a [Observation],
-    theta: Vec<f64>,
-    free: &'a [usize],
-    priors: &'a [(usize, f64, f64)],
-    sigma: f64,
-}
-
-impl solve::Problem for Touches<'_> {
-    fn evaluate(&self, free: &DVector<f64>, residual: &mut DVector<f64>, jacobian: &mut DMatrix<f64>) {
-        let mut theta = self.theta.clone();
-        for (value, &i) in free.iter().zip(self.free) {
-            theta[i] = *value;
-        }
-        let mut scratch = self.model.scratch();
-        let mut row = vec![0.0; theta.len()];
-        jacobian.fill(0.0);
-        for (i, touch) in self.observations.iter().enumerate() {
-            residual[i] = self.model.gap_and_row(touch, &theta, &mut scratch, &mut row) / self.sigma;
-            for (column, &f) in self.free.iter().enumerate() {
-                jacobian[(i, column)] = row[f] / self.sigma;
-            }
-        }
-        let n = self.observations.len();
-        for (i, (column, value, sigma)) in self.priors.iter().enumerate() {
-            residual[n + i] = (free[*column] - value) / sigma;
-            jacobian[(n + i, *column)] = 1.0 / sigma;
-        }
-    }
-
-    fn n_rows(&self) -> usize {
-        self.observations.len() + self.priors.len()
-    }
-
-    fn sigma(&self, row: usize) -> f64 {
-        if row < self.observations.len() { self.sigma } else { 0.0 }
-    }
 }

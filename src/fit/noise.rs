@@ -1,78 +1,355 @@
-//! How much a touch scatters: from touches repeated at once, or as declared.
+//! How much a touch scatters, and how much the ball's place scatters from one index visit to the next.
+//!
+//! Both from contrasts that no model error can enter: touches of one point made right after each other differ by σ only;
+//! touches of the same points in two visits of one pose differ by σ and by one displacement per visit. With y the
+//! residuals of such a group, X its points and Z its normals by visit, X is projected out of y and of Z; the projected
+//! ZZᵀ has eigenvalues λₖ, and yₖ² has the expectation σ² + τ²·λₖ. τ̂ solves Σ yₖ²/(σ² + τ²λₖ) = K (Paule and Mandel's
+//! estimator, exact in its degrees of freedom), and its 90 % bound solves the same sum for the 10 % quantile of χ²(K).
 
+use crate::units::um_from_mm;
+use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 /// Fewer degrees of freedom than this say too little: their 95 % interval for σ spans more than a factor of two.
 const LEAST_REPEATS: usize = 8;
 
-/// The noise of a touch.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Noise {
-    /// Standard deviation, mm.
+/// Fewer contrasts than this say too little about visits.
+const LEAST_REVISITS: usize = 6;
+
+/// A pose visited this often at most enters the estimate of τ: the work grows with its cube.
+const MOST_ROWS: usize = 600;
+
+/// The noise of the touches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Standard deviation of a touch, mm.
     pub sigma_mm: f64,
     /// `repeats`, `study` or `declared`.
     pub source: &'static str,
-    /// Factor of the 95 % interval.
-    pub coverage_factor: f64,
+    /// Degrees of freedom of σ; none where it is taken as known.
+    pub dof: Option<f64>,
+    /// Standard deviation of each component of a visit's displacement, mm.
+    pub tau_mm: f64,
+    /// `revisits`, `study`, `declared`, or `one pose`.
+    pub visit_source: &'static str,
+    /// Degrees of freedom of τ; none where it is taken as known.
+    pub visit_dof: Option<f64>,
+    /// 90 % upper bound of τ, mm: what tests for missing effects use.
+    pub tau_90_mm: f64,
 }
 
-/// From residuals (mm) and their repeat groups; `stated` is the user's own figure and goes first.
-pub(super) fn estimate(residual_mm: &[f64], groups: &[usize], declared_mm: f64, stated_mm: Option<f64>) -> Noise {
-    if let Some(sigma_mm) = stated_mm {
-        return Noise { sigma_mm, source: "study", coverage_factor: coverage(None) };
-    }
-    let (mut squares, mut dof, mut at) = (0.0, 0, 0);
-    while at < groups.len() {
-        let end = at + groups[at..].iter().take_while(|&&g| g == groups[at]).count();
-        let group = &residual_mm[at..end];
-        let mean = group.iter().sum::<f64>() / group.len() as f64;
-        squares += group.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
-        dof += group.len() - 1;
-        at = end;
-    }
-    let sigma_mm = (squares / dof as f64).sqrt();
+/// What is known without looking at the touches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Known {
+    /// The probe's repeatability, mm.
+    pub declared_sigma_mm: f64,
+    /// The indexing repeatability of the axes that are indexed, mm.
+    pub declared_tau_mm: f64,
+    /// σ where the user states it, mm.
+    pub stated_sigma_mm: Option<f64>,
+    /// τ where the user states it, mm.
+    pub stated_tau_mm: Option<f64>,
+}
+
+/// One touch as the noise sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Residual, mm.
+    pub residual_mm: f64,
+    /// Outward normal in R.
+    pub normal: Vector3<f64>,
+    /// Touches of one point made right after each other share it.
+    pub repeat: usize,
+    /// The index visit.
+    pub visit: usize,
+    /// Visits of one pose share it.
+    pub pose: usize,
+    /// Touches of one point share it, in whatever visit.
+    pub point: usize,
+}
+
+/// σ and τ from the touches in their order, or as known.
+#[must_use]
+pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
+    let immediate = immediate_repeats(samples);
+    let revisits = revisits(samples);
+    // a revisit also repeats each point once the visit's displacement is taken off
+    let (squares, dof) = (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1);
+    let from_repeats = (dof >= LEAST_REPEATS).then(|| (squares / dof as f64).sqrt());
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
-    if dof >= LEAST_REPEATS && sigma_mm > 1e-9 {
-        Noise { sigma_mm, source: "repeats", coverage_factor: coverage(Some(dof)) }
-    } else {
-        Noise { sigma_mm: declared_mm, source: "declared", coverage_factor: coverage(None) }
+    let from_repeats = from_repeats.filter(|s| *s > 1e-9);
+    let (sigma_mm, source, sigma_dof) = match (known.stated_sigma_mm, from_repeats) {
+        (Some(stated), _) => (stated, "study", None),
+        (None, Some(found)) => (found, "repeats", Some(dof as f64)),
+        (None, None) => (known.declared_sigma_mm, "declared", None),
+    };
+    let n_poses = samples.iter().map(|s| s.pose).collect::<std::collections::BTreeSet<_>>().len();
+    let fixed = |tau_mm, visit_source| (tau_mm, visit_source, None, tau_mm);
+    let enough = revisits.contrasts.len() >= LEAST_REVISITS && from_repeats.is_some();
+    let (tau_mm, visit_source, visit_dof, tau_90_mm) = match known.stated_tau_mm {
+        Some(stated) => fixed(stated, "study"),
+        None if enough => {
+            let (tau, dof, upper) = revisits.solve(sigma_mm);
+            (tau, "revisits", Some(dof), upper)
+        }
+        None if n_poses < 2 => fixed(0.0, "one pose"),
+        None => fixed(known.declared_tau_mm, "declared"),
+    };
+    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_90_mm }
+}
+
+impl Noise {
+    /// In words, for the screen.
+    #[must_use]
+    pub fn says(&self) -> String {
+        let sigma = match (self.source, self.dof) {
+            ("repeats", Some(dof)) => format!("from repeated touches, {dof:.0} degrees of freedom"),
+            ("study", _) => "as the study states".to_owned(),
+            _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
+        };
+        let tau = match (self.visit_source, self.visit_dof) {
+            ("revisits", Some(_)) => {
+                format!("from revisited poses, at most {:.2} um with 90 % certainty", um_from_mm(self.tau_90_mm))
+            }
+            ("study", _) => "as the study states".to_owned(),
+            ("one pose", _) => "only one pose was visited".to_owned(),
+            _ => "the axes' declared indexing repeatability: the plan has too few revisits".to_owned(),
+        };
+        format!(
+            "touch {:.2} um ({sigma}); index visit {:.2} um ({tau})",
+            um_from_mm(self.sigma_mm),
+            um_from_mm(self.tau_mm)
+        )
+    }
+
+    /// Two-sided 95 % factor for a standard uncertainty of which `visit_share` of the variance goes back to τ
+    /// (Welch and Satterthwaite).
+    #[must_use]
+    pub fn coverage(&self, visit_share: f64) -> f64 {
+        let part = |share: f64, dof: Option<f64>| dof.map_or(0.0, |d| share * share / d.max(1.0));
+        let sum = part(1.0 - visit_share, self.dof) + part(visit_share, self.visit_dof);
+        coverage((sum > 1e-9).then(|| 1.0 / sum))
     }
 }
 
-/// Two-sided 95 % factor of Student's t, or of the normal distribution where σ is taken as known.
-fn coverage(dof: Option<usize>) -> f64 {
-    let t = dof.and_then(|d| StudentsT::new(0.0, 1.0, d as f64).ok());
+/// Sum of squares and degrees of freedom within touches of one point made right after each other.
+fn immediate_repeats(samples: &[Sample]) -> (f64, usize) {
+    let (mut squares, mut dof) = (0.0, 0);
+    for group in samples.chunk_by(|a, b| a.repeat == b.repeat) {
+        let mean = group.iter().map(|s| s.residual_mm).sum::<f64>() / group.len() as f64;
+        squares += group.iter().map(|s| (s.residual_mm - mean).powi(2)).sum::<f64>();
+        dof += group.len() - 1;
+    }
+    (squares, dof)
+}
+
+/// What revisited poses say.
+#[derive(Debug, Default)]
+struct Revisits {
+    /// (λ, y²) of each contrast between visits.
+    contrasts: Vec<(f64, f64)>,
+    /// Sum of squares and degrees of freedom of what is left when each visit is displaced freely.
+    within: (f64, usize),
+}
+
+fn revisits(samples: &[Sample]) -> Revisits {
+    let mut out = Revisits::default();
+    let mut poses: Vec<usize> = samples.iter().map(|s| s.pose).collect();
+    poses.sort_unstable();
+    poses.dedup();
+    for pose in poses {
+        // touches made right after each other count by their mean: their own scatter is used already
+        let mut rows: Vec<(Sample, f64)> = Vec::new();
+        for group in samples.chunk_by(|a, b| a.repeat == b.repeat).filter(|g| g[0].pose == pose) {
+            let mean = group.iter().map(|s| s.residual_mm).sum::<f64>() / group.len() as f64;
+            rows.push((Sample { residual_mm: mean, ..group[0] }, (group.len() as f64).sqrt()));
+        }
+        // only points that stand in several visits say anything
+        let count = |rows: &[(Sample, f64)], point: usize| rows.iter().filter(|r| r.0.point == point).count();
+        let again: Vec<bool> = rows.iter().map(|r| count(&rows, r.0.point) > 1).collect();
+        let rows: Vec<(Sample, f64)> = rows.into_iter().zip(again).filter(|r| r.1).map(|r| r.0).collect();
+        if rows.len() < 2 || rows.len() > MOST_ROWS {
+            continue;
+        }
+        let mut visits: Vec<usize> = rows.iter().map(|r| r.0.visit).collect();
+        visits.sort_unstable();
+        visits.dedup();
+        if visits.len() < 2 {
+            continue;
+        }
+        out.add(&rows, &visits);
+    }
+    out
+}
+
+impl Revisits {
+    /// One pose: rows with the root of their weights.
+    fn add(&mut self, rows: &[(Sample, f64)], visits: &[usize]) {
+        let n = rows.len();
+        let mut y = DVector::from_iterator(n, rows.iter().map(|(s, root)| s.residual_mm * root));
+        let mut z = DMatrix::zeros(n, 3 * visits.len());
+        for (i, (s, root)) in rows.iter().enumerate() {
+            if let Some(v) = visits.iter().position(|v| *v == s.visit) {
+                for k in 0..3 {
+                    z[(i, 3 * v + k)] = s.normal[k] * root;
+                }
+            }
+        }
+        // the mean of each point is a fixed unknown: project it out of both
+        let mut points: Vec<usize> = rows.iter().map(|r| r.0.point).collect();
+        points.sort_unstable();
+        points.dedup();
+        for point in &points {
+            let of: Vec<usize> = (0..n).filter(|&i| rows[i].0.point == *point).collect();
+            let norm2: f64 = of.iter().map(|&i| rows[i].1.powi(2)).sum();
+            let mean = of.iter().map(|&i| rows[i].1 * y[i]).sum::<f64>() / norm2;
+            of.iter().for_each(|&i| y[i] -= rows[i].1 * mean);
+            for mut column in z.column_iter_mut() {
+                let mean = of.iter().map(|&i| rows[i].1 * column[i]).sum::<f64>() / norm2;
+                of.iter().for_each(|&i| column[i] -= rows[i].1 * mean);
+            }
+        }
+        let svd = z.svd(true, false);
+        let Some(u) = svd.u else { return };
+        let mut explained = 0.0;
+        let mut n_contrasts = 0;
+        for (k, s) in svd.singular_values.iter().enumerate() {
+            if *s > 1e-6 {
+                let y2 = u.column(k).dot(&y).powi(2);
+                self.contrasts.push((s * s, y2));
+                explained += y2;
+                n_contrasts += 1;
+            }
+        }
+        self.within.0 += (y.norm_squared() - explained).max(0.0);
+        self.within.1 += (n - points.len()).saturating_sub(n_contrasts);
+    }
+
+    /// τ, its degrees of freedom and its 90 % upper bound, mm.
+    fn solve(&self, sigma_mm: f64) -> (f64, f64, f64) {
+        let k = self.contrasts.len() as f64;
+        let sum = |tau2: f64| -> f64 {
+            self.contrasts.iter().map(|(lambda, y2)| y2 / (sigma_mm * sigma_mm + tau2 * lambda)).sum()
+        };
+        let tau2 = root(sum, k);
+        let quantile = ChiSquared::new(k).map_or(k, |d| d.inverse_cdf(0.1));
+        let upper2 = root(sum, quantile);
+        let information: f64 =
+            self.contrasts.iter().map(|(lambda, _)| lambda / (sigma_mm * sigma_mm + tau2 * lambda)).sum();
+        let dof = (tau2 * information).powi(2) / k;
+        (tau2.sqrt(), dof, upper2.sqrt())
+    }
+}
+
+/// Where a falling function of x ≥ 0 takes a value; 0 where it starts below.
+fn root(f: impl Fn(f64) -> f64, value: f64) -> f64 {
+    if f(0.0) <= value {
+        return 0.0;
+    }
+    let mut high = 1e-12;
+    while f(high) > value && high < 1e6 {
+        high *= 4.0;
+    }
+    let mut low = 0.0;
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if f(middle) > value { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// Two-sided 95 % factor of Student's t, or of the normal distribution where the uncertainty is taken as known.
+fn coverage(dof: Option<f64>) -> f64 {
+    let t = dof.and_then(|d| StudentsT::new(0.0, 1.0, d.max(1.0)).ok());
     t.map_or(1.959_963_984_540_054, |t| t.inverse_cdf(0.975))
 }
 
-/// χ²/dof above this has a probability below 0.1 % when the model holds.
-pub(super) fn chi2_limit(dof: usize) -> f64 {
-    ChiSquared::new(dof as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(0.999) / dof as f64)
+/// χ²/dof above this has a probability below 0.1 % when the model holds and σ is known; `dof_noise` of σ widen it.
+#[must_use]
+pub fn chi2_limit(dof: usize, dof_noise: Option<f64>) -> f64 {
+    match dof_noise {
+        None => ChiSquared::new(dof as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(0.999) / dof as f64),
+        Some(nu) => statrs::distribution::FisherSnedecor::new(dof as f64, nu.max(1.0))
+            .map_or(f64::INFINITY, |d| d.inverse_cdf(0.999)),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn known() -> Known {
+        Known { declared_sigma_mm: 5.0, declared_tau_mm: 0.5, ..Known::default() }
+    }
+
+    fn sample(residual_mm: f64, repeat: usize) -> Sample {
+        Sample { residual_mm, normal: Vector3::x(), repeat, visit: 0, pose: 0, point: repeat }
+    }
 
     #[test]
     fn repeats_give_the_pure_error() {
-        let residual: Vec<f64> =
-            (0..20).map(|i| 0.01 * f64::from(i / 2) + if i % 2 == 0 { 1e-3 } else { -1e-3 }).collect();
-        let groups: Vec<usize> = (0..20).map(|i| i / 2).collect();
-        let noise = estimate(&residual, &groups, 5.0, None);
-        assert_eq!(noise.source, "repeats");
+        let at = |i: usize| 0.01 * (i / 2) as f64 + if i.is_multiple_of(2) { 1e-3 } else { -1e-3 };
+        let samples: Vec<Sample> = (0..20).map(|i| sample(at(i), i / 2)).collect();
+        let noise = estimate(&samples, &known());
+        assert_eq!((noise.source, noise.visit_source), ("repeats", "one pose"));
         assert!((noise.sigma_mm - 2f64.sqrt() * 1e-3).abs() < 1e-15);
-        assert!((noise.coverage_factor - 2.228).abs() < 1e-3);
+        assert!((noise.coverage(0.0) - 2.228).abs() < 1e-3);
     }
 
     #[test]
     fn too_few_repeats_mean_the_declared_value() {
-        let noise = estimate(&[0.1, 0.2, 0.3], &[0, 0, 1], 5.0, None);
+        let samples = [sample(0.1, 0), sample(0.2, 0), sample(0.3, 1)];
+        let noise = estimate(&samples, &known());
         assert_eq!((noise.sigma_mm, noise.source), (5.0, "declared"));
+        assert!((noise.coverage(0.5) - 1.96).abs() < 1e-3);
+    }
+
+    /// Four poses, each visited twice, twelve points each: τ and its bound over many draws.
+    #[test]
+    fn revisits_give_the_scatter_of_visits() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+        let mut draw = |scale: f64| -> f64 {
+            let x: f64 = StandardNormal.sample(&mut rng);
+            x * scale
+        };
+        let (sigma, tau, runs) = (1e-3, 0.7e-3, 400);
+        let (mut mean_tau2, mut mean_sigma2, mut below) = (0.0, 0.0, 0);
+        for _ in 0..runs {
+            let mut samples = Vec::new();
+            for pose in 0..4 {
+                for visit in 0..2 {
+                    let shift = Vector3::new(draw(tau), draw(tau), draw(tau));
+                    for point in 0..12 {
+                        let mut normal = Vector3::zeros();
+                        normal[point % 3] = if point % 2 == 0 { 1.0 } else { -1.0 };
+                        samples.push(Sample {
+                            residual_mm: 0.01 * point as f64 + normal.dot(&shift) + draw(sigma),
+                            normal,
+                            repeat: samples.len(),
+                            visit: 2 * pose + visit,
+                            pose,
+                            point: 100 * pose + point,
+                        });
+                    }
+                }
+            }
+            let noise = estimate(&samples, &known());
+            assert_eq!((noise.source, noise.visit_source), ("repeats", "revisits"));
+            mean_tau2 += noise.tau_mm.powi(2) / f64::from(runs);
+            mean_sigma2 += noise.sigma_mm.powi(2) / f64::from(runs);
+            below += i32::from(noise.tau_90_mm < tau);
+        }
+        assert!((mean_tau2.sqrt() / tau - 1.0).abs() < 0.06, "{}", mean_tau2.sqrt());
+        assert!((mean_sigma2.sqrt() / sigma - 1.0).abs() < 0.02, "{}", mean_sigma2.sqrt());
+        // the bound misses in a tenth of the cases
+        assert!((20..=65).contains(&below), "{below}");
     }
 
     #[test]
     fn chi_square_limit_is_above_one() {
-        assert!((chi2_limit(100) - 1.494).abs() < 2e-3);
+        assert!((chi2_limit(100, None) - 1.494).abs() < 2e-3);
+        assert!(chi2_limit(100, Some(20.0)) > 2.0);
     }
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 pub const FORMAT: &str = "axiscal-fit/1";
 
 /// The answer of `identify`. Displacements in mm, tilts in deg.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// `axiscal-fit/1`
     pub format: String,
@@ -40,18 +40,39 @@ pub struct Outcome {
     pub held_out_rms_um: Option<f64>,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,
-    /// Where that comes from: `repeats`, `declared`, `residuals`.
+    /// Where that comes from: `repeats`, `declared`, `study`.
     pub noise_source: String,
     /// Scatter per index visit, µm.
     pub visit_um: f64,
+    /// Where that comes from: `revisits`, `declared`, `study`, `one pose`.
+    #[serde(default)]
+    pub visit_source: String,
+    /// Both in a sentence.
+    #[serde(default)]
+    pub noise_says: String,
     /// Reduced chi-square.
     pub chi2_per_dof: f64,
     /// Combinations that the data cannot tell.
     pub undetermined: Vec<Undetermined>,
+    /// Combinations that the data determine no better than their typical sizes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub weak: Vec<Combination>,
     /// The parameters.
     pub parameters: Vec<Parameter>,
+    /// Pairs of results that are least told apart, worst first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub correlations: Vec<Correlation>,
+    /// The priors that entered the fit.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub priors: Vec<PriorRow>,
+    /// Uncertainties of the measurement itself that widen the results.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub type_b: Vec<TypeBRow>,
     /// Where location errors of workpiece-side axes are stated, mm in R.
     pub reference_mm: [f64; 3],
+    /// Covariance of the results, on request.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Covariance>,
     /// Residuals, on request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residuals: Option<Vec<Residual>>,
@@ -78,6 +99,61 @@ pub struct Undetermined {
     pub combination: BTreeMap<String, f64>,
     /// In words.
     pub says: String,
+}
+
+/// A combination that is known badly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Combination {
+    /// Weights of the parameters in it, each in units of its typical size.
+    pub combination: BTreeMap<String, f64>,
+    /// Its standard uncertainty in units of the typical size.
+    pub times_typical: f64,
+    /// In words.
+    pub says: String,
+}
+
+/// Two results that go together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Correlation {
+    /// One.
+    pub a: String,
+    /// The other.
+    pub b: String,
+    /// Their correlation coefficient.
+    pub r: f64,
+}
+
+/// A prior that entered the fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PriorRow {
+    /// Parameter.
+    pub name: String,
+    /// Expected value.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// Their unit.
+    pub unit: String,
+}
+
+/// A type B row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TypeBRow {
+    /// Parameter that is not solved for.
+    pub name: String,
+    /// Standard uncertainty.
+    pub sigma: f64,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// Covariance matrix of some parameters, in their units (type A).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Covariance {
+    /// The parameters.
+    pub names: Vec<String>,
+    /// Row by row.
+    pub matrix: Vec<Vec<f64>>,
 }
 
 /// Is the value a result?
@@ -108,10 +184,19 @@ pub struct Parameter {
     pub value: f64,
     /// `mm`, `deg`, …
     pub unit: String,
-    /// Standard uncertainty; none when undetermined or fixed.
+    /// Standard uncertainty from the noise and the type B rows; none when undetermined or fixed.
     pub sigma: Option<f64>,
-    /// Expanded uncertainty (95 %).
+    /// Expanded uncertainty (95 %, Student's t with the degrees of freedom of the noise).
     pub expanded: Option<f64>,
+    /// Standard uncertainty from the noise alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_noise: Option<f64>,
+    /// Standard uncertainty from the type B rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_type_b: Option<f64>,
+    /// Standard uncertainty when everything that the model leaves out acts at its typical size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_with_unmodelled: Option<f64>,
     /// Is the value a result?
     pub status: Status,
 }
@@ -127,4 +212,11 @@ pub struct Residual {
     pub residual_um: f64,
     /// Externally studentised.
     pub standardised: f64,
+    /// False for a touch that does not belong to the rest.
+    #[serde(default = "yes")]
+    pub used: bool,
+}
+
+fn yes() -> bool {
+    true
 }

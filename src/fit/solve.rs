@@ -1,4 +1,4 @@
-//! Weighted Gauss-Newton by orthogonal factors, rank by singular values, and nothing about effects or machines.
+//! Weighted Gauss-Newton, rank by singular values, and nothing about effects or machines.
 //!
 //! The unknowns are scaled by their columns' norms at the nominal touches; directions that leave no trace there
 //! (singular value below [`RANK_TOLERANCE`] of the largest) are gauges: they are taken out of the search, stay at
@@ -123,130 +123,220 @@ fn echelon(mut rows: DMatrix<f64>) -> Vec<DVector<f64>> {
         .collect()
 }
 
-/// Residuals (mm, already divided by their standard deviations when weights are wanted) and Jacobian at θ.
-pub trait Problem {
-    /// Fills both; `residual` has one row per touch and prior, `jacobian` one column per free unknown.
-    fn evaluate(&self, theta: &DVector<f64>, residual: &mut DVector<f64>, jacobian: &mut DMatrix<f64>);
-    /// Rows.
-    fn n_rows(&self) -> usize;
-    /// Standard deviation that one row is divided by, mm: turns a whitened step back into mm.
-    fn sigma(&self, row: usize) -> f64;
+/// Sums of a whitened least-squares problem at θ: JᵀJ, Jᵀr, rᵀr.
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// JᵀJ, or empty where it was not asked for.
+    pub gram: DMatrix<f64>,
+    /// Jᵀr.
+    pub gradient: DVector<f64>,
+    /// rᵀr.
+    pub sum: f64,
 }
+
+/// A whitened least-squares problem.
+pub trait Problem {
+    /// Its sums at θ; the Gram matrix only on request.
+    fn normal(&self, theta: &DVector<f64>, with_gram: bool) -> Normal;
+    /// Its Jacobian at θ, one row per touch and prior.
+    fn jacobian(&self, theta: &DVector<f64>) -> DMatrix<f64>;
+    /// Rows that count.
+    fn n_rows(&self) -> usize;
+    /// Noise of a touch, mm: turns a whitened step back into mm.
+    fn noise(&self) -> f64;
+}
+
+/// Above this condition the Gram matrix loses too many digits: the factor then comes from the Jacobian itself.
+const GRAM_CONDITION: f64 = 1e5;
+
+/// While steps are larger than this, mm, the factor is made anew; smaller ones do not change it.
+const SAME_FACTOR_MM: f64 = 1e-6;
 
 /// Where a search ended.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The free unknowns.
     pub theta: DVector<f64>,
-    /// Residuals at θ, whitened.
-    pub residual: DVector<f64>,
+    /// Sum of squared whitened residuals at θ.
+    pub chi2: f64,
     /// Did it converge?
     pub converged: bool,
     /// Steps taken.
     pub iterations: usize,
     /// By which test it stopped.
     pub stopped: String,
-    /// Covariance of the free unknowns for unit weight; zero along unseen directions.
+    /// Covariance of the free unknowns; zero along unseen directions.
     pub covariance: DMatrix<f64>,
-    /// Leverage of each row: the share of its own residual that the fit takes away.
-    pub leverage: DVector<f64>,
 }
 
-/// Minimises the sum of squares over the seen directions, from `start`.
+/// The seen directions of the scaled unknowns with the factor R, RᵀR = their normal matrix.
+struct Factor {
+    r: DMatrix<f64>,
+}
+
+impl Factor {
+    /// From the Gram matrix where that is accurate enough, else from the Jacobian.
+    fn new(problem: &impl Problem, theta: &DVector<f64>, normal: &Normal, seen: &Observability) -> Option<Self> {
+        if seen.condition < GRAM_CONDITION {
+            let scaled = DMatrix::from_fn(theta.len(), theta.len(), |i, j| {
+                normal.gram[(i, j)] / (seen.scale[i] * seen.scale[j])
+            });
+            let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
+            if let Some(cholesky) = reduced.cholesky() {
+                return Some(Self { r: cholesky.unpack().transpose() });
+            }
+        }
+        let mut jacobian = problem.jacobian(theta);
+        for (mut column, s) in jacobian.column_iter_mut().zip(seen.scale.iter()) {
+            column /= *s;
+        }
+        let reduced = if seen.full() { jacobian } else { jacobian * &seen.seen };
+        let r = reduced.qr().r();
+        let good = r.nrows() == seen.rank && r.diagonal().iter().all(|d| *d != 0.0 && d.is_finite());
+        good.then_some(Self { r })
+    }
+
+    /// −(RᵀR)⁻¹·Sᵀ·D⁻¹·gradient, and the length of the move that it makes (whitened).
+    fn step(&self, gradient: &DVector<f64>, seen: &Observability) -> Option<(DVector<f64>, f64)> {
+        let scaled = gradient.component_div(&seen.scale);
+        let mut x = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) };
+        if !self.r.tr_solve_upper_triangular_mut(&mut x) {
+            return None;
+        }
+        let length = x.norm();
+        if !self.r.solve_upper_triangular_mut(&mut x) || x.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let step = if seen.full() { -x } else { -(&seen.seen * x) };
+        Some((step.component_div(&seen.scale), length))
+    }
+
+    fn covariance(&self, seen: &Observability) -> Option<DMatrix<f64>> {
+        let mut inverse = DMatrix::identity(self.r.nrows(), self.r.ncols());
+        if !self.r.solve_upper_triangular_mut(&mut inverse) {
+            return None;
+        }
+        let mut half = if seen.full() { inverse } else { &seen.seen * inverse };
+        for (mut row, s) in half.row_iter_mut().zip(seen.scale.iter()) {
+            row /= *s;
+        }
+        Some(&half * half.transpose())
+    }
+}
+
+impl Observability {
+    /// True when every combination of the unknowns is seen.
+    #[must_use]
+    pub fn full(&self) -> bool {
+        self.rank == self.scale.len()
+    }
+}
+
+/// Minimises the sum of squares over the seen directions, from `start`: Gauss-Newton with halved steps. Its steps solve
+/// (corrected semi-)normal equations; the gradient is always that of the exact residuals, so that the factor decides
+/// about the speed of convergence and not about the answer.
 #[must_use]
 pub fn minimise(problem: &impl Problem, start: DVector<f64>, seen: &Observability) -> Solution {
-    let (n, p, rank) = (problem.n_rows(), start.len(), seen.rank);
+    let p = start.len();
     let mut theta = start;
-    let mut residual = DVector::zeros(n);
-    let mut jacobian = DMatrix::zeros(n, p);
-    problem.evaluate(&theta, &mut residual, &mut jacobian);
+    if seen.rank == 0 {
+        let chi2 = problem.normal(&theta, false).sum;
+        let stopped =
+            if p == 0 { "nothing is left to solve for" } else { "no unknown leaves a trace in these touches" }.into();
+        let covariance = DMatrix::zeros(p, p);
+        return Solution { theta, chi2, converged: p == 0, iterations: 0, stopped, covariance };
+    }
+    // moves are judged by their root mean square over the touches
+    let to_mm = problem.noise() / (problem.n_rows().max(1) as f64).sqrt();
+    let mut normal = problem.normal(&theta, true);
+    let mut factor = Factor::new(problem, &theta, &normal, seen);
     let mut iterations = 0;
     let mut converged = false;
     let mut stopped = format!("no end after {MAX_STEPS} steps");
-    let full = rank == p;
-    let scaled = |jacobian: &DMatrix<f64>| -> DMatrix<f64> {
-        let mut a = jacobian.clone();
-        for (mut column, s) in a.column_iter_mut().zip(seen.scale.iter()) {
-            column /= *s;
-        }
-        if full { a } else { a * &seen.seen }
-    };
-    if rank == 0 {
-        return Solution {
-            theta,
-            residual,
-            converged: p == 0,
-            iterations: 0,
-            stopped: if p == 0 { "nothing is left to solve for" } else { "no unknown leaves a trace in these touches" }
-                .into(),
-            covariance: DMatrix::zeros(p, p),
-            leverage: DVector::zeros(n),
-        };
-    }
     while iterations < MAX_STEPS {
-        let a = scaled(&jacobian);
-        let qr = a.clone().qr();
-        let mut rhs = residual.clone();
-        qr.q_tr_mul(&mut rhs);
-        let mut phi = -rhs.rows(0, rank).into_owned();
-        if !qr.r().solve_upper_triangular_mut(&mut phi) || phi.iter().any(|x| !x.is_finite()) {
+        let Some((step, length)) = factor.as_ref().and_then(|f| f.step(&normal.gradient, seen)) else {
             stopped = "the factor became singular".into();
             break;
-        }
-        let moves = &a * &phi;
-        let largest_mm = moves.iter().enumerate().map(|(i, m)| m.abs() * problem.sigma(i)).fold(0.0, f64::max);
-        let step = (if full { phi } else { &seen.seen * phi }).component_div(&seen.scale);
-        let before = residual.norm_squared();
+        };
+        let moved_mm = length * to_mm;
+        let again = moved_mm > SAME_FACTOR_MM;
         iterations += 1;
-        let mut length = 1.0;
+        let mut part = 1.0;
         let accepted = loop {
-            let candidate = &theta + &step * length;
-            problem.evaluate(&candidate, &mut residual, &mut jacobian);
-            let after = residual.norm_squared();
+            let candidate = &theta + &step * part;
+            let after = problem.normal(&candidate, again);
             // close to the minimum rounding decides about the sum of squares: the step itself is then the better judge
-            if after.is_finite() && (after <= before * (1.0 + 1e-12) || largest_mm < 1e-9) {
+            if after.sum.is_finite() && (after.sum <= normal.sum * (1.0 + 1e-12) || moved_mm < 1e-9) {
                 theta = candidate;
-                break true;
+                break Some(after);
             }
-            length *= 0.5;
-            if length < 1e-4 {
-                break false;
+            part *= 0.5;
+            if part < 1e-4 {
+                break None;
             }
         };
-        if !accepted {
-            problem.evaluate(&theta, &mut residual, &mut jacobian);
+        let Some(after) = accepted else {
             stopped = "no shorter step lowers the sum of squares".into();
-            converged = largest_mm < 1e-6;
+            converged = moved_mm < 1e-6;
             break;
-        }
-        if largest_mm * length < STEP_TOLERANCE_MM {
+        };
+        let fell = normal.sum - after.sum;
+        normal = Normal { gram: if again { after.gram } else { normal.gram }, ..after };
+        if moved_mm * part < STEP_TOLERANCE_MM {
             converged = true;
             stopped = format!("the last step moved no touch by more than {STEP_TOLERANCE_MM:e} mm");
             break;
         }
         // where touches are noisy, a step far below their noise changes nothing that anybody could see
-        if largest_mm < 1e-11 && (before - residual.norm_squared()).abs() <= 1e-13 * before {
+        if moved_mm < 1e-11 && fell.abs() <= 1e-13 * normal.sum {
             converged = true;
             stopped = "the sum of squares no longer falls".into();
             break;
         }
-    }
-    let a = scaled(&jacobian);
-    let qr = a.qr();
-    let q = qr.q();
-    let leverage = DVector::from_iterator(n, q.row_iter().map(|row| row.norm_squared()));
-    let covariance = match qr.r().try_inverse() {
-        Some(inverse) => {
-            let half = if full { inverse } else { &seen.seen * inverse };
-            let mut half = half;
-            for (mut row, s) in half.row_iter_mut().zip(seen.scale.iter()) {
-                row /= *s;
-            }
-            &half * half.transpose()
+        if again {
+            factor = Factor::new(problem, &theta, &normal, seen);
         }
-        None => DMatrix::from_element(p, p, f64::NAN),
-    };
-    Solution { theta, residual, converged, iterations, stopped, covariance, leverage }
+    }
+    let covariance =
+        factor.and_then(|f| f.covariance(seen)).unwrap_or_else(|| DMatrix::from_element(p, p, f64::NAN));
+    Solution { theta, chi2: normal.sum, converged, iterations, stopped, covariance }
+}
+
+/// Condition of the column-scaled Jacobian over its rank, from its Gram matrix.
+#[must_use]
+pub fn condition(gram: &DMatrix<f64>, rank: usize) -> f64 {
+    let p = gram.ncols();
+    if rank == 0 {
+        return if p == 0 { 1.0 } else { f64::INFINITY };
+    }
+    let scale = |i: usize| if gram[(i, i)] > 0.0 { gram[(i, i)].sqrt() } else { 1.0 };
+    let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (scale(i) * scale(j)));
+    let mut values: Vec<f64> = scaled.symmetric_eigenvalues().iter().copied().collect();
+    values.sort_unstable_by(|a, b| b.total_cmp(a));
+    let smallest = values.get(rank - 1).copied().unwrap_or(0.0).max(f64::EPSILON * values[0]);
+    (values[0] / smallest).sqrt()
+}
+
+/// Rank and condition from a Gram matrix alone, where it is well enough conditioned to say that every unknown is seen.
+#[must_use]
+pub fn observe_gram(gram: &DMatrix<f64>) -> Option<Observability> {
+    let p = gram.ncols();
+    let scale = DVector::from_fn(p, |i, _| gram[(i, i)].sqrt());
+    let largest = scale.max();
+    if p == 0 || scale.iter().any(|s| !(*s > 1e-12 * largest)) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+    let values = scaled.symmetric_eigenvalues();
+    let (low, high) = (values.min(), values.max());
+    // rounding moves an eigenvalue by some 1e-14: its root is good to a percent from here on
+    (low > 1e-11 * high).then(|| Observability {
+        scale,
+        rank: p,
+        condition: (high / low).sqrt(),
+        seen: DMatrix::identity(p, p),
+        unseen: Vec::new(),
+    })
 }
 
 #[cfg(test)]

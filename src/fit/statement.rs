@@ -71,3 +71,13 @@ fn set_up_word(word: &str) -> &str {
         other => other,
     }
 }
+
+/// A combination that is known badly, in words.
+pub(super) fn weak(weights: &BTreeMap<String, f64>, times: f64) -> String {
+    let names: Vec<String> = weights.keys().cloned().collect();
+    let what = match &names[..] {
+        [one] => one.clone(),
+        several => format!("the combination of {}", join(several)),
+    };
+    format!("{what} is known to {times:.1} times its typical size only: these touches hardly see it")
+}

@@ -2,7 +2,7 @@
 
 use super::formula::{State, VARIABLES};
 use super::predict::{Observation, SetUp};
-use crate::axes::{AxisName, Position};
+use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::program::plan::{Plan, PlanTouch};
@@ -48,6 +48,11 @@ pub struct Data {
     pub set_ups: Vec<SetUp>,
     /// For each observation: touches of one point made right after each other share a number.
     pub repeats: Vec<usize>,
+    /// For each observation: its index visit, counted through all runs; touches of a visit follow one another.
+    pub visits: Vec<usize>,
+    /// For each visit: visits of equal poses share a number. The rotary axes were moved there in the same sense, the
+    /// same blocks and stylus and the same orientation of the spindle are in use: only scatter and time part them.
+    pub poses: Vec<usize>,
 }
 
 /// Assembles runs. Positions mm and deg in R, lengths mm.
@@ -56,11 +61,13 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut data = Data::default();
     let mut clock_s = 0.0;
     let mut first_touch_s: Option<f64> = None;
+    let mut visits = Visits::default();
     for (index, run) in runs.iter().enumerate() {
         let label = run_label(runs, index);
         let started = run.started_s.unwrap_or(clock_s);
         let mut previous: Option<&PlanTouch> = None;
         let mut last_sense = [0.0; 6];
+        visits.last = None;
         for touch in run.touches {
             let Some(planned) = run.plan.touch(touch.id) else {
                 data.unusable.push(Unusable {
@@ -122,10 +129,59 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 .unwrap_or(touch.position);
             data.nominal.push(Observation { position: ideal, ..observation.clone() });
             data.repeats.push(repeat_group(&data, run.plan, planned, index));
+            let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));
+            data.visits.push(visit);
             data.observations.push(observation);
         }
     }
     data
+}
+
+/// What the touches of one index visit have in common.
+#[derive(Debug, Clone, PartialEq)]
+struct Indexed {
+    mounting: String,
+    pose: AxisMap,
+    from: AxisMap,
+    spindle_deg: Option<f64>,
+    tool_length_mm: Option<f64>,
+}
+
+/// The visits so far.
+#[derive(Debug, Default)]
+struct Visits {
+    last: Option<(usize, Option<u32>, Indexed)>,
+    poses: Vec<Indexed>,
+    count: usize,
+}
+
+impl Visits {
+    /// The visit that a touch belongs to: a new one where the run, the plan's visit number or the pose changes.
+    fn of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
+        let at = Indexed {
+            mounting,
+            pose: touch.pose.clone(),
+            from: touch.from.clone(),
+            spindle_deg: touch.spindle_deg,
+            tool_length_mm: touch.tool_length_mm,
+        };
+        let now = (run, touch.visit, at);
+        if self.last.as_ref() != Some(&now) {
+            let pose = self.poses.iter().position(|p| *p == now.2).unwrap_or_else(|| {
+                self.poses.push(now.2.clone());
+                self.poses.len() - 1
+            });
+            data.poses.push(pose);
+            self.count += 1;
+            self.last = Some(now);
+        }
+        self.count - 1
+    }
+}
+
+/// Blocks of equal key share their set-up.
+fn mounting_key(label: &Option<String>, mounting: &str) -> String {
+    label.clone().unwrap_or_else(|| mounting.to_owned())
 }
 
 /// `None` when the plans' own mounting names tell the runs apart.

@@ -1,6 +1,7 @@
 //! Machine + effects + parameters → the gap between ball and face at a touch, with derivatives.
 
 pub mod as_written;
+pub mod batch;
 pub mod catalogue;
 pub mod data;
 pub mod formula;

@@ -13,10 +13,9 @@
 
 use super::catalogue::{Effect, Place, Term};
 use super::formula::State;
-use crate::axes::{AxisName, Position};
-use crate::geometry::{Displacement, Transform, apply};
+use crate::axes::Position;
 use crate::machine::{Axis, Carrier, Machine, Side};
-use nalgebra::{RowVector3, Vector3};
+use nalgebra::Vector3;
 
 /// One unknown of a model.
 #[derive(Debug, Clone)]
@@ -39,6 +38,10 @@ pub struct Unknown {
     pub start: f64,
     /// A location error of a workpiece-side rotary axis: it is stated at the reference point.
     pub at_reference: bool,
+    /// The block that it is of.
+    pub set_up: Option<usize>,
+    /// It stands inside a formula and scales nothing by itself.
+    pub shape: bool,
 }
 
 /// A block as it stood during a run: what `block-setup` has a set of parameters for.
@@ -79,70 +82,116 @@ pub struct Observation {
 
 /// A displacement of the model with its place resolved.
 #[derive(Debug, Clone)]
-struct Active {
+pub(super) struct Active {
     /// Index of its factor in the unknowns.
-    unknown: usize,
+    pub unknown: usize,
     /// Index of the first unknown of its effect: formulas number shape parameters from there.
-    first: usize,
+    pub first: usize,
     /// Number of parameters of its effect.
-    count: usize,
-    slot: usize,
-    component: usize,
-    factor: f64,
-    term: Term,
-    set_up: Option<usize>,
+    pub count: usize,
+    /// Where it acts.
+    pub slot: usize,
+    pub component: usize,
+    pub factor: f64,
+    pub term: Term,
+    /// The block that it is of.
+    pub set_up: Option<usize>,
 }
 
 /// A place where displacements act.
 #[derive(Debug, Clone, Copy)]
-struct Slot {
-    place: Place,
+pub(super) struct Slot {
+    pub place: Place,
     /// The point at which its offsets are stated, mm in R at zero.
-    centre: Vector3<f64>,
+    pub centre: Vector3<f64>,
+    /// What its displacement depends on.
+    pub changes: Changes,
+}
+
+/// How often the displacement of a place must be computed for one θ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Changes {
+    /// Once.
+    Never,
+    /// Once for each block.
+    WithSetUp,
+    /// At every touch.
+    WithTouch,
+}
+
+/// An axis of the chain with the places in front of and behind its motion.
+#[derive(Debug, Clone)]
+pub(super) struct Link {
+    pub axis: Axis,
+    pub before: Option<usize>,
+    pub after: Option<usize>,
 }
 
 /// Machine and effects, ready to predict.
 #[derive(Debug, Clone)]
 pub struct Model {
-    workpiece: Vec<Axis>,
+    pub(super) workpiece: Vec<Link>,
     n_table: usize,
-    tool: Vec<Axis>,
-    slots: Vec<Slot>,
-    active: Vec<Active>,
+    pub(super) tool: Vec<Link>,
+    pub(super) slots: Vec<Slot>,
+    pub(super) active: Vec<Active>,
     set_ups: Vec<SetUp>,
     /// The unknowns, in the order of θ.
     pub unknowns: Vec<Unknown>,
     /// Where location errors of workpiece-side axes are stated, mm in R.
     pub reference: Vector3<f64>,
+    /// Unknowns that every touch sees, and those of each block.
+    pub(super) layout: Layout,
 }
 
-/// Working space of a prediction; one per thread.
-#[derive(Debug, Clone)]
-pub struct Scratch {
-    displacement: Vec<Displacement>,
-    /// d gap / d component, per slot.
-    gradient: Vec<[f64; 6]>,
-    coefficient: Vec<f64>,
-    /// Suffix points of the tool chain, in the order of the chain.
-    points: Vec<Vector3<f64>>,
+/// Which unknowns the row of a touch holds: the common ones first, then those of its block. The rows of a large
+/// problem are short because a touch sees one block only.
+#[derive(Debug, Clone, Default)]
+pub struct Layout {
+    /// Unknowns of no block, in the order of θ.
+    pub common: Vec<usize>,
+    /// Unknowns of each block.
+    pub own: Vec<Vec<usize>>,
+    /// Place of each unknown in the rows that hold it.
+    at: Vec<usize>,
 }
 
-/// An error transform at its place: index of the slot, the point at which offsets are stated (mm), the transform.
-type Placed = (usize, Vector3<f64>, Transform);
+impl Layout {
+    /// The unknowns of a row, in its order.
+    pub fn row(&self, set_up: usize) -> impl Iterator<Item = usize> + '_ {
+        self.common.iter().copied().chain(self.own.get(set_up).into_iter().flatten().copied())
+    }
+
+    /// Length of a row.
+    #[must_use]
+    pub fn row_length(&self, set_up: usize) -> usize {
+        self.common.len() + self.own.get(set_up).map_or(0, Vec::len)
+    }
+
+    /// Place of an unknown in the rows that hold it.
+    #[must_use]
+    pub fn place(&self, unknown: usize) -> usize {
+        self.at[unknown]
+    }
+}
 
 impl Model {
     /// Puts effects into a machine's chain.
     #[must_use]
     pub fn new(machine: &Machine, effects: &[&Effect], set_ups: &[SetUp], reference: Vector3<f64>) -> Self {
+        let bare = |side| -> Vec<Link> {
+            machine.side(side).map(|axis| Link { axis: axis.clone(), before: None, after: None }).collect()
+        };
         let mut model = Self {
-            workpiece: machine.side(Side::Workpiece).cloned().collect(),
+            workpiece: bare(Side::Workpiece),
             n_table: machine.carrier_chain(Carrier::Table).len(),
-            tool: machine.side(Side::Tool).cloned().collect(),
+            tool: bare(Side::Tool),
             slots: Vec::new(),
             active: Vec::new(),
             set_ups: set_ups.to_vec(),
             unknowns: Vec::new(),
             reference,
+            layout: Layout { own: vec![Vec::new(); set_ups.len()], ..Layout::default() },
         };
         for effect in effects {
             let instances: Vec<Option<usize>> =
@@ -150,6 +199,12 @@ impl Model {
             for set_up in instances {
                 model.put(machine, effect, set_up);
             }
+        }
+        let places: Vec<Place> = model.slots.iter().map(|s| s.place).collect();
+        let find = |place: Place| places.iter().position(|p| *p == place);
+        for link in model.workpiece.iter_mut().chain(&mut model.tool) {
+            link.before = find(Place::Before(link.axis.name));
+            link.after = find(Place::After(link.axis.name));
         }
         model
     }
@@ -161,6 +216,12 @@ impl Model {
                 t.parameter == i
                     && matches!(t.place, Place::Before(a) if a.is_rotary() && machine.axis(a).is_some_and(|x| x.side == Side::Workpiece))
             });
+            let list = match set_up {
+                Some(s) => &mut self.layout.own[s],
+                None => &mut self.layout.common,
+            };
+            self.layout.at.push(list.len());
+            list.push(self.unknowns.len());
             self.unknowns.push(Unknown {
                 name: match set_up {
                     Some(s) => format!("{}@{}", p.name, self.set_ups[s].label),
@@ -174,10 +235,18 @@ impl Model {
                 nuisance: effect.nuisance,
                 start: p.shape.map_or(0.0, |(start, _, _)| start),
                 at_reference,
+                set_up,
+                shape: p.shape.is_some(),
             });
         }
         for term in &effect.terms {
             let slot = self.slot(machine, term.place);
+            let changes = match (term.formula.constant(), set_up) {
+                (None, _) => Changes::WithTouch,
+                (Some(_), Some(_)) => Changes::WithSetUp,
+                (Some(_), None) => Changes::Never,
+            };
+            self.slots[slot].changes = self.slots[slot].changes.max(changes);
             self.active.push(Active {
                 unknown: first + term.parameter,
                 first,
@@ -205,7 +274,9 @@ impl Model {
             // a carriage's own coordinates are those of R at zero
             _ => Vector3::zeros(),
         };
-        self.slots.push(Slot { place, centre });
+        // a block turns about its own centre
+        let changes = if place == Place::Block { Changes::WithSetUp } else { Changes::Never };
+        self.slots.push(Slot { place, centre, changes });
         self.slots.len() - 1
     }
 
@@ -221,15 +292,10 @@ impl Model {
         &self.set_ups
     }
 
-    /// Working space for this model.
+    /// Which unknowns the row of a touch holds.
     #[must_use]
-    pub fn scratch(&self) -> Scratch {
-        Scratch {
-            displacement: vec![Displacement::default(); self.slots.len()],
-            gradient: vec![[0.0; 6]; self.slots.len()],
-            coefficient: vec![0.0; self.active.len()],
-            points: Vec::with_capacity(2 * self.tool.len() + 1),
-        }
+    pub fn layout(&self) -> &Layout {
+        &self.layout
     }
 
     /// θ at which the search begins.
@@ -238,250 +304,72 @@ impl Model {
         self.unknowns.iter().map(|u| u.start).collect()
     }
 
-    /// The gap at a touch, mm: measured less model along the outward normal.
-    #[must_use]
-    pub fn gap(&self, touch: &Observation, theta: &[f64], scratch: &mut Scratch) -> f64 {
-        self.displace(touch, theta, scratch);
-        self.evaluate(touch, scratch, false)
-    }
-
-    /// The gap at a touch, mm, and its derivatives with respect to every unknown (mm per unit) into `row`.
-    pub fn gap_and_row(&self, touch: &Observation, theta: &[f64], scratch: &mut Scratch, row: &mut [f64]) -> f64 {
-        self.displace(touch, theta, scratch);
-        let gap = self.evaluate(touch, scratch, true);
-        row.fill(0.0);
-        for (i, a) in self.active.iter().enumerate() {
-            if a.set_up.is_some_and(|s| s != touch.set_up) {
-                continue;
-            }
-            let slope = scratch.gradient[a.slot][a.component];
-            if slope == 0.0 {
-                continue;
-            }
-            row[a.unknown] += slope * scratch.coefficient[i];
-            if a.term.formula.has_shape() {
-                let amount = theta[a.unknown] * a.factor;
-                for (shape, derivative) in a.term.formula.partials(&touch.state, &theta[a.first..a.first + a.count]) {
-                    row[a.first + shape] += slope * amount * derivative;
-                }
-            }
-        }
-        gap
-    }
-
-    /// Displacements of all slots at a touch.
-    fn displace(&self, touch: &Observation, theta: &[f64], scratch: &mut Scratch) {
-        scratch.displacement.fill(Displacement::default());
-        for (i, a) in self.active.iter().enumerate() {
-            if a.set_up.is_some_and(|s| s != touch.set_up) {
-                continue;
-            }
-            let coefficient = a.factor * a.term.formula.eval(&touch.state, &theta[a.first..a.first + a.count]);
-            scratch.coefficient[i] = coefficient;
-            scratch.displacement[a.slot].add(a.component, theta[a.unknown] * coefficient);
-        }
-    }
-
-    fn find(&self, place: Place) -> Option<usize> {
+    pub(super) fn find(&self, place: Place) -> Option<usize> {
         self.slots.iter().position(|s| s.place == place)
     }
 
-    /// What a control shows for an axis, corrected by the reading's own error.
-    fn position(&self, touch: &Observation, scratch: &Scratch) -> Position {
-        let mut at = touch.position;
-        if let Some(slot) = self.find(Place::Reading) {
-            for name in AxisName::ALL {
-                let amount = scratch.displacement[slot].get(name.index());
-                let shown = if name.is_rotary() { crate::units::deg_from_rad(amount) } else { amount };
-                at.set(name, at.get(name) + shown);
-            }
-        }
-        at
-    }
-
     /// Number of workpiece-side axes between the base and the touched block.
-    fn carrier_length(&self, carrier: Carrier) -> usize {
+    pub(super) fn carrier_length(&self, carrier: Carrier) -> usize {
         match carrier {
             Carrier::Base => 0,
             Carrier::Table => self.n_table,
-            Carrier::Axis(name) => self.workpiece.iter().position(|a| a.name == name).map_or(0, |i| i + 1),
+            Carrier::Axis(name) => self.workpiece.iter().position(|l| l.axis.name == name).map_or(0, |i| i + 1),
         }
     }
 
-    fn evaluate(&self, touch: &Observation, scratch: &mut Scratch, derive: bool) -> f64 {
-        let set_up = &self.set_ups[touch.set_up];
-        let at = self.position(touch, scratch);
-        let at_slot = |slot: Option<usize>, centre: Option<Vector3<f64>>| -> Option<Placed> {
-            let i = slot?;
-            let centre = centre.unwrap_or(self.slots[i].centre);
-            Some((i, centre, scratch.displacement[i].transform_about(&centre)))
-        };
-        let reading = self.find(Place::Reading);
-
-        // --- the ball from the tool's frame to R, remembering the point behind each place
-        let tool_slot = at_slot(self.find(Place::Tool), None);
-        let mut point = touch.ball_at_zero;
-        let mut behind: Vec<Vector3<f64>> = std::mem::take(&mut scratch.points);
-        behind.clear();
-        behind.push(point);
-        if let Some((_, _, e)) = &tool_slot {
-            point = apply(e, &point);
-        }
-        struct Link<'a> {
-            axis: &'a Axis,
-            motion: Transform,
-            before: Option<Placed>,
-            after: Option<Placed>,
-        }
-        let link = |axis: &'_ Axis| -> (Transform, Option<Placed>, Option<Placed>) {
-            (
-                axis.motion(&at),
-                at_slot(self.find(Place::Before(axis.name)), None),
-                at_slot(self.find(Place::After(axis.name)), None),
-            )
-        };
-        let tool: Vec<Link> = self
-            .tool
-            .iter()
-            .map(|axis| {
-                let (motion, before, after) = link(axis);
-                Link { axis, motion, before, after }
-            })
-            .collect();
-        for l in tool.iter().rev() {
-            behind.push(point);
-            if let Some((_, _, e)) = &l.after {
-                point = apply(e, &point);
-            }
-            point = apply(&l.motion, &point);
-            behind.push(point);
-            if let Some((_, _, e)) = &l.before {
-                point = apply(e, &point);
-            }
-        }
-        let in_r = point;
-
-        // --- from R into the frame of the touched block
-        let workpiece: Vec<Link> = self.workpiece[..self.carrier_length(set_up.carrier)]
-            .iter()
-            .map(|axis| {
-                let (motion, before, after) = link(axis);
-                Link { axis, motion, before, after }
-            })
-            .collect();
-        let mut ahead: Vec<(Vector3<f64>, Vector3<f64>)> = Vec::with_capacity(workpiece.len());
-        for l in &workpiece {
-            if let Some((_, _, e)) = &l.before {
-                point = apply(&e.inverse(), &point);
-            }
-            let after_before = point;
-            point = apply(&l.motion.inverse(), &point);
-            if let Some((_, _, e)) = &l.after {
-                point = apply(&e.inverse(), &point);
-            }
-            ahead.push((after_before, point));
-        }
-        let work_slot = at_slot(self.find(Place::Workpiece), None);
-        if let Some((_, _, e)) = &work_slot {
-            point = apply(&e.inverse(), &point);
-        }
-        let in_carrier = point;
-        let block_slot = at_slot(self.find(Place::Block), Some(set_up.centre));
-        if let Some((_, _, e)) = &block_slot {
-            point = apply(&e.inverse(), &point);
-        }
-        let trigger = self.find(Place::Trigger);
-        let late = trigger.map_or(0.0, |i| scratch.displacement[i].get(0));
-        let gap = touch.normal.dot(&(point - touch.point)) - touch.ball_radius + late;
-        if !derive {
-            scratch.points = behind;
-            return gap;
-        }
-
-        // --- derivatives: the row g = d gap / d point is carried back through the same places
-        let displacement = scratch.displacement.clone();
-        let gradient = &mut scratch.gradient;
-        for g in gradient.iter_mut() {
-            *g = [0.0; 6];
-        }
-        if let Some(i) = trigger {
-            gradient[i][0] = 1.0;
-        }
-        // a place on the workpiece side is undone: q = E⁻¹·p, dq = −Rᵀ·dE·q
-        let undo =
-            |slot: &Placed, g: RowVector3<f64>, behind: &Vector3<f64>, gradient: &mut [[f64; 6]]| -> RowVector3<f64> {
-                let (i, centre, e) = slot;
-                let g = g * e.rotation.inverse().to_rotation_matrix().matrix();
-                let turned = g * displacement[*i].rotation_derivative(&(behind - centre));
-                for k in 0..3 {
-                    gradient[*i][k] -= g[k];
-                    gradient[*i][k + 3] -= turned[k];
-                }
-                g
+    /// Where location errors are least correlated: at the middle of the touched points instead of the reference.
+    /// (offset, tilt, lever): the offset at the reference is that at the middle plus lever × tilt, in their units.
+    #[must_use]
+    pub fn least_correlated(&self, observations: &[Observation]) -> Vec<(usize, usize, f64)> {
+        let mut out = Vec::new();
+        for link in self.workpiece.iter().filter(|l| l.axis.name.is_rotary()) {
+            let Some(slot) = link.before else { continue };
+            let seen = |o: &&Observation| {
+                let carrier = self.set_ups[o.set_up].carrier;
+                self.workpiece[..self.carrier_length(carrier)].iter().any(|l| l.axis.name == link.axis.name)
             };
-        let mut g: RowVector3<f64> = touch.normal.transpose();
-        if let Some(slot) = &block_slot {
-            g = undo(slot, g, &point, gradient);
-        }
-        if let Some(slot) = &work_slot {
-            // the workpiece's own slot lies between carrier and block
-            g = undo(slot, g, &in_carrier, gradient);
-        }
-        for (l, (after_before, after_all)) in workpiece.iter().zip(&ahead).rev() {
-            if let Some(slot) = &l.after {
-                g = undo(slot, g, after_all, gradient);
+            let (mut sum, mut n) = (Vector3::zeros(), 0.0);
+            for o in observations.iter().filter(seen) {
+                sum += o.point;
+                n += 1.0;
             }
-            g *= l.motion.rotation.inverse().to_rotation_matrix().matrix();
-            if let Some(i) = reading {
-                gradient[i][l.axis.name.index()] -= motion_slope(l.axis, &g, after_before);
+            if n == 0.0 {
+                continue;
             }
-            if let Some(slot) = &l.before {
-                g = undo(slot, g, after_before, gradient);
-            }
-        }
-        debug_assert!(in_r.iter().all(|x| x.is_finite()) || gap.is_nan());
-        let mut at_point = behind.len();
-        for l in &tool {
-            at_point -= 1;
-            let moved = behind[at_point];
-            if let Some((i, centre, e)) = &l.before {
-                add(&mut gradient[*i], &g, &displacement[*i], &(moved - centre));
-                g *= e.rotation.to_rotation_matrix().matrix();
-            }
-            if let Some(i) = reading {
-                gradient[i][l.axis.name.index()] += motion_slope(l.axis, &g, &moved);
-            }
-            g *= l.motion.rotation.to_rotation_matrix().matrix();
-            at_point -= 1;
-            if let Some((i, centre, e)) = &l.after {
-                add(&mut gradient[*i], &g, &displacement[*i], &(behind[at_point] - centre));
-                g *= e.rotation.to_rotation_matrix().matrix();
+            // a constant tilt w about the reference moves the middle by w × (middle − reference)
+            let lever = self.reference - sum / n;
+            let constant = |a: &&Active| a.slot == slot && a.set_up.is_none() && a.term.formula.constant().is_some();
+            for tilt in self.active.iter().filter(constant).filter(|a| a.component >= 3) {
+                let mut axis = Vector3::zeros();
+                axis[tilt.component - 3] = tilt.factor;
+                let moved = axis.cross(&lever);
+                for offset in self.active.iter().filter(constant).filter(|a| a.component < 3) {
+                    let amount = moved[offset.component] / offset.factor;
+                    if amount != 0.0 {
+                        out.push((offset.unknown, tilt.unknown, amount));
+                    }
+                }
             }
         }
-        if let Some((i, centre, _)) = &tool_slot {
-            add(&mut gradient[*i], &g, &displacement[*i], &(behind[0] - centre));
+        out
+    }
+
+    /// The gap at one touch, mm: measured less model along the outward normal. For many touches: [`Model::prepare`].
+    #[must_use]
+    pub fn gap(&self, touch: &Observation, theta: &[f64]) -> f64 {
+        let batch = self.prepare(std::slice::from_ref(touch));
+        batch.at(theta).gap(0, &mut batch.scratch())
+    }
+
+    /// The gap at one touch, mm, and its derivatives with respect to every unknown (mm per unit) into `row`.
+    pub fn gap_and_row(&self, touch: &Observation, theta: &[f64], row: &mut [f64]) -> f64 {
+        let batch = self.prepare(std::slice::from_ref(touch));
+        let mut short = vec![0.0; self.layout.row_length(touch.set_up)];
+        let gap = batch.at(theta).gap_and_row(0, &mut batch.scratch(), &mut short);
+        row.fill(0.0);
+        for (value, unknown) in short.iter().zip(self.layout.row(touch.set_up)) {
+            row[unknown] = *value;
         }
-        scratch.points = behind;
         gap
-    }
-}
-
-/// Adds the derivatives of E·v: `g` is d gap / d (E·v), `v` relative to the centre of the place.
-fn add(gradient: &mut [f64; 6], g: &RowVector3<f64>, at: &Displacement, v: &Vector3<f64>) {
-    let turned = g * at.rotation_derivative(v);
-    for k in 0..3 {
-        gradient[k] += g[k];
-        gradient[k + 3] += turned[k];
-    }
-}
-
-/// d gap / d coordinate of an axis (mm or rad), from `g` = d gap / d point in front of its motion.
-fn motion_slope(axis: &Axis, g: &RowVector3<f64>, moved: &Vector3<f64>) -> f64 {
-    let direction = axis.direction.into_inner();
-    if axis.name.is_rotary() {
-        axis.sense * (g * direction.cross(&(moved - axis.point)))[0]
-    } else {
-        let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
-        sign * (g * direction)[0]
     }
 }

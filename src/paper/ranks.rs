@@ -77,7 +77,7 @@ fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &
     let set_up = SetUp { label: "datum".into(), carrier: Carrier::Table, centre: Vector3::zeros() };
     let model = Model::new(machine, &effects, std::slice::from_ref(&set_up), machine.reference.pivot);
     let mut jacobian = DMatrix::zeros(measured.len(), model.n_unknowns());
-    let (mut scratch, mut row) = (model.scratch(), vec![0.0; model.n_unknowns()]);
+    let mut row = vec![0.0; model.n_unknowns()];
     for (i, (b, a, k)) in measured.iter().enumerate() {
         let mut pose = crate::axes::Position::default();
         pose.set(AxisName::B, *b);
@@ -98,7 +98,7 @@ fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &
             state: [0.0; crate::model::formula::VARIABLES.len()],
             has_temperature: false,
         };
-        model.gap_and_row(&touch, &model.start(), &mut scratch, &mut row);
+        model.gap_and_row(&touch, &model.start(), &mut row);
         jacobian.row_mut(i).copy_from_slice(&row);
     }
     Ok(observe(&jacobian).rank)

@@ -4,7 +4,7 @@
 //! and order stay. Nothing here opens the files that a study names: `cli` does.
 
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
-use crate::fit::Knowledge;
+use crate::fit::{Knowledge, Mask};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -31,6 +31,26 @@ pub struct AsWritten {
     /// What the user states about the noise.
     #[serde(default)]
     pub noise: NoiseAsWritten,
+    /// Type B rows: standard uncertainty of parameters that are not in the model, in their units (`sX = 0.5`).
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>")]
+    pub uncertainty: BTreeMap<String, Spanned<f64>>,
+    /// Touches that are not to be used.
+    #[serde(default)]
+    pub mask: Vec<MaskAsWritten>,
+}
+
+/// A touch that is not to be used.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MaskAsWritten {
+    /// Which run, from 1.
+    #[schemars(with = "usize")]
+    pub run: Spanned<usize>,
+    /// Number in the plan.
+    pub id: u64,
+    /// Why.
+    pub reason: String,
 }
 
 /// One run as written.
@@ -88,6 +108,8 @@ pub struct ParameterAsWritten {
 pub struct NoiseAsWritten {
     /// Standard deviation of a touch, µm.
     pub touch_um: Option<f64>,
+    /// Standard deviation of each component of the displacement of an index visit, µm.
+    pub visit_um: Option<f64>,
 }
 
 /// A checked study. Paths are as written: relative to the study.
@@ -107,6 +129,12 @@ pub struct Study {
     pub knowledge: BTreeMap<String, Knowledge>,
     /// Standard deviation of a touch, mm, where stated.
     pub touch_sigma_mm: Option<f64>,
+    /// Standard deviation of each component of the displacement of an index visit, mm, where stated.
+    pub visit_sigma_mm: Option<f64>,
+    /// Type B rows, in the parameters' units.
+    pub type_b: BTreeMap<String, f64>,
+    /// Touches that are not to be used.
+    pub masked: Vec<Mask>,
 }
 
 /// One run.
@@ -200,6 +228,34 @@ impl Study {
                     .at(source, 0..0),
             );
         }
+        let visit_sigma_mm = w.noise.visit_um.map(crate::units::mm_from_um);
+        if visit_sigma_mm.is_some_and(|s| !(s.is_finite() && s >= 0.0)) {
+            findings.push(
+                Finding::error("study::noise", "visit_um is not a number, 0 or greater")
+                    .help("the standard deviation of the ball's place from one index to the next in um")
+                    .at(source, 0..0),
+            );
+        }
+        for (name, sigma) in &w.uncertainty {
+            if !(sigma.get_ref().is_finite() && *sigma.get_ref() > 0.0) {
+                findings.push(
+                    Finding::error("study::uncertainty", format!("the uncertainty of {name} is no positive number"))
+                        .help("a standard uncertainty (1 sigma) in the parameter's unit")
+                        .at(source, sigma.span()),
+                );
+            }
+        }
+        let mut masked = Vec::new();
+        for m in &w.mask {
+            match m.run.get_ref().checked_sub(1).filter(|run| *run < data.len()) {
+                Some(run) => masked.push(Mask { run, id: m.id, reason: m.reason.clone() }),
+                None => findings.push(
+                    Finding::error("study::mask", format!("there is no run {}", m.run.get_ref()))
+                        .help(format!("runs are counted from 1; the study has {}", data.len()))
+                        .at(source, m.run.span()),
+                ),
+            }
+        }
         findings.finish(Self {
             machines: w.machines,
             machine: w.machine.into_inner(),
@@ -208,6 +264,9 @@ impl Study {
             effects: w.model.effects.into_iter().map(Spanned::into_inner).collect(),
             knowledge,
             touch_sigma_mm,
+            visit_sigma_mm,
+            type_b: w.uncertainty.into_iter().map(|(name, sigma)| (name, sigma.into_inner())).collect(),
+            masked,
         })
     }
 
@@ -249,10 +308,21 @@ impl Study {
             .decor_mut()
             .set_prefix("\n# the whole model: nothing is added to it. `axiscal effects` lists what there is\n");
         doc["model"] = Item::Table(model);
-        if let Some(sigma) = self.touch_sigma_mm {
-            let mut noise = Table::new();
-            noise["touch_um"] = value(crate::units::um_from_mm(sigma));
+        let mut noise = Table::new();
+        for (word, sigma) in [("touch_um", self.touch_sigma_mm), ("visit_um", self.visit_sigma_mm)] {
+            if let Some(sigma) = sigma {
+                noise[word] = value(crate::units::um_from_mm(sigma));
+            }
+        }
+        if !noise.is_empty() {
             doc["noise"] = Item::Table(noise);
+        }
+        if !self.type_b.is_empty() {
+            let mut rows = Table::new();
+            for (name, sigma) in &self.type_b {
+                rows[name.as_str()] = value(*sigma);
+            }
+            doc["uncertainty"] = Item::Table(rows);
         }
         let text = format!("# what was measured, and what the model holds (docs/guide)\n{doc}");
         Self::parse(&crate::diag::source("study.toml", text.clone()))
@@ -282,6 +352,9 @@ mod tests {
             effects: vec!["location-b".into(), "block-setup".into()],
             knowledge: BTreeMap::new(),
             touch_sigma_mm: None,
+            visit_sigma_mm: None,
+            type_b: BTreeMap::new(),
+            masked: vec![],
         }
     }
 

@@ -1,0 +1,150 @@
+//! The answer of a fit, put together: values with their doubt, what cannot be told, what a reader must not miss.
+
+use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
+use super::solve::Solution;
+use super::{Fit, Knowledge, Settings, noise, snoop, statement, uncertainty};
+use crate::diag::Result;
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::predict::Unknown;
+use crate::units::um_from_mm;
+use nalgebra::DVector;
+
+pub(super) fn outcome(
+    fit: &Fit,
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    settings: &Settings,
+    solution: &Solution,
+    condition: f64,
+) -> Result<Outcome> {
+    let (n, n_used) = (fit.data.observations.len(), fit.n_used());
+    let p = fit.free.len();
+    let by_visits = uncertainty::visit_variance(fit);
+    let type_b = uncertainty::type_b(fit, machine, catalogue, &settings.type_b)?;
+    let unmodelled = (!settings.quick).then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
+    let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
+    let b_variance =
+        DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
+    let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
+    let parameters: Vec<Parameter> = (0..fit.theta.len())
+        .map(|i| {
+            let u = &fit.model.unknowns[i];
+            let column = fit.free.binary_search(&i).ok();
+            let status = match (column, &fit.knowledge[i]) {
+                (None, _) => Status::Fixed,
+                (Some(c), _) if unseen(c) > 1e-6 => Status::Undetermined,
+                // the data halve the prior's variance at least, or the value is the prior's rather than theirs
+                (Some(c), Some(Knowledge::Prior { sigma, .. })) if noise_variance(c) > 0.5 * sigma * sigma => {
+                    Status::PriorDominated
+                }
+                _ => Status::Identified,
+            };
+            let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
+            let sigma = known.map(|c| (noise_variance(c) + b_variance[c]).sqrt());
+            let expanded = known.zip(sigma).map(|(c, s)| {
+                let share = if s > 0.0 { by_visits[c] / (s * s) } else { 0.0 };
+                s * fit.noise.coverage(share.clamp(0.0, 1.0))
+            });
+            Parameter {
+                name: u.name.clone(),
+                alias: u.alias.clone(),
+                effect: u.effect.clone(),
+                value: fit.theta[i],
+                unit: u.unit.clone(),
+                sigma,
+                expanded,
+                sigma_noise: known.map(|c| noise_variance(c).sqrt()),
+                sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
+                sigma_with_unmodelled: known
+                    .zip(unmodelled.as_ref())
+                    .map(|(c, all)| (all[c] * all[c] + b_variance[c]).sqrt())
+                    .filter(|s| s.is_finite()),
+                status,
+            }
+        })
+        .collect();
+    let free_unknowns: Vec<&Unknown> = fit.free.iter().map(|&i| &fit.model.unknowns[i]).collect();
+    let squares: f64 = fit.residual_mm.iter().zip(&fit.weight).map(|(r, w)| w * r * r).sum();
+    let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
+    let unusable =
+        fit.data.unusable.iter().map(|u| Rejected { id: u.id, run: u.run + 1, reason: format!("{} (line {})", u.reason, u.line) });
+    let strangers = fit.rejected.iter().map(|(&i, reason)| {
+        let o = &fit.data.observations[i];
+        Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
+    });
+    Ok(Outcome {
+        format: FORMAT.into(),
+        machine: machine.name.clone(),
+        effects: settings.effects.clone(),
+        converged: solution.converged,
+        iterations: solution.iterations,
+        stopped: solution.stopped.clone(),
+        touches: n + fit.data.unusable.len(),
+        rejected: unusable.chain(strangers).collect(),
+        unknowns: p,
+        rank: fit.observability.rank,
+        dof: fit.dof,
+        condition,
+        rms_um: um_from_mm((squares / n_used.max(1) as f64).sqrt()),
+        held_out_rms_um: None,
+        noise_um: um_from_mm(fit.noise.sigma_mm),
+        noise_source: fit.noise.source.into(),
+        visit_um: um_from_mm(fit.noise.tau_mm),
+        visit_source: fit.noise.visit_source.into(),
+        noise_says: fit.noise.says(),
+        chi2_per_dof,
+        undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, v)).collect(),
+        weak: if settings.quick { Vec::new() } else { uncertainty::weak(fit) },
+        parameters,
+        correlations: uncertainty::correlations(fit),
+        priors: uncertainty::priors(fit),
+        type_b: type_b.iter().map(|b| TypeBRow { name: b.name.clone(), sigma: b.sigma, unit: b.unit.clone() }).collect(),
+        reference_mm: fit.model.reference.into(),
+        covariance: None,
+        residuals: Some(residuals(fit)),
+        warnings: warnings(fit, effects, solution, chi2_per_dof),
+    })
+}
+
+fn residuals(fit: &Fit) -> Vec<Residual> {
+    let each = fit.data.observations.iter().enumerate().map(|(i, o)| Residual {
+        id: o.id,
+        run: o.run + 1,
+        residual_um: um_from_mm(fit.residual_mm[i]),
+        standardised: fit.studentised[i],
+        used: fit.weight[i] > 0.0,
+    });
+    each.collect()
+}
+
+fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f64) -> Vec<String> {
+    let mut out = Vec::new();
+    if fit.data.observations.iter().all(|o| !o.has_temperature) {
+        for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
+            out.push(format!("effect {} goes with the temperature T, and no touch carries one", effect.id));
+        }
+    }
+    if !solution.converged {
+        out.push(format!("the search did not converge: {}", solution.stopped));
+    }
+    if fit.dof == 0 {
+        out.push("as many unknowns as touches: nothing is left over to judge the model by".into());
+    }
+    let n_out = fit.rejected.values().filter(|r| !r.starts_with("taken out")).count();
+    let n = fit.data.observations.len();
+    if n_out as f64 > snoop::MOST_SHARE * n as f64 {
+        out.push(format!(
+            "{n_out} of {n} touches do not belong to the rest, more than {:.0} %: dirt, a loose block or probe, or an effect that the model lacks",
+            100.0 * snoop::MOST_SHARE
+        ));
+    }
+    if fit.dof > 0 && chi2_per_dof > noise::chi2_limit(fit.dof, fit.noise.dof) {
+        out.push(format!(
+            "the touches miss the model by {:.1} times their noise: something is missing in it, and the uncertainties count the noise only (`axiscal diagnose` looks for it)",
+            chi2_per_dof.sqrt()
+        ));
+    }
+    out
+}

@@ -1,0 +1,105 @@
+//! What the user said about a model: which effects, which parameters are held or known, and whether that makes sense.
+
+use super::Knowledge;
+use crate::diag::{Failure, Finding, Result};
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::data::Data;
+use crate::model::predict::{Observation, Unknown};
+use std::collections::BTreeMap;
+
+/// The effects of a model, in order.
+///
+/// # Errors
+/// When an id is unknown, stands twice, or the machine lacks the axis that it needs.
+pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machine) -> Result<Vec<&'c Effect>> {
+    let mut findings = Vec::new();
+    let mut effects: Vec<&Effect> = Vec::new();
+    for id in ids {
+        match catalogue.get(id, machine) {
+            Some(effect) if effects.iter().any(|e| e.id == effect.id) => {
+                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} stands twice in the model")).help("name each effect once"));
+            }
+            Some(effect) => effects.push(effect),
+            None if catalogue.knows(id) => findings.push(
+                Finding::error("model::effect_not_here", format!("effect {id:?} does not apply to machine {:?}", machine.name))
+                    .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` tells which"),
+            ),
+            None => {
+                let known: Vec<&str> = catalogue.iter().filter(|e| e.applies_to(machine)).map(|e| e.id.as_str()).collect();
+                findings.push(Finding::error("model::unknown_effect", format!("no effect is called {id:?}")).help(format!("for this machine there are: {}", known.join(", "))));
+            }
+        }
+    }
+    // two effects may not bring the same parameter: their columns would be equal and the names would clash
+    for (i, a) in effects.iter().enumerate() {
+        for b in &effects[..i] {
+            if let Some(p) = a.parameters.iter().find(|p| b.parameters.iter().any(|q| q.name == p.name)) {
+                findings.push(
+                    Finding::error(
+                        "model::parameter_twice",
+                        format!("effects {:?} and {:?} both bring the parameter {}", b.id, a.id, p.name),
+                    )
+                    .help("take one of the two out of the model"),
+                );
+            }
+        }
+    }
+    if findings.is_empty() { Ok(effects) } else { Err(Failure(findings)) }
+}
+
+/// A formula that gives no number at a touch would spoil the whole fit: say which, and where.
+pub(super) fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Result<()> {
+    let mut findings = Vec::new();
+    for effect in effects {
+        let shapes: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
+        for term in &effect.terms {
+            let bad = |o: &&Observation| !term.formula.eval(&o.state, &shapes).is_finite();
+            let n_bad = data.observations.iter().filter(bad).count();
+            if let Some(first) = data.observations.iter().find(bad) {
+                findings.push(
+                    Finding::error(
+                        "model::no_value",
+                        format!("formula {:?} of effect {} has no value at {n_bad} touches, the first is touch {}", term.formula.text(), effect.id, first.id),
+                    )
+                    .help("a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch"),
+                );
+            }
+        }
+    }
+    if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
+}
+
+/// Which unknowns the user's words mean.
+pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>) -> Result<Vec<Option<Knowledge>>> {
+    let mut out = vec![None; unknowns.len()];
+    let mut findings = Vec::new();
+    for (word, known) in words {
+        let matches: Vec<usize> = (0..unknowns.len())
+            .filter(|&i| crate::symbols::same(&unknowns[i].name, word) || unknowns[i].alias.as_deref() == Some(word))
+            .collect();
+        match matches[..] {
+            [i] => out[i] = Some(*known),
+            _ => {
+                let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
+                findings.push(
+                    Finding::error("model::unknown_parameter", format!("no parameter of the model is called {word:?}"))
+                        .help(format!("there are: {}", names.join(", "))),
+                );
+            }
+        }
+        // a kilometre or a billion degrees is no knowledge of a machine
+        let sane = |v: f64| v.is_finite() && v.abs() < 1e6;
+        let bad = match known {
+            Knowledge::Fixed(v) => !sane(*v),
+            Knowledge::Prior { value, sigma } => !(sane(*value) && sane(*sigma) && *sigma > 0.0),
+        };
+        if bad {
+            findings.push(
+                Finding::error("model::knowledge", format!("what is said of {word} is not usable"))
+                    .help("value must be a number and sigma greater than 0"),
+            );
+        }
+    }
+    if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
+}

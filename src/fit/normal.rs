@@ -1,0 +1,442 @@
+//! The touches of a study as weighted normal equations, accumulated block by block.
+//!
+//! The noise of a touch is white, σ, plus one random displacement of the ball per index visit, τ in each direction:
+//! V = σ²·I + τ²·Σᵥ NᵥNᵥᵀ with the normals in R as rows of Nᵥ. Its inverse needs one 3 × 3 matrix per visit
+//! (Woodbury), so that neither V nor the full Jacobian is ever formed. A row holds the common unknowns and those of its
+//! block; the Gram matrix is collected per block and spread out at the end.
+
+use super::solve::{Normal, Problem};
+use crate::model::batch::{At, Batch, Scratch};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Touches accumulated together: some hundred microseconds of work.
+const CHUNK: usize = 1024;
+
+/// What a prior says: index of the unknown, value, standard deviation (in the unknown's unit).
+pub type Prior = (usize, f64, f64);
+
+/// The touches as a least-squares problem. Residuals are in units of their noise.
+#[derive(Debug)]
+pub struct Touches<'a> {
+    batch: &'a Batch<'a>,
+    /// Touch by touch: the number of its visit; touches of a visit follow one another.
+    visits: &'a [usize],
+    /// Weight of each touch: 1, or 0 for one that is not used; in between for the robust start.
+    weight: Vec<f64>,
+    /// All unknowns; the free ones are overwritten.
+    theta: Vec<f64>,
+    free: &'a [usize],
+    priors: &'a [Prior],
+    sigma_mm: f64,
+    tau_mm: f64,
+    chunks: Vec<Range<usize>>,
+}
+
+impl<'a> Touches<'a> {
+    /// Of a batch, with all touches used.
+    #[must_use]
+    pub fn new(
+        batch: &'a Batch<'a>,
+        visits: &'a [usize],
+        theta: Vec<f64>,
+        free: &'a [usize],
+        priors: &'a [Prior],
+        (sigma_mm, tau_mm): (f64, f64),
+    ) -> Self {
+        let mut touches = Self {
+            batch,
+            visits,
+            weight: vec![1.0; batch.len()],
+            theta,
+            free,
+            priors,
+            sigma_mm,
+            tau_mm,
+            chunks: Vec::new(),
+        };
+        touches.set_noise(sigma_mm, tau_mm);
+        touches
+    }
+
+    /// Another noise, mm.
+    pub fn set_noise(&mut self, sigma_mm: f64, tau_mm: f64) {
+        (self.sigma_mm, self.tau_mm) = (sigma_mm, tau_mm);
+        self.chunks.clear();
+        let mut from = 0;
+        for i in 1..=self.visits.len() {
+            // a visit's touches must stay together where they share a displacement
+            let may_end = tau_mm == 0.0 || i == self.visits.len() || self.visits[i] != self.visits[i - 1];
+            if i == self.visits.len() || (may_end && i - from >= CHUNK) {
+                self.chunks.push(from..i);
+                from = i;
+            }
+        }
+    }
+
+    /// Other weights, one for each touch.
+    pub fn set_weights(&mut self, weight: Vec<f64>) {
+        self.weight = weight;
+    }
+
+    /// Standard deviation of a touch and of a component of a visit's displacement, mm.
+    #[must_use]
+    pub fn noise_mm(&self) -> (f64, f64) {
+        (self.sigma_mm, self.tau_mm)
+    }
+
+    /// Weights of the touches.
+    #[must_use]
+    pub fn weights(&self) -> &[f64] {
+        &self.weight
+    }
+
+    /// All unknowns with the free ones filled in.
+    #[must_use]
+    pub fn full(&self, free: &DVector<f64>) -> Vec<f64> {
+        let mut theta = self.theta.clone();
+        for (value, &i) in free.iter().zip(self.free) {
+            theta[i] = *value;
+        }
+        theta
+    }
+
+    /// Gaps at all touches, mm.
+    #[must_use]
+    pub fn gaps(&self, free: &DVector<f64>) -> Vec<f64> {
+        let theta = self.full(free);
+        let at = self.batch.at(&theta);
+        let each = |range: &Range<usize>| -> Vec<f64> {
+            let mut scratch = self.batch.scratch();
+            range.clone().map(|i| at.gap(i, &mut scratch)).collect()
+        };
+        self.chunks.par_iter().map(each).collect::<Vec<_>>().concat()
+    }
+
+    /// Outward normal of a touch in R.
+    pub(super) fn normal_in_r(&self, touch: usize) -> Vector3<f64> {
+        let s = &self.batch.observations()[touch].state;
+        Vector3::new(s[8], s[9], s[10])
+    }
+
+    /// Runs of touches of one visit inside a range.
+    pub(super) fn visits_in(&self, range: Range<usize>) -> Vec<Range<usize>> {
+        let mut out = Vec::new();
+        let mut from = range.start;
+        for i in range.start + 1..=range.end {
+            if i == range.end || self.visits[i] != self.visits[from] {
+                out.push(from..i);
+                from = i;
+            }
+        }
+        out
+    }
+
+    /// Σ w·n·nᵀ over the touches of a visit.
+    pub(super) fn normals_square(&self, visit: Range<usize>) -> Matrix3<f64> {
+        visit.fold(Matrix3::zeros(), |sum, i| {
+            let n = self.normal_in_r(i);
+            sum + n * n.transpose() * self.weight[i]
+        })
+    }
+
+    /// M of V⁻¹ = (I − N·M·Nᵀ)/σ² for a visit.
+    pub(super) fn visit_inverse(&self, normals_square: &Matrix3<f64>) -> Matrix3<f64> {
+        let rho2 = (self.tau_mm / self.sigma_mm).powi(2);
+        (Matrix3::identity() + normals_square * rho2).try_inverse().map_or_else(Matrix3::zeros, |m| m * rho2)
+    }
+
+    /// K of V^(−1/2) = (I − N·K·Nᵀ)/σ for a visit.
+    fn visit_root(&self, normals_square: &Matrix3<f64>) -> Matrix3<f64> {
+        let rho2 = (self.tau_mm / self.sigma_mm).powi(2);
+        let eigen = normals_square.symmetric_eigen();
+        let mut k = Matrix3::zeros();
+        for (s, v) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let shrink = if *s > 1e-12 { (1.0 - 1.0 / (1.0 + rho2 * s).sqrt()) / s } else { 0.5 * rho2 };
+            k += v * v.transpose() * shrink;
+        }
+        k
+    }
+
+    /// Whitens columns (one row per touch, mm or mm per unit) in place; rows of unused touches become zero.
+    pub fn whiten(&self, columns: &mut DMatrix<f64>) {
+        for (i, w) in self.weight.iter().enumerate() {
+            if *w != 1.0 {
+                columns.row_mut(i).scale_mut(w.sqrt());
+            }
+        }
+        if self.tau_mm > 0.0 {
+            for visit in self.visits_in(0..self.batch.len()) {
+                let k = self.visit_root(&self.normals_square(visit.clone()));
+                let normals: Vec<Vector3<f64>> =
+                    visit.clone().map(|i| self.normal_in_r(i) * self.weight[i].sqrt()).collect();
+                for mut column in columns.column_iter_mut() {
+                    let mut part = column.rows_mut(visit.start, visit.len());
+                    let sum = normals.iter().zip(part.iter()).fold(Vector3::zeros(), |s, (n, x)| s + n * *x);
+                    let by = k * sum;
+                    part.iter_mut().zip(&normals).for_each(|(x, n)| *x -= n.dot(&by));
+                }
+            }
+        }
+        *columns /= self.sigma_mm;
+    }
+
+    /// Gaps, mm, and Jacobian of the free unknowns, mm per unit; touches only.
+    #[must_use]
+    pub fn unwhitened(&self, free: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let theta = self.full(free);
+        let at = self.batch.at(&theta);
+        let (n, p) = (self.batch.len(), self.free.len());
+        let column_of = self.columns();
+        let (mut gaps, mut jacobian) = (DVector::zeros(n), DMatrix::zeros(n, p));
+        let mut scratch = self.batch.scratch();
+        let layout = self.batch.model().layout();
+        let mut row = Vec::new();
+        for (i, o) in self.batch.observations().iter().enumerate() {
+            row.resize(layout.row_length(o.set_up), 0.0);
+            gaps[i] = at.gap_and_row(i, &mut scratch, &mut row);
+            for (value, unknown) in row.iter().zip(layout.row(o.set_up)) {
+                if let Some(c) = column_of[unknown] {
+                    jacobian[(i, c)] = *value;
+                }
+            }
+        }
+        (gaps, jacobian)
+    }
+
+    /// Gap, mm, and derivatives with respect to the free unknowns at one touch.
+    #[must_use]
+    pub fn row(&self, free: &DVector<f64>, touch: usize) -> (f64, DVector<f64>) {
+        let theta = self.full(free);
+        let layout = self.batch.model().layout();
+        let set_up = self.batch.observations()[touch].set_up;
+        let mut short = vec![0.0; layout.row_length(set_up)];
+        let gap = self.batch.at(&theta).gap_and_row(touch, &mut self.batch.scratch(), &mut short);
+        let column_of = self.columns();
+        let mut row = DVector::zeros(free.len());
+        for (value, unknown) in short.iter().zip(layout.row(set_up)) {
+            if let Some(c) = column_of[unknown] {
+                row[c] = *value;
+            }
+        }
+        (gap, row)
+    }
+
+    /// Residuals and Jacobian of the free unknowns, whitened, the priors' rows last.
+    #[must_use]
+    pub fn dense(&self, free: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let (gaps, touched) = self.unwhitened(free);
+        let (n, p) = touched.shape();
+        let column_of = self.columns();
+        let mut gaps = DMatrix::from_column_slice(n, 1, gaps.as_slice());
+        self.whiten(&mut gaps);
+        let mut residual = DVector::zeros(n + self.priors.len());
+        residual.rows_mut(0, n).copy_from(&gaps.column(0));
+        let mut jacobian = DMatrix::zeros(n + self.priors.len(), p);
+        jacobian.rows_mut(0, n).copy_from(&touched);
+        drop(touched);
+        if self.priors.is_empty() {
+            self.whiten(&mut jacobian);
+        } else {
+            let mut own = jacobian.rows(0, n).into_owned();
+            self.whiten(&mut own);
+            jacobian.rows_mut(0, n).copy_from(&own);
+        }
+        for (i, (unknown, value, sigma)) in self.priors.iter().enumerate() {
+            if let Some(c) = column_of[*unknown] {
+                residual[n + i] = (free[c] - value) / sigma;
+                jacobian[(n + i, c)] = 1.0 / sigma;
+            }
+        }
+        (residual, jacobian)
+    }
+
+    /// Column of each unknown among the free ones.
+    fn columns(&self) -> Vec<Option<usize>> {
+        let mut out = vec![None; self.theta.len()];
+        for (c, &u) in self.free.iter().enumerate() {
+            out[u] = Some(c);
+        }
+        out
+    }
+
+    /// Adds a range of touches.
+    fn accumulate(&self, at: &At, range: &Range<usize>, with_gram: bool) -> Partial {
+        let layout = self.batch.model().layout();
+        let n_set_ups = layout.own.len();
+        let mut part = Partial { blocks: vec![None; n_set_ups], visits: None, sum: 0.0 };
+        let mut scratch: Scratch = self.batch.scratch();
+        let mut row = Vec::new();
+        let p = self.theta.len();
+        let whole = if self.tau_mm > 0.0 { self.visits_in(range.clone()) } else { vec![range.clone()] };
+        for visit in whole {
+            let mut seen = VisitSums::new(if self.tau_mm > 0.0 { p } else { 0 });
+            for i in visit.clone() {
+                let root = self.weight[i].sqrt();
+                if root == 0.0 {
+                    continue;
+                }
+                let set_up = self.batch.observations()[i].set_up;
+                let k = layout.row_length(set_up);
+                row.resize(k, 0.0);
+                let mut gap = at.gap_and_row(i, &mut scratch, &mut row);
+                if root != 1.0 {
+                    gap *= root;
+                    row.iter_mut().for_each(|x| *x *= root);
+                }
+                part.sum += gap * gap;
+                let block = part.blocks[set_up].get_or_insert_with(|| Block::new(k, with_gram));
+                block.add(gap, &row, with_gram);
+                if self.tau_mm > 0.0 {
+                    let n = self.normal_in_r(i) * root;
+                    seen.gaps += n * gap;
+                    seen.normals += n * n.transpose();
+                    for (value, unknown) in row.iter().zip(layout.row(set_up)) {
+                        let mut s = seen.rows.column_mut(unknown);
+                        s += n * *value;
+                    }
+                }
+            }
+            if self.tau_mm > 0.0 {
+                let m = self.visit_inverse(&seen.normals);
+                let weighted = m * &seen.rows;
+                let (gram, gradient) = part
+                    .visits
+                    .get_or_insert_with(|| (DMatrix::zeros(if with_gram { p } else { 0 }, if with_gram { p } else { 0 }), DVector::zeros(p)));
+                if with_gram {
+                    gram.gemm_tr(1.0, &seen.rows, &weighted, 1.0);
+                }
+                gradient.gemv_tr(1.0, &weighted, &seen.gaps, 1.0);
+                part.sum -= seen.gaps.dot(&(m * seen.gaps));
+            }
+        }
+        part
+    }
+}
+
+/// Sums over one visit.
+struct VisitSums {
+    /// Σ n ⊗ row.
+    rows: nalgebra::Matrix3xX<f64>,
+    gaps: Vector3<f64>,
+    normals: Matrix3<f64>,
+}
+
+impl VisitSums {
+    fn new(p: usize) -> Self {
+        Self { rows: nalgebra::Matrix3xX::zeros(p), gaps: Vector3::zeros(), normals: Matrix3::zeros() }
+    }
+}
+
+/// Sums over some touches.
+struct Partial {
+    blocks: Vec<Option<Block>>,
+    /// What the shared displacements of visits take away: Gram and gradient.
+    visits: Option<(DMatrix<f64>, DVector<f64>)>,
+    sum: f64,
+}
+
+/// Gram (upper triangle, row by row) and gradient of the touches of one block.
+#[derive(Debug, Clone)]
+struct Block {
+    gram: Vec<f64>,
+    gradient: Vec<f64>,
+}
+
+impl Block {
+    fn new(k: usize, with_gram: bool) -> Self {
+        Self { gram: vec![0.0; if with_gram { k * k } else { 0 }], gradient: vec![0.0; k] }
+    }
+
+    fn add(&mut self, gap: f64, row: &[f64], with_gram: bool) {
+        let k = row.len();
+        for (g, x) in self.gradient.iter_mut().zip(row) {
+            *g += x * gap;
+        }
+        if with_gram {
+            for (a, &x) in row.iter().enumerate() {
+                if x != 0.0 {
+                    for (g, y) in self.gram[a * k + a..(a + 1) * k].iter_mut().zip(&row[a..]) {
+                        *g += x * y;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Problem for Touches<'_> {
+    fn normal(&self, free: &DVector<f64>, with_gram: bool) -> Normal {
+        let theta = self.full(free);
+        let at = self.batch.at(&theta);
+        let parts: Vec<Partial> =
+            self.chunks.par_iter().map(|range| self.accumulate(&at, range, with_gram)).collect();
+        let p = free.len();
+        let column_of = self.columns();
+        let layout = self.batch.model().layout();
+        let mut gram = DMatrix::zeros(if with_gram { p } else { 0 }, if with_gram { p } else { 0 });
+        let mut gradient = DVector::zeros(p);
+        let mut sum = 0.0;
+        // in the order of the touches, whatever the threads did: the same input gives the same bits
+        for part in parts {
+            sum += part.sum;
+            for (set_up, block) in part.blocks.iter().enumerate() {
+                let Some(block) = block else { continue };
+                let row: Vec<Option<usize>> = layout.row(set_up).map(|u| column_of[u]).collect();
+                for (a, ca) in row.iter().enumerate() {
+                    let Some(ca) = *ca else { continue };
+                    gradient[ca] += block.gradient[a];
+                    if with_gram {
+                        for (b, cb) in row.iter().enumerate().skip(a) {
+                            if let Some(cb) = *cb {
+                                let value = block.gram[a * row.len() + b];
+                                gram[(ca, cb)] += value;
+                                if ca != cb {
+                                    gram[(cb, ca)] += value;
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            if let Some((visits, slope)) = &part.visits {
+                for (a, &u) in self.free.iter().enumerate() {
+                    gradient[a] -= slope[u];
+                    if with_gram {
+                        for (b, &v) in self.free.iter().enumerate() {
+                            gram[(a, b)] -= visits[(u, v)];
+                        }
+                    }
+                }
+            }
+        }
+        let weight = self.sigma_mm.powi(-2);
+        gram *= weight;
+        gradient *= weight;
+        sum *= weight;
+        for (unknown, value, sigma) in self.priors {
+            if let Some(c) = column_of[*unknown] {
+                let off = (free[c] - value) / sigma;
+                sum += off * off;
+                gradient[c] += off / sigma;
+                if with_gram {
+                    gram[(c, c)] += sigma.powi(-2);
+                }
+            }
+        }
+        Normal { gram, gradient, sum }
+    }
+
+    fn jacobian(&self, free: &DVector<f64>) -> DMatrix<f64> {
+        self.dense(free).1
+    }
+
+    fn n_rows(&self) -> usize {
+        self.weight.iter().filter(|w| **w > 0.0).count() + self.priors.len()
+    }
+
+    fn noise(&self) -> f64 {
+        self.sigma_mm
+    }
+}

@@ -1,0 +1,259 @@
+//! Where the uncertainty of a parameter comes from, what it becomes with everything that the model leaves out, and which
+//! combinations are weak.
+
+use super::candidates::columns;
+use super::normal::Touches;
+use super::outcome::{Combination, Correlation};
+use super::{Fit, Knowledge};
+use crate::diag::{Failure, Finding, Result};
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect};
+use nalgebra::{DMatrix, DVector, Matrix3};
+use std::collections::BTreeMap;
+
+/// Correlations above this are worth a line.
+const WORTH_NAMING: f64 = 0.8;
+
+/// Pairs that are named at most.
+const MOST_PAIRS: usize = 8;
+
+/// Variance of each free unknown that goes back to the scatter of visits.
+pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
+    let tau = fit.noise.tau_mm;
+    let mut out = DVector::zeros(fit.free.len());
+    if tau == 0.0 {
+        return out;
+    }
+    let c = free_covariance(fit);
+    fit.with_touches(tau, |touches: &Touches| {
+        let (_, jacobian) = touches.unwhitened(&fit.free_theta());
+        let (sigma, _) = touches.noise_mm();
+        for visit in touches.visits_in(0..jacobian.nrows()) {
+            let square = touches.normals_square(visit.clone());
+            let m = touches.visit_inverse(&square);
+            let mut sums = DMatrix::zeros(3, jacobian.ncols());
+            for i in visit {
+                sums.ger(fit.weight[i], &touches.normal_in_r(i), &jacobian.row(i).transpose(), 1.0);
+            }
+            // JᵀV⁻¹N of this visit, times C: how its displacement moves each unknown
+            let by = (Matrix3::identity() - square * m) / (sigma * sigma);
+            let moves = &c * sums.transpose() * by;
+            for (i, row) in moves.row_iter().enumerate() {
+                out[i] += tau * tau * row.norm_squared();
+            }
+        }
+    });
+    out
+}
+
+/// Covariance of the free unknowns.
+#[must_use]
+pub fn free_covariance(fit: &Fit) -> DMatrix<f64> {
+    DMatrix::from_fn(fit.free.len(), fit.free.len(), |a, b| fit.covariance[(fit.free[a], fit.free[b])])
+}
+
+/// A source of uncertainty that the touches cannot show.
+#[derive(Debug, Clone)]
+pub(super) struct TypeB {
+    pub name: String,
+    pub unit: String,
+    pub sigma: f64,
+    /// What it makes of each free unknown: standard uncertainty, in the unknown's unit.
+    pub makes: DVector<f64>,
+}
+
+/// Type B rows as the user states them: by name of a parameter of an effect that is not in the model.
+pub(super) fn type_b(
+    fit: &Fit,
+    machine: &Machine,
+    catalogue: &Catalogue,
+    stated: &BTreeMap<String, f64>,
+) -> Result<Vec<TypeB>> {
+    let mut out = Vec::new();
+    let mut findings = Vec::new();
+    for (word, &sigma) in stated {
+        if fit.model.unknowns.iter().any(|u| crate::symbols::same(&u.name, word)) {
+            findings.push(
+                Finding::error("model::type_b_in_model", format!("{word} is in the model: it cannot be a type B row too"))
+                    .help("give it a prior under [model.parameters], or take its effect out of the model"),
+            );
+            continue;
+        }
+        let owner = catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper).find_map(|e| {
+            let p = e.parameters.iter().position(|p| crate::symbols::same(&p.name, word))?;
+            Some((e, p))
+        });
+        let Some((effect, which)) = owner else {
+            findings.push(
+                Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
+                    .help("`axiscal effects` lists them, for instance sX (block-size), dL (tool-length), expansion (ambient-scale)"),
+            );
+            continue;
+        };
+        if !(sigma.is_finite() && sigma > 0.0) {
+            findings.push(Finding::error("model::type_b", format!("uncertainty of {word} is {sigma}")).help("write a positive number in the parameter's unit"));
+            continue;
+        }
+        let column = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, None)
+            .values
+            .column(which)
+            .into_owned();
+        let moved = sensitivity(fit, column);
+        let p = &effect.parameters[which];
+        out.push(TypeB { name: p.name.clone(), unit: p.unit.clone(), sigma, makes: moved.map(|m| (m * sigma).abs()) });
+    }
+    if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
+}
+
+/// How much the free unknowns move per unit of something that displaces the touches by `column` (mm per unit).
+fn sensitivity(fit: &Fit, column: DVector<f64>) -> DVector<f64> {
+    let linear = fit.linear(fit.noise.tau_mm);
+    let n = column.len();
+    let mut whitened = DMatrix::from_column_slice(n, 1, column.as_slice());
+    fit.with_touches(fit.noise.tau_mm, |t| t.whiten(&mut whitened));
+    -(free_covariance(fit) * linear.jacobian.rows(0, n).tr_mul(&whitened.column(0)))
+}
+
+/// Effects that may act although the model does not hold them: all of the catalogue but those that share a parameter with
+/// the model, the paper's sets, whole hypotheses and the set-up of blocks.
+#[must_use]
+pub fn unmodelled<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
+    let held = |e: &Effect| {
+        e.parameters.iter().any(|p| fit.model.unknowns.iter().any(|u| u.effect == e.id || u.name == p.name))
+    };
+    catalogue
+        .iter()
+        .filter(|e| e.applies_to(machine) && !e.paper && !e.per_block && !held(e))
+        .collect()
+}
+
+/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size.
+pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> DVector<f64> {
+    let effects = unmodelled(fit, machine, catalogue);
+    let all = columns(machine, &effects, &fit.data, &fit.data.observations, fit.model.reference, None);
+    let linear = fit.linear(fit.noise.tau_mm);
+    let n = all.values.nrows();
+    let mut b = all.values;
+    for (mut column, u) in b.column_iter_mut().zip(&all.unknowns) {
+        column *= u.typical;
+    }
+    fit.with_touches(fit.noise.tau_mm, |t| t.whiten(&mut b));
+    // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
+    let jacobian = linear.jacobian.rows(0, n);
+    let cross = jacobian.tr_mul(&b);
+    let mut inner = b.tr_mul(&b);
+    inner.fill_diagonal_added();
+    let Some(cholesky) = inner.cholesky() else { return DVector::from_element(fit.free.len(), f64::NAN) };
+    let taken = &cross * cholesky.solve(&cross.transpose());
+    let seen = &fit.observability;
+    let gram = linear.jacobian.tr_mul(&linear.jacobian) - taken;
+    let scaled = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
+    let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
+    let Some(inverse) = reduced.cholesky().map(|c| c.inverse()) else {
+        return DVector::from_element(fit.free.len(), f64::NAN);
+    };
+    let full = if seen.full() { inverse } else { &seen.seen * inverse * seen.seen.transpose() };
+    DVector::from_fn(full.nrows(), |i, _| full[(i, i)].max(0.0).sqrt() / seen.scale[i])
+}
+
+trait AddToDiagonal {
+    fn fill_diagonal_added(&mut self);
+}
+
+impl AddToDiagonal for DMatrix<f64> {
+    /// Adds the identity.
+    fn fill_diagonal_added(&mut self) {
+        for i in 0..self.nrows() {
+            self[(i, i)] += 1.0;
+        }
+    }
+}
+
+/// The pairs of results that are least told apart.
+pub(super) fn correlations(fit: &Fit) -> Vec<Correlation> {
+    let results: Vec<usize> =
+        fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance && fit.covariance[(i, i)] > 0.0).collect();
+    let mut out = Vec::new();
+    for (k, &i) in results.iter().enumerate() {
+        for &j in &results[..k] {
+            let r = fit.covariance[(i, j)] / (fit.covariance[(i, i)] * fit.covariance[(j, j)]).sqrt();
+            if r.abs() > WORTH_NAMING {
+                out.push(Correlation {
+                    a: fit.model.unknowns[j].name.clone(),
+                    b: fit.model.unknowns[i].name.clone(),
+                    r: (r * 1e4).round() / 1e4,
+                });
+            }
+        }
+    }
+    out.sort_by(|x, y| y.r.abs().total_cmp(&x.r.abs()));
+    out.truncate(MOST_PAIRS);
+    out
+}
+
+/// Combinations of results that these touches determine no better than their typical sizes: columns scaled by typical
+/// size, nuisance projected out, singular values below 1 (in units of the noise). Without those that leave no trace.
+pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
+    let is_nuisance = |i: usize| fit.model.unknowns[i].nuisance;
+    let physical: Vec<usize> = (0..fit.free.len()).filter(|&c| !is_nuisance(fit.free[c])).collect();
+    let nuisance: Vec<usize> = (0..fit.free.len()).filter(|&c| is_nuisance(fit.free[c])).collect();
+    if physical.is_empty() {
+        return Vec::new();
+    }
+    let linear = fit.linear(fit.noise.tau_mm);
+    let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
+    let mut own = linear.jacobian.select_columns(&physical);
+    for (mut column, &c) in own.column_iter_mut().zip(&physical) {
+        column *= typical(c);
+    }
+    if !nuisance.is_empty() {
+        let mut others = linear.jacobian.select_columns(&nuisance);
+        for mut column in others.column_iter_mut() {
+            let norm = column.norm();
+            if norm > 0.0 {
+                column /= norm;
+            }
+        }
+        let svd = others.svd(true, false);
+        if let Some(u) = svd.u {
+            let top = svd.singular_values.max();
+            let kept: Vec<usize> = (0..u.ncols()).filter(|&k| svd.singular_values[k] > 1e-9 * top).collect();
+            let q = u.select_columns(&kept);
+            let inside = q.tr_mul(&own);
+            own -= &q * inside;
+        }
+    }
+    let svd = own.svd(false, true);
+    let (Some(v_t), top) = (svd.v_t, svd.singular_values.max()) else { return Vec::new() };
+    let mut out = Vec::new();
+    for (k, s) in svd.singular_values.iter().enumerate() {
+        if *s >= 1.0 || *s <= 1e-8 * top {
+            continue;
+        }
+        let direction = v_t.row(k);
+        let weights = physical
+            .iter()
+            .zip(direction.iter())
+            .filter(|(_, w)| w.abs() > 0.05)
+            .map(|(&c, w)| (fit.model.unknowns[fit.free[c]].name.clone(), (w * 1e3).round() / 1e3))
+            .collect();
+        out.push(Combination {
+            says: super::statement::weak(&weights, 1.0 / s),
+            combination: weights,
+            times_typical: (1e3 / s).round() / 1e3,
+        });
+    }
+    out
+}
+
+/// Names and values of the priors that entered the fit.
+pub(super) fn priors(fit: &Fit) -> Vec<super::outcome::PriorRow> {
+    let mut out = Vec::new();
+    for (i, known) in fit.knowledge.iter().enumerate() {
+        if let Some(Knowledge::Prior { value, sigma }) = known {
+            let u = &fit.model.unknowns[i];
+            out.push(super::outcome::PriorRow { name: u.name.clone(), value: *value, sigma: *sigma, unit: u.unit.clone() });
+        }
+    }
+    out
+}

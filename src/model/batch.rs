@@ -1,0 +1,496 @@
+//! Many touches at once: what does not change from touch to touch is computed once, and rows hold only the unknowns
+//! that their touch sees.
+//!
+//! Three levels: [`Model::prepare`] evaluates what depends on neither θ nor the iteration (formulas without shape
+//! parameters, the rotations of each pose); [`Batch::at`] builds the error transforms that are the same at all touches,
+//! or at all touches of a block; what is left per touch is a handful of 3 × 3 products.
+
+use super::catalogue::Place;
+use super::predict::{Changes, Model, Observation};
+use crate::axes::{AxisName, Position};
+use crate::geometry::Displacement;
+use crate::machine::{Axis, Side};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
+
+/// Touches ready for many evaluations of one model.
+#[derive(Debug)]
+pub struct Batch<'a> {
+    model: &'a Model,
+    observations: &'a [Observation],
+    /// Which of `poses` a touch is at.
+    pose: Vec<u32>,
+    /// Rotations of all rotary axes, workpiece side first, for each distinct pose.
+    poses: Vec<Vec<Rigid>>,
+    /// Factors whose formula has neither a constant value nor a shape parameter: index in `active`.
+    varying: Vec<usize>,
+    /// Their coefficients, touch by touch.
+    coefficients: Vec<f64>,
+    /// Actives with a shape parameter: evaluated anew for each θ.
+    shaped: Vec<usize>,
+    roles: Roles,
+}
+
+/// Slots outside of the axes.
+#[derive(Debug, Clone, Copy)]
+struct Roles {
+    tool: Option<usize>,
+    workpiece: Option<usize>,
+    block: Option<usize>,
+    trigger: Option<usize>,
+    reading: Option<usize>,
+}
+
+/// p → r·p + t, mm.
+#[derive(Debug, Clone, Copy)]
+struct Rigid {
+    r: Matrix3<f64>,
+    t: Vector3<f64>,
+}
+
+impl Rigid {
+    fn of_rotary(axis: &Axis, at: &Position) -> Self {
+        let motion = axis.motion(at);
+        Self { r: motion.rotation.to_rotation_matrix().into_inner(), t: motion.translation.vector }
+    }
+
+    fn apply(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        self.r * p + self.t
+    }
+
+    fn undo(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        self.r.tr_mul(&(p - self.t))
+    }
+}
+
+/// An error transform at its place: p → r·(p − centre) + image.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    rigid: Rigid,
+    /// Where the transform takes its centre.
+    image: Vector3<f64>,
+    /// About which axes the angles a and b turn; c turns about z.
+    axis_a: Vector3<f64>,
+    axis_b: Vector3<f64>,
+}
+
+impl Placed {
+    fn new(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        let ((sa, ca), (sb, cb), (sc, cc)) = (by.w.x.sin_cos(), by.w.y.sin_cos(), by.w.z.sin_cos());
+        // Rz(c)·Ry(b)·Rx(a), as `Displacement::rotation`
+        let r = Matrix3::new(
+            cc * cb,
+            cc * sb * sa - sc * ca,
+            cc * sb * ca + sc * sa,
+            sc * cb,
+            sc * sb * sa + cc * ca,
+            sc * sb * ca - cc * sa,
+            -sb,
+            cb * sa,
+            cb * ca,
+        );
+        let image = centre + by.d;
+        Self {
+            rigid: Rigid { r, t: image - r * centre },
+            image,
+            axis_a: r.column(0).into_owned(),
+            axis_b: Vector3::new(-sc, cc, 0.0),
+        }
+    }
+
+    /// Adds d gap / d (dx … rz) for a place that is applied; `g` = d gap / d moved.
+    fn slope(&self, g: &Vector3<f64>, moved: &Vector3<f64>, sign: f64, into: &mut [f64; 6]) {
+        let turned = (moved - self.image).cross(g);
+        for k in 0..3 {
+            into[k] += sign * g[k];
+        }
+        into[3] += sign * self.axis_a.dot(&turned);
+        into[4] += sign * self.axis_b.dot(&turned);
+        into[5] += sign * turned.z;
+    }
+}
+
+/// Working space; one per thread.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    displacement: Vec<Displacement>,
+    placed: Vec<Placed>,
+    gradient: Vec<[f64; 6]>,
+    coefficient: Vec<f64>,
+    /// Points after each place of the tool chain, in order of application.
+    moved: Vec<Vector3<f64>>,
+    /// Points in front of each place of the workpiece chain, in order of application.
+    met: Vec<Vector3<f64>>,
+}
+
+/// A batch at one θ.
+#[derive(Debug)]
+pub struct At<'b> {
+    batch: &'b Batch<'b>,
+    theta: &'b [f64],
+    /// Displacements that do not change from touch to touch, by slot; of blocks after that, by set-up and slot.
+    displacement: Vec<Displacement>,
+    placed: Vec<Placed>,
+    n_slots: usize,
+}
+
+impl Model {
+    /// Prepares touches for many evaluations.
+    #[must_use]
+    pub fn prepare<'a>(&'a self, observations: &'a [Observation]) -> Batch<'a> {
+        let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
+        let mut poses = Vec::new();
+        let pose = observations
+            .iter()
+            .map(|o| {
+                let key = [AxisName::A, AxisName::B, AxisName::C].map(|a| o.position.get(a).to_bits());
+                *seen.entry(key).or_insert_with(|| {
+                    let all = self.workpiece.iter().chain(&self.tool).filter(|l| l.axis.name.is_rotary());
+                    poses.push(all.map(|l| Rigid::of_rotary(&l.axis, &o.position)).collect());
+                    (poses.len() - 1) as u32
+                })
+            })
+            .collect();
+        let is = |i: &usize, shape: bool| {
+            let f = &self.active[*i].term.formula;
+            f.constant().is_none() && f.has_shape() == shape
+        };
+        let varying: Vec<usize> = (0..self.active.len()).filter(|i| is(i, false)).collect();
+        let shaped: Vec<usize> = (0..self.active.len()).filter(|i| is(i, true)).collect();
+        let mut coefficients = Vec::with_capacity(varying.len() * observations.len());
+        for o in observations {
+            for &i in &varying {
+                let a = &self.active[i];
+                let here = a.set_up.is_none_or(|s| s == o.set_up);
+                coefficients.push(if here { a.factor * a.term.formula.eval(&o.state, &[]) } else { 0.0 });
+            }
+        }
+        let roles = Roles {
+            tool: self.find(Place::Tool),
+            workpiece: self.find(Place::Workpiece),
+            block: self.find(Place::Block),
+            trigger: self.find(Place::Trigger),
+            reading: self.find(Place::Reading),
+        };
+        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, roles }
+    }
+}
+
+impl Batch<'_> {
+    /// Number of touches.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.observations.len()
+    }
+
+    /// True without touches.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.observations.is_empty()
+    }
+
+    /// The model.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        self.model
+    }
+
+    /// The touches.
+    #[must_use]
+    pub fn observations(&self) -> &[Observation] {
+        self.observations
+    }
+
+    /// Working space for this batch.
+    #[must_use]
+    pub fn scratch(&self) -> Scratch {
+        let n = self.model.slots.len();
+        let nowhere = Placed::new(&Displacement::default(), &Vector3::zeros());
+        Scratch {
+            displacement: vec![Displacement::default(); n],
+            placed: vec![nowhere; n],
+            gradient: vec![[0.0; 6]; n],
+            coefficient: vec![0.0; self.model.active.len()],
+            moved: Vec::with_capacity(3 * self.model.tool.len() + 2),
+            met: Vec::with_capacity(3 * self.model.workpiece.len() + 2),
+        }
+    }
+
+    /// The batch at θ (each unknown in its unit).
+    #[must_use]
+    pub fn at<'b>(&'b self, theta: &'b [f64]) -> At<'b> {
+        let model = self.model;
+        let n_slots = model.slots.len();
+        let n_set_ups = model.set_ups().len();
+        // the common displacements, then a copy of them for each block with the block's own added
+        let mut displacement = vec![Displacement::default(); n_slots];
+        for a in model.active.iter().filter(|a| a.set_up.is_none()) {
+            if let Some(value) = a.term.formula.constant() {
+                displacement[a.slot].add(a.component, theta[a.unknown] * a.factor * value);
+            }
+        }
+        let mut all = displacement.clone();
+        for _ in 0..n_set_ups {
+            all.extend_from_slice(&displacement);
+        }
+        for a in &model.active {
+            if let (Some(s), Some(value)) = (a.set_up, a.term.formula.constant()) {
+                all[(1 + s) * n_slots + a.slot].add(a.component, theta[a.unknown] * a.factor * value);
+            }
+        }
+        let placed = all
+            .iter()
+            .enumerate()
+            .map(|(i, d)| {
+                let slot = &model.slots[i % n_slots];
+                let centre = match (i / n_slots).checked_sub(1) {
+                    Some(s) if slot.place == Place::Block => model.set_ups()[s].centre,
+                    _ => slot.centre,
+                };
+                Placed::new(d, &centre)
+            })
+            .collect();
+        At { batch: self, theta, displacement: all, placed, n_slots }
+    }
+}
+
+impl At<'_> {
+    /// The gap at a touch, mm: measured less model along the outward normal.
+    pub fn gap(&self, touch: usize, scratch: &mut Scratch) -> f64 {
+        self.displace(touch, scratch);
+        self.evaluate(touch, scratch, false)
+    }
+
+    /// The gap at a touch, mm, and its derivatives (mm per unit) with respect to the unknowns of its row
+    /// ([`super::predict::Layout::row`]).
+    pub fn gap_and_row(&self, touch: usize, scratch: &mut Scratch, row: &mut [f64]) -> f64 {
+        self.displace(touch, scratch);
+        let gap = self.evaluate(touch, scratch, true);
+        row.fill(0.0);
+        let (model, o) = (self.batch.model, &self.batch.observations[touch]);
+        let n_common = model.layout.common.len();
+        for (i, a) in model.active.iter().enumerate() {
+            let offset = match a.set_up {
+                Some(s) if s != o.set_up => continue,
+                Some(_) => n_common,
+                None => 0,
+            };
+            let slope = scratch.gradient[a.slot][a.component];
+            let coefficient = match a.term.formula.constant() {
+                Some(value) => a.factor * value,
+                None => scratch.coefficient[i],
+            };
+            row[offset + model.layout.place(a.unknown)] += slope * coefficient;
+            if a.term.formula.has_shape() {
+                let amount = self.theta[a.unknown] * a.factor;
+                for (shape, derivative) in a.term.formula.partials(&o.state, &self.theta[a.first..a.first + a.count]) {
+                    row[offset + model.layout.place(a.first + shape)] += slope * amount * derivative;
+                }
+            }
+        }
+        gap
+    }
+
+    /// Displacements and transforms of the places that change from touch to touch.
+    fn displace(&self, touch: usize, scratch: &mut Scratch) {
+        let (batch, model) = (self.batch, self.batch.model);
+        if batch.varying.is_empty() && batch.shaped.is_empty() {
+            return;
+        }
+        let o = &batch.observations[touch];
+        let base = (1 + o.set_up) * self.n_slots;
+        for (i, slot) in model.slots.iter().enumerate() {
+            if slot.changes == Changes::WithTouch {
+                scratch.displacement[i] = self.displacement[base + i];
+            }
+        }
+        let own = &batch.coefficients[touch * batch.varying.len()..(touch + 1) * batch.varying.len()];
+        for (&i, &coefficient) in batch.varying.iter().zip(own) {
+            let a = &model.active[i];
+            scratch.coefficient[i] = coefficient;
+            scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * coefficient);
+        }
+        for &i in &batch.shaped {
+            let a = &model.active[i];
+            if a.set_up.is_none_or(|s| s == o.set_up) {
+                let value = a.term.formula.eval(&o.state, &self.theta[a.first..a.first + a.count]);
+                scratch.coefficient[i] = a.factor * value;
+                scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * a.factor * value);
+            }
+        }
+        for (i, slot) in model.slots.iter().enumerate() {
+            if slot.changes == Changes::WithTouch {
+                let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
+                scratch.placed[i] = Placed::new(&scratch.displacement[i], &centre);
+            }
+        }
+    }
+
+    fn evaluate(&self, touch: usize, scratch: &mut Scratch, derive: bool) -> f64 {
+        let (batch, model) = (self.batch, self.batch.model);
+        let o = &batch.observations[touch];
+        let base = (1 + o.set_up) * self.n_slots;
+        let Scratch { placed, displacement, gradient, moved, met, .. } = scratch;
+        let changes = |i: usize| model.slots[i].changes == Changes::WithTouch;
+        let at_slot = |i: usize| -> &Placed { if changes(i) { &placed[i] } else { &self.placed[base + i] } };
+        let by_slot = |i: usize| -> &Displacement { if changes(i) { &displacement[i] } else { &self.displacement[base + i] } };
+
+        // what the control shows, corrected by the reading's own error
+        let mut shown = o.position;
+        let mut turned: [Option<Rigid>; 6] = [None; 6];
+        if let Some(slot) = batch.roles.reading {
+            for link in model.workpiece.iter().chain(&model.tool) {
+                let name = link.axis.name;
+                let amount = by_slot(slot).get(name.index());
+                let by = if name.is_rotary() { crate::units::deg_from_rad(amount) } else { amount };
+                shown.set(name, shown.get(name) + by);
+                if name.is_rotary() && amount != 0.0 {
+                    turned[name.index()] = Some(Rigid::of_rotary(&link.axis, &shown));
+                }
+            }
+        }
+        let pose = &batch.poses[batch.pose[touch] as usize];
+        let rotary = |axis: &Axis, at: usize| -> Rigid { turned[axis.name.index()].unwrap_or(pose[at]) };
+        let travel = |axis: &Axis| -> Vector3<f64> {
+            let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
+            axis.direction.into_inner() * (sign * shown.get(axis.name))
+        };
+        let n_rotary_workpiece = model.workpiece.iter().filter(|l| l.axis.name.is_rotary()).count();
+
+        // --- the ball from the tool's frame to R
+        moved.clear();
+        let mut point = o.ball_at_zero;
+        if let Some(i) = batch.roles.tool {
+            point = at_slot(i).rigid.apply(&point);
+            moved.push(point);
+        }
+        let mut at_rotary = pose.len();
+        for link in model.tool.iter().rev() {
+            if let Some(i) = link.after {
+                point = at_slot(i).rigid.apply(&point);
+                moved.push(point);
+            }
+            if link.axis.name.is_rotary() {
+                at_rotary -= 1;
+                point = rotary(&link.axis, at_rotary).apply(&point);
+            } else {
+                point += travel(&link.axis);
+            }
+            moved.push(point);
+            if let Some(i) = link.before {
+                point = at_slot(i).rigid.apply(&point);
+                moved.push(point);
+            }
+        }
+
+        // --- from R into the frame of the touched block
+        met.clear();
+        let chain = &model.workpiece[..model.carrier_length(model.set_ups()[o.set_up].carrier)];
+        let mut at_rotary = 0;
+        for link in chain {
+            if let Some(i) = link.before {
+                met.push(point);
+                point = at_slot(i).rigid.undo(&point);
+            }
+            met.push(point);
+            if link.axis.name.is_rotary() {
+                point = rotary(&link.axis, at_rotary).undo(&point);
+                at_rotary += 1;
+            } else {
+                point -= travel(&link.axis);
+            }
+            if let Some(i) = link.after {
+                met.push(point);
+                point = at_slot(i).rigid.undo(&point);
+            }
+        }
+        debug_assert!(at_rotary <= n_rotary_workpiece);
+        for i in [batch.roles.workpiece, batch.roles.block].into_iter().flatten() {
+            met.push(point);
+            point = at_slot(i).rigid.undo(&point);
+        }
+        let late = batch.roles.trigger.map_or(0.0, |i| by_slot(i).get(0));
+        let gap = o.normal.dot(&(point - o.point)) - o.ball_radius + late;
+        if !derive {
+            return gap;
+        }
+
+        // --- derivatives: g = d gap / d point is carried back through the same places
+        gradient.fill([0.0; 6]);
+        if let Some(i) = batch.roles.trigger {
+            gradient[i][0] = 1.0;
+        }
+        let mut g = o.normal;
+        // a place on the workpiece side is undone: q = E⁻¹·p, dq = −Rᵀ·dE·q
+        let mut back = met.iter().rev();
+        let undone = |p: Option<&Vector3<f64>>, i: usize, g: &mut Vector3<f64>, gradient: &mut [[f64; 6]]| {
+            if let Some(p) = p {
+                let place = at_slot(i);
+                *g = place.rigid.r * *g;
+                place.slope(g, p, -1.0, &mut gradient[i]);
+            }
+        };
+        for i in [batch.roles.block, batch.roles.workpiece].into_iter().flatten() {
+            undone(back.next(), i, &mut g, gradient);
+        }
+        for link in chain.iter().rev() {
+            if let Some(i) = link.after {
+                undone(back.next(), i, &mut g, gradient);
+            }
+            if link.axis.name.is_rotary() {
+                at_rotary -= 1;
+                g = rotary(&link.axis, at_rotary).r * g;
+            }
+            if let Some(p) = back.next()
+                && let Some(i) = batch.roles.reading
+            {
+                gradient[i][link.axis.name.index()] -= motion_slope(&link.axis, &g, p);
+            }
+            if let Some(i) = link.before {
+                undone(back.next(), i, &mut g, gradient);
+            }
+        }
+        // on the tool side a place is applied
+        let mut back = moved.iter().rev();
+        let applied = |p: Option<&Vector3<f64>>, i: usize, g: &mut Vector3<f64>, gradient: &mut [[f64; 6]]| {
+            if let Some(p) = p {
+                let place = at_slot(i);
+                place.slope(g, p, 1.0, &mut gradient[i]);
+                *g = place.rigid.r.tr_mul(g);
+            }
+        };
+        let mut at_rotary = n_rotary_workpiece;
+        for link in &model.tool {
+            if let Some(i) = link.before {
+                applied(back.next(), i, &mut g, gradient);
+            }
+            if let Some(p) = back.next()
+                && let Some(i) = batch.roles.reading
+            {
+                gradient[i][link.axis.name.index()] += motion_slope(&link.axis, &g, p);
+            }
+            if link.axis.name.is_rotary() {
+                g = rotary(&link.axis, at_rotary).r.tr_mul(&g);
+                at_rotary += 1;
+            }
+            if let Some(i) = link.after {
+                applied(back.next(), i, &mut g, gradient);
+            }
+        }
+        if let Some(i) = batch.roles.tool {
+            applied(back.next(), i, &mut g, gradient);
+        }
+        gap
+    }
+}
+
+/// d gap / d coordinate of an axis (mm or rad), from `g` = d gap / d point in front of its motion.
+fn motion_slope(axis: &Axis, g: &Vector3<f64>, moved: &Vector3<f64>) -> f64 {
+    let direction = axis.direction.into_inner();
+    if axis.name.is_rotary() {
+        axis.sense * g.dot(&direction.cross(&(moved - axis.point)))
+    } else {
+        let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
+        sign * g.dot(&direction)
+    }
+}
