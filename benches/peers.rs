@@ -1,14 +1,14 @@
 //! The crate beside its peers on the same touches and unknowns, in one run: answers compared, times as ratios.
 //!
-//! `cargo bench --bench peers` prints the table; `-- --write` puts it into `docs/performance.md` as well. Without
-//! `--bench` (as `cargo test` calls it) it compares the answers at small size only. Peers are what `benches/peers/run` finds;
+//! `cargo bench --bench peers` prints the table; `-- --write` puts it into `docs/performance.md` as well, and words such as
+//! `10000x60` choose sizes (touches x unknowns); `-- --answers` compares the answers only. Without `--bench` (as `cargo test` calls it) it compares the answers at small size only. Peers are what `benches/peers/run` finds;
 //! `AXISCAL_PEERS_REQUIRED=1` makes a missing one an error.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a benchmark that cannot run says where
 
 mod comparison;
 mod problems;
 
-use comparison::{Answer, Peers, compare, identify_both, run_crate};
+use comparison::{Answer, Peers, compare, identify_both, run_crate, run_identify};
 use problems::Problem;
 use std::fmt::Write;
 use std::path::Path;
@@ -28,12 +28,14 @@ fn main() {
     let peers = Peers::find(has("--bench"));
     let folder = tempfile::tempdir().unwrap();
     agree(&peers, folder.path());
-    if !has("--bench") {
+    if !has("--bench") || has("--answers") {
         return;
     }
     let mut text = machine();
     text.push_str(&whole_process(&peers, folder.path()));
     let sizes = [356, 10_000, 100_000].into_iter().flat_map(|n| [15, 60, 120].map(|p| (n, p)));
+    let chosen = words.iter().any(|w| w.contains('x') && !w.starts_with('-'));
+    let sizes = sizes.filter(|(n, p)| !chosen || has(&format!("{n}x{p}")));
     let results: Vec<Size> = sizes.map(|(n, p)| measure(&peers, folder.path(), n, p)).collect();
     text.push_str(&table(&results));
     text.push_str(&solvers(&results));
@@ -79,6 +81,8 @@ struct Size {
 struct Row {
     n_threads: usize,
     ours: Answer,
+    /// All of `identify`: time, s, and heap, KiB.
+    identify: (f64, f64),
     newton: Option<Answer>,
     scipy: Option<Answer>,
     /// Fits by solver.
@@ -133,6 +137,7 @@ fn measure(peers: &Peers, folder: &Path, n_touches: usize, n_unknowns: usize) ->
             scipy: peers.scipy(&file, n_threads, repeats.min(3)),
             covariances: covariances.flatten().collect(),
             ceres: fits.into_iter().flatten().collect(),
+            identify: run_identify(&problem, n_threads, (30_000 / n_touches).clamp(1, 10), &HEAP),
             ours,
         };
         let others = row.ceres.iter().chain(&row.covariances).chain(&row.newton).chain(&row.scipy);
@@ -155,8 +160,8 @@ fn beside(theirs: Option<f64>, ours: f64) -> String {
 fn table(results: &[Size]) -> String {
     let mut out = String::from(
         "## Fit with covariance\n\nMilliseconds, fastest run; in brackets how many times as long as axiscal.\n\n\
-         | touches x unknowns | threads | axiscal | Gauss-Newton by hand | Ceres, normal equations | Ceres, best of all | SciPy | heap / dense Jacobian |\n\
-         |---|---|---|---|---|---|---|---|\n",
+         | touches x unknowns | threads | axiscal | Gauss-Newton by hand | Ceres, normal equations | Ceres, best of all | SciPy | heap / dense Jacobian \
+         | all of `identify` | its heap / dense Jacobian |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for size in results {
         let jacobian_kb = (size.n_touches * size.n_unknowns * 8) as f64 / 1024.0;
@@ -164,7 +169,7 @@ fn table(results: &[Size]) -> String {
             let ours = row.ours.total_s();
             writeln!(
                 out,
-                "| {} x {} | {} | {} | {} | {} | {} | {} | {:.2} |",
+                "| {} x {} | {} | {} | {} | {} | {} | {} | {:.2} | {} | {:.2} |",
                 size.n_touches,
                 size.n_unknowns,
                 row.n_threads,
@@ -174,6 +179,8 @@ fn table(results: &[Size]) -> String {
                 beside(row.ceres_best_s(), ours),
                 beside(row.scipy.as_ref().map(Answer::total_s), ours),
                 (row.ours.peak_kb - row.ours.loaded_kb) / jacobian_kb,
+                milliseconds(row.identify.0),
+                row.identify.1 / jacobian_kb,
             )
             .unwrap();
         }
@@ -225,7 +232,9 @@ fn whole_process(peers: &Peers, folder: &Path) -> String {
     let row = |t: &comparison::Times| format!("{} ({})", milliseconds(t.median_s), milliseconds(t.least_s));
     writeln!(out, "| `axiscal identify` | {} | 1 |", row(&ours)).unwrap();
     match theirs {
-        Some(t) => writeln!(out, "| SciPy (`benches/peers/identify.py`) | {} | {:.0} |", row(&t), t.median_s / ours.median_s),
+        Some(t) => {
+            writeln!(out, "| SciPy (`benches/peers/identify.py`) | {} | {:.0} |", row(&t), t.median_s / ours.median_s)
+        }
         None => writeln!(out, "| SciPy | left out | |"),
     }
     .unwrap();

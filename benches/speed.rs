@@ -7,67 +7,102 @@
 mod problems;
 
 use axiscal::fit;
+use axiscal::fit::normal::Touches;
+use axiscal::fit::solve::Problem as _;
 use axiscal::log::{self, Writer};
-use axiscal::model::predict::Model;
 use axiscal::post::{LogRecord, Postprocessor};
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use nalgebra::DVector;
 use problems::{Problem, SIGMA_MM};
-use std::hint::black_box;
 use std::time::Duration;
 
-/// Problems of every size; small ones only where nothing is timed.
-fn each(mut with: impl FnMut(Problem, u64, usize)) {
+/// Problems of every size for a group of benchmarks; small ones only where nothing is timed, and none that the first word of
+/// the call (criterion's filter) leaves out.
+fn each(group: &str, mut with: impl FnMut(Problem, u64, usize)) {
     let timed = std::env::args().any(|a| a == "--bench");
+    let filter = std::env::args().skip(1).find(|a| !a.starts_with('-')).unwrap_or_default();
     for n_touches in [356, 10_000, 100_000] {
         for n_unknowns in [15, 60, 120] {
-            if timed || n_touches == 356 {
+            if (timed || n_touches == 356) && format!("{group}/{n_touches}/{n_unknowns}").contains(&filter) {
                 with(Problem::new(n_touches, n_unknowns, SIGMA_MM), n_touches as u64, n_unknowns);
             }
         }
     }
 }
 
-fn model(problem: &Problem) -> Model {
-    let effects = fit::effects_of(&problem.effects, &problem.catalogue, &problem.machine).unwrap();
-    Model::new(&problem.machine, &effects, &problem.data().set_ups, problem.machine.reference.pivot)
-}
-
 /// Gaps of all touches.
 fn prediction(c: &mut Criterion) {
     let mut group = c.benchmark_group("prediction");
-    each(|problem, n_touches, n_unknowns| {
-        let (data, model) = (problem.data(), model(&problem));
-        let (theta, mut scratch) = (model.start(), model.scratch());
-        group.throughput(Throughput::Elements(n_touches));
-        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
-            b.iter(|| data.observations.iter().map(|o| model.gap(o, &theta, &mut scratch)).sum::<f64>());
-        });
-    });
-}
-
-/// Gaps of all touches and their derivatives by all unknowns.
-fn jacobian(c: &mut Criterion) {
-    let mut group = c.benchmark_group("jacobian");
-    each(|problem, n_touches, n_unknowns| {
-        let (data, model) = (problem.data(), model(&problem));
-        let (theta, mut scratch) = (model.start(), model.scratch());
-        let mut row = vec![0.0; n_unknowns];
+    each("prediction", |problem, n_touches, n_unknowns| {
+        let data = problem.data();
+        let model = problem.model(&data);
+        let (batch, theta) = (model.prepare(&data.observations), model.start());
+        let mut scratch = batch.scratch();
         group.throughput(Throughput::Elements(n_touches));
         group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
             b.iter(|| {
-                for o in &data.observations {
-                    black_box(model.gap_and_row(o, &theta, &mut scratch, &mut row));
-                }
+                let at = batch.at(&theta);
+                (0..batch.len()).map(|i| at.gap(i, &mut scratch)).sum::<f64>()
             });
         });
     });
 }
 
-/// From the touches in memory to the answer, with everything that `identify` says of them.
+/// Gaps of all touches and their derivatives with respect to the unknowns that each of them sees.
+fn jacobian(c: &mut Criterion) {
+    let mut group = c.benchmark_group("jacobian");
+    each("jacobian", |problem, n_touches, n_unknowns| {
+        let data = problem.data();
+        let model = problem.model(&data);
+        let (batch, theta) = (model.prepare(&data.observations), model.start());
+        let mut scratch = batch.scratch();
+        let mut row = vec![0.0; model.layout().row_length(0)];
+        group.throughput(Throughput::Elements(n_touches));
+        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
+            b.iter(|| {
+                let at = batch.at(&theta);
+                (0..batch.len()).map(|i| at.gap_and_row(i, &mut scratch, &mut row) + row[0]).sum::<f64>()
+            });
+        });
+    });
+}
+
+/// Rank, fit and covariance of touches in memory.
 fn whole_fit(c: &mut Criterion) {
     let mut group = c.benchmark_group("fit");
     group.sample_size(10).measurement_time(Duration::from_secs(3));
-    each(|problem, n_touches, n_unknowns| {
+    each("fit", |problem, n_touches, n_unknowns| {
+        let data = problem.data();
+        let model = problem.model(&data);
+        group.throughput(Throughput::Elements(n_touches));
+        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
+            b.iter(|| problems::solve(&model, &data));
+        });
+    });
+}
+
+/// Gram matrix of all touches and its inverse: the covariance where the solution is known.
+fn covariance(c: &mut Criterion) {
+    let mut group = c.benchmark_group("covariance");
+    each("covariance", |problem, n_touches, n_unknowns| {
+        let data = problem.data();
+        let model = problem.model(&data);
+        let batch = model.prepare(&data.observations);
+        let free: Vec<usize> = (0..n_unknowns).collect();
+        let touches = Touches::new(&batch, &data.visits, model.start(), &free, &[], (SIGMA_MM, 0.0));
+        let theta = DVector::from_vec(model.start());
+        group.throughput(Throughput::Elements(n_touches));
+        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
+            b.iter(|| touches.normal(&theta, true).gram.cholesky().unwrap().inverse());
+        });
+    });
+}
+
+/// All of `identify` on touches in memory: noise, snooping and uncertainty budget too.
+fn identify(c: &mut Criterion) {
+    let mut group = c.benchmark_group("identify");
+    group.sample_size(10).measurement_time(Duration::from_secs(3));
+    each("identify", |problem, n_touches, n_unknowns| {
         let (data, settings) = (problem.data(), problem.settings());
         group.throughput(Throughput::Elements(n_touches));
         group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
@@ -84,7 +119,7 @@ fn whole_fit(c: &mut Criterion) {
 fn parse(c: &mut Criterion) {
     let mut group = c.benchmark_group("parse");
     let (post, _) = Postprocessor::load_built_in_or_file("linuxcnc").unwrap();
-    each(|problem, n_touches, n_unknowns| {
+    each("parse", |problem, n_touches, n_unknowns| {
         if n_unknowns != 15 {
             return; // a log knows no unknowns
         }
@@ -93,11 +128,11 @@ fn parse(c: &mut Criterion) {
             touches.iter().map(|t| LogRecord { id: t.id, status: t.status, position: t.position }).collect();
         let text = post.log_text(machine, plan, &records);
         group.throughput(Throughput::Bytes(text.len() as u64));
-        group.bench_function(n_touches.to_string(), |b| {
+        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
             b.iter(|| log::read(text.as_bytes(), "run.log", Writer::Controller(&post), machine, plan).unwrap());
         });
     });
 }
 
-criterion_group!(benches, prediction, jacobian, whole_fit, parse);
+criterion_group!(benches, prediction, jacobian, whole_fit, covariance, identify, parse);
 criterion_main!(benches);

@@ -72,16 +72,21 @@ struct Problem {
       const char* expected = i < globals ? kGlobals[i] : kSetUp[(i - globals) % 6];
       if (names[i].substr(0, names[i].find('@')) != expected) throw std::runtime_error("unexpected unknown " + names[i]);
     }
-    std::vector<double> row(16 * n);
-    in.read(reinterpret_cast<char*>(row.data()), static_cast<std::streamsize>(row.size() * sizeof(double)));
-    if (!in) throw std::runtime_error(path + " is cut short");
+    // read twice, a touch at a time, so that nothing but the touches stays in memory
+    const auto numbers = in.tellg();
+    double r[16];
+    const auto next_row = [&] {
+      in.read(reinterpret_cast<char*>(r), sizeof r);
+      if (!in) throw std::runtime_error(path + " is cut short");
+    };
     first.assign(n_set_ups + 1, 0);
-    for (size_t i = 0; i < n; ++i) ++first[static_cast<size_t>(row[16 * i + 15]) + 1];
+    for (size_t i = 0; i < n; ++i) next_row(), ++first[static_cast<size_t>(r[15]) + 1];
+    in.seekg(numbers);
     for (size_t s = 0; s < n_set_ups; ++s) first[s + 1] += first[s];
     std::vector<size_t> next = first;
     touches.resize(n);
     for (size_t i = 0; i < n; ++i) {
-      const double* r = &row[16 * i];
+      next_row();
       Touch& t = touches[next[static_cast<size_t>(r[15])]++];
       t.x = r[0], t.y = r[1], t.z = r[2];
       t.sb = std::sin(r[3] * kDeg), t.cb = std::cos(r[3] * kDeg);

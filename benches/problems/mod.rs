@@ -4,14 +4,17 @@
 
 use axiscal::axes::{AxisMap, AxisName};
 use axiscal::diag::source;
-use axiscal::fit::Settings;
+use axiscal::fit::normal::Touches;
+use axiscal::fit::solve::{self, Problem as _, Solution};
+use axiscal::fit::{self, Settings};
 use axiscal::log::{RawTouch, Status, Touch};
 use axiscal::machine::{self, Machine};
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::{Data, Run, assemble};
+use axiscal::model::predict::Model;
 use axiscal::program::plan::{ControllerFrame, FORMAT, Plan, PlanBlock, PlanTouch};
 use axiscal::simulate::{self, Scenario};
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -20,6 +23,14 @@ pub const SIGMA_MM: f64 = 1e-3;
 
 /// Name of the mounting that holds all blocks.
 pub const MOUNTING: &str = "bench";
+
+/// An effect as a user would write it.
+const SQUARENESS: &str = r#"
+[[effect]]
+id = "squareness-xy"
+at = "Y"
+terms = [ { parameter = "EC0Y", unit = "urad", dof = "dx", formula = "-Y" } ]
+"#;
 
 /// Touches of a plan and the model that is fitted to them.
 pub struct Problem {
@@ -69,7 +80,11 @@ impl Problem {
         let (raw, _) = simulate::run(&machine, &plan, &scenario, None).unwrap();
         let touches = raw.iter().map(matched).collect();
         let effects = effects.into_iter().map(str::to_owned).collect();
-        Self { machine, catalogue: Catalogue::built_in().unwrap(), plan, touches, effects }
+        let mut catalogue = Catalogue::built_in().unwrap();
+        if !catalogue.knows("squareness-xy") {
+            catalogue.add_file(&source("squareness.toml", SQUARENESS)).unwrap();
+        }
+        Self { machine, catalogue, plan, touches, effects }
     }
 
     /// The touches as the fit takes them.
@@ -77,10 +92,36 @@ impl Problem {
         assemble(&self.machine, &[Run { plan: &self.plan, touches: &self.touches, mounting: None, started_s: None }])
     }
 
-    /// What the fit is asked for.
-    pub fn settings(&self) -> Settings {
-        Settings { effects: self.effects.clone(), touch_sigma_mm: Some(SIGMA_MM), ..Settings::default() }
+    /// The model in the machine's chain.
+    pub fn model(&self, data: &Data) -> Model {
+        let effects = fit::effects_of(&self.effects, &self.catalogue, &self.machine).unwrap();
+        Model::new(&self.machine, &effects, &data.set_ups, self.machine.reference.pivot)
     }
+
+    /// What `identify` is asked for.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            effects: self.effects.clone(),
+            touch_sigma_mm: Some(SIGMA_MM),
+            visit_sigma_mm: Some(0.0),
+            ..Settings::default()
+        }
+    }
+}
+
+/// Rank on the nominal touches, fit and covariance, as `identify` does them, without what it does around them: the same
+/// work as the peers do. White noise of [`SIGMA_MM`].
+pub fn solve(model: &Model, data: &Data) -> Solution {
+    let free: Vec<usize> = (0..model.n_unknowns()).collect();
+    let start = DVector::from_vec(model.start());
+    let nominal = model.prepare(&data.nominal);
+    let touches = |batch| Touches::new(batch, &data.visits, model.start(), &free, &[], (SIGMA_MM, 0.0));
+    let gram = touches(&nominal).normal(&start, true).gram;
+    let seen = solve::observe_gram(&gram).expect("every unknown is seen");
+    let batch = model.prepare(&data.observations);
+    let solution = solve::minimise(&touches(&batch), start, &seen);
+    assert!(solution.converged, "{}", solution.stopped);
+    solution
 }
 
 /// The machine of all benchmarks.
