@@ -22,6 +22,7 @@ pub mod paper;
 pub mod post;
 pub mod program;
 pub mod report;
+pub mod search;
 pub mod simulate;
 pub mod study;
 pub mod tables;

@@ -164,7 +164,7 @@ fn programs_are_listed_and_shown() {
     let folder = tempfile::tempdir().unwrap();
     let list = json(axiscal(folder.path()).arg("programs"));
     let names: Vec<&str> = list["programs"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["head", "table", "double-head", "basic", "basic"]);
+    assert_eq!(names, ["head", "table", "double-head", "basic", "basic", "full", "full", "full", "full"]);
     let head = json(axiscal(folder.path()).args(["programs", "show", "head"]));
     let counts: Vec<u64> =
         head["programs"][0]["setups"].as_array().unwrap().iter().map(|s| s["touches"].as_u64().unwrap()).collect();

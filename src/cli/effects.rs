@@ -82,6 +82,7 @@ fn word(place: Place) -> String {
     match place {
         Place::Before(axis) => format!("{axis}, before its motion"),
         Place::After(axis) => format!("{axis}, after its motion"),
+        Place::Base => "base".into(),
         Place::Tool => "tool".into(),
         Place::Workpiece => "workpiece".into(),
         Place::Block => "block".into(),

@@ -48,7 +48,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let specs = program::built_in()?;
         let mut t = table(&["program", "machine", "mounting", "what it is for"]);
         for s in &specs {
-            t.add_row(vec![s.name.clone(), machine_of(s), s.mounting.value.clone(), s.says.clone()]);
+            t.add_row(vec![s.name.clone(), machine_of(s), mountings(s).join(", "), s.says.clone()]);
         }
         io.say(t.to_string());
         io.answer(&json!({ "programs": specs.iter().map(|s| as_json(s, None)).collect::<Vec<_>>() }));
@@ -105,15 +105,30 @@ fn name_of(word: &str) -> Result<String> {
     Ok(find(word)?.into_iter().next().map_or_else(|| word.to_owned(), |s| s.name))
 }
 
+/// Each mounting once, in the order in which they are put up.
+fn mountings(spec: &ProgramSpec) -> Vec<String> {
+    let mut names: Vec<String> = spec.parts.iter().map(|p| p.mounting.value.clone()).collect();
+    let mut seen = std::collections::BTreeSet::new();
+    names.retain(|name| seen.insert(name.clone()));
+    names
+}
+
+/// The styli that the machine must have beside the probe's own.
+fn styli(spec: &ProgramSpec) -> std::collections::BTreeSet<&str> {
+    spec.parts.iter().filter_map(|p| p.stylus.as_ref()).map(|s| s.value.as_str()).collect()
+}
+
 fn machine_of(spec: &ProgramSpec) -> String {
     spec.machine.as_ref().map_or_else(|| "any".to_owned(), |m| m.value.clone())
 }
 
 fn show(spec: &ProgramSpec, machine: &str, layout: &Layout, io: &Io) {
-    io.say(format!(
-        "{} on {machine}: {}\nmounting {:?}: {}",
-        spec.name, spec.says, layout.mounting.name, layout.mounting.says
-    ));
+    io.say(format!("{} on {machine}: {}", spec.name, spec.says));
+    for (i, part) in layout.parts.iter().enumerate() {
+        let stop = if i == 0 { String::new() } else { format!("stop {i}: ") };
+        let stylus = part.stylus.map_or_else(String::new, |s| format!(", stylus {:?}", s.name));
+        io.say(format!("{stop}mounting {:?}{stylus}: {}", part.label, part.mounting.says));
+    }
     let mut t = table(&["stage", "pose (deg)", "blocks", "faces", "repeats", "touches"]);
     let mut total = 0;
     for s in &layout.setups {
@@ -135,7 +150,7 @@ fn show(spec: &ProgramSpec, machine: &str, layout: &Layout, io: &Io) {
 
 fn block_names<'a>(layout: &'a Layout, setup: &program::layout::Setup) -> Vec<&'a str> {
     let mut names: Vec<&str> =
-        setup.targets.iter().filter_map(|t| layout.mounting.blocks.get(t.block)).map(|b| b.name.as_str()).collect();
+        setup.targets.iter().filter_map(|t| layout.block(setup, t)).map(|b| b.name.as_str()).collect();
     names.dedup();
     names
 }
@@ -145,7 +160,9 @@ fn as_json(spec: &ProgramSpec, layout: Option<&Layout>) -> Value {
         "name": spec.name,
         "machine": spec.machine.as_ref().map(|m| m.value.clone()),
         "says": spec.says,
-        "mounting": spec.mounting.value,
+        "mounting": mountings(spec).first(),
+        "mountings": mountings(spec),
+        "styli": styli(spec),
     });
     if let (Some(layout), Some(object)) = (layout, answer.as_object_mut()) {
         let setups: Vec<Value> = layout

@@ -55,7 +55,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         None => Scenario::flawless(),
         Some(path) => {
             let text = source(path.display().to_string(), files::read_text(path)?);
-            reported(simulate::scenario::parse(&text, &machine)?, io)
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let open = |name: &str| {
+                let file = folder.join(name);
+                keep_inputs(&args.out, [file.as_path()].into_iter())?;
+                Ok(source(file.display().to_string(), files::read_text(&file)?))
+            };
+            reported(simulate::scenario::parse_with(&text, &machine, &open)?, io)
         }
     };
     let compensation = match &args.compensation {

@@ -91,7 +91,7 @@ pub(super) fn outcome(
         held_out_rms_um: None,
         noise_um: um_from_mm(fit.noise.sigma_mm),
         noise_source: fit.noise.source.into(),
-        visit_um: um_from_mm(fit.noise.tau_mm),
+        visit_um: um_from_mm(fit.noise.visit_mm()),
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,

@@ -23,6 +23,7 @@ use crate::machine::Machine;
 use crate::model::batch::Batch;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::{Data, Run, assemble};
+use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation};
 use nalgebra::{DMatrix, DVector, Vector3};
 use noise::{Known, Noise, Sample};
@@ -324,7 +325,7 @@ impl Search<'_> {
                 bits(o.normal.x),
                 bits(o.normal.y),
                 bits(o.normal.z),
-                bits(o.state[20]),
+                bits(o.state[slot::FEED]),
             ];
             let n = points.len();
             let point = *points.entry(key).or_insert(n);

@@ -28,14 +28,15 @@ pub struct Noise {
     pub source: &'static str,
     /// Degrees of freedom of σ; none where it is taken as known.
     pub dof: Option<f64>,
-    /// Standard deviation of each component of a visit's displacement, mm.
+    /// Standard deviation of each component of a visit's displacement, mm: what weights and uncertainties use. 0 where
+    /// nothing but a declaration is known of it: uncertainties then count the probe's noise alone, and say so.
     pub tau_mm: f64,
     /// `revisits`, `study`, `declared`, or `one pose`.
     pub visit_source: &'static str,
     /// Degrees of freedom of τ; none where it is taken as known.
     pub visit_dof: Option<f64>,
-    /// 90 % upper bound of τ, mm: what tests for missing effects use.
-    pub tau_90_mm: f64,
+    /// What tests for missing effects use, mm: the 90 % upper bound of τ, or the declared value.
+    pub tau_test_mm: f64,
 }
 
 /// What is known without looking at the touches.
@@ -86,16 +87,16 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
     let n_poses = samples.iter().map(|s| s.pose).collect::<std::collections::BTreeSet<_>>().len();
     let fixed = |tau_mm, visit_source| (tau_mm, visit_source, None, tau_mm);
     let enough = revisits.contrasts.len() >= LEAST_REVISITS && from_repeats.is_some();
-    let (tau_mm, visit_source, visit_dof, tau_90_mm) = match known.stated_tau_mm {
+    let (tau_mm, visit_source, visit_dof, tau_test_mm) = match known.stated_tau_mm {
         Some(stated) => fixed(stated, "study"),
         None if enough => {
             let (tau, dof, upper) = revisits.solve(sigma_mm);
             (tau, "revisits", Some(dof), upper)
         }
         None if n_poses < 2 => fixed(0.0, "one pose"),
-        None => fixed(known.declared_tau_mm, "declared"),
+        None => (0.0, "declared", None, known.declared_tau_mm),
     };
-    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_90_mm }
+    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm }
 }
 
 impl Noise {
@@ -109,17 +110,25 @@ impl Noise {
         };
         let tau = match (self.visit_source, self.visit_dof) {
             ("revisits", Some(_)) => {
-                format!("from revisited poses, at most {:.2} um with 90 % certainty", um_from_mm(self.tau_90_mm))
+                format!("from revisited poses, at most {:.2} um with 90 % certainty", um_from_mm(self.tau_test_mm))
             }
             ("study", _) => "as the study states".to_owned(),
             ("one pose", _) => "only one pose was visited".to_owned(),
-            _ => "the axes' declared indexing repeatability: the plan has too few revisits".to_owned(),
+            _ => "the axes' declared indexing repeatability, for tests only: the plan has too few revisits to measure it, \
+                  and the uncertainties count the probe's noise alone"
+                .to_owned(),
         };
         format!(
             "touch {:.2} um ({sigma}); index visit {:.2} um ({tau})",
             um_from_mm(self.sigma_mm),
-            um_from_mm(self.tau_mm)
+            um_from_mm(self.visit_mm())
         )
+    }
+
+    /// Standard deviation of each component of a visit's displacement as it is known, mm.
+    #[must_use]
+    pub fn visit_mm(&self) -> f64 {
+        if self.visit_source == "declared" { self.tau_test_mm } else { self.tau_mm }
     }
 
     /// Two-sided 95 % factor for a standard uncertainty of which `visit_share` of the variance goes back to τ
@@ -339,7 +348,7 @@ mod tests {
             assert_eq!((noise.source, noise.visit_source), ("repeats", "revisits"));
             mean_tau2 += noise.tau_mm.powi(2) / f64::from(runs);
             mean_sigma2 += noise.sigma_mm.powi(2) / f64::from(runs);
-            below += i32::from(noise.tau_90_mm < tau);
+            below += i32::from(noise.tau_test_mm < tau);
         }
         assert!((mean_tau2.sqrt() / tau - 1.0).abs() < 0.06, "{}", mean_tau2.sqrt());
         assert!((mean_sigma2.sqrt() / sigma - 1.0).abs() < 0.02, "{}", mean_sigma2.sqrt());

@@ -123,21 +123,23 @@ pub fn unmodelled<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) ->
     };
     catalogue
         .iter()
-        .filter(|e| e.applies_to(machine) && !e.paper && !e.per_block && !held(e))
+        .filter(|e| e.applies_to(machine) && !e.paper && !e.per_block && !e.discrete && !held(e))
         .collect()
 }
 
-/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size.
+/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size,
+/// and the ball's place scatters from one index to the next as far as that is known.
 pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> DVector<f64> {
     let effects = unmodelled(fit, machine, catalogue);
     let all = columns(machine, &effects, &fit.data, &fit.data.observations, fit.model.reference, None);
-    let linear = fit.linear(fit.noise.tau_mm);
+    let tau_mm = fit.noise.visit_mm();
+    let linear = fit.linear(tau_mm);
     let n = all.values.nrows();
     let mut b = all.values;
     for (mut column, u) in b.column_iter_mut().zip(&all.unknowns) {
         column *= u.typical;
     }
-    fit.with_touches(fit.noise.tau_mm, |t| t.whiten(&mut b));
+    fit.with_touches(tau_mm, |t| t.whiten(&mut b));
     // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
     let jacobian = linear.jacobian.rows(0, n);
     let cross = jacobian.tr_mul(&b);

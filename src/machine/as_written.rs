@@ -45,6 +45,9 @@ pub struct Machine {
     pub reference: Option<Reference>,
     /// The touch probe.
     pub probe: Option<Spanned2<Probe>>,
+    /// Further styli of the probe, which a program may ask for.
+    #[serde(default)]
+    pub stylus: Vec<Stylus>,
     /// Solids that must not be hit, whatever is mounted.
     #[serde(default)]
     pub solid: Vec<Solid>,
@@ -232,6 +235,25 @@ pub struct Probe {
     pub back_off: f64,
 }
 
+/// Another stylus of the same probe: what is not written is as with the probe's own.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stylus {
+    /// Short name, used by programs.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// What to do at the machine, in one line.
+    #[serde(default)]
+    pub says: String,
+    /// How much longer the stem is than the probe's own, mm; negative: shorter.
+    #[serde(default)]
+    pub longer: f64,
+    /// Radius of its ball, mm.
+    pub ball_radius: Option<f64>,
+    /// Radius of its stem, mm.
+    pub stem_radius: Option<f64>,
+}
+
 /// A solid that must not be hit.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -321,4 +343,7 @@ pub struct Block {
     pub size: Spanned<[f64; 3]>,
     /// Where it differs from the mounting's.
     pub riser: Option<Riser>,
+    /// Where it differs from the mounting's: a fixed block beside those that turn.
+    #[schemars(with = "Option<String>")]
+    pub carrier: Option<Spanned<String>>,
 }

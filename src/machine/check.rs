@@ -179,6 +179,7 @@ impl Check<'_> {
             return None;
         };
         self.probe(name, &probe.0);
+        let styli = self.styli(name, &m.stylus, probe.0.get_ref());
         let Some(reference) = m.reference else {
             self.error(
                 &here,
@@ -235,7 +236,7 @@ impl Check<'_> {
             "{:x}",
             HexDigest(
                 Sha256::digest(
-                    format!("{:?}{:?}{:?}{:?}{:?}{:?}", axes, tool, p, mountings, reference, m.origin).as_bytes()
+                    format!("{axes:?}{tool:?}{p:?}{styli:?}{mountings:?}{reference:?}{:?}", m.origin).as_bytes()
                 )
                 .to_vec()
             )
@@ -252,6 +253,7 @@ impl Check<'_> {
                 table: reference.table.into(),
             },
             probe: *p,
+            styli,
             solids,
             mountings,
             sha256,

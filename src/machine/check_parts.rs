@@ -2,7 +2,7 @@
 
 use super::as_written as w;
 use super::check::{Check, LARGEST};
-use super::{Block, Carrier, Mounting, Shape, Solid, Tool};
+use super::{Block, Carrier, Mounting, SAME_STYLUS_MM, Shape, Solid, Stylus, Tool};
 use crate::units::Plain;
 use nalgebra::Vector3;
 
@@ -124,6 +124,53 @@ impl Check<'_> {
         }
     }
 
+    /// Further styli. Plans know a stylus by its length and ball, so no two may be alike.
+    pub(super) fn styli(&mut self, machine: &str, written: &[w::Stylus], p: &w::Probe) -> Vec<Stylus> {
+        let mut styli: Vec<Stylus> = Vec::new();
+        for s in written {
+            let stylus = Stylus {
+                name: s.name.get_ref().clone(),
+                says: s.says.clone(),
+                longer: s.longer,
+                ball_radius: s.ball_radius.unwrap_or(p.ball_radius),
+                stem_radius: s.stem_radius.unwrap_or(p.stem_radius),
+            };
+            let name = &stylus.name;
+            let alike = |longer: f64, ball_radius: f64| {
+                (longer - stylus.longer).abs() < SAME_STYLUS_MM
+                    && (ball_radius - stylus.ball_radius).abs() < SAME_STYLUS_MM
+            };
+            let fault = if styli.iter().any(|o| o.name == *name) {
+                Some("stands twice".to_owned())
+            } else if !(stylus.longer.abs() <= LARGEST && p.stem_length + stylus.longer > stylus.ball_radius) {
+                Some(format!("is {} mm longer than the probe's own", Plain(stylus.longer)))
+            } else if !(stylus.stem_radius > 0.0
+                && stylus.stem_radius < stylus.ball_radius
+                && stylus.ball_radius <= LARGEST)
+            {
+                Some(format!(
+                    "has a stem of radius {} mm and a ball of radius {} mm",
+                    Plain(stylus.stem_radius),
+                    Plain(stylus.ball_radius)
+                ))
+            } else if alike(0.0, p.ball_radius) || styli.iter().any(|o| alike(o.longer, o.ball_radius)) {
+                Some("has the length and the ball of another one".to_owned())
+            } else {
+                None
+            };
+            if let Some(fault) = fault {
+                self.error(
+                    &s.name.span(),
+                    "machine::stylus",
+                    format!("stylus {name:?} of {machine:?} {fault}"),
+                    "a stylus has a name of its own, differs in length or ball, and is thinner than its ball",
+                );
+            }
+            styli.push(stylus);
+        }
+        styli
+    }
+
     pub(super) fn solid(&mut self, machine: &str, s: &w::Solid, carriers: &Carriers) -> Option<Solid> {
         let name = s.name.get_ref();
         let carrier = self.carrier(machine, name, &s.carrier, carriers);
@@ -233,6 +280,19 @@ impl Check<'_> {
                     "check the two centres and sizes",
                 );
             }
+            let carrier = match &b.carrier {
+                Some(word) if word.get_ref() == "base" => {
+                    self.error(
+                        &word.span(),
+                        "machine::block_carrier",
+                        format!("block {block:?} is carried by \"base\", which bears solids but no blocks"),
+                        "write \"table\"",
+                    );
+                    continue;
+                }
+                Some(word) => self.carrier(machine, block, word, carriers)?,
+                None => carrier,
+            };
             let riser = b.riser.or(x.riser);
             if let Some(r) = riser {
                 if !(r.height > 0.0 && r.height <= LARGEST && r.size.iter().all(|s| *s > 0.0 && *s <= LARGEST)) {
@@ -251,7 +311,7 @@ impl Check<'_> {
                     shape: Shape::Box { centre: under, size: Vector3::new(r.size[0], r.size[1], r.height) },
                 });
             }
-            blocks.push(Block { name: block.clone(), centre, size, riser });
+            blocks.push(Block { name: block.clone(), centre, size, riser, carrier });
         }
         if blocks.is_empty() {
             self.error(

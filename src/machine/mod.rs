@@ -158,6 +158,8 @@ pub struct Block {
     pub size: Vector3<f64>,
     /// Height and edges of the box under it.
     pub riser: Option<as_written::Riser>,
+    /// What bears it.
+    pub carrier: Carrier,
 }
 
 /// An artefact as it is mounted.
@@ -167,12 +169,27 @@ pub struct Mounting {
     pub name: String,
     /// What to do at the machine.
     pub says: String,
-    /// What bears it.
+    /// What bears it, where a block says nothing else.
     pub carrier: Carrier,
     /// Its blocks.
     pub blocks: Vec<Block>,
     /// Its other solids (the risers are among them).
     pub solids: Vec<Solid>,
+}
+
+/// A further stylus of the probe: what differs from the probe's own. Lengths mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stylus {
+    /// Short name, used by programs.
+    pub name: String,
+    /// What to do at the machine.
+    pub says: String,
+    /// How much longer the stem is.
+    pub longer: f64,
+    /// Radius of the ball.
+    pub ball_radius: f64,
+    /// Radius of the stem.
+    pub stem_radius: f64,
 }
 
 /// Points at which location errors can be stated, mm in R.
@@ -203,6 +220,8 @@ pub struct Machine {
     pub reference: Reference,
     /// The probe; `repeatability_um` in µm, lengths mm, feeds mm/min.
     pub probe: as_written::Probe,
+    /// Further styli of the probe.
+    pub styli: Vec<Stylus>,
     /// Solids that are always there.
     pub solids: Vec<Solid>,
     /// Artefacts as they can be mounted.
@@ -210,6 +229,9 @@ pub struct Machine {
     /// SHA-256 of the description that this was read from, hexadecimal.
     pub sha256: String,
 }
+
+/// Styli whose lengths and balls differ by less are taken for one, mm.
+pub const SAME_STYLUS_MM: f64 = 1e-6;
 
 impl Machine {
     /// An axis by letter.
@@ -280,10 +302,39 @@ impl Machine {
         Some(pose.with_xyz_mm(inverse * (ball - p0)))
     }
 
-    /// A mounting by name.
+    /// A mounting by name. `NAME#2`, `NAME#3` … are the same blocks put up once more.
     #[must_use]
     pub fn mounting(&self, name: &str) -> Option<&Mounting> {
-        self.mountings.iter().find(|m| m.name == name)
+        let described = |name: &str| self.mountings.iter().find(|m| m.name == name);
+        described(name).or_else(|| described(name.rsplit_once('#')?.0))
+    }
+
+    /// The machine with a stylus in its probe: other lengths and radii, everything else the same. `None`: it has no
+    /// stylus of that name.
+    #[must_use]
+    pub fn with_stylus(&self, name: &str) -> Option<Self> {
+        let stylus = self.styli.iter().find(|s| s.name == name)?;
+        let mut machine = self.clone();
+        // to a picometre: plans need not carry 302.68399999999997
+        let longer = |own: f64| ((own + stylus.longer) * 1e9).round() / 1e9;
+        machine.tool.length_mm = longer(machine.tool.length_mm);
+        machine.probe.stem_length = longer(machine.probe.stem_length);
+        machine.probe.stem_radius = stylus.stem_radius;
+        machine.probe.ball_radius = stylus.ball_radius;
+        Some(machine)
+    }
+
+    /// The machine with the stylus of this length (pivot to ball's centre) and ball radius, mm; `None`: it has no such.
+    #[must_use]
+    pub fn with_stylus_of(&self, length_mm: f64, ball_radius_mm: f64) -> Option<Self> {
+        let same = |m: &Self| {
+            (m.tool.length_mm - length_mm).abs() < SAME_STYLUS_MM
+                && (m.probe.ball_radius - ball_radius_mm).abs() < SAME_STYLUS_MM
+        };
+        if same(self) {
+            return Some(self.clone());
+        }
+        self.styli.iter().filter_map(|s| self.with_stylus(&s.name)).find(same)
     }
 
     /// Reads `table`, `base` or an axis letter of the workpiece side.

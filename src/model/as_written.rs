@@ -34,11 +34,25 @@ pub struct EffectAsWritten {
     /// What mends it.
     #[serde(default)]
     pub mends: String,
-    /// An axis of the chain, or tool, workpiece, block, trigger, reading.
+    /// An axis of the chain, or base, tool, workpiece, block, trigger, reading.
     #[schemars(with = "String")]
     pub at: Spanned<String>,
-    /// Applies where the axis stands on this side only.
+    /// Applies where its axes stand on this side only.
     pub side: Option<SideAsWritten>,
+    /// Letters of further axes that the machine must have (on that side).
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub needs: Vec<Spanned<String>>,
+    /// Letters of axes that the machine must not have (on that side).
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub unless: Vec<Spanned<String>>,
+    /// Short word that groups effects in lists.
+    #[serde(default)]
+    pub family: String,
+    /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
+    #[serde(default)]
+    pub discrete: bool,
     /// `block`: a set of parameters for each block.
     pub per: Option<Per>,
     /// Solved for, but no result.
@@ -86,10 +100,10 @@ pub enum Frame {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermAsWritten {
-    /// Name of its factor.
+    /// Name of its factor, unique among the effects of a model.
     #[schemars(with = "String")]
     pub parameter: Spanned<String>,
-    /// ISO 230 symbol.
+    /// ISO 230 symbol of the error motion or location error that it belongs to.
     pub iso: Option<String>,
     /// The paper's symbol.
     pub alias: Option<String>,
@@ -120,12 +134,61 @@ pub struct ShapeAsWritten {
     /// Its name in the formulas.
     #[schemars(with = "String")]
     pub parameter: Spanned<String>,
-    /// Its unit, for the reader.
-    pub unit: String,
+    /// Its unit: the formula sees the value in it.
+    #[schemars(with = "String")]
+    pub unit: Spanned<String>,
     /// Where the search begins.
     pub start: f64,
     /// Lowest value.
     pub min: Option<f64>,
     /// Highest value.
     pub max: Option<f64>,
+    /// Values to be tried where a search from `start` alone would not find the right one.
+    pub scan: Option<Scan>,
+    /// Where the start comes from.
+    pub source: Option<String>,
+}
+
+/// Values of a shape parameter to be tried.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Scan {
+    /// These.
+    Values(Vec<f64>),
+    /// So many in equal ratios (`log = true`) or equal steps.
+    Grid(Grid),
+}
+
+/// Values from one to another.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// The first.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
+    /// How many, 2 to 1000.
+    pub points: usize,
+    /// In equal ratios instead of equal steps.
+    #[serde(default)]
+    pub log: bool,
+}
+
+impl Scan {
+    /// The values; `None` where they make no sense.
+    #[must_use]
+    pub fn values(&self) -> Option<Vec<f64>> {
+        let values = match self {
+            Self::Values(values) => values.clone(),
+            Self::Grid(g) => {
+                let fit = (2..=1000).contains(&g.points) && (!g.log || (g.from > 0.0 && g.to > 0.0));
+                let share = |i: usize| i as f64 / (g.points - 1) as f64;
+                let at = |i: usize| {
+                    if g.log { g.from * (g.to / g.from).powf(share(i)) } else { g.from + (g.to - g.from) * share(i) }
+                };
+                if fit { (0..g.points).map(at).collect() } else { Vec::new() }
+            }
+        };
+        (!values.is_empty() && values.iter().all(|v| v.is_finite())).then_some(values)
+    }
 }

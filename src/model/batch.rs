@@ -35,6 +35,7 @@ pub struct Batch<'a> {
 #[derive(Debug, Clone, Copy)]
 struct Roles {
     tool: Option<usize>,
+    base: Option<usize>,
     workpiece: Option<usize>,
     block: Option<usize>,
     trigger: Option<usize>,
@@ -167,6 +168,7 @@ impl Model {
         }
         let roles = Roles {
             tool: self.find(Place::Tool),
+            base: self.find(Place::Base),
             workpiece: self.find(Place::Workpiece),
             block: self.find(Place::Block),
             trigger: self.find(Place::Trigger),
@@ -383,6 +385,11 @@ impl At<'_> {
             }
         }
 
+        if let Some(i) = batch.roles.base {
+            point = at_slot(i).rigid.apply(&point);
+            moved.push(point);
+        }
+
         // --- from R into the frame of the touched block
         met.clear();
         let chain = &model.workpiece[..model.carrier_length(model.set_ups()[o.set_up].carrier)];
@@ -460,6 +467,9 @@ impl At<'_> {
             }
         };
         let mut at_rotary = n_rotary_workpiece;
+        if let Some(i) = batch.roles.base {
+            applied(back.next(), i, &mut g, gradient);
+        }
         for link in &model.tool {
             if let Some(i) = link.before {
                 applied(back.next(), i, &mut g, gradient);

@@ -1,12 +1,12 @@
 //! From plans and touches to observations: what the model needs to know of each touch, and which touches it cannot use.
 
-use super::formula::{State, VARIABLES};
+use super::formula::{State, VARIABLES, slot};
 use super::predict::{Observation, SetUp};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Touch};
-use crate::machine::Machine;
-use crate::program::plan::{Plan, PlanTouch};
-use crate::units::hours_from_s;
+use crate::machine::{Carrier, Machine};
+use crate::program::plan::{Plan, PlanBlock, PlanTouch};
+use crate::units::{hours_from_s, rad_from_deg};
 use nalgebra::Vector3;
 
 /// One measurement run.
@@ -99,6 +99,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             };
             let mounting = planned.mounting.as_deref().unwrap_or(&run.plan.mounting);
             let set_up_label = match (&label, mounting) {
+                // a program with several mountings keeps them apart under the study's name too
+                (Some(label), _) if planned.mounting.is_some() => format!("{label}/{mounting}/{}", planned.block),
                 (Some(label), _) => format!("{label}/{}", planned.block),
                 (None, "") => planned.block.clone(),
                 (None, mounting) => format!("{mounting}/{}", planned.block),
@@ -122,7 +124,18 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 ball_at_zero: machine.tool.ball_at_zero(length_mm),
                 position: touch.position,
                 has_temperature: touch.temperature_deg_c.is_some(),
-                state: state(machine, planned, &touch.position, t, touch.temperature_deg_c, &last_sense, &normal),
+                state: Circumstances {
+                    machine,
+                    carrier,
+                    block,
+                    planned,
+                    at: &touch.position,
+                    hours: t,
+                    temperature_deg_c: touch.temperature_deg_c,
+                    senses: &last_sense,
+                    length_mm,
+                }
+                .state(),
             };
             let ideal = machine
                 .linear_for_ball(carrier, &planned.pose.position(), &(point + normal * ball_radius), length_mm)
@@ -212,32 +225,60 @@ fn senses(last: &mut [f64; 6], touch: &PlanTouch, previous: Option<&PlanTouch>) 
     }
 }
 
-fn state(
-    machine: &Machine,
-    touch: &PlanTouch,
-    at: &Position,
-    t: f64,
-    temperature: Option<f64>,
-    senses: &[f64; 6],
-    normal: &Vector3<f64>,
-) -> State {
-    let mut state = [0.0; VARIABLES.len()];
-    for name in AxisName::ALL {
-        state[name.index()] = at.mm_or_rad(name);
-        state[14 + name.index()] = senses[name.index()];
+/// What the state of a touch is made of.
+struct Circumstances<'a> {
+    machine: &'a Machine,
+    carrier: Carrier,
+    block: &'a PlanBlock,
+    planned: &'a PlanTouch,
+    /// Where the axes stood, mm and deg.
+    at: &'a Position,
+    hours: f64,
+    temperature_deg_c: Option<f64>,
+    senses: &'a [f64; 6],
+    /// Pivot to ball, mm.
+    length_mm: f64,
+}
+
+impl Circumstances<'_> {
+    fn state(&self) -> State {
+        let c = self;
+        let mut state = [0.0; VARIABLES.len()];
+        for name in AxisName::ALL {
+            state[slot::AXES + name.index()] = c.at.mm_or_rad(name);
+        }
+        state[slot::SENSES..slot::SENSES + 6].copy_from_slice(c.senses);
+        state[slot::HOURS] = c.hours;
+        state[slot::TEMPERATURE] = c.temperature_deg_c.unwrap_or(20.0);
+        state[slot::FEED] = c.planned.feed_mm_min.unwrap_or(c.machine.probe.slow_feed);
+        let spindle = rad_from_deg(c.planned.spindle_deg.unwrap_or(0.0));
+        state[slot::SPINDLE] = spindle;
+        state[slot::LENGTHS] = c.length_mm;
+        state[slot::LENGTHS + 1] = c.machine.tool.length_mm;
+        let mut put = |from: usize, v: Vector3<f64>| state[from..from + 3].copy_from_slice(v.as_slice());
+        let normal = Vector3::from(c.planned.normal).normalize();
+        let in_r = c.machine.carrier_frame(c.carrier, c.at).rotation * normal;
+        let into_tool = c.machine.tool_frame(c.at).rotation.inverse();
+        let into_probe = nalgebra::Rotation3::from_axis_angle(&c.machine.tool.direction, -spindle);
+        put(slot::NORMAL_IN_R, in_r);
+        put(slot::NORMAL_IN_PROBE, into_probe * (into_tool * in_r));
+        put(slot::GRAVITY, into_tool * -Vector3::z());
+        put(slot::NORMAL_OF_BLOCK, normal);
+        put(slot::POINT, c.planned.point.into());
+        put(slot::OUTWARD, outward(c.machine, c.carrier, &c.block.centre.into()));
+        state[slot::EDGE] = Vector3::from(c.block.size).dot(&normal.abs());
+        state
     }
-    state[6] = t;
-    state[7] = temperature.unwrap_or(20.0);
-    if let Some(carrier) = machine.carrier(&touch.carrier) {
-        let in_r = machine.carrier_frame(carrier, at).rotation * normal;
-        let in_tool = machine.tool_frame(at).rotation.inverse() * in_r;
-        let spindle = crate::units::rad_from_deg(touch.spindle_deg.unwrap_or(0.0));
-        let in_probe = nalgebra::Rotation3::from_axis_angle(&machine.tool.direction, -spindle) * in_tool;
-        state[8..11].copy_from_slice(in_r.as_slice());
-        state[11..14].copy_from_slice(in_probe.as_slice());
-    }
-    state[20] = touch.feed_mm_min.unwrap_or(machine.probe.slow_feed);
-    state
+}
+
+/// Unit vector from a carrier's centre line (its rotary axis, else the z axis of R) to a place in its frame; 0 on it.
+fn outward(machine: &Machine, carrier: Carrier, place: &Vector3<f64>) -> Vector3<f64> {
+    let turning = machine.carrier_chain(carrier).last().copied().filter(|a| a.name.is_rotary());
+    let (foot, along) =
+        turning.map_or((Vector3::zeros(), Vector3::z()), |axis| (axis.point, axis.direction.into_inner()));
+    let arm = place - foot;
+    let across = arm - along * arm.dot(&along);
+    across.try_normalize(1e-9).unwrap_or_default()
 }
 
 /// A new number unless the touch before was made at the same point of the same set-up.
@@ -251,6 +292,8 @@ fn repeat_group(data: &Data, plan: &Plan, touch: &PlanTouch, run: usize) -> usiz
                 && p.point == touch.point
                 && p.normal == touch.normal
                 && p.visit == touch.visit
+                && p.spindle_deg == touch.spindle_deg
+                && p.feed_mm_min == touch.feed_mm_min
         });
     if same { group } else { group + 1 }
 }

@@ -5,14 +5,48 @@
 
 use exmex::prelude::*;
 use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
+use std::sync::OnceLock;
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
-pub const VARIABLES: [&str; 21] = [
+pub const VARIABLES: [&str; 37] = [
     "X", "Y", "Z", "A", "B", "C", "t", "T", "nx", "ny", "nz", "mx", "my", "mz", "sX", "sY", "sZ", "sA", "sB", "sC",
-    "feed",
+    "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge",
 ];
 
-/// Values of [`VARIABLES`] at one touch: X Y Z mm; A B C rad; t h; T °C; normals; senses ±1; feed mm/min.
+/// Where groups of variables begin in a [`State`].
+pub mod slot {
+    /// `X Y Z A B C`.
+    pub const AXES: usize = 0;
+    /// `t`.
+    pub const HOURS: usize = 6;
+    /// `T`.
+    pub const TEMPERATURE: usize = 7;
+    /// `nx ny nz`.
+    pub const NORMAL_IN_R: usize = 8;
+    /// `mx my mz`.
+    pub const NORMAL_IN_PROBE: usize = 11;
+    /// `sX … sC`.
+    pub const SENSES: usize = 14;
+    /// `feed`.
+    pub const FEED: usize = 20;
+    /// `S`.
+    pub const SPINDLE: usize = 21;
+    /// `gx gy gz`.
+    pub const GRAVITY: usize = 22;
+    /// `L L0`.
+    pub const LENGTHS: usize = 25;
+    /// `bx by bz`.
+    pub const NORMAL_OF_BLOCK: usize = 27;
+    /// `px py pz`.
+    pub const POINT: usize = 30;
+    /// `ox oy oz`.
+    pub const OUTWARD: usize = 33;
+    /// `edge`.
+    pub const EDGE: usize = 36;
+}
+
+/// Values of [`VARIABLES`] at one touch: X Y Z mm; A B C rad; t h; T °C; normals; senses ±1; feed mm/min; spindle rad;
+/// gravity in the tool's frame; lengths, point and edge mm; outward from the carrier's centre line.
 pub type State = [f64; VARIABLES.len()];
 
 /// Functions that a formula may use.
@@ -60,14 +94,23 @@ enum Origin {
     Shape(usize),
 }
 
-/// A parsed formula.
+/// What a formula is once it is compiled.
+#[derive(Debug, Clone)]
+struct Parts {
+    constant: Option<f64>,
+    /// `None` for a bare number.
+    value: Option<Compiled>,
+    /// One per shape parameter that stands in it; `None` where the crate cannot differentiate (`floor`, `step`, …).
+    partials: Vec<(usize, Option<Compiled>)>,
+}
+
+/// A formula, compiled when it is first used: a study takes a few of the many that are built in.
 #[derive(Debug, Clone)]
 pub struct Formula {
     text: String,
-    constant: Option<f64>,
-    value: Compiled,
-    /// One per shape parameter that stands in it; `None` where the crate cannot differentiate (`floor`, `step`, …).
-    partials: Vec<(usize, Option<Compiled>)>,
+    /// Names of the effect's parameters that may stand inside.
+    shapes: Vec<String>,
+    parts: OnceLock<Option<Parts>>,
 }
 
 impl Formula {
@@ -76,23 +119,19 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
-        let plain = plain_numbers(text)?;
-        known_functions(&plain)?;
-        let expression =
-            Expression::parse(&plain).map_err(|e| format!("{} (functions: {})", e.msg(), FUNCTIONS.join(" ")))?;
-        let origins = origins(&expression, shapes)?;
-        let mut partials = Vec::new();
-        for (at, origin) in origins.iter().enumerate() {
-            if let Origin::Shape(shape) = origin {
-                let partial = expression.clone().partial(at).ok().and_then(|p| {
-                    let o = origins_of(&p, shapes).ok()?;
-                    Some((p, o))
-                });
-                partials.push((*shape, partial));
-            }
-        }
-        let constant = if origins.is_empty() { expression.eval(&[]).ok() } else { None };
-        Ok(Self { text: text.to_owned(), constant, value: (expression, origins), partials })
+        let parts = OnceLock::from(Some(compile(text, shapes)?));
+        Ok(Self { parts, ..Self::unchecked(text, shapes) })
+    }
+
+    /// A formula that is known to be good: nothing is parsed before it is used. A bad one has no value anywhere.
+    pub(super) fn unchecked(text: &str, shapes: &[&str]) -> Self {
+        let shapes = shapes.iter().map(|s| (*s).to_owned()).collect();
+        Self { text: text.to_owned(), shapes, parts: OnceLock::new() }
+    }
+
+    fn parts(&self) -> Option<&Parts> {
+        let compiled = || compile(&self.text, &self.shapes.iter().map(String::as_str).collect::<Vec<_>>()).ok();
+        self.parts.get_or_init(compiled).as_ref()
     }
 
     /// The formula as it was written.
@@ -104,30 +143,37 @@ impl Formula {
     /// Its value where it uses no variable.
     #[must_use]
     pub fn constant(&self) -> Option<f64> {
-        self.constant
+        self.parts().and_then(|p| p.constant)
     }
 
     /// True when a parameter of the effect stands inside.
     #[must_use]
     pub fn has_shape(&self) -> bool {
-        !self.partials.is_empty()
+        self.parts().is_some_and(|p| !p.partials.is_empty())
     }
 
     /// The state variables that it uses.
     #[must_use]
     pub fn variables(&self) -> Vec<&'static str> {
-        self.value.1.iter().filter_map(|o| if let Origin::State(i) = o { Some(VARIABLES[*i]) } else { None }).collect()
+        let origins = self.parts().and_then(|p| p.value.as_ref()).map_or(&[][..], |value| &value.1);
+        origins.iter().filter_map(|o| if let Origin::State(i) = o { Some(VARIABLES[*i]) } else { None }).collect()
     }
 
     /// Value at a state; `shapes` are the parameters' values in their own units.
     #[must_use]
     pub fn eval(&self, state: &State, shapes: &[f64]) -> f64 {
-        self.constant.unwrap_or_else(|| evaluate(&self.value, state, shapes))
+        let Some(parts) = self.parts() else { return f64::NAN };
+        match (parts.constant, &parts.value) {
+            (Some(constant), _) => constant,
+            (None, Some(value)) => evaluate(value, state, shapes),
+            (None, None) => f64::NAN,
+        }
     }
 
     /// Derivatives with respect to the shape parameters that stand inside: (which, value).
     pub fn partials<'a>(&'a self, state: &'a State, shapes: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        self.partials.iter().map(move |(shape, partial)| {
+        let partials = self.parts().map_or(&[][..], |p| &p.partials);
+        partials.iter().map(move |(shape, partial)| {
             let value = partial.as_ref().map(|p| evaluate(p, state, shapes)).filter(|v| v.is_finite());
             (*shape, value.unwrap_or_else(|| self.difference(*shape, state, shapes)))
         })
@@ -141,6 +187,35 @@ impl Formula {
         at[shape] -= 2.0 * step;
         (plus - self.eval(state, &at)) / (2.0 * step)
     }
+}
+
+fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
+    // most terms of a usual model are bare numbers, and the expression crate takes a tenth of a millisecond for each
+    if let Some(constant) = bare_number(text) {
+        return Ok(Parts { constant: Some(constant), value: None, partials: Vec::new() });
+    }
+    let plain = plain_numbers(text)?;
+    known_functions(&plain)?;
+    let expression =
+        Expression::parse(&plain).map_err(|e| format!("{} (functions: {})", e.msg(), FUNCTIONS.join(" ")))?;
+    let origins = origins(&expression, shapes)?;
+    let mut partials = Vec::new();
+    for (at, origin) in origins.iter().enumerate() {
+        if let Origin::Shape(shape) = origin {
+            let partial = expression.clone().partial(at).ok().and_then(|p| {
+                let o = self::origins(&p, shapes).ok()?;
+                Some((p, o))
+            });
+            partials.push((*shape, partial));
+        }
+    }
+    let constant = if origins.is_empty() { expression.eval(&[]).ok() } else { None };
+    Ok(Parts { constant, value: Some((expression, origins)), partials })
+}
+
+fn bare_number(text: &str) -> Option<f64> {
+    let digits = text.trim().trim_start_matches('-');
+    digits.starts_with(|c: char| c.is_ascii_digit()).then(|| text.trim().parse().ok().filter(|v: &f64| v.is_finite()))?
 }
 
 /// The expression crate reads no exponents: `1.5e-3` is written out as `0.0015`.
@@ -206,10 +281,6 @@ fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> 
 }
 
 fn origins(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
-    origins_of(expression, shapes)
-}
-
-fn origins_of(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
     let names = expression.var_names();
     if names.len() > 32 {
         return Err("a formula has more than 32 variables".to_owned());

@@ -3,6 +3,7 @@
 pub mod as_written;
 pub mod batch;
 pub mod catalogue;
+mod check;
 pub mod data;
 pub mod formula;
 pub mod predict;

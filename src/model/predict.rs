@@ -4,7 +4,7 @@
 //! centre in the frame of the real block, n and p the nominal normal and contact point, the gap is
 //!
 //! ```text
-//! g(θ) = n·(q − p) − r + trigger(θ)        q = E_block⁻¹ · (carrier chain)⁻¹ · (tool chain) · ball
+//! g(θ) = n·(q − p) − r + trigger(θ)        q = E_block⁻¹ · (carrier chain)⁻¹ · E_base · (tool chain) · ball
 //! ```
 //!
 //! and g = 0 at the true parameters θ. With θ = 0 it is the reading of the method (recorded less nominal, along the

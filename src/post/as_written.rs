@@ -182,6 +182,8 @@ pub struct Write {
     pub resume: Entry,
     /// A set-up ends.
     pub setup_end: Entry,
+    /// The program waits until a person has changed blocks or stylus; absent: programs with such a stop are refused.
+    pub stop: Option<Entry>,
     /// The spindle is oriented.
     pub orient: Entry,
     /// Rapid of linear axes.

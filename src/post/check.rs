@@ -231,7 +231,7 @@ impl Check<'_> {
             ("message", &write.message),
             ("end", &write.end),
         ];
-        for (name, entry) in entries {
+        for (name, entry) in entries.into_iter().chain(write.stop.as_ref().map(|entry| ("stop", entry))) {
             self.origin(&format!("write.{name}"), &entry.source, &entry.unverified, &entry.template.span());
             self.template(&mut env, name, &entry.template);
         }

@@ -74,6 +74,8 @@ pub(super) struct Writer<'a> {
     pub(super) senses: AxisMap,
     /// Orientation of the spindle at the control, deg.
     pub(super) oriented: Option<f64>,
+    /// What is mounted in the present part; empty where the program has one part.
+    pub(super) mounted: Vec<String>,
     /// Label of the set-up that is open.
     open_setup: Option<usize>,
     last: Named,
@@ -111,6 +113,7 @@ impl<'a> Writer<'a> {
             opening: Opening::default(),
             senses: AxisMap::default(),
             oriented: None,
+            mounted: path.mounted.clone(),
             open_setup: None,
             last: Named::default(),
         };
@@ -148,7 +151,7 @@ impl<'a> Writer<'a> {
 
     // ------------------------------------------------------------------------------------------------- rendering
 
-    fn render(&mut self, template: &str, context: Value) -> Result<()> {
+    pub(super) fn render(&mut self, template: &str, context: Value) -> Result<()> {
         let next = self.next_touch();
         let names = |axes: &[AxisName]| axes.iter().map(ToString::to_string).collect::<Vec<_>>();
         let rotary: Vec<AxisName> = self.axes.iter().copied().filter(|a| a.is_rotary()).collect();
@@ -163,6 +166,7 @@ impl<'a> Writer<'a> {
             axes => names(&self.axes),
             rotary => names(&rotary),
             tcp => self.frame.is_tcp(),
+            stops => !self.path.mounted.is_empty(),
             program => self.plan.program.clone(),
             machine => self.machine.name.clone(),
         };
@@ -251,6 +255,7 @@ impl<'a> Writer<'a> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
             Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),
+            Step::Stop(stop) => self.stop(stop),
             Step::OrientSpindle { deg } => {
                 let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
                 self.oriented = Some(angle);
@@ -298,7 +303,8 @@ impl<'a> Writer<'a> {
         self.render("setup", context! { number => number, says => says })?;
         let moves = self.resume(resume)?;
         let possible = moves.is_some();
-        self.render("resume", context! { number, possible, moves => moves.unwrap_or_default() })
+        let mounted = self.mounted.clone();
+        self.render("resume", context! { number, possible, moves => moves.unwrap_or_default(), mounted })
     }
 
     fn rotary(&mut self, to: &AxisMap, sense: &AxisMap) -> Result<()> {

@@ -20,7 +20,7 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// The frame of a plan's program.
+    /// The frame of a plan's program up to its first stop: a touch with another stylus has a frame of its own.
     #[must_use]
     pub fn of(machine: &'a Machine, plan: &Plan) -> Self {
         Self::new(machine, plan.controller_frame, plan.tool_length_mm)
@@ -32,6 +32,12 @@ impl<'a> Frame<'a> {
         // the workpiece is borne by the last axis of its side
         let carrier = machine.side(Side::Workpiece).last().map_or(Carrier::Base, |a| Carrier::Axis(a.name));
         Self { machine, carrier, length_mm, kind }
+    }
+
+    /// Length of the stylus for which it holds, mm.
+    #[must_use]
+    pub(super) fn length_mm(&self) -> f64 {
+        self.length_mm
     }
 
     /// True when the program's X, Y, Z are the tool's place in the workpiece.

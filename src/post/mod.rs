@@ -103,6 +103,12 @@ pub struct ColumnRule {
 }
 
 impl Postprocessor {
+    /// Whether a program may wait for a person.
+    #[must_use]
+    pub fn can_stop(&self) -> bool {
+        self.templates.get_template("stop").is_ok()
+    }
+
     /// All postprocessors that are built in.
     ///
     /// # Errors

@@ -1,15 +1,17 @@
-//! The first moves of a program, and the way back in when it starts again at a later set-up.
+//! The first moves of a program, its stops, and the way back in when it starts again at a later set-up.
 //!
 //! The first moves bring the machine from anywhere to a known place with the lift at its top, where nothing can meet
 //! whatever the other axes do: the path has proven that. A run that starts again makes the same moves, then goes up
 //! there to where its set-up begins, rotary axes first and in the sense in which they would have come, the lift last.
 
+use super::Frame;
 use super::emit::Writer;
 use crate::axes::{AxisMap, AxisName};
+use crate::diag::Failure;
 use crate::diag::Result;
 use crate::machine::Machine;
-use crate::program::path::{Path, Step};
-use minijinja::Value;
+use crate::program::path::{Path, Step, Stop};
+use minijinja::{Value, context};
 
 /// The first moves.
 #[derive(Debug, Clone, Default)]
@@ -63,6 +65,23 @@ impl Opening {
 }
 
 impl Writer<'_> {
+    /// Blocks or stylus are changed. It belongs to the set-up before it: a run that starts again behind it does not stop.
+    pub(super) fn stop(&mut self, stop: &Stop) -> Result<()> {
+        if !self.post.can_stop() {
+            return Err(Failure::new(
+                "post::no_stop",
+                format!("controller {} does not say how a program waits for a person", self.post.name),
+            )
+            .help("describe it under [write.stop] in the postprocessor file, or make a program with one mounting and stylus"));
+        }
+        self.mounted.clone_from(&stop.mounted);
+        // all rotary axes stand at 0, where the control's coordinates are the same for every length
+        self.frame = Frame::new(self.machine, self.plan.controller_frame, stop.tool_length_mm);
+        let longer = self.number(stop.tool_length_mm - self.plan.tool_length_mm);
+        let origin_z = self.number(self.machine.origin.get(AxisName::Z).unwrap_or(0.0));
+        self.render("stop", context! { says => stop.says.clone(), longer, origin_z })
+    }
+
     /// Remembers where the first moves have brought the machine.
     pub(super) fn opened(&mut self) {
         if self.opening.lift.is_some() && self.path.start_near.is_none() {
@@ -74,6 +93,10 @@ impl Writer<'_> {
     /// path proves none.
     pub(super) fn resume(&self, way: Option<&[Step]>) -> Result<Option<Vec<Value>>> {
         let (Some(opening), Some(way)) = (self.opening.place, way) else { return Ok(None) };
+        // the first moves are written for the length of the first stylus, and turn
+        if self.frame.is_tcp() && self.frame.length_mm().to_bits() != self.plan.tool_length_mm.to_bits() {
+            return Ok(None);
+        }
         let (mut stands, mut places) = (opening, Vec::new());
         for step in way {
             match step {

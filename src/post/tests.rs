@@ -78,7 +78,7 @@ pub(crate) fn path(plan: &Plan, probe: &crate::machine::as_written::Probe) -> pa
         steps.push(Step::Retract { to, feed: probe.position_feed });
         steps.push(Step::Protected { to: z(high), feed: probe.position_feed });
     }
-    path::Path { head: vec!["three touches (by hand), about 1 min".into()], steps, seconds: 60.0, start_near: None }
+    path::Path { head: vec!["three touches (by hand), about 1 min".into()], steps, seconds: 60.0, ..Default::default() }
 }
 
 fn program_of(name: &str, mounting: &str, block: &str, frame: ControllerFrame) -> String {

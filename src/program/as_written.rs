@@ -23,9 +23,12 @@ pub struct File {
     /// What it is for, in one line.
     #[serde(default)]
     pub says: String,
-    /// The mounting of the machine's description that carries the blocks.
+    /// The mounting of the machine's description that carries the blocks, where a stage does not say otherwise.
     #[schemars(with = "String")]
     pub mounting: Spanned<String>,
+    /// The stylus of the machine's description, where a stage does not say otherwise; without it the probe's own.
+    #[schemars(with = "Option<String>")]
+    pub stylus: Option<Spanned<String>>,
     /// What the names of faces mean: the block's own faces at all axes 0, or machine directions at the pose.
     #[serde(default)]
     pub faces_in: FacesIn,
@@ -52,6 +55,16 @@ pub enum FacesIn {
     Block,
     /// The direction into which the face looks at the pose; the carrier must then stand at a multiple of 90 degrees.
     Machine,
+}
+
+/// How the blocks of a stage came to stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Placed {
+    /// As they stood when this mounting was used last: on a pallet that comes back to its place.
+    Same,
+    /// Put up anew: where they stand now is another unknown.
+    Anew,
 }
 
 /// Points on a face: all combinations of `u` with `v` or with `depth` (`u` changes slowest).
@@ -81,6 +94,15 @@ pub struct Stage {
     /// Short name; the touches carry it.
     #[schemars(with = "String")]
     pub name: Spanned<String>,
+    /// The mounting, where it differs from the program's: the program stops and says what to put up.
+    #[schemars(with = "Option<String>")]
+    pub mounting: Option<Spanned<String>>,
+    /// The stylus, where it differs from the program's (`own`: the probe's own): the program stops and says which.
+    #[schemars(with = "Option<String>")]
+    pub stylus: Option<Spanned<String>>,
+    /// Whether the blocks stand as an earlier stage left them. Default: `same` while the mounting does not change, `anew`
+    /// when it does.
+    pub placed: Option<Placed>,
     /// How often each point is touched.
     #[schemars(with = "Option<i64>")]
     pub repeats: Option<Spanned<i64>>,

@@ -1,7 +1,8 @@
 //! The touches of a program without asking whether they can be reached: for studies on paper, never for a machine.
 
 use super::layout::lay_out;
-use super::plan::{self, ControllerFrame, Plan, PlanBlock, PlanTouch};
+use super::parts::{plan_blocks, where_it_differs};
+use super::plan::{self, ControllerFrame, Plan, PlanTouch};
 use super::spec::ProgramSpec;
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Failure, Result};
@@ -13,16 +14,20 @@ use crate::machine::Machine;
 /// When the program does not fit the machine.
 pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> {
     let (layout, _) = lay_out(machine, spec)?;
-    let mounting = layout.mounting;
-    let length_mm = machine.tool.length_mm;
+    let Some(one) = layout.parts.first() else {
+        return Err(Failure::new("program::empty", "the program has no part"));
+    };
     let mut touches: Vec<PlanTouch> = Vec::new();
     for (setup, visit) in layout.setups.iter().zip(1..) {
         let pose = setup.at_pose();
+        let Some(part) = layout.parts.get(setup.part) else { continue };
+        let (probe, length_mm) = (&part.machine.probe, part.machine.tool.length_mm);
         for target in &setup.targets {
+            let Some(block) = layout.block(setup, target) else { continue };
             let at = |off_face: f64| -> Result<AxisMap> {
-                let ball = target.point + target.normal * (machine.probe.ball_radius + off_face);
+                let ball = target.point + target.normal * (probe.ball_radius + off_face);
                 let place: Position =
-                    machine.linear_for_ball(mounting.carrier, &pose, &ball, length_mm).ok_or_else(|| {
+                    machine.linear_for_ball(block.carrier, &pose, &ball, length_mm).ok_or_else(|| {
                         Failure::new("program::linear_axes", "the linear axes do not span space in this pose")
                     })?;
                 let xyz = place.xyz_mm();
@@ -33,23 +38,23 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
                     id: touches.len() as u64 + 1,
                     stage: setup.spec.stage.clone(),
                     repeat,
-                    carrier: mounting.carrier.to_string(),
-                    mounting: None,
-                    block: mounting.blocks[target.block].name.clone(),
+                    carrier: block.carrier.to_string(),
+                    mounting: (part.label != one.label).then(|| part.label.clone()),
+                    block: block.name.clone(),
                     face: target.face.to_string(),
                     point: target.point.into(),
                     normal: target.normal.into(),
                     pose: setup.pose,
-                    start: at(machine.probe.approach)?,
+                    start: at(probe.approach)?,
                     nominal: at(0.0)?,
-                    end: at(-machine.probe.search)?,
+                    end: at(-probe.search)?,
                     time_s: None,
                     visit: Some(visit),
-                    feed_mm_min: None,
-                    spindle_deg: None,
-                    tool_length_mm: None,
-                    ball_radius_mm: None,
-                    from: AxisMap::default(),
+                    feed_mm_min: setup.spec.feed_mm_min,
+                    spindle_deg: setup.spec.spindle_deg,
+                    tool_length_mm: where_it_differs(length_mm, one.machine.tool.length_mm),
+                    ball_radius_mm: where_it_differs(probe.ball_radius, one.machine.probe.ball_radius),
+                    from: setup.spec.from.value,
                     first: false,
                 });
             }
@@ -60,22 +65,12 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
         machine: machine.name.clone(),
         machine_sha256: machine.sha256.clone(),
         program: spec.name.clone(),
-        mounting: mounting.name.clone(),
+        mounting: one.label.clone(),
         controller_frame: ControllerFrame::Axes,
-        ball_radius_mm: machine.probe.ball_radius,
-        tool_length_mm: length_mm,
+        ball_radius_mm: one.machine.probe.ball_radius,
+        tool_length_mm: one.machine.tool.length_mm,
         placement_tolerance_mm: None,
-        blocks: mounting
-            .blocks
-            .iter()
-            .map(|b| PlanBlock {
-                name: b.name.clone(),
-                carrier: mounting.carrier.to_string(),
-                mounting: None,
-                centre: b.centre.into(),
-                size: b.size.into(),
-            })
-            .collect(),
+        blocks: plan_blocks(&layout.parts),
         touches,
         skipped: Vec::new(),
         notes: Vec::new(),

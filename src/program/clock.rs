@@ -20,6 +20,12 @@ const MOVE_S: f64 = 0.2;
 /// Stopping at the trigger and writing the log, s, each touch.
 const TOUCH_S: f64 = 0.5;
 
+/// A person puts up other blocks, s: assumed.
+const MOUNTING_S: f64 = 600.0;
+
+/// A person changes the stylus, s: assumed.
+const STYLUS_S: f64 = 300.0;
+
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// Time since the program began.
@@ -48,6 +54,11 @@ impl Clock {
     /// A move at a feed, mm and mm/min.
     pub(super) fn feed(&mut self, way_mm: f64, feed_mm_min: f64) {
         self.add(way_mm, feed_mm_min);
+    }
+
+    /// The program stands while blocks or stylus are changed.
+    pub(super) fn stop(&mut self, blocks: bool, stylus: bool) {
+        self.seconds += if blocks { MOUNTING_S } else { 0.0 } + if stylus { STYLUS_S } else { 0.0 };
     }
 
     /// A touch up to its measuring trigger.

@@ -5,14 +5,13 @@ use super::plan::{PlanTouch, Skipped};
 use super::route::Routed;
 use super::spec::ProgramSpec;
 use crate::axes::{AxisMap, AxisName, Position};
-use crate::machine::{Block, Machine, Mounting, Side};
+use crate::machine::{Block, Machine, Side};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The lines at the head of the NC program: plain ASCII, no brackets, so that every control takes them as a comment.
 pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, routed: &Routed) -> Vec<String> {
     let probe = &machine.probe;
-    let mounting = layout.mounting;
     let mut lines = vec![
         format!("Probing program {} for {}", spec.name, machine.name),
         spec.says.clone(),
@@ -22,24 +21,14 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
             duration(routed.path.seconds),
             spec.name
         ),
-        "Set up:".to_owned(),
-        format!("  mounting {}: {}", mounting.name, mounting.says),
     ];
-    for block in &mounting.blocks {
-        lines.extend(block_lines(machine, mounting, block));
-    }
+    lines.extend(parts_lines(layout));
     lines.extend([
         format!(
             "  each block within {} mm of its place, its faces along the machine's axes",
             probe.placement_tolerance
         ),
         "  a touch that is further off stops the program; the first of each block is made slowly".to_owned(),
-        format!(
-            "  probe with ball {} mm across, stem {} mm; {} mm from the pivot or gauge line to the ball's centre",
-            2.0 * probe.ball_radius,
-            probe.stem_length,
-            machine.tool.length_mm
-        ),
         "  the positions above and below are machine coordinates with all rotary axes at 0, ball's centre".to_owned(),
         "Before the start:".to_owned(),
         "  probe in the spindle, spindle stopped, nothing that touches the stylus".to_owned(),
@@ -70,6 +59,28 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
         line.retain(|c| c.is_ascii() && !matches!(c, '(' | ')'));
     }
     lines.retain(|l| !l.trim().is_empty());
+    lines
+}
+
+/// What is to be put up: at the start and, where the program has several parts, at each stop.
+fn parts_lines(layout: &Layout) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut said = BTreeSet::new();
+    for (i, part) in layout.parts.iter().enumerate() {
+        lines.push(if i == 0 {
+            "Set up:".to_owned()
+        } else {
+            format!("At stop {i}, where the program waits for cycle start:")
+        });
+        lines.push(format!("  mounting {}: {}", part.mounting.name, part.mounting.says));
+        if said.insert(&part.mounting.name) {
+            for block in &part.mounting.blocks {
+                lines.extend(block_lines(&part.machine, block));
+            }
+        }
+        let says = if part.stylus.is_some() { part.stylus_says() } else { part.probe_says() };
+        lines.push(format!("  probe with {says}"));
+    }
     lines
 }
 
@@ -117,9 +128,9 @@ fn towards(direction: &Vector3<f64>) -> String {
     words.join(" ")
 }
 
-fn block_lines(machine: &Machine, mounting: &Mounting, block: &Block) -> Vec<String> {
+fn block_lines(machine: &Machine, block: &Block) -> Vec<String> {
     let top = block.centre + Vector3::z() * (block.size.z / 2.0 + machine.probe.ball_radius);
-    let at = machine.linear_for_ball(mounting.carrier, &Position::default(), &top, machine.tool.length_mm);
+    let at = machine.linear_for_ball(block.carrier, &Position::default(), &top, machine.tool.length_mm);
     let mut line = format!("  block {}: {} x {} x {} mm", block.name, block.size.x, block.size.y, block.size.z);
     if let Some(riser) = &block.riser {
         line.push_str(&format!(", on a riser {} mm high", riser.height));
@@ -201,17 +212,16 @@ pub(super) fn losses(layout: &Layout, touches: &[PlanTouch], skipped: &[Skipped]
         let here = |pose: &AxisMap, stage: &str| *pose == setup.pose && stage == setup.spec.stage;
         let made: BTreeSet<(&str, &str)> =
             touches.iter().filter(|t| here(&t.pose, &t.stage)).map(|t| (t.block.as_str(), t.face.as_str())).collect();
-        notes.extend(losses_of(layout.mounting, setup, &made));
+        notes.extend(losses_of(layout, setup, &made));
     }
     notes.dedup();
     notes
 }
 
-fn losses_of(mounting: &Mounting, setup: &Setup, made: &BTreeSet<(&str, &str)>) -> Vec<String> {
+fn losses_of(layout: &Layout, setup: &Setup, made: &BTreeSet<(&str, &str)>) -> Vec<String> {
     let pose = pose_says(&setup.pose);
-    let name = |b: usize| mounting.blocks.get(b).map_or("", |b| b.name.as_str());
     let wanted: Vec<(&str, String, Vector3<f64>)> =
-        setup.targets.iter().map(|t| (name(t.block), t.face.to_string(), t.normal)).collect();
+        setup.targets.iter().map(|t| (layout.block_name(setup, t), t.face.to_string(), t.normal)).collect();
     if made.is_empty() {
         return vec![format!("{pose}: nothing can be touched in this pose; every relation that needs it is lost")];
     }

@@ -2,9 +2,10 @@
 //! asked here.
 
 use super::as_written::FacesIn;
+use super::parts::Part;
 use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, SetupSpec};
 use crate::axes::{AxisMap, Position};
-use crate::diag::{Finding, Findings, Result};
+use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Block, Machine, Mounting};
 use crate::units::Plain;
 use nalgebra::{Rotation3, Vector3};
@@ -27,6 +28,8 @@ pub struct Target {
 pub struct Setup<'a> {
     /// What the program says about it.
     pub spec: &'a SetupSpec,
+    /// Place of its part in [`Layout::parts`].
+    pub part: usize,
     /// Every rotary axis of the machine, deg.
     pub pose: AxisMap,
     /// The targets; each is touched `spec.repeats` times.
@@ -44,10 +47,24 @@ impl Setup<'_> {
 /// A whole program on a machine.
 #[derive(Debug, Clone)]
 pub struct Layout<'a> {
-    /// The artefact.
-    pub mounting: &'a Mounting,
+    /// What is mounted, from stop to stop: at least one part.
+    pub parts: Vec<Part<'a>>,
     /// The set-ups, in order.
     pub setups: Vec<Setup<'a>>,
+}
+
+impl Layout<'_> {
+    /// The block of a target.
+    #[must_use]
+    pub fn block(&self, setup: &Setup, target: &Target) -> Option<&Block> {
+        self.parts.get(setup.part)?.mounting.blocks.get(target.block)
+    }
+
+    /// Name of a target's block.
+    #[must_use]
+    pub fn block_name(&self, setup: &Setup, target: &Target) -> &str {
+        self.block(setup, target).map_or("", |b| b.name.as_str())
+    }
 }
 
 /// Lays a program out on a machine.
@@ -70,28 +87,29 @@ pub fn lay_out<'a>(machine: &'a Machine, spec: &'a ProgramSpec) -> Result<(Layou
             .at(&spec.source, written_for.span.clone()),
         );
     }
-    let Some(mounting) = machine.mounting(&spec.mounting.value) else {
-        let names: Vec<&str> = machine.mountings.iter().map(|m| m.name.as_str()).collect();
-        return Err(spec
-            .error(
-                &spec.mounting.span,
-                "program::unknown_mounting",
-                format!("{} has no mounting {:?}", machine.name, spec.mounting.value),
-                format!("it has: {}; a mounting is described in the machine's file", names.join(", ")),
-            )
-            .into());
-    };
-    let setups: Vec<Setup> = spec.setups.iter().map(|s| check.setup(mounting, s)).collect();
+    let mut parts = Vec::new();
+    for part in &spec.parts {
+        match Part::on(machine, spec, part) {
+            Ok(part) => parts.push(part),
+            Err(lacks) => lacks.into_iter().for_each(|finding| check.push_once(finding)),
+        }
+    }
+    if parts.len() < spec.parts.len() {
+        return Err(Failure(check.findings.0));
+    }
+    let mounting = |s: &SetupSpec| parts.get(s.part).map(|p| p.mounting);
+    let setups: Vec<Setup> = spec.setups.iter().filter_map(|s| Some(check.setup(mounting(s)?, s))).collect();
     let touches: usize = setups.iter().map(|s| s.targets.len().saturating_mul(s.spec.repeats as usize)).sum();
     if touches > MOST_TOUCHES {
-        check.error(
-            &spec.mounting,
+        let at = spec.parts.first().map_or(0..0, |p| p.mounting.span.clone());
+        check.push_once(spec.error(
+            &at,
             "program::too_many",
             format!("the program asks for {touches} touches"),
             format!("write fewer points, poses or repeats: {MOST_TOUCHES} at most"),
-        );
+        ));
     }
-    check.findings.finish(Layout { mounting, setups })
+    check.findings.finish(Layout { parts, setups })
 }
 
 struct Check<'a> {
@@ -145,20 +163,21 @@ impl<'a> Check<'a> {
             }
         }
         let blocks = self.blocks(mounting, spec);
-        let to_carrier = machine.carrier_frame(mounting.carrier, &pose.position()).rotation.inverse();
-        let to_carrier = match self.spec.faces_in {
+        let to_carrier = |block: &Block| match self.spec.faces_in {
             FacesIn::Block => Rotation3::identity(),
-            FacesIn::Machine => to_carrier.to_rotation_matrix(),
+            FacesIn::Machine => {
+                machine.carrier_frame(block.carrier, &pose.position()).rotation.inverse().to_rotation_matrix()
+            }
         };
         let targets = blocks
             .iter()
             .flat_map(|&b| spec.faces.iter().map(move |f| (b, f)))
             .flat_map(|(b, faces)| match &mounting.blocks.get(b) {
-                Some(block) => self.face(b, block, faces, &to_carrier),
+                Some(block) => self.face(b, block, faces, &to_carrier(block)),
                 None => Vec::new(),
             })
             .collect();
-        Setup { spec, pose, targets }
+        Setup { spec, part: spec.part, pose, targets }
     }
 
     fn blocks(&mut self, mounting: &Mounting, spec: &SetupSpec) -> Vec<usize> {

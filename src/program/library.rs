@@ -1,16 +1,21 @@
 //! The programs that are built in, and which of them is meant for a machine.
 
+use super::parts::Part;
 use super::spec::{ProgramSpec, load};
 use crate::diag::{Failure, Result, source};
 use crate::machine::Machine;
 
 /// The programs that are built in: file name and text.
-const BUILT_IN: [(&str, &str); 5] = [
+const BUILT_IN: [(&str, &str); 9] = [
     ("programs/head.toml", include_str!("../../programs/head.toml")),
     ("programs/table.toml", include_str!("../../programs/table.toml")),
     ("programs/double-head.toml", include_str!("../../programs/double-head.toml")),
     ("programs/basic-trunnion.toml", include_str!("../../programs/basic-trunnion.toml")),
     ("programs/basic-swivel-table-b.toml", include_str!("../../programs/basic-swivel-table-b.toml")),
+    ("programs/full-swivel-head.toml", include_str!("../../programs/full-swivel-head.toml")),
+    ("programs/full-double-head.toml", include_str!("../../programs/full-double-head.toml")),
+    ("programs/full-trunnion.toml", include_str!("../../programs/full-trunnion.toml")),
+    ("programs/full-swivel-table-b.toml", include_str!("../../programs/full-swivel-table-b.toml")),
 ];
 
 /// The programs that are built in.
@@ -41,11 +46,14 @@ pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &Machine) -> Result<
     let written_for: Vec<String> = named.iter().filter_map(|s| s.machine.as_ref().map(|m| m.value.clone())).collect();
     let written_for_it = |s: &ProgramSpec| s.machine.as_ref().is_none_or(|m| m.value == machine.name);
     let fits = |s: &ProgramSpec| {
-        machine.mounting(&s.mounting.value).is_some_and(|mounting| {
-            let has_block = |name: &String| mounting.blocks.iter().any(|b| &b.name == name);
+        let parts: Option<Vec<Part>> = s.parts.iter().map(|p| Part::on(machine, s, p).ok()).collect();
+        parts.is_some_and(|parts| {
+            let has_block = |part: usize, name: &String| {
+                parts.get(part).is_some_and(|p| p.mounting.blocks.iter().any(|b| &b.name == name))
+            };
             s.setups.iter().all(|x| {
                 x.pose.value.iter().all(|(a, _)| machine.axis(a).is_some())
-                    && x.blocks.iter().flatten().all(|b| has_block(&b.value))
+                    && x.blocks.iter().flatten().all(|b| has_block(x.part, &b.value))
             })
         })
     };

@@ -11,12 +11,14 @@ mod head;
 pub mod heights;
 pub mod layout;
 mod library;
+pub mod parts;
 pub mod path;
 pub mod plan;
 mod reach;
 mod route;
 pub mod scene;
 pub mod spec;
+mod stops;
 pub mod sweep;
 mod turns;
 mod verify;
@@ -32,7 +34,7 @@ pub use verify::{Violation, verify};
 
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
-use plan::{ControllerFrame, Plan, PlanBlock};
+use plan::{ControllerFrame, Plan};
 
 /// How a program is generated.
 #[derive(Debug, Clone, Copy, Default)]
@@ -69,8 +71,12 @@ pub fn schema() -> schemars::Schema {
 /// proof finds a move that is not clear.
 pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Result<(Generated, Findings)> {
     let (layout, mut findings) = layout::lay_out(machine, spec)?;
-    let scene = scene::Scene::new(machine, layout.mounting)?;
-    let mut routed = route::route(&scene, &layout, spec)?;
+    let scenes: Vec<scene::Scene> =
+        layout.parts.iter().map(|p| scene::Scene::new(&p.machine, p.mounting)).collect::<Result<_>>()?;
+    for scene in &scenes {
+        scene.blocks_clear_of_each_other()?;
+    }
+    let mut routed = route::route(&scenes, &layout, spec)?;
     let groups = skipped_groups(&routed.skipped);
     for group in &groups {
         let message = format!(
@@ -106,28 +112,19 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
     }
     let head = head::head(machine, spec, &layout, &routed);
     routed.path.head = head;
-    let mounting = layout.mounting;
+    let first = layout.parts.first();
+    let own = first.map_or(machine, |p| &p.machine);
     let plan = Plan {
         format: plan::FORMAT.to_owned(),
         machine: machine.name.clone(),
         machine_sha256: machine.sha256.clone(),
         program: spec.name.clone(),
-        mounting: mounting.name.clone(),
+        mounting: first.map(|p| p.label.clone()).unwrap_or_default(),
         controller_frame: if options.tcp { ControllerFrame::Tcp } else { ControllerFrame::Axes },
-        ball_radius_mm: machine.probe.ball_radius,
-        tool_length_mm: machine.tool.length_mm,
+        ball_radius_mm: own.probe.ball_radius,
+        tool_length_mm: own.tool.length_mm,
         placement_tolerance_mm: Some(machine.probe.placement_tolerance),
-        blocks: mounting
-            .blocks
-            .iter()
-            .map(|b| PlanBlock {
-                name: b.name.clone(),
-                carrier: mounting.carrier.to_string(),
-                mounting: None,
-                centre: b.centre.into(),
-                size: b.size.into(),
-            })
-            .collect(),
+        blocks: parts::plan_blocks(&layout.parts),
         touches: routed.touches,
         skipped: routed.skipped,
         notes,

@@ -23,6 +23,8 @@ pub enum Step {
         /// senses, proven like every other move. `None`: no way is proven clear, the program cannot be taken up here.
         resume: Option<Vec<Step>>,
     },
+    /// The program stops until a person has done what is said. The lift stands at its top and all rotary axes at 0.
+    Stop(Stop),
     /// Spindle stopped and oriented, right-handed about the tool frame's +z, deg.
     OrientSpindle {
         /// Orientation.
@@ -57,6 +59,21 @@ pub enum Step {
         /// Feed.
         feed: f64,
     },
+}
+
+/// What a person does while the program stands, and what is mounted then.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// What to do, one line each.
+    pub says: Vec<String>,
+    /// What is mounted then, one line each: what a run that starts again in this part needs.
+    pub mounted: Vec<String>,
+    /// Name of the blocks as they stand then; the plan's touches carry it.
+    pub mounting: String,
+    /// Pivot to ball's centre.
+    pub tool_length_mm: f64,
+    /// Radius of the ball.
+    pub ball_radius_mm: f64,
 }
 
 /// What a postprocessor needs to spell a touch.
@@ -95,6 +112,8 @@ pub struct Path {
     pub steps: Vec<Step>,
     /// Predicted run time, s.
     pub seconds: f64,
+    /// What is mounted up to the first stop, one line each; empty where the program does not stop.
+    pub mounted: Vec<String>,
     /// Where the rotary axes must stand at the start; `None`: anywhere.
     pub start_near: Option<StartNear>,
 }

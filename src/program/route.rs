@@ -6,16 +6,20 @@
 use super::clock::{Clock, distance_mm};
 use super::heights::{Heights, Lift};
 use super::layout::{Layout, Setup, Target};
+use super::parts::where_it_differs;
 use super::path::{Path, StartNear, Step, TouchStep};
 use super::plan::{PlanTouch, Skipped};
 use super::reach::Reached;
 use super::scene::Scene;
 use super::spec::ProgramSpec;
+use super::stops::mounted;
 use super::sweep::Manner;
 use super::turns::{Turn, turn_step, turns};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
+use crate::machine::{Axis, Carrier};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// A protected move is never shorter than this, mm: some controls refuse a probing move of a few tenths.
 pub(super) const SHORTEST_PROTECTED_MM: f64 = 1.0;
@@ -24,7 +28,7 @@ pub(super) const SHORTEST_PROTECTED_MM: f64 = 1.0;
 const TURN_STEP_MM: f64 = 10.0;
 
 /// Coordinates that differ by less are the same place, mm or deg.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 /// What the routing of a program gives.
 #[derive(Debug, Default)]
@@ -38,7 +42,8 @@ pub(super) struct Routed {
 ///
 /// # Errors
 /// When no program can begin on this machine: no axis lifts the probe, or not even near the first pose all is clear.
-pub(super) fn route(scene: &Scene, layout: &Layout, spec: &ProgramSpec) -> Result<Routed> {
+pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec) -> Result<Routed> {
+    let Some(scene) = scenes.first() else { return Ok(Routed::default()) };
     let Some(lift) = scene.lift() else {
         return Err(Failure::new("program::no_lift", format!("{} has no linear axis", scene.machine.name))
             .help("a probing program needs X, Y and Z"));
@@ -54,7 +59,9 @@ pub(super) fn route(scene: &Scene, layout: &Layout, spec: &ProgramSpec) -> Resul
         ));
     }
     let mut router = Router {
+        scenes,
         scene,
+        part: 0,
         layout,
         lift,
         overshoot_deg: spec.overshoot_deg,
@@ -64,7 +71,8 @@ pub(super) fn route(scene: &Scene, layout: &Layout, spec: &ProgramSpec) -> Resul
         senses: AxisMap::default(),
         opening: None,
         visit: 0,
-        met: vec![false; layout.mounting.blocks.len()],
+        stopped: false,
+        met: BTreeSet::new(),
         heights: Heights { over_all: lift.top_height(), over_blocks: lift.top_height() },
     };
     for (number, setup) in (1..).zip(&layout.setups) {
@@ -72,39 +80,51 @@ pub(super) fn route(scene: &Scene, layout: &Layout, spec: &ProgramSpec) -> Resul
     }
     router.leave();
     router.out.path.seconds = router.clock.rounded_s();
+    if router.part > 0 {
+        router.out.path.mounted = layout.parts.first().map(mounted).unwrap_or_default();
+    }
     Ok(router.out)
 }
 
-struct Router<'a, 'm> {
-    scene: &'a Scene<'m>,
-    layout: &'a Layout<'a>,
-    lift: Lift,
+pub(super) struct Router<'a, 'm> {
+    /// Of each part.
+    pub(super) scenes: &'a [Scene<'m>],
+    /// Of the part that is mounted.
+    pub(super) scene: &'a Scene<'m>,
+    pub(super) part: usize,
+    pub(super) layout: &'a Layout<'a>,
+    pub(super) lift: Lift,
     overshoot_deg: f64,
-    out: Routed,
-    clock: Clock,
+    pub(super) out: Routed,
+    pub(super) clock: Clock,
     /// Where the machine stands; `None` until the first moves have brought it to a known place.
-    at: Option<Position>,
+    pub(super) at: Option<Position>,
     /// Sense of each rotary axis's last move.
-    senses: AxisMap,
+    pub(super) senses: AxisMap,
     /// Where the opening ended, and the senses in which the rotary axes came there.
-    opening: Option<(Position, AxisMap)>,
-    visit: u32,
-    /// Blocks that have been touched.
-    met: Vec<bool>,
+    pub(super) opening: Option<(Position, AxisMap)>,
+    pub(super) visit: u32,
+    /// The program has stopped since the last touch: what comes is another visit, turned or not.
+    pub(super) stopped: bool,
+    /// Blocks of the part that have been touched with its stylus.
+    pub(super) met: BTreeSet<usize>,
     /// Of the pose in which the machine stands.
-    heights: Heights,
+    pub(super) heights: Heights,
 }
 
 impl Router<'_, '_> {
     fn setup(&mut self, number: u32, setup: &Setup) -> Result<()> {
-        let probe = &self.scene.machine.probe;
+        let Some(scene) = self.scenes.get(setup.part) else { return Ok(()) };
+        let probe = &scene.machine.probe;
         let room = probe.clearance + probe.placement_tolerance + probe.approach;
-        let heights = self.scene.heights(&self.lift, &setup.at_pose(), room);
-        let carrier = self.layout.mounting.carrier;
+        let heights = scene.heights(&self.lift, &setup.at_pose(), room);
         let reached: Vec<_> = setup
             .targets
             .par_iter()
-            .map(|t| self.scene.reach(&self.lift, carrier, &setup.at_pose(), t, heights.over_all))
+            .map(|t| {
+                let carrier = self.layout.block(setup, t).map_or(Carrier::Base, |b| b.carrier);
+                scene.reach(&self.lift, carrier, &setup.at_pose(), t, heights.over_all)
+            })
             .collect();
         let Some(first) = reached.iter().find_map(|r| r.as_ref().ok()) else {
             for (target, reached) in setup.targets.iter().zip(reached) {
@@ -112,7 +132,11 @@ impl Router<'_, '_> {
             }
             return Ok(());
         };
-        if let Err(reason) = self.index(number, setup, heights, first)? {
+        let there = match self.change_part(setup.part) {
+            Ok(()) => self.index(number, setup, heights, first)?,
+            Err(reason) => Err(reason),
+        };
+        if let Err(reason) = there {
             for (target, reached) in setup.targets.iter().zip(reached) {
                 self.skip(setup, target, reached.err().unwrap_or_else(|| reason.clone()));
             }
@@ -134,7 +158,7 @@ impl Router<'_, '_> {
     fn skip(&mut self, setup: &Setup, target: &Target, reason: String) {
         self.out.skipped.push(Skipped {
             stage: setup.spec.stage.clone(),
-            block: self.layout.mounting.blocks.get(target.block).map(|b| b.name.clone()).unwrap_or_default(),
+            block: self.layout.block_name(setup, target).to_owned(),
             face: target.face.to_string(),
             point: target.point.into(),
             pose: setup.pose,
@@ -166,7 +190,8 @@ impl Router<'_, '_> {
                     for turn in &turns {
                         self.turn(turn);
                     }
-                    self.visit += u32::from(!turns.is_empty());
+                    let stopped = std::mem::take(&mut self.stopped);
+                    self.visit += u32::from(stopped || !turns.is_empty());
                     self.heights = heights;
                     return Ok(Ok(()));
                 }
@@ -193,10 +218,13 @@ impl Router<'_, '_> {
     /// The first moves: nobody knows where the machine stands.
     fn begin(&mut self, setup: &Setup, turns: &[Turn], first: &Reached) -> Result<()> {
         let lift = self.lift;
-        let anywhere = self.scene.clear_from_anywhere(&lift, &|a| a.range);
-        if !anywhere {
+        // whatever is mounted when a run starts again at a later set-up
+        let all_clear = |window: &dyn Fn(&Axis) -> [f64; 2]| {
+            self.scenes.iter().all(|scene| scene.clear_from_anywhere(&lift, window))
+        };
+        if !all_clear(&|a| a.range) {
             let near = StartNear { pose: setup.pose, within_deg: self.overshoot_deg };
-            if !self.scene.clear_from_anywhere(&lift, &|a| near.window(a)) {
+            if !all_clear(&|a| near.window(a)) {
                 return Err(Failure::new(
                     "program::no_start",
                     format!("{} at the top of its range does not lift the probe over everything", lift.axis),
@@ -239,34 +267,16 @@ impl Router<'_, '_> {
         self.push(Step::OrientSpindle { deg });
     }
 
-    /// The proven way from the end of the opening to here: turns at the top, across, down.
-    fn resume(&self) -> Option<Vec<Step>> {
-        let ((mut at, senses), to) = (self.opening?, self.at?);
-        let mut steps = Vec::new();
-        for (axis, angle, sense) in self.turns(Some((at, senses)), &AxisMap(to.0.map(Some)), &self.senses).ok()? {
-            self.scene.clear_turn(&at, axis, angle).ok()?;
-            at.set(axis, angle);
-            steps.push(turn_step(axis, angle, sense));
-        }
-        let mut rapids = self.lateral(&at, &to).ok()?;
-        if (self.lift.height(&at) - self.lift.height(&to)).abs() > SAME {
-            rapids.push(self.lift.axis);
-        }
-        for axis in rapids {
-            let mut next = at;
-            next.set(axis, to.get(axis));
-            self.scene.clear_straight(&at, &next, Manner::Rapid).ok()?;
-            steps.push(Step::Rapid { to: AxisMap::default().with(axis, to.get(axis)) });
-            at = next;
-        }
-        Some(steps)
-    }
-
-    fn turns(&self, from: Option<(Position, AxisMap)>, pose: &AxisMap, wanted: &AxisMap) -> Result<Vec<Turn>, String> {
+    pub(super) fn turns(
+        &self,
+        from: Option<(Position, AxisMap)>,
+        pose: &AxisMap,
+        wanted: &AxisMap,
+    ) -> Result<Vec<Turn>, String> {
         turns(self.scene.machine, self.overshoot_deg, from, pose, wanted)
     }
 
-    fn turn(&mut self, (axis, to, sense): &Turn) {
+    pub(super) fn turn(&mut self, (axis, to, sense): &Turn) {
         if let Some(sense) = sense {
             self.senses.set(*axis, *sense);
         }
@@ -284,7 +294,7 @@ impl Router<'_, '_> {
     }
 
     /// Rapids across at the height of `from`, one axis at a time: the order in which they are clear.
-    fn lateral(&self, from: &Position, to: &Position) -> Result<Vec<AxisName>, String> {
+    pub(super) fn lateral(&self, from: &Position, to: &Position) -> Result<Vec<AxisName>, String> {
         let forth: Vec<AxisName> = self.across().filter(|a| (to.get(*a) - from.get(*a)).abs() > SAME).collect();
         let back: Vec<AxisName> = forth.iter().rev().copied().collect();
         let try_order = |order: &[AxisName]| {
@@ -359,7 +369,7 @@ impl Router<'_, '_> {
     }
 
     /// Up to a height where the ball stands: protected until it is over everything, at rapid from there on.
-    fn rise(&mut self, height: f64) {
+    pub(super) fn rise(&mut self, height: f64) {
         let Some(mut to) = self.at else { return };
         let here = self.lift.height(&to);
         let guarded = height.min(self.heights.over_all.max(here + SHORTEST_PROTECTED_MM));
@@ -385,7 +395,7 @@ impl Router<'_, '_> {
         self.at = Some(*to);
     }
 
-    fn rapid(&mut self, axis: AxisName, to: f64) {
+    pub(super) fn rapid(&mut self, axis: AxisName, to: f64) {
         if let Some(at) = &mut self.at {
             self.clock.rapid((to - at.get(axis)).abs());
             at.set(axis, to);
@@ -394,10 +404,16 @@ impl Router<'_, '_> {
     }
 
     fn touch(&mut self, setup: &Setup, target: &Target, reached: &Reached, repeat: u32) {
-        let probe = &self.scene.machine.probe;
+        let machine = self.scene.machine;
+        let probe = &machine.probe;
+        let Some(((part, one), planned)) =
+            self.layout.parts.get(setup.part).zip(self.layout.parts.first()).zip(self.layout.block(setup, target))
+        else {
+            return;
+        };
         let id = self.out.touches.len() as u64 + 1;
-        let block = self.layout.mounting.blocks.get(target.block).map(|b| b.name.clone()).unwrap_or_default();
-        let first = self.met.get_mut(target.block).is_some_and(|met| !std::mem::replace(met, true));
+        let block = planned.name.clone();
+        let first = self.met.insert(target.block);
         let measure_feed = setup.spec.feed_mm_min.unwrap_or(probe.slow_feed);
         let step = TouchStep {
             id,
@@ -418,8 +434,8 @@ impl Router<'_, '_> {
             id,
             stage: setup.spec.stage.clone(),
             repeat,
-            carrier: self.layout.mounting.carrier.to_string(),
-            mounting: None,
+            carrier: planned.carrier.to_string(),
+            mounting: (part.label != one.label).then(|| part.label.clone()),
             block,
             face: target.face.to_string(),
             point: target.point.into(),
@@ -432,8 +448,8 @@ impl Router<'_, '_> {
             visit: Some(self.visit),
             feed_mm_min: Some(measure_feed),
             spindle_deg: setup.spec.spindle_deg,
-            tool_length_mm: None,
-            ball_radius_mm: None,
+            tool_length_mm: where_it_differs(machine.tool.length_mm, one.machine.tool.length_mm),
+            ball_radius_mm: where_it_differs(probe.ball_radius, one.machine.probe.ball_radius),
             from: self.senses,
             first,
         });
@@ -451,7 +467,7 @@ impl Router<'_, '_> {
         }
     }
 
-    fn push(&mut self, step: Step) {
+    pub(super) fn push(&mut self, step: Step) {
         self.out.path.steps.push(step);
     }
 }

@@ -5,7 +5,7 @@
 
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Result};
-use crate::geometry::{Transform, apply};
+use crate::geometry::{Transform, apply, rotation_about};
 use crate::machine::{Axis, Carrier, Machine, Mounting, Shape, Side};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
@@ -128,6 +128,7 @@ pub struct Scene<'m> {
     pub machine: &'m Machine,
     pub(super) parts: Vec<(Part, Solid)>,
     pub(super) obstacles: Vec<Obstacle>,
+    /// The first is the mounting's own.
     pub(super) carriers: Vec<Carrier>,
 }
 
@@ -160,10 +161,10 @@ impl<'m> Scene<'m> {
         parts.push((Part::Stem, Solid::cylinder(ball, up, probe.stem_radius, probe.stem_length)));
         parts.push((Part::Ball, Solid::ball(ball, probe.ball_radius)));
 
-        let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: Vec::new() };
+        let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: vec![mounting.carrier] };
         for (i, block) in mounting.blocks.iter().enumerate() {
             let solid = Solid::cuboid(block.centre, block.size);
-            scene.add(format!("block {}", block.name), Role::Block(i), mounting.carrier, solid);
+            scene.add(format!("block {}", block.name), Role::Block(i), block.carrier, solid);
         }
         for (role, solids) in [(Role::Mounted, &mounting.solids), (Role::Fixed, &machine.solids)] {
             for s in solids {
@@ -189,6 +190,76 @@ impl<'m> Scene<'m> {
         Ok(scene)
     }
 
+    /// Proves that blocks which do not move with the rest of their mounting are clear of everything that rotary axes turn
+    /// against them, at every angle. Moves of the machine then need not look at it.
+    ///
+    /// # Errors
+    /// The first pair that is not proven clear.
+    pub fn blocks_clear_of_each_other(&self) -> Result<()> {
+        let probe = &self.machine.probe;
+        let room = probe.clearance + probe.placement_tolerance;
+        // what stands on the mounting's own carrier meets the machine's solids as its maker meant it
+        let astray = |o: &Obstacle| o.role != Role::Fixed && o.carrier != 0;
+        for one in self.obstacles.iter().filter(|o| astray(o)) {
+            for other in self.obstacles.iter().filter(|o| o.carrier != one.carrier) {
+                if self.least_gap(one, other) < room {
+                    return Err(Failure::new(
+                        "program::blocks_turn_into",
+                        format!("{} is not clear of {} at every angle of the rotary axes", one.name, other.name),
+                    )
+                    .help("stand it further off what turns, in the machine's file"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lower bound of the distance of two solids of different carriers over all angles of the axes between them, mm.
+    fn least_gap(&self, one: &Obstacle, other: &Obstacle) -> f64 {
+        let chain =
+            |o: &Obstacle| self.carriers.get(o.carrier).map(|c| self.machine.carrier_chain(*c)).unwrap_or_default();
+        let (a, b) = (chain(one), chain(other));
+        let shared = a.iter().zip(&b).take_while(|(x, y)| x.name == y.name).count();
+        let between: Vec<&Axis> = a.iter().skip(shared).chain(b.iter().skip(shared)).copied().collect();
+        if between.iter().any(|x| !x.name.is_rotary()) {
+            return 0.0; // a linear axis can bring anything anywhere
+        }
+        // solids of one carrier never move against each other
+        let Some(innermost) = between.last() else { return f64::MAX };
+        let (turning, standing) = if b.len() > shared { (other, one) } else { (one, other) };
+        if let [axis] = between[..] {
+            return self.least_gap_about(axis, turning, standing);
+        }
+        if a.len() > shared && b.len() > shared {
+            return 0.0; // both turn
+        }
+        // any angles of several axes: inside the sphere about the outer axis's point that holds all of them
+        let outer = between.first().unwrap_or(innermost);
+        let mut reach = turning.solid.reach();
+        let mut centre = turning.solid.centre(&Transform::identity());
+        for axis in between.iter().rev() {
+            reach += (centre - axis.point).norm();
+            centre = axis.point;
+        }
+        let ball = Solid::ball(outer.point, reach);
+        self.distance(&ball, &Transform::identity(), &standing.solid, &Transform::identity())
+    }
+
+    /// The same for one axis between them: in steps, less what a point of the turning one moves in half a step.
+    fn least_gap_about(&self, axis: &Axis, turning: &Obstacle, standing: &Obstacle) -> f64 {
+        const STEPS: u32 = 720;
+        let step = std::f64::consts::TAU / f64::from(STEPS);
+        let line = (axis.point, axis.direction.into_inner());
+        let margin = Self::radius_about(&line, &turning.solid, &Transform::identity()) * step / 2.0;
+        (0..STEPS)
+            .map(|k| {
+                let turned = rotation_about(&axis.point, &axis.direction, step * f64::from(k));
+                self.distance(&turning.solid, &turned, &standing.solid, &Transform::identity())
+            })
+            .fold(f64::MAX, f64::min)
+            - margin
+    }
+
     fn add(&mut self, name: String, role: Role, carrier: Carrier, solid: Solid) {
         let carrier = self.carriers.iter().position(|c| *c == carrier).unwrap_or_else(|| {
             self.carriers.push(carrier);
@@ -209,9 +280,14 @@ impl<'m> Scene<'m> {
     /// Distance between a part and an obstacle, mm; 0 when they overlap.
     pub(super) fn gap(&self, part: &Solid, obstacle: &Obstacle, placed: &Placement) -> f64 {
         let Some(carrier) = placed.carriers.get(obstacle.carrier) else { return 0.0 };
-        let (a, b) = (placed.tool * part.local, carrier * obstacle.solid.local);
+        self.distance(part, &placed.tool, &obstacle.solid, carrier)
+    }
+
+    /// Distance between two solids on bodies, mm; 0 when they overlap.
+    fn distance(&self, one: &Solid, on: &Transform, other: &Solid, other_on: &Transform) -> f64 {
+        let (a, b) = (on * one.local, other_on * other.local);
         // a pair that parry cannot compare counts as touching: refused, never let through
-        query::distance(&parry(&a), part.shape.as_ref(), &parry(&b), obstacle.solid.shape.as_ref())
+        query::distance(&parry(&a), one.shape.as_ref(), &parry(&b), other.shape.as_ref())
             .map_or(0.0, |d| if d.distance.is_finite() { d.distance } else { 0.0 })
     }
 

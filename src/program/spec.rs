@@ -3,6 +3,7 @@
 //! What only a machine can tell (does the mounting have this block, does the axis go there) is checked by `layout`.
 
 use super::as_written::{self as w, FacesIn};
+use super::parts::{PartSpec, part_of};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use crate::units::Plain;
@@ -119,6 +120,8 @@ pub struct FaceGrid {
 pub struct SetupSpec {
     /// Stage of the procedure.
     pub stage: String,
+    /// Place of its part in [`ProgramSpec::parts`].
+    pub part: usize,
     /// Rotary axes that are named, deg.
     pub pose: At<AxisMap>,
     /// The sense in which a rotary axis must come to the pose.
@@ -144,8 +147,8 @@ pub struct ProgramSpec {
     pub machine: Option<At<String>>,
     /// What it is for.
     pub says: String,
-    /// The mounting that carries the blocks.
-    pub mounting: At<String>,
+    /// Blocks and stylus, from stop to stop: at least one part.
+    pub parts: Vec<PartSpec>,
     /// What the names of faces mean.
     pub faces_in: FacesIn,
     /// How far a rotary axis goes past a pose that it must come to from the other side.
@@ -217,7 +220,7 @@ impl Check<'_> {
         }
         let grids = self.grids(&f.grid);
         let repeats = self.repeats(f.repeats.as_ref()).unwrap_or(1);
-        let mut setups = Vec::new();
+        let (mut setups, mut parts) = (Vec::new(), Vec::new());
         if f.stage.is_empty() {
             self.error(
                 f.name.span(),
@@ -236,15 +239,21 @@ impl Check<'_> {
                     "add a [[stage.setup]] table",
                 );
             }
+            let mounting = stage.mounting.as_ref().unwrap_or(&f.mounting);
+            let stylus = stage.stylus.as_ref().or(f.stylus.as_ref());
+            let part = part_of(&mut parts, mounting.into(), stylus.map(At::from), stage.placed);
             for setup in &stage.setup {
-                self.setup(stage.name.get_ref(), repeats, setup, &grids, &mut setups);
+                self.setup((stage.name.get_ref(), part), repeats, setup, &grids, &mut setups);
             }
+        }
+        if parts.is_empty() {
+            part_of(&mut parts, At::from(&f.mounting), f.stylus.as_ref().map(At::from), None);
         }
         ProgramSpec {
             name: name.clone(),
             machine: f.machine.as_ref().map(At::from),
             says: f.says.clone(),
-            mounting: At::from(&f.mounting),
+            parts,
             faces_in: f.faces_in,
             overshoot_deg,
             setups,
@@ -308,7 +317,7 @@ impl Check<'_> {
 
     fn setup(
         &mut self,
-        stage: &str,
+        (stage, part): (&str, usize),
         repeats: u32,
         s: &w::Setup,
         grids: &[(String, Vec<GridPoint>, bool)],
@@ -360,6 +369,7 @@ impl Check<'_> {
         for pose in poses {
             out.push(SetupSpec {
                 stage: stage.to_owned(),
+                part,
                 pose: At { value: pose, span: s.pose.span() },
                 from: from.clone(),
                 spindle_deg: s.spindle_deg.as_ref().map(|a| *a.get_ref()),

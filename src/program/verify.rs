@@ -4,13 +4,13 @@
 //! believed to be clear. Every move is checked against limits and against collision over its whole length, every touch
 //! against the plan, every turn for its sense.
 
-use super::path::{Path, Step, TouchStep};
+use super::path::{Path, Step, Stop, TouchStep};
 use super::plan::{Plan, PlanTouch};
 use super::scene::Scene;
 use super::sweep::Manner;
 use crate::axes::{AxisMap, AxisName, Position};
-use crate::diag::Result;
-use crate::machine::Machine;
+use crate::diag::{Failure, Result};
+use crate::machine::{Axis, Machine};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -31,16 +31,34 @@ pub struct Violation {
 /// # Errors
 /// When the plan names a mounting that the machine lacks, or the machine's lengths cannot be computed with.
 pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violation>> {
-    let mounting = machine.mounting(&plan.mounting).ok_or_else(|| {
-        crate::diag::Failure::new(
-            "program::unknown_mounting",
-            format!("the plan is for mounting {:?}, which {} lacks", plan.mounting, machine.name),
-        )
-        .help("plan and machine belong together: make the plan again")
-    })?;
-    let scene = Scene::new(machine, mounting)?;
+    let first = (&plan.mounting, plan.tool_length_mm, plan.ball_radius_mm);
+    let stops = path.steps.iter().filter_map(|s| match s {
+        Step::Stop(stop) => Some((&stop.mounting, stop.tool_length_mm, stop.ball_radius_mm)),
+        _ => None,
+    });
+    let parts: Vec<(&String, f64, f64)> = std::iter::once(first).chain(stops).collect();
+    let machines = parts.iter().map(|(_, length_mm, radius_mm)| {
+        machine.with_stylus_of(*length_mm, *radius_mm).ok_or_else(|| {
+            let what = format!("a stylus of {length_mm} mm with a ball of radius {radius_mm} mm");
+            not_this_machine("program::unknown_stylus", &what, machine)
+        })
+    });
+    let machines: Vec<Machine> = machines.collect::<Result<_>>()?;
+    let scenes = parts.iter().zip(&machines).map(|((name, ..), with_stylus)| {
+        let mounting = machine
+            .mounting(name)
+            .ok_or_else(|| not_this_machine("program::unknown_mounting", &format!("mounting {name:?}"), machine))?;
+        let scene = Scene::new(with_stylus, mounting)?;
+        scene.blocks_clear_of_each_other().map(|()| scene)
+    });
+    let scenes: Vec<Scene> = scenes.collect::<Result<_>>()?;
+    let Some(scene) = scenes.first() else { return Ok(Vec::new()) };
     let mut walk = Walk {
-        scene: &scene,
+        scenes: &scenes,
+        scene,
+        part: 0,
+        mounted: &plan.mounting,
+        part_began: 0,
         plan,
         at: AxisMap::default(),
         senses: AxisMap::default(),
@@ -65,14 +83,21 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
     }
     let mut violations = walk.violations;
     // each by itself, in the order of the path whatever order the threads take
-    let found: Vec<Option<Violation>> = walk.moves.par_iter().map(|m| m.check(&scene)).collect();
+    let found: Vec<Option<Violation>> = walk.moves.par_iter().map(|m| m.check(scenes.get(m.part)?)).collect();
     violations.extend(found.into_iter().flatten());
     violations.sort_by_key(|v| v.step);
     Ok(violations)
 }
 
+fn not_this_machine(code: &'static str, what: &str, machine: &Machine) -> Failure {
+    Failure::new(code, format!("the plan is for {what}, which {} lacks", machine.name))
+        .help("plan and machine belong together: make the plan again")
+}
+
 /// A move whose ends are known.
 struct Move {
+    /// Place of its scene.
+    part: usize,
     step: usize,
     from: Position,
     to: Position,
@@ -98,7 +123,15 @@ impl Move {
 }
 
 struct Walk<'a, 'm> {
+    /// Of each part.
+    scenes: &'a [Scene<'m>],
+    /// Of the part that is mounted.
     scene: &'a Scene<'m>,
+    part: usize,
+    /// Name of the blocks as they stand.
+    mounted: &'a str,
+    /// Touches that were made before the part began.
+    part_began: usize,
     plan: &'a Plan,
     /// The axes whose place is known.
     at: AxisMap,
@@ -117,12 +150,33 @@ struct Walk<'a, 'm> {
     anywhere: Option<bool>,
 }
 
-impl Walk<'_, '_> {
+impl<'a> Walk<'a, '_> {
     fn violation(&mut self, step: usize, says: String) {
         self.violations.push(Violation { step, says });
     }
 
-    fn step(&mut self, i: usize, step: &Step) {
+    fn prove(&mut self, step: usize, from: Position, to: Position, how: How) {
+        self.moves.push(Move { part: self.part, step, from, to, how });
+    }
+
+    /// Stylus and blocks change: at the top, with all rotary axes at 0, and clear of what is mounted then.
+    fn stop(&mut self, i: usize, stop: &'a Stop) {
+        let Some(at) = self.known() else {
+            self.violation(i, "the program stops before the place of every axis is known".to_owned());
+            return;
+        };
+        let turned = self.scene.machine.rotary().any(|a| at.get(a.name).abs() > SAME);
+        if turned || self.scene.lift().is_none_or(|lift| (at.get(lift.axis) - lift.top).abs() > SAME) {
+            self.violation(i, "the program stops elsewhere than at the top with all rotary axes at 0".to_owned());
+        }
+        let Some(scene) = self.scenes.get(self.part + 1) else { return };
+        (self.scene, self.part) = (scene, self.part + 1);
+        (self.mounted, self.part_began) = (&stop.mounting, self.next_touch);
+        self.at_start_of = None;
+        self.prove(i, at, at, How::Straight(Manner::Rapid));
+    }
+
+    fn step(&mut self, i: usize, step: &'a Step) {
         let moves = !matches!(step, Step::Note(_) | Step::Setup { .. });
         if moves && self.in_contact.is_some() && !matches!(step, Step::Retract { .. }) {
             self.violation(i, "the ball may still press against the block: a retract must come first".to_owned());
@@ -130,6 +184,7 @@ impl Walk<'_, '_> {
         }
         match step {
             Step::Note(_) => {}
+            Step::Stop(stop) => self.stop(i, stop),
             Step::OrientSpindle { .. } => self.at_start_of = None,
             Step::Setup { resume, .. } => self.setup(i, resume.as_deref()),
             Step::Rapid { to } => self.linear(i, to, None),
@@ -141,7 +196,7 @@ impl Walk<'_, '_> {
     }
 
     /// Proves the way from the end of the opening to a set-up.
-    fn setup(&mut self, i: usize, resume: Option<&[Step]>) {
+    fn setup(&mut self, i: usize, resume: Option<&'a [Step]>) {
         if self.in_contact.is_some() {
             self.violation(i, "a set-up begins while the ball may press against a block".to_owned());
         }
@@ -209,7 +264,7 @@ impl Walk<'_, '_> {
                     None if moving > 1 => How::Spanned,
                     None => How::Straight(Manner::Rapid),
                 };
-                self.moves.push(Move { step: i, from, to: end, how });
+                self.prove(i, from, end, how);
             }
             None => self.unknown_start(i, to, feed.is_some()),
         }
@@ -239,10 +294,12 @@ impl Walk<'_, '_> {
             return known;
         }
         let Some(lift) = self.scene.lift() else { return false };
-        let clear = self.scene.clear_from_anywhere(&lift, &|a| match self.start_near {
+        // whatever is mounted when a run starts again at a later set-up
+        let window = |a: &Axis| match self.start_near {
             Some(near) => near.window(a),
             None => a.range,
-        });
+        };
+        let clear = self.scenes.iter().all(|scene| scene.clear_from_anywhere(&lift, &window));
         self.anywhere = Some(clear);
         clear
     }
@@ -276,8 +333,8 @@ impl Walk<'_, '_> {
                 Some(from) => {
                     let mut end = from;
                     end.set(axis, target);
-                    self.moves.push(Move { step: i, from, to: end, how: How::Turn(axis) });
-                    self.moves.push(Move { step: i, from, to: from, how: How::Straight(Manner::Rapid) });
+                    self.prove(i, from, end, How::Turn(axis));
+                    self.prove(i, from, from, How::Straight(Manner::Rapid));
                 }
                 None => {
                     let lift = self.scene.lift();
@@ -316,8 +373,8 @@ impl Walk<'_, '_> {
         match block {
             Some(b) => {
                 let [nominal, end] = [touch.nominal, touch.end].map(|m| m.or(&touch.pose).position());
-                self.moves.push(Move { step: i, from: at, to: nominal, how: How::Straight(Manner::ToContact(b)) });
-                self.moves.push(Move { step: i, from: nominal, to: end, how: How::Straight(Manner::PastContact(b)) });
+                self.prove(i, at, nominal, How::Straight(Manner::ToContact(b)));
+                self.prove(i, nominal, end, How::Straight(Manner::PastContact(b)));
             }
             None => self.violation(i, format!("touch {}: the mounting has no block {:?}", touch.id, planned.block)),
         }
@@ -326,7 +383,7 @@ impl Walk<'_, '_> {
     }
 
     fn scene_block(&self, planned: &PlanTouch) -> Option<usize> {
-        let mounting = self.scene.machine.mounting(&self.plan.mounting)?;
+        let mounting = self.scene.machine.mounting(self.mounted)?;
         mounting.blocks.iter().position(|b| b.name == planned.block)
     }
 
@@ -349,6 +406,16 @@ impl Walk<'_, '_> {
         need(
             planned.from.iter().all(|(a, s)| self.senses.get(a) == Some(s)),
             "an axis came in another sense than planned",
+        );
+        need(
+            planned.mounting.as_ref().unwrap_or(&self.plan.mounting) == self.mounted,
+            "its mounting is not the one that is up",
+        );
+        let stylus = (planned.tool_length_mm, planned.ball_radius_mm);
+        need(
+            stylus.0.unwrap_or(self.plan.tool_length_mm) == machine.tool.length_mm
+                && stylus.1.unwrap_or(self.plan.ball_radius_mm) == probe.ball_radius,
+            "its stylus is not the one that is in the probe",
         );
         // the geometry from the carrier's frame, not from the plan's own numbers
         let carrier = machine.carrier(&planned.carrier);
@@ -375,8 +442,9 @@ impl Walk<'_, '_> {
         need(!touch.first || touch.search_feed <= probe.slow_feed, "the first touch of a block must search slowly");
         need(touch.measure_feed > 0.0 && touch.back_off_mm > 0.0, "its feeds and ways must be more than 0");
         need(touch.back_off_mm < start.0, "it backs off past its start");
-        let met = self.plan.touches.iter().take(self.next_touch - 1).any(|t| t.block == planned.block);
-        need(met || touch.first, "it is the first touch of its block and is not marked so");
+        let of_part = self.plan.touches.iter().take(self.next_touch - 1).skip(self.part_began);
+        let met = of_part.into_iter().any(|t| t.block == planned.block);
+        need(met || touch.first, "it is the first touch of its block in this part and is not marked so");
         says
     }
 

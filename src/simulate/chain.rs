@@ -142,8 +142,18 @@ impl Chain {
         if shifts.ball_stylus != [0.0; 3] {
             ball = plus(ball, 1.0, self.spindle(stylus.spindle_deg).outward_direction(shifts.ball_stylus));
         }
-        let ball = plus(tool.outward(ball), 1.0, shifts.ball_machine);
-        Place { ball, carrier: Self::frame(links, joints, shifts) }
+        if shifts.tool != [0.0; 6] {
+            ball = Rigid::error(&shifts.tool, self.pivot).outward(ball);
+        }
+        let mut ball = plus(tool.outward(ball), 1.0, shifts.ball_machine);
+        if shifts.base != [0.0; 6] {
+            ball = Rigid::error(&shifts.base, [0.0; 3]).outward(ball);
+        }
+        let mut carrier = Self::frame(links, joints, shifts);
+        if shifts.workpiece != [0.0; 6] {
+            carrier = carrier.then(&Rigid::error(&shifts.workpiece, [0.0; 3]));
+        }
+        Place { ball, carrier }
     }
 
     /// The turn of the spindle in the tool's frame.

@@ -14,6 +14,7 @@ mod chain;
 mod contact;
 pub mod control;
 mod noise;
+mod own;
 mod prepare;
 mod rigid;
 pub mod scenario;

@@ -9,8 +9,8 @@ use super::terms::{Shifts, Terms, TouchState};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Carrier, Machine};
-use crate::program::plan::{ControllerFrame, Plan, PlanTouch};
-use crate::units::hours_from_s;
+use crate::program::plan::{ControllerFrame, Plan, PlanBlock, PlanTouch};
+use crate::units::{hours_from_s, rad_from_deg};
 use std::collections::BTreeMap;
 
 /// What one touch takes when the plan does not say, s.
@@ -18,6 +18,9 @@ const TOUCH_S: f64 = 12.0;
 
 /// No axis stands as far as this, mm or deg: guards against numbers that would not leave any digits for the contact.
 const FAR: f64 = 1e6;
+
+/// An axis that goes less far than this (mm or deg) stands still: the rest is rounding of the plan's numbers.
+const STILL: f64 = 1e-9;
 
 /// The virtual machine with a program in it.
 pub struct Bench<'a> {
@@ -83,7 +86,7 @@ pub fn bench<'a>(
     }
     let p = &machine.reference.pivot;
     let chain = Chain::new(machine, [p.x, p.y, p.z]);
-    let terms = Terms::new(scenario.terms.iter().copied());
+    let terms = Terms::new(scenario.terms.iter().copied(), &scenario.formulas);
     let times = times(plan, scenario, terms.timed(), &mut findings);
     let mut present = [false; 6];
     for axis in &machine.axes {
@@ -92,6 +95,7 @@ pub fn bench<'a>(
     let mut senses = Senses::default();
     let mut visits = Visits::default();
     let mut touches = Vec::with_capacity(plan.touches.len());
+    let mut no_value: Vec<u64> = Vec::new();
     let mut refused: BTreeMap<String, Vec<u64>> = BTreeMap::new();
     for (i, touch) in plan.touches.iter().enumerate() {
         match ready(machine, plan, scenario, &chain, touch) {
@@ -104,6 +108,9 @@ pub fn bench<'a>(
                 }
                 ready.state.sense = senses.next(touch, &ready);
                 ready.visit = visits.next(touch, plan, &ready);
+                if !terms.finite(&ready.state, &ready.start) {
+                    no_value.push(touch.id);
+                }
                 touches.push(ready);
             }
             Err(what) => refused.entry(what).or_default().push(touch.id),
@@ -118,6 +125,13 @@ pub fn bench<'a>(
             )
             .help("make the plan again with `axiscal generate`"),
         );
+    }
+    if !no_value.is_empty() {
+        let (which, more) = super::some_of(&no_value);
+        let message = format!("a formula of a planted effect has no value at touch {which}{more}");
+        let help =
+            "a division by zero, or a root or logarithm of a negative number: write it so that it holds at every touch";
+        findings.push(Finding::error("simulate::no_value", message).help(help));
     }
     let dice = Dice::new(scenario, plan, compensation.is_some());
     let rounding_mm = scenario.noise.rounding_mm;
@@ -207,7 +221,7 @@ fn ready(
         half: block.size.map(|s| 0.5 * s),
         wrong: wrong_block(machine, plan, scenario, touch),
         normal: touch.normal,
-        state: state(machine, chain, touch, &start, &end, n_links, stylus),
+        state: state(machine, plan, chain, (touch, block), (&start, &end), n_links, stylus),
         visit: 0,
         time_s: None,
         temperature_deg_c: None,
@@ -231,10 +245,10 @@ fn wrong_block(machine: &Machine, plan: &Plan, scenario: &Scenario, touch: &Plan
 /// Everything that the errors of a touch may depend on besides axis positions; senses and time come later.
 fn state(
     machine: &Machine,
+    plan: &Plan,
     chain: &Chain,
-    touch: &PlanTouch,
-    start: &Position,
-    end: &Position,
+    (touch, block): (&PlanTouch, &PlanBlock),
+    (start, end): (&Position, &Position),
     n_links: usize,
     stylus: Stylus,
 ) -> TouchState {
@@ -243,6 +257,10 @@ fn state(
     let way = minus(to.carrier.inward(to.ball), from.carrier.inward(from.ball));
     let tool = chain.tool_frame(start, &none);
     let approach_tool = tool.inward_direction(from.carrier.outward_direction(unit(way)));
+    let spindle = chain.spindle(stylus.spindle_deg);
+    let normal = unit(touch.normal);
+    let normal_machine = from.carrier.outward_direction(normal);
+    let mounting = touch.mounting.as_deref().unwrap_or(&plan.mounting);
     let feed = touch.feed_mm_min.filter(|f| f.is_finite()).unwrap_or(machine.probe.slow_feed);
     TouchState {
         sense: [0.0; 6],
@@ -250,10 +268,20 @@ fn state(
         hours: 0.0,
         stylus_ratio: stylus.length_mm / machine.tool.length_mm,
         id: touch.id,
-        approach_probe: chain.spindle(stylus.spindle_deg).inward_direction(approach_tool),
+        approach_probe: spindle.inward_direction(approach_tool),
         down_tool: tool.inward_direction([0.0, 0.0, -1.0]),
         tool_axis: tool.outward_direction(chain.tool_direction()),
         stylus_axis: chain.tool_direction(),
+        spindle_rad: rad_from_deg(stylus.spindle_deg),
+        stylus_mm: stylus.length_mm,
+        own_stylus_mm: machine.tool.length_mm,
+        normal_machine,
+        normal_probe: spindle.inward_direction(tool.inward_direction(normal_machine)),
+        normal_carrier: normal,
+        point: touch.point,
+        outward: chain.outward_from_centre(n_links, block.centre),
+        edge_mm: (0..3).map(|i| block.size[i] * normal[i].abs()).sum(),
+        label: if mounting.is_empty() { touch.block.as_str().into() } else { format!("{mounting}/{}", touch.block).into() },
         ..TouchState::default()
     }
 }
@@ -275,7 +303,7 @@ impl Senses {
             // the search itself, else the forced sense of indexing, else the way from the last touch
             let forced = touch.from.get(name).unwrap_or(0.0);
             for motion in [searched, forced, came] {
-                if motion != 0.0 && motion.is_finite() {
+                if motion.abs() > STILL && motion.is_finite() {
                     self.last[i] = motion.signum();
                     break;
                 }

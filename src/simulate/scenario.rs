@@ -2,6 +2,8 @@
 
 use super::catalogue::unit::Unit;
 use super::catalogue::{self, Parameter, Refusal, Role};
+use super::own::formula::Formula;
+use super::own::{Own, converted};
 use super::rigid::Vec3;
 use super::terms::Term;
 use crate::axes::AxisName;
@@ -9,7 +11,7 @@ use crate::diag::{Failure, Findings, Result, Source};
 use crate::machine::Machine;
 use crate::units::Plain;
 
-pub use super::written::parse;
+pub use super::written::{parse, parse_with};
 
 /// A checked scenario.
 #[derive(Debug, Clone, Default)]
@@ -20,6 +22,10 @@ pub struct Scenario {
     pub planted: Vec<Planted>,
     /// The same as terms of the chain.
     pub(super) terms: Vec<Term>,
+    /// Formulas of planted effects of the user's own.
+    pub(super) formulas: Vec<Formula>,
+    /// Files of effects of the user's own, as the scenario names them.
+    pub effects_files: Vec<String>,
     /// Blocks that stand elsewhere or have another size than the plan says.
     pub blocks: Vec<BlockError>,
     /// Scatter.
@@ -217,6 +223,74 @@ impl Scenario {
         }
     }
 
+    /// Plants values of an effect of the user's own; a name may end in `@mounting/block` or `@block`.
+    pub(super) fn plant_own(&mut self, machine: &Machine, own: &Own, values: &[Value<'_>]) -> Result<(), Vec<Misfit>> {
+        let id = &own.id;
+        if let Some(why) = &own.not_here {
+            return Err(vec![Misfit {
+                value: None,
+                code: "scenario::effect_not_here",
+                message: format!("effect {id:?} cannot be planted: {why}"),
+                help: "take it out, or plant one that the machine has the axes for".to_owned(),
+            }]);
+        }
+        let mut misfits = Vec::new();
+        // one group for all blocks (None), and one for each block that is named
+        let mut groups: Vec<(Option<&str>, Vec<(usize, f64)>)> = Vec::new();
+        for (i, value) in values.iter().enumerate() {
+            let mut bad = |code, message: String, help: String| {
+                misfits.push(Misfit { value: Some(i), code, message, help });
+            };
+            let (name, block) = value.name.split_once('@').map_or((value.name, None), |(n, b)| (n, Some(b)));
+            let Some(row) = own.parameters.iter().position(|p| p.name == name) else {
+                bad(
+                    "scenario::parameter",
+                    format!("effect {id:?} has no parameter {name:?}"),
+                    format!("it has: {}", own.written()),
+                );
+                continue;
+            };
+            if let Some(block) = block.filter(|b| !has_block(machine, b)) {
+                bad(
+                    "scenario::block",
+                    format!("no mounting has a block {block:?}"),
+                    format!("{:?} has: {}", machine.name, blocks_of(machine)),
+                );
+            }
+            let unit = own.parameters[row].unit;
+            let given = value.unit.unwrap_or(unit);
+            let Some(amount) = converted(value.value, given, unit) else {
+                bad(
+                    "scenario::unit",
+                    format!("{name} of {id:?} is given in {}, expected {}", given.word(), unit.word()),
+                    format!("write the value in {}", unit.word()),
+                );
+                continue;
+            };
+            if !groups.iter().any(|(b, _)| *b == block) {
+                groups.push((block, Vec::new()));
+            }
+            if let Some((_, group)) = groups.iter_mut().find(|(b, _)| *b == block) {
+                group.push((row, amount));
+            }
+            self.planted.push(Planted {
+                effect: id.clone(),
+                parameter: value.name.to_owned(),
+                value: value.value,
+                unit: given.word(),
+            });
+        }
+        if !misfits.is_empty() {
+            return Err(misfits);
+        }
+        for (block, group) in groups {
+            let (terms, formulas) = own.plant(&group, block, self.formulas.len());
+            self.terms.extend(terms);
+            self.formulas.extend(formulas);
+        }
+        Ok(())
+    }
+
     /// The temperature at a time (hours), °C; outside the profile it stays as at its end.
     pub(super) fn temperature_at(&self, hours: f64) -> Option<f64> {
         let (first, last) = (self.temperature.first()?, self.temperature.last()?);
@@ -282,6 +356,12 @@ pub(super) fn blocks_of(machine: &Machine) -> String {
         format!("{} ({})", m.name, names.join(", "))
     });
     each.collect::<Vec<_>>().join("; ")
+}
+
+fn has_block(machine: &Machine, label: &str) -> bool {
+    let (mounting, name) = label.split_once('/').map_or((None, label), |(m, n)| (Some(m), n));
+    let mut mountings = machine.mountings.iter().filter(|m| mounting.is_none_or(|w| w == m.name));
+    mountings.any(|m| m.blocks.iter().any(|b| b.name == name))
 }
 
 /// Reads a scenario without a place for its findings, for callers that built the text themselves.

@@ -1,11 +1,13 @@
 //! What is wrong with the virtual machine: terms, each an amount times a function of the state at a place of the chain.
 
+use super::own::formula::Formula;
 use super::rigid::{Vec3, dot, norm};
 use crate::axes::{AxisName, Position};
 use crate::units::mm_s_from_mm_min;
+use std::sync::Arc;
 
 /// What a touch is like while the ball searches: everything a term may depend on besides the axes' positions.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct TouchState {
     /// Sense (+1, -1, 0 when nothing is known) of each axis's last motion.
     pub sense: [f64; 6],
@@ -27,6 +29,26 @@ pub struct TouchState {
     pub tool_axis: Vec3,
     /// Along `tool_axis`, unit vector in the frame of the probe.
     pub stylus_axis: Vec3,
+    /// Turn of the spindle, rad.
+    pub spindle_rad: f64,
+    /// Pivot to ball, mm: of this stylus and of the machine's own.
+    pub stylus_mm: f64,
+    /// See `stylus_mm`.
+    pub own_stylus_mm: f64,
+    /// Outward unit normal of the planned face in R.
+    pub normal_machine: Vec3,
+    /// In the frame of the probe.
+    pub normal_probe: Vec3,
+    /// In the carrier's frame.
+    pub normal_carrier: Vec3,
+    /// Planned contact in the carrier's frame, mm.
+    pub point: Vec3,
+    /// Unit vector from the carrier's centre line to the block's centre, in the carrier's frame; 0 on it.
+    pub outward: Vec3,
+    /// Planned edge of the block along the normal, mm.
+    pub edge_mm: f64,
+    /// `mounting/block`.
+    pub label: Arc<str>,
 }
 
 impl Default for TouchState {
@@ -42,6 +64,16 @@ impl Default for TouchState {
             down_tool: [0.0, 0.0, -1.0],
             tool_axis: [0.0, 0.0, 1.0],
             stylus_axis: [0.0, 0.0, 1.0],
+            spindle_rad: 0.0,
+            stylus_mm: 0.0,
+            own_stylus_mm: 0.0,
+            normal_machine: [0.0; 3],
+            normal_probe: [0.0; 3],
+            normal_carrier: [0.0; 3],
+            point: [0.0; 3],
+            outward: [0.0; 3],
+            edge_mm: 0.0,
+            label: Arc::from(""),
         }
     }
 }
@@ -60,6 +92,12 @@ pub enum Target {
     },
     /// The ball, along an axis of R.
     BallInMachine(usize),
+    /// The tool's side against the workpiece's, about the origin of R, component 0 to 5.
+    Base(usize),
+    /// The tool in its holder, about the pivot, component 0 to 5 in the tool's frame.
+    Tool(usize),
+    /// What bears the block, in its own frame about the origin of R at zero, component 0 to 5.
+    Workpiece(usize),
     /// The ball, along an axis of the tool's frame (turns with the head, not with the spindle).
     BallInTool(usize),
     /// The ball, along an axis of the stylus's frame (turns with the spindle too).
@@ -121,12 +159,15 @@ pub enum Shape {
     FromHour(f64),
     /// 1 from this touch on, 0 before.
     FromTouch(f64),
+    /// A formula of a user's effect, by its number.
+    Formula(usize),
 }
 
 impl Shape {
     /// Does it change while the linear axes move?
-    fn moves(&self) -> bool {
+    fn moves(&self, formulas: &[Formula]) -> bool {
         match self {
+            Self::Formula(i) => formulas.get(*i).is_some_and(Formula::moves),
             Self::Power(axis, ..) | Self::WarmthTimes(axis) => !axis.is_rotary(),
             Self::PitchCosine(..) | Self::PitchSine(..) => true,
             _ => false,
@@ -134,11 +175,14 @@ impl Shape {
     }
 
     /// Does it need the time of the touch?
-    fn timed(&self) -> bool {
+    fn timed(&self, formulas: &[Formula]) -> bool {
+        if let Self::Formula(i) = self {
+            return formulas.get(*i).is_some_and(Formula::timed);
+        }
         matches!(self, Self::Hours | Self::WarmUp(_) | Self::Warmth | Self::WarmthTimes(_) | Self::FromHour(_))
     }
 
-    fn value(&self, touch: &TouchState, joints: &Position) -> f64 {
+    fn value(&self, formulas: &[Formula], touch: &TouchState, joints: &Position) -> f64 {
         let q = |axis: AxisName| joints.mm_or_rad(axis);
         let turn = std::f64::consts::TAU;
         match *self {
@@ -164,6 +208,7 @@ impl Shape {
             Self::WarmthTimes(axis) => (touch.temperature_deg_c - REFERENCE_DEG_C) * q(axis),
             Self::FromHour(h) => f64::from(touch.hours >= h),
             Self::FromTouch(id) => f64::from(touch.id as f64 >= id),
+            Self::Formula(i) => formulas.get(i).map_or(f64::NAN, |f| f.value(touch, joints)),
         }
     }
 }
@@ -198,6 +243,12 @@ pub struct Shifts {
     pub after: [[f64; 6]; 6],
     /// Displacement of the ball in R, mm.
     pub ball_machine: Vec3,
+    /// Displacement of the tool's side in R, mm and rad.
+    pub base: [f64; 6],
+    /// Displacement of the tool in its holder, mm and rad.
+    pub tool: [f64; 6],
+    /// Displacement of what bears the block, mm and rad.
+    pub workpiece: [f64; 6],
     /// In the tool's frame.
     pub ball_tool: Vec3,
     /// In the stylus's frame.
@@ -223,6 +274,9 @@ impl Shifts {
         match target {
             Target::Axis { axis, after: false, dof } => self.before[axis.index()][dof] += value,
             Target::Axis { axis, after: true, dof } => self.after[axis.index()][dof] += value,
+            Target::Base(i) => self.base[i] += value,
+            Target::Tool(i) => self.tool[i] += value,
+            Target::Workpiece(i) => self.workpiece[i] += value,
             Target::BallInMachine(i) => self.ball_machine[i] += value,
             Target::BallInTool(i) => self.ball_tool[i] += value,
             Target::BallInStylus(i) => self.ball_stylus[i] += value,
@@ -242,13 +296,20 @@ impl Shifts {
 pub struct Terms {
     steady: Vec<Term>,
     moving: Vec<Term>,
+    formulas: Vec<Formula>,
 }
 
 impl Terms {
-    /// Sorts terms; those of amount 0 are left out.
-    pub fn new(terms: impl IntoIterator<Item = Term>) -> Self {
-        let (moving, steady) = terms.into_iter().filter(|t| t.amount != 0.0).partition(|t| t.shape.moves());
-        Self { steady, moving }
+    /// Sorts terms; those of amount 0 are left out. `formulas` are those of users' effects.
+    pub fn new(terms: impl IntoIterator<Item = Term>, formulas: &[Formula]) -> Self {
+        let (moving, steady) = terms.into_iter().filter(|t| t.amount != 0.0).partition(|t| t.shape.moves(formulas));
+        Self { steady, moving, formulas: formulas.to_vec() }
+    }
+
+    /// Has every term a value at a touch?
+    pub fn finite(&self, touch: &TouchState, joints: &Position) -> bool {
+        let value = |t: &Term| t.shape.value(&self.formulas, touch, joints);
+        self.steady.iter().chain(&self.moving).all(|t| value(t).is_finite())
     }
 
     /// Does nothing change while the ball searches? Then its way in the block's frame is straight.
@@ -258,23 +319,23 @@ impl Terms {
 
     /// Does a term need the time of the touch?
     pub fn timed(&self) -> bool {
-        self.steady.iter().chain(&self.moving).any(|t| t.shape.timed())
+        self.steady.iter().chain(&self.moving).any(|t| t.shape.timed(&self.formulas))
     }
 
     /// The sum of what does not change during a touch.
     pub fn during(&self, touch: &TouchState, pose: &Position) -> Shifts {
-        sum(Shifts::default(), &self.steady, touch, pose)
+        self.sum(Shifts::default(), &self.steady, touch, pose)
     }
 
     /// With what does, at positions of the axes.
     pub fn at(&self, steady: &Shifts, touch: &TouchState, joints: &Position) -> Shifts {
-        sum(*steady, &self.moving, touch, joints)
+        self.sum(*steady, &self.moving, touch, joints)
     }
-}
 
-fn sum(mut out: Shifts, terms: &[Term], touch: &TouchState, joints: &Position) -> Shifts {
-    for term in terms {
-        out.add(term.target, term.amount * term.shape.value(touch, joints));
+    fn sum(&self, mut out: Shifts, terms: &[Term], touch: &TouchState, joints: &Position) -> Shifts {
+        for term in terms {
+            out.add(term.target, term.amount * term.shape.value(&self.formulas, touch, joints));
+        }
+        out
     }
-    out
 }

@@ -1,10 +1,11 @@
 //! A scenario as a person wrote it → [`Scenario`]; all findings at once, each with its place and remedy.
 
 use super::catalogue::unit::Unit;
+use super::own::{self, Own};
 use super::rigid::Vec3;
 use super::scenario::{BlockError, Misfit, Scenario, Value, axis_named, blocks_of};
 use super::terms::{Shape, Target, Term};
-use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
 use crate::machine::Machine;
 use crate::units::{Plain, mm_from_um, rad_from_deg, ratio_from_ppm};
 use std::ops::Range;
@@ -31,14 +32,33 @@ type Node<'a> = Spanned<DeValue<'a>>;
 /// # Errors
 /// When the text is not TOML, or something in it cannot be planted in this machine.
 pub fn parse(source: &Source, machine: &Machine) -> Result<(Scenario, Findings)> {
+    parse_with(source, machine, &|file| {
+        Err(Failure::new("scenario::effects_file", format!("{file}: this scenario has no folder to look in")))
+    })
+}
+
+/// The same; `open` gives the text of a file of effects that the scenario names.
+///
+/// # Errors
+/// As [`parse`], and when a file of effects is unusable.
+pub fn parse_with(
+    source: &Source,
+    machine: &Machine,
+    open: &dyn Fn(&str) -> Result<Source>,
+) -> Result<(Scenario, Findings)> {
     let text: &str = source.inner();
     let document = DeTable::parse(text).map_err(|e| {
         from_toml(&e, source, "scenario::not_toml").help("a scenario is TOML; docs/formats.md shows the form")
     })?;
-    let mut reader = Reader { source, machine, findings: Findings::default() };
+    let mut reader = Reader { source, machine, own: Vec::new(), findings: Findings::default() };
     let mut out = Scenario::default();
+    // the user's effects first: what is planted may be of them
+    if let Some(node) = document.get_ref().get("effects_file") {
+        reader.effects_file(&mut out, node, open);
+    }
     for (key, node) in in_order(document.get_ref()) {
         match &**key.get_ref() {
+            "effects_file" => {}
             "seed" => out.seed = reader.seed(node),
             "effects" => reader.effects(&mut out, node),
             "block" => reader.each(node, "block", |r, t, at| r.block(&mut out, t, at)),
@@ -52,7 +72,7 @@ pub fn parse(source: &Source, machine: &Machine) -> Result<(Scenario, Findings)>
                     key.span(),
                     "scenario::unknown",
                     message,
-                    "it has: seed, effects, block, harmonic, noise, time, temperature",
+                    "it has: seed, effects_file, effects, block, harmonic, noise, time, temperature",
                 );
             }
         }
@@ -70,10 +90,36 @@ fn in_order<'t, 'i>(table: &'t Table<'i>) -> Vec<(&'t Spanned<DeString<'i>>, &'t
 struct Reader<'a> {
     source: &'a Source,
     machine: &'a Machine,
+    /// Effects of the user's own.
+    own: Vec<Own>,
     findings: Findings,
 }
 
 impl Reader<'_> {
+    /// `effects_file = ["my-effects.toml"]`, or one name.
+    fn effects_file(&mut self, out: &mut Scenario, node: &Node<'_>, open: &dyn Fn(&str) -> Result<Source>) {
+        let names: Vec<&Node<'_>> = match node.get_ref() {
+            DeValue::Array(names) => names.iter().collect(),
+            _ => vec![node],
+        };
+        for node in names {
+            let Some(name) = self.word(node, "effects_file") else { continue };
+            match open(name).and_then(|text| own::read(&text, self.machine)) {
+                Ok(effects) => {
+                    for effect in &effects {
+                        if self.own.iter().any(|o| o.id == effect.id) {
+                            let message = format!("effect {:?} stands in two files", effect.id);
+                            self.error(node.span(), "scenario::effects_file", message, "keep one of the two");
+                        }
+                    }
+                    self.own.extend(effects);
+                }
+                Err(failure) => self.findings.0.extend(failure.0),
+            }
+            out.effects_files.push(name.to_owned());
+        }
+    }
+
     fn error(&mut self, span: Range<usize>, code: &'static str, message: impl Into<String>, help: impl Into<String>) {
         self.findings.push(Finding::error(code, message).help(help).at(self.source, span));
     }
@@ -251,7 +297,12 @@ impl Reader<'_> {
             if self.findings.0.len() > before {
                 continue;
             }
-            if let Err(misfits) = out.plant(self.machine, id.get_ref(), &values) {
+            let own = self.own.iter().find(|o| o.id == **id.get_ref());
+            let planted = match own {
+                Some(own) => out.plant_own(self.machine, own, &values),
+                None => out.plant(self.machine, id.get_ref(), &values),
+            };
+            if let Err(misfits) = planted {
                 for Misfit { value, code, message, help } in misfits {
                     let span = value.and_then(|i| spans.get(i).cloned()).unwrap_or(id.span());
                     self.error(span, code, message, help);

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // each test file uses a part of it
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
+pub mod more_machines;
 pub mod random;
 
 use axiscal::diag::source;

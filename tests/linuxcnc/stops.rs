@@ -139,6 +139,10 @@ pub fn rs274_accepts_every_program() {
         ("double-head", "double-head", &[]),
         ("trunnion", "basic", &[]),
         ("swivel-table-b", "basic", &["--tcp"]),
+        ("swivel-head", "full", &[]),
+        ("double-head", "full", &[]),
+        ("trunnion", "full", &["--tcp"]),
+        ("swivel-table-b", "full", &[]),
     ];
     for (machine, program, more) in programs {
         let (folder, text) = generate(machine, program, more);

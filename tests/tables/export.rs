@@ -14,6 +14,9 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
             unit: (*unit).to_owned(),
             sigma: Some(0.0002),
             expanded: Some(0.0004),
+            sigma_noise: None,
+            sigma_type_b: None,
+            sigma_with_unmodelled: None,
             status: *status,
         })
         .collect();
@@ -23,24 +26,17 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
         effects: vec![],
         converged: true,
         iterations: 4,
-        stopped: String::new(),
         touches: 202,
-        rejected: vec![],
         unknowns: 5,
         rank: 5,
         dof: 197,
         condition: 13.7,
         rms_um: 1.0,
-        held_out_rms_um: None,
         noise_um: 1.0,
         noise_source: "declared".to_owned(),
-        visit_um: 0.0,
         chi2_per_dof: 1.0,
-        undetermined: vec![],
         parameters,
-        reference_mm: [0.0; 3],
-        residuals: None,
-        warnings: vec![],
+        ..Outcome::default()
     }
 }
 

@@ -137,12 +137,13 @@ fn polynomial(axis: AxisName, dof: usize, n: i32, numbered: bool) -> Parameter {
 
 /// The screw's error of every turn.
 fn pitch(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
-    let period = settings("pitch").unwrap_or(PITCH_MM);
+    let own = format!("pitch_{axis}");
+    let period = settings(&own).or_else(|| settings("pitch")).unwrap_or(PITCH_MM);
     let target = moved(axis, along(axis));
     vec![
         Parameter::at(format!("E{axis}{axis}c"), Um, target, Shape::PitchCosine(axis, period)),
         Parameter::at(format!("E{axis}{axis}s"), Um, target, Shape::PitchSine(axis, period)),
-        Parameter::setting("pitch", Mm, Some(PITCH_MM)),
+        Parameter::setting(&own, Mm, Some(PITCH_MM)).alias("pitch"),
     ]
 }
 
@@ -180,8 +181,8 @@ fn harmonic(family: &str, axis: AxisName, k: &str, machine: &Machine) -> Result<
 /// The axis lags behind the control by half the lost motion, whichever way it goes.
 fn backlash(axis: AxisName) -> Parameter {
     let unit = if axis.is_rotary() { Urad } else { Um };
-    let row = Parameter::new("backlash", unit, [(Target::Reading(axis), Shape::Sense(axis), -0.5)]);
-    row.alias(format!("backlash_{axis}")).alias(format!("b_{axis}"))
+    let acts = [(Target::Reading(axis), Shape::Sense(axis), -0.5)];
+    Parameter::new(format!("backlash_{axis}"), unit, acts).alias("backlash").alias(format!("b_{axis}"))
 }
 
 /// The control counts this axis the wrong way round (value 1).

@@ -46,10 +46,10 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     }
 }
 
-/// The first axis of the head that tilts the tool.
+/// The axis of the head that tilts the tool: B where the head has it, else A.
 fn tilting_head(machine: &Machine) -> Result<AxisName, Refusal> {
-    let tilts = |a: &&crate::machine::Axis| a.side == Side::Tool && a.name.is_rotary() && a.direction.z.abs() < 0.5;
-    let found = machine.axes.iter().find(tilts).map(|a| a.name);
+    let here = |name: &AxisName| machine.axis(*name).is_some_and(|a| a.side == Side::Tool);
+    let found = [AxisName::B, AxisName::A].into_iter().find(here);
     found.ok_or_else(|| Refusal::NotHere(format!("the head of {:?} does not tilt", machine.name)))
 }
 
@@ -69,10 +69,10 @@ fn table_sag(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
     Ok(vec![Parameter::new("table_sag", Um, acts).alias("k").alias("sag")])
 }
 
-/// A load beside the centre tilts the plate, and the tilt turns with it.
+/// A load beside the centre tilts the plate (C's where there is one), and the tilt turns with it.
 fn table_load(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
-    let last = machine.axes.iter().rfind(|a| a.side == Side::Workpiece && a.name.is_rotary()).map(|a| a.name);
-    let Some(axis) = last else {
+    let here = |name: &AxisName| machine.axis(*name).is_some_and(|a| a.side == Side::Workpiece);
+    let Some(axis) = [AxisName::C, AxisName::B, AxisName::A].into_iter().find(here) else {
         return Err(Refusal::NotHere(format!("{:?} has no rotary table", machine.name)));
     };
     let row =
@@ -83,7 +83,7 @@ fn table_load(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
 /// The edge of all blocks along their own x, y or z is longer by this much.
 fn size(i: usize) -> Parameter {
     let acts = [(Target::HalfSize(i), Shape::Constant, 0.5)];
-    Parameter::new(format!("s{}", dof_letter(i)), Um, acts).alias(format!("size_{}", dof_letter(i)))
+    Parameter::new(format!("size_{}", dof_letter(i)), Um, acts).alias(format!("s{}", dof_letter(i)))
 }
 
 /// All blocks slip on their carrier at one moment.

@@ -96,9 +96,16 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
 
 /// All ids that can be planted in a machine.
 pub fn ids(machine: &Machine) -> Vec<String> {
-    let families = [location::ids, axes::ids, probe::ids, body::ids, thermal::ids];
-    let all = families.into_iter().flat_map(|f| f(machine));
-    all.filter(|id| parameters(id, machine, &|_| Some(1.0)).is_ok()).collect()
+    all(machine).filter(|id| parameters(id, machine, &|_| Some(1.0)).is_ok()).collect()
+}
+
+/// Is this the id of an effect that some machine can have?
+pub fn is_known(id: &str, machine: &Machine) -> bool {
+    id == "block-setup" || all(machine).any(|known| known == id)
+}
+
+fn all(machine: &Machine) -> impl Iterator<Item = String> {
+    [location::ids, axes::ids, probe::ids, body::ids, thermal::ids].into_iter().flat_map(|family| family(machine))
 }
 
 /// `name-b` → the axis B of the machine, when the id begins so.

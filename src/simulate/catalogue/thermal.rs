@@ -25,8 +25,8 @@ pub fn ids(_: &Machine) -> Vec<String> {
 
 /// Parameters of an id of this family.
 pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
-    let tau = settings("tau").unwrap_or(TAU_H);
-    let tau_row = || Parameter::setting("tau", H, Some(TAU_H)).alias("tau_h");
+    let tau = settings("spindle_tau").or_else(|| settings("tau")).unwrap_or(TAU_H);
+    let tau_row = |name: &str| Parameter::setting(name, H, Some(TAU_H)).alias("tau_h");
     let ball = |prefix: &'static str, unit, shape| {
         (0..3).map(move |i| {
             let letter = dof_letter(i).to_ascii_lowercase();
@@ -35,11 +35,12 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     };
     Ok(match id {
         "drift-linear" => ball("v", UmPerH, Shape::Hours).collect(),
-        "warm-up" => ball("w", Um, Shape::WarmUp(tau)).chain([tau_row()]).collect(),
+        "warm-up" => ball("w", Um, Shape::WarmUp(tau)).chain([tau_row("tau")]).collect(),
         "ambient-bending" => ball("q", UmPerK, Shape::Warmth).collect(),
         // the spindle grows out of the head: the ball moves away from it
         "spindle-growth" => {
-            vec![Parameter::at("growth", Um, Target::Length, Shape::WarmUp(tau)).alias("A"), tau_row()]
+            let row = Parameter::at("spindle_growth", Um, Target::Length, Shape::WarmUp(tau)).alias("growth");
+            vec![row.alias("A"), tau_row("spindle_tau").alias("tau")]
         }
         "ambient-scale" => {
             let axes = machine.axes.iter().map(|a| a.name).filter(|a| !a.is_rotary());
@@ -51,11 +52,14 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
             must_stand_on(AxisName::C, Side::Workpiece, machine)?;
             let row = |dof: usize, name: &str| {
                 let target = Target::Axis { axis: AxisName::C, after: false, dof };
-                Parameter::at(name, UmPerH, target, Shape::Hours)
+                Parameter::at(format!("centre_{name}"), UmPerH, target, Shape::Hours).alias(name)
             };
             vec![row(0, "vx"), row(1, "vy")]
         }
-        "artefact-growth" => vec![Parameter::at("growth", UmPerH, Target::BlockOutward, Shape::Hours).alias("k")],
+        "artefact-growth" => {
+            let row = Parameter::at("artefact_growth", UmPerH, Target::BlockOutward, Shape::Hours);
+            vec![row.alias("growth").alias("k")]
+        }
         _ => return Err(Refusal::Unknown),
     })
 }

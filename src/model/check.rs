@@ -1,0 +1,364 @@
+//! Effects as written → checked records; every finding has its place and says which words exist.
+
+use super::as_written::{EffectAsWritten, File, Frame, Per, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten};
+use super::catalogue::{Effect, Parameter, Place, Term};
+use super::formula::{FUNCTIONS, Formula, VARIABLES};
+use crate::axes::AxisName;
+use crate::diag::{Finding, Findings, Severity, Source};
+use crate::machine::Side;
+use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
+use toml::Spanned;
+
+/// Name of the file's format.
+const FORMAT: &str = "axiscal-effects/1";
+
+/// Source of a size that no publication stands behind.
+const ASSUMED: &str = "assumed";
+
+/// Reads effects as written and gathers what is wrong with them.
+pub(super) struct Check<'a> {
+    source: &'a Source,
+    /// Built-in effects are checked by a test, and their formulas are compiled when they are used.
+    built_in: bool,
+    pub(super) findings: Findings,
+}
+
+impl<'a> Check<'a> {
+    pub(super) fn new(source: &'a Source, built_in: bool) -> Self {
+        Self { source, built_in, findings: Findings::default() }
+    }
+
+    /// The file must be of this format, if it says so.
+    pub(super) fn format(&mut self, file: &File) {
+        if file.format.as_deref().is_some_and(|f| f != FORMAT) {
+            self.error(
+                &(0..0),
+                "effects::format",
+                format!("format is not {FORMAT}"),
+                &format!("write format = \"{FORMAT}\""),
+            );
+        }
+    }
+
+    /// An id that exists already.
+    pub(super) fn twice(&mut self, written: &EffectAsWritten) {
+        self.error(
+            &written.id.span(),
+            "effects::id_twice",
+            format!("effect {:?} exists already", written.id.get_ref()),
+            "give it an id of its own; rows of one id must apply to different machines (side, needs, unless)",
+        );
+    }
+
+    fn error(&mut self, span: &std::ops::Range<usize>, code: &'static str, message: String, help: &str) {
+        self.findings.push(Finding::error(code, message).help(help).at(self.source, span.clone()));
+    }
+
+    /// A parameter's name must be a word that a formula can use, and none that means something else there.
+    fn name(&mut self, name: &str, span: &std::ops::Range<usize>) {
+        let word = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !word || VARIABLES.contains(&name) || FUNCTIONS.contains(&name) {
+            self.error(
+                span,
+                "effects::parameter",
+                format!("{name:?} cannot be the name of a parameter"),
+                "letters, digits and _, and none of the variables and functions of formulas",
+            );
+        }
+    }
+
+    /// A constant displacement is a length or an angle; with variables in it the formula may carry the rest of the unit.
+    fn unit_fits(&mut self, t: &TermAsWritten) {
+        let unit = t.unit.get_ref().as_str();
+        let constant = Formula::parse(t.formula.get_ref(), &[]).is_ok_and(|f| f.constant().is_some());
+        let wrong = match t.dof.get_ref().as_str() {
+            "dx" | "dy" | "dz" | "r" | "X" | "Y" | "Z" => !matches!(unit, "um" | "mm"),
+            "rx" | "ry" | "rz" | "A" | "B" | "C" => !matches!(unit, "urad" | "mrad" | "deg"),
+            _ => false,
+        };
+        if constant && wrong && unit_factor(unit).is_some() {
+            self.error(
+                &t.unit.span(),
+                "effects::unit",
+                format!("a constant {} cannot be in {unit}", t.dof.get_ref()),
+                "lengths in um or mm, angles in urad, mrad or deg",
+            );
+        }
+    }
+
+    /// One effect; `None` where it is unusable.
+    pub(super) fn effect(&mut self, w: &EffectAsWritten) -> Option<Effect> {
+        let before = self.findings.0.len();
+        let mut parameters: Vec<Parameter> = Vec::new();
+        for t in &w.terms {
+            self.factor(t, &mut parameters);
+        }
+        for s in &w.shape {
+            self.shape(s, &mut parameters);
+        }
+        let names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let mut needs = self.axes(&w.needs);
+        let unless = self.axes(&w.unless);
+        let terms: Vec<Term> = w.terms.iter().filter_map(|t| self.term(w, t, &names, &mut needs)).collect();
+        if w.terms.is_empty() {
+            self.error(
+                &w.id.span(),
+                "effects::no_terms",
+                format!("effect {:?} has no terms", w.id.get_ref()),
+                "add terms = [ { parameter, unit, dof, formula } ]",
+            );
+        }
+        if self.findings.0[before..].iter().any(|f| f.severity == Severity::Error) {
+            return None;
+        }
+        Some(Effect {
+            id: w.id.get_ref().clone(),
+            name: if w.name.is_empty() { w.id.get_ref().clone() } else { w.name.clone() },
+            says: w.says.clone(),
+            look: w.look.clone(),
+            mends: w.mends.clone(),
+            side: w.side.map(|s| if s == SideAsWritten::Tool { Side::Tool } else { Side::Workpiece }),
+            needs,
+            unless,
+            family: if w.family.is_empty() { "own".to_owned() } else { w.family.clone() },
+            discrete: w.discrete,
+            per_block: w.per == Some(Per::Block),
+            nuisance: w.nuisance,
+            paper: w.paper,
+            parameters,
+            terms,
+            built_in: self.built_in,
+        })
+    }
+
+    /// The parameter that a term is multiplied by; one parameter may stand before several terms.
+    fn factor(&mut self, t: &TermAsWritten, parameters: &mut Vec<Parameter>) {
+        let name = t.parameter.get_ref();
+        let unit = t.unit.get_ref();
+        let factor = unit_factor(unit);
+        let typical = t.typical.unwrap_or_else(|| default_typical(unit));
+        if !self.built_in {
+            self.name(name, &t.parameter.span());
+            self.unit_fits(t);
+        }
+        if factor.is_none() {
+            self.unknown_unit(&t.unit);
+        }
+        if !(typical.is_finite() && typical > 0.0) {
+            self.error(
+                &t.unit.span(),
+                "effects::typical",
+                format!("typical size of {name} is {typical}"),
+                "write a positive number",
+            );
+        }
+        match parameters.iter().find(|p| &p.name == name) {
+            // one factor may act in several terms, but it is one number with one unit
+            Some(p) if &p.unit != unit => {
+                self.error(&t.unit.span(), "effects::unit", format!("{name} has two units"), "one parameter, one unit");
+            }
+            Some(_) => {}
+            None => parameters.push(Parameter {
+                name: name.clone(),
+                alias: t.alias.clone(),
+                iso: t.iso.as_deref().map(|iso| crate::symbols::canonical(iso).unwrap_or_else(|| iso.to_owned())),
+                unit: unit.clone(),
+                factor: factor.unwrap_or(1.0),
+                typical,
+                source: t.source.clone().unwrap_or_else(|| ASSUMED.to_owned()),
+                shape: None,
+                scan: Vec::new(),
+            }),
+        }
+    }
+
+    /// A parameter that stands inside the formulas.
+    fn shape(&mut self, s: &ShapeAsWritten, parameters: &mut Vec<Parameter>) {
+        let (name, span) = (s.parameter.get_ref(), s.parameter.span());
+        self.name(name, &span);
+        if unit_factor(s.unit.get_ref()).is_none() {
+            self.unknown_unit(&s.unit);
+        }
+        if parameters.iter().any(|p| &p.name == name) {
+            self.error(
+                &span,
+                "effects::parameter",
+                format!("{name} stands before a term and inside: two parameters of one name"),
+                "give the one inside a name of its own",
+            );
+        }
+        let (low, high) = (s.min.unwrap_or(f64::NEG_INFINITY), s.max.unwrap_or(f64::INFINITY));
+        if !(s.start.is_finite() && low < high && (low..=high).contains(&s.start)) {
+            self.error(
+                &span,
+                "effects::shape",
+                format!("start of {name} is not between min and max"),
+                "write start, min and max with min < start < max",
+            );
+        }
+        let scan = s.scan.as_ref().map(Scan::values);
+        if scan.as_ref().is_some_and(|v| !v.as_ref().is_some_and(|v| v.iter().all(|x| (low..=high).contains(x)))) {
+            self.error(
+                &span,
+                "effects::scan",
+                format!("scan of {name} holds no usable values"),
+                "write scan = [5, 10, 20] or scan = { from = 0.1, to = 5, points = 12, log = true }, from min to max",
+            );
+        }
+        parameters.push(Parameter {
+            name: name.clone(),
+            alias: None,
+            iso: None,
+            unit: s.unit.get_ref().clone(),
+            factor: 1.0,
+            typical: s.start.abs().max(1e-9),
+            source: s.source.clone().unwrap_or_else(|| ASSUMED.to_owned()),
+            shape: Some((s.start, low, high)),
+            scan: scan.flatten().unwrap_or_default(),
+        });
+    }
+
+    /// Letters of axes.
+    fn axes(&mut self, written: &[Spanned<String>]) -> Vec<AxisName> {
+        let mut out = Vec::new();
+        for word in written {
+            match axis(word.get_ref()) {
+                Some(name) => out.push(name),
+                None => self.error(
+                    &word.span(),
+                    "effects::axis",
+                    format!("{:?} is no axis", word.get_ref()),
+                    "axes: X Y Z A B C",
+                ),
+            }
+        }
+        out
+    }
+
+    fn term(
+        &mut self,
+        w: &EffectAsWritten,
+        t: &TermAsWritten,
+        names: &[&str],
+        needs: &mut Vec<AxisName>,
+    ) -> Option<Term> {
+        let at = t.at.as_ref().unwrap_or(&w.at);
+        let Some(place) = place(at.get_ref(), t.frame) else {
+            self.error(
+                &at.span(),
+                "effects::at",
+                format!("unknown place {:?}", at.get_ref()),
+                "places: X Y Z A B C, base, tool, workpiece, block, trigger, reading",
+            );
+            return None;
+        };
+        let Some(component) = component(place, t.dof.get_ref()) else {
+            let known = match place {
+                Place::Trigger => "r",
+                Place::Reading => "X Y Z A B C",
+                _ => "dx dy dz rx ry rz",
+            };
+            self.error(
+                &t.dof.span(),
+                "effects::dof",
+                format!("unknown dof {:?} at {:?}", t.dof.get_ref(), at.get_ref()),
+                &format!("there: {known}"),
+            );
+            return None;
+        };
+        let needed = match place {
+            Place::Before(axis) | Place::After(axis) => Some(axis),
+            Place::Reading => AxisName::ALL.get(component).copied(),
+            _ => None,
+        };
+        needs.extend(needed.filter(|axis| !needs.contains(axis)));
+        let text = t.formula.get_ref();
+        let formula =
+            if self.built_in { Ok(Formula::unchecked(text, names)) } else { Formula::parse(text, names) };
+        match formula {
+            Ok(formula) => {
+                let parameter = names.iter().position(|name| name == t.parameter.get_ref())?;
+                Some(Term { parameter, place, component, formula })
+            }
+            Err(message) => {
+                self.error(
+                    &t.formula.span(),
+                    "effects::formula",
+                    format!("formula of {:?}: {message}", w.id.get_ref()),
+                    "angles A B C are radians inside a formula; unary minus binds tighter than ^: write -(x^2)",
+                );
+                None
+            }
+        }
+    }
+
+    fn unknown_unit(&mut self, unit: &Spanned<String>) {
+        self.error(
+            &unit.span(),
+            "effects::unit",
+            format!("unknown unit {:?}", unit.get_ref()),
+            "units: um mm urad mrad deg um/m um/h um/K ppm/K ms s h 1",
+        );
+    }
+}
+
+fn unit_factor(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "um" | "um/h" | "um/K" => mm_from_um(1.0),
+        "mm" | "s" | "h" | "1" => 1.0,
+        "urad" | "um/m" | "ppm/K" => ratio_from_ppm(1.0),
+        // milliradians to radians, milliseconds to seconds: both a thousandth
+        "mrad" | "ms" => 1e-3,
+        "deg" => rad_from_deg(1.0),
+        _ => return None,
+    })
+}
+
+fn default_typical(unit: &str) -> f64 {
+    match unit {
+        "um" | "um/h" | "um/m" | "ppm/K" => 10.0,
+        "um/K" => 3.0,
+        "mm" => 0.03,
+        "urad" => 50.0,
+        "mrad" => 0.05,
+        "deg" => 0.003,
+        _ => 1.0,
+    }
+}
+
+fn place(at: &str, frame: Option<Frame>) -> Option<Place> {
+    Some(match at {
+        "base" => Place::Base,
+        "tool" => Place::Tool,
+        "workpiece" => Place::Workpiece,
+        "block" => Place::Block,
+        "trigger" => Place::Trigger,
+        "reading" => Place::Reading,
+        _ => {
+            let axis = axis(at)?;
+            // error motions: a rotary axis's in the frame it turns in, a linear one's in the frame it carries
+            let default = if axis.is_rotary() { Frame::Fixed } else { Frame::Moving };
+            match frame.unwrap_or(default) {
+                Frame::Fixed => Place::Before(axis),
+                Frame::Moving => Place::After(axis),
+            }
+        }
+    })
+}
+
+/// The axis of a letter.
+fn axis(word: &str) -> Option<AxisName> {
+    let mut letters = word.chars();
+    let name = AxisName::from_letter(letters.next()?)?;
+    letters.next().is_none().then_some(name)
+}
+
+fn component(place: Place, dof: &str) -> Option<usize> {
+    match place {
+        Place::Trigger => (dof == "r").then_some(0),
+        Place::Reading => axis(dof).map(AxisName::index),
+        _ => ["dx", "dy", "dz", "rx", "ry", "rz"].iter().position(|d| *d == dof),
+    }
+}

@@ -1,0 +1,220 @@
+//! On what the misfit depends: variables ranked, with the curve itself and a formula to start from.
+
+use super::distributions::p_of_t;
+use super::generic::{Features, Generics, Shape};
+use super::groups::Member;
+use super::score::{Question, Score, Search};
+use nalgebra::DVector;
+
+/// Points of a curve.
+const POINTS: usize = 121;
+
+/// A term of a formula: size times formula.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SketchTerm {
+    /// In the formula language; `None` where it has no words for the shape (groups of touches).
+    pub formula: Option<String>,
+    /// Size, in the unit of the dependence.
+    pub size: f64,
+    /// Its standard uncertainty.
+    pub sigma: f64,
+}
+
+/// A number inside the formulas of a dependence that a fit may refine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SketchShape {
+    /// Name, as the formulas say it.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What the scan found.
+    pub start: f64,
+    /// Smallest sensible value: the neighbour in the scan.
+    pub min: f64,
+    /// Largest sensible value.
+    pub max: f64,
+}
+
+/// A point of a curve: what the misfit is at a value of the variable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurvePoint {
+    /// Value of the variable, in its unit; number of the group for groups.
+    pub x: f64,
+    /// Size of the misfit, in the unit of the dependence.
+    pub y: f64,
+    /// Standard uncertainty of y.
+    pub sigma: f64,
+}
+
+/// What the misfit depends on.
+#[derive(Debug, Clone)]
+pub struct Dependence {
+    /// The variable or pair of variables, or `block`, `face`, `visit`.
+    pub on: String,
+    /// Id of the generic candidate that shows it best.
+    pub id: String,
+    /// Its index in the library.
+    pub candidate: usize,
+    /// Name of the direction in which it acts.
+    pub direction: String,
+    /// What the scan found: order of a rotary axis, period, place of a step or kink, time constant; 0 without a scan.
+    pub scanned: f64,
+    /// ΔSS as a share of the misfit's sum of squares.
+    pub share: f64,
+    /// p-value, the scan taken into account.
+    pub p: f64,
+    /// Its logarithm.
+    pub ln_p: f64,
+    /// Holm's over all generic shapes, against the whole level.
+    pub p_adjusted: f64,
+    /// `at` of an effect that acts so.
+    pub at: String,
+    /// `dof` of it.
+    pub dof: String,
+    /// Unit of its size.
+    pub unit: String,
+    /// Formula, as a sum of terms.
+    pub terms: Vec<SketchTerm>,
+    /// The number that the scan found, where a fit may refine it; the formulas then have it by name.
+    pub shape: Option<SketchShape>,
+    /// The curve against the variable; empty for a product.
+    pub curve: Vec<CurvePoint>,
+}
+
+/// The generic search: what the misfit depends on, best first, one entry per variable or pair.
+///
+/// The leader of the ranking goes first, unless a simpler shape (fewer variables, then smaller p) says the same.
+#[must_use]
+pub fn dependences(question: Question, features: &Features, generics: &Generics) -> Vec<Dependence> {
+    let search = Search::new(question, &generics.library);
+    let ranking = search.ranking();
+    let mut order = Vec::new();
+    if let Some(&leader) = ranking.first() {
+        let group = search.group_of(leader, &ranking);
+        let key = |m: &Member| (generics.shapes[m.candidate].depends_on.matches('*').count(), search.scores[m.candidate].ln_p);
+        let simplest = group.members.iter().filter(|m| m.stays).min_by(|a, b| {
+            let ((n, p), (k, q)) = (key(a), key(b));
+            n.cmp(&k).then(p.total_cmp(&q))
+        });
+        order.extend(simplest.map(|m| m.candidate));
+    }
+    order.extend(ranking);
+    let total = question.base.project(question.residual).norm_squared();
+    let mut out: Vec<Dependence> = Vec::new();
+    for candidate in order {
+        let shape = &generics.shapes[candidate];
+        if out.iter().all(|d| d.on != shape.depends_on) {
+            out.push(dependence(&search.scores[candidate], shape, features, generics, total));
+        }
+    }
+    out
+}
+
+fn dependence(score: &Score, shape: &Shape, features: &Features, generics: &Generics, total: f64) -> Dependence {
+    let candidate = &generics.library.candidates()[score.candidate];
+    let direction = &features.directions[shape.direction];
+    let functions = &shape.functions[score.variant];
+    let free = functions.first().and_then(|f| f.free_parameter(features));
+    let terms = functions
+        .iter()
+        .enumerate()
+        .map(|(i, f)| SketchTerm {
+            formula: f.formula(features, free.map(|(name, _, _)| name)),
+            size: score.estimate[i],
+            sigma: score.covariance[(i, i)].max(0.0).sqrt(),
+        })
+        .collect();
+    let scanned = candidate.variants[score.variant].shape;
+    Dependence {
+        on: shape.depends_on.clone(),
+        id: candidate.id.clone(),
+        candidate: score.candidate,
+        direction: direction.name.clone(),
+        scanned,
+        share: if total > 0.0 { score.delta_ss / total } else { 0.0 },
+        p: score.p,
+        ln_p: score.ln_p,
+        p_adjusted: score.p_adjusted,
+        at: direction.at.clone(),
+        dof: direction.dof.clone(),
+        unit: direction.unit.clone(),
+        terms,
+        shape: free.map(|(name, unit, start)| {
+            let neighbours = || candidate.variants.iter().map(|v| v.shape).filter(|s| *s != start);
+            let below = neighbours().filter(|s| *s < start).fold(f64::NEG_INFINITY, f64::max);
+            let above = neighbours().filter(|s| *s > start).fold(f64::INFINITY, f64::min);
+            SketchShape {
+                name: name.to_owned(),
+                unit: unit.to_owned(),
+                start,
+                min: if below.is_finite() { below } else { start - 0.5 * start.abs() },
+                max: if above.is_finite() { above } else { start + start.abs().max(1e-3) },
+            }
+        }),
+        curve: curve(score, shape, features),
+    }
+}
+
+fn curve(score: &Score, shape: &Shape, features: &Features) -> Vec<CurvePoint> {
+    let functions = &shape.functions[score.variant];
+    let point = |x: f64, values: DVector<f64>| CurvePoint {
+        x,
+        y: score.estimate.dot(&values),
+        sigma: values.dot(&(&score.covariance * &values)).max(0.0).sqrt(),
+    };
+    match shape.variables[..] {
+        [] => (0..functions.len())
+            .map(|i| point(i as f64, DVector::from_fn(functions.len(), |k, _| f64::from(u8::from(i == k)))))
+            .collect(),
+        [v] if !shape.depends_on.contains('*') => {
+            let values = &features.variables[v].values;
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            (0..POINTS)
+                .map(|i| {
+                    let x = low + (high - low) * i as f64 / (POINTS - 1) as f64;
+                    point(x, DVector::from_iterator(functions.len(), functions.iter().map(|f| f.at(x))))
+                })
+                .collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Does a residual remember the one before? Rows in the order of the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Serial {
+    /// Correlation of neighbours.
+    pub lag_1: f64,
+    /// Two-sided p-value of it.
+    pub lag_1_p: f64,
+    /// Number of runs of one sign.
+    pub runs: usize,
+    /// Two-sided p-value of so few or many (Wald and Wolfowitz, normal approximation).
+    pub runs_p: f64,
+}
+
+/// Lag-1 autocorrelation and runs test of residuals in run order. `None` with fewer than ten or all of one sign.
+#[must_use]
+pub fn serial(residual: &[f64]) -> Option<Serial> {
+    let n = residual.len() as f64;
+    let mean = residual.iter().sum::<f64>() / n;
+    let square: f64 = residual.iter().map(|r| (r - mean) * (r - mean)).sum();
+    let above = residual.iter().filter(|r| **r > 0.0).count() as f64;
+    if residual.len() < 10 || square <= 0.0 || above == 0.0 || above == n {
+        return None;
+    }
+    let lag_1 = residual.windows(2).map(|w| (w[0] - mean) * (w[1] - mean)).sum::<f64>() / square;
+    let runs = 1 + residual.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0)).count();
+    let below = n - above;
+    let expected = 2.0 * above * below / n + 1.0;
+    let variance = (expected - 1.0) * (expected - 2.0) / (n - 1.0);
+    let normal = |z: f64| p_of_t(z, 1e6);
+    Some(Serial {
+        lag_1,
+        // its standard error is 1/√n and its mean −1/n
+        lag_1_p: normal((lag_1 + 1.0 / n) * n.sqrt()),
+        runs,
+        runs_p: normal((runs as f64 - expected) / variance.max(1e-12).sqrt()),
+    })
+}

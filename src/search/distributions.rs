@@ -1,0 +1,139 @@
+//! Probabilities of the tests, also where they are too small for a floating-point number.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::function::beta::{beta_reg, ln_beta};
+use statrs::function::gamma::ln_gamma;
+
+/// Below this a regularised incomplete beta function is computed by its series in logarithms.
+const SMALLEST: f64 = 1e-250;
+
+/// ln P(F > f) with f = (`part` / `d1`) / (`rest` / `d2`): a strong effect has a p below 1e-308, and must still be
+/// ranked.
+#[must_use]
+pub fn ln_p_of_f(part: f64, d1: f64, rest: f64, d2: f64) -> f64 {
+    if part <= 0.0 {
+        return 0.0;
+    }
+    if rest <= 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    ln_beta_reg(0.5 * d2, 0.5 * d1, rest / (rest + part))
+}
+
+/// P(|T| > |t|) with `dof` degrees of freedom.
+#[must_use]
+pub fn p_of_t(t: f64, dof: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |d| 2.0 * d.sf(t.abs()))
+}
+
+/// P(χ² > x) with `dof` degrees of freedom.
+#[must_use]
+pub fn p_of_chi2(x: f64, dof: f64) -> f64 {
+    ChiSquared::new(dof).map_or(f64::NAN, |d| d.sf(x))
+}
+
+fn ln_beta_reg(a: f64, b: f64, x: f64) -> f64 {
+    let direct = beta_reg(a, b, x.clamp(0.0, 1.0));
+    if direct > SMALLEST {
+        return direct.ln();
+    }
+    // x^a / (a B(a, b)) · Σ (1 − b)_n a x^n / ((a + n) n!), Abramowitz and Stegun 26.5.4
+    let (mut sum, mut term) = (1.0, 1.0);
+    for n in 1..20_000 {
+        let n = f64::from(n);
+        term *= (n - b) / n * x;
+        let added = term * a / (a + n);
+        sum += added;
+        if added.abs() < 1e-14 * sum.abs() {
+            break;
+        }
+    }
+    a * x.ln() - a.ln() - ln_beta(a, b) + sum.ln()
+}
+
+/// ln of a bound on the p-value of the best of many scanned shapes.
+///
+/// `ln_p` holds the p-value of each shape (`q` columns each, neighbours in the scan next to each other). Two bounds
+/// hold, and the smaller is taken: Bonferroni's, and that of Davies (Biometrika 74 (1987) 33) for the supremum of a
+/// χ² process, P(χ² > S) + V · S^((q−1)/2) · e^(−S/2) · 2^(−q/2) / Γ(q/2), with V the total variation of √S over the
+/// scan: neighbours that resemble each other cost little. Each p is turned into the S that has it.
+#[must_use]
+pub fn ln_p_of_scan(ln_p: &[f64], q: usize) -> f64 {
+    let best = ln_p.iter().copied().fold(0.0, f64::min);
+    if ln_p.len() < 2 {
+        return best;
+    }
+    let bonferroni = best + (ln_p.len() as f64).ln();
+    // the roots of a tiny p are not needed exactly: Bonferroni's factor no longer matters there
+    if best < -300.0 {
+        return bonferroni;
+    }
+    let Ok(chi2) = ChiSquared::new(q as f64) else { return bonferroni.min(0.0) };
+    let root = |ln_p: f64| -> f64 {
+        let p = ln_p.exp();
+        if p > 1e-12 { chi2.inverse_cdf(1.0 - p).max(0.0).sqrt() } else { tail_root(ln_p, q) }
+    };
+    let roots: Vec<f64> = ln_p.iter().map(|&l| root(l)).collect();
+    let variation: f64 = roots.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
+    let top = roots.iter().copied().fold(0.0, f64::max);
+    let half_q = 0.5 * q as f64;
+    let crossings = variation
+        * ((q as f64 - 1.0) * top.max(f64::MIN_POSITIVE).ln() - 0.5 * top * top
+            - half_q * std::f64::consts::LN_2
+            - ln_gamma(half_q))
+        .exp();
+    bonferroni.min((best.exp() + crossings).ln()).min(0.0)
+}
+
+/// √S with ln P(χ²_q > S) = `ln_p`, for small p: Newton's steps on the leading term of the tail.
+fn tail_root(ln_p: f64, q: usize) -> f64 {
+    let half_q = 0.5 * q as f64;
+    let mut s = -2.0 * ln_p;
+    for _ in 0..50 {
+        // P ≈ (S/2)^(q/2 − 1) e^(−S/2) / Γ(q/2) · S / (S − q + 2)
+        let ln_tail = (half_q - 1.0) * (0.5 * s).ln() - 0.5 * s - ln_gamma(half_q) - (1.0 + (2.0 - q as f64) / s).ln();
+        let step = 2.0 * (ln_tail - ln_p);
+        s = (s + step).max(1.0);
+        if step.abs() < 1e-9 {
+            break;
+        }
+    }
+    s.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f_agrees_with_tables_and_goes_on_where_numbers_end() {
+        // F(0.95; 3, 20) = 3.0984
+        assert!((ln_p_of_f(3.0 * 3.0984, 3.0, 20.0, 20.0).exp() - 0.05).abs() < 1e-5);
+        // the series joins the direct value
+        let direct = beta_reg(150.0, 1.0, 0.05).ln();
+        assert!((direct - 150.0 * 0.05f64.ln()).abs() < 1e-9);
+        let tiny = ln_p_of_f(1e6, 2.0, 300.0, 300.0);
+        assert!((tiny - 150.0 * (300.0f64 / 1_000_300.0).ln()).abs() < 1e-6 * tiny.abs(), "{tiny}");
+        assert!(ln_p_of_f(2e6, 3.0, 300.0, 300.0) < ln_p_of_f(1e6, 3.0, 300.0, 300.0));
+    }
+
+    #[test]
+    fn roots_of_small_tails_join_those_of_large_ones() {
+        for q in [1, 2, 3, 6] {
+            let chi2 = ChiSquared::new(q as f64).unwrap();
+            for p in [1e-6f64, 1e-9] {
+                let exact = chi2.inverse_cdf(1.0 - p).sqrt();
+                assert!((tail_root(p.ln(), q) - exact).abs() < 0.02 * exact, "{q} {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn equal_shapes_cost_nothing_and_no_scan_costs_more_than_bonferroni() {
+        let p = 1e-4f64.ln();
+        assert!((ln_p_of_scan(&[p; 50], 2) - p).abs() < 1e-9);
+        let jagged: Vec<f64> = (0..50).map(|i| if i % 2 == 0 { p } else { -0.01 }).collect();
+        assert!(ln_p_of_scan(&jagged, 2) <= p + 50f64.ln() + 1e-12);
+        assert!(ln_p_of_scan(&jagged, 2) > p + 1.0);
+    }
+}

@@ -1,0 +1,413 @@
+//! Generic shapes: what the misfit might depend on, where no effect has a name for it.
+//!
+//! From a plain table of what is known of each touch come polynomials, harmonics, a periodogram of each rotary axis by
+//! order and of time by frequency, steps, kinks, exponentials, products of two variables, and groups that disagree:
+//! all as candidates of the same tests, a scan as the variants of one candidate.
+
+use super::library::{Library, Origin};
+use super::shapes::{Function, Grouping};
+use nalgebra::{DMatrix, Vector3};
+
+/// Highest order of a rotary axis that is looked for.
+pub const ORDERS: u32 = 12;
+
+/// Most frequencies of the periodogram in time.
+const FREQUENCIES: usize = 120;
+
+/// Most places of a step or kink along an axis, and of a step in time.
+const PLACES: usize = 12;
+const CHANGE_POINTS: usize = 48;
+
+/// Most groups that get a constant each.
+const GROUPS: usize = 40;
+
+/// What kind of quantity a variable is: it decides which shapes are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Position of a linear axis, mm.
+    Linear,
+    /// Position of a rotary axis, rad.
+    Rotary,
+    /// Hours since the first touch.
+    Time,
+    /// Temperature, °C.
+    Temperature,
+    /// Angle of approach in the probe's frame, rad.
+    Approach,
+    /// Anything else: sense of motion, feed, tool length, pose before.
+    Plain,
+}
+
+impl Kind {
+    /// Its unit in an effects file.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Linear => "mm",
+            Self::Rotary | Self::Approach | Self::Plain => "1",
+            Self::Time => "h",
+            Self::Temperature => "1",
+        }
+    }
+}
+
+/// A variable with its value at each touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variable {
+    /// Name for people.
+    pub name: String,
+    /// How formulas say it; `None`: they cannot.
+    pub word: Option<String>,
+    /// What it is.
+    pub kind: Kind,
+    /// Values, in the kind's unit.
+    pub values: Vec<f64>,
+}
+
+impl Variable {
+    /// A variable that formulas call by its name.
+    #[must_use]
+    pub fn new(name: impl Into<String>, kind: Kind, values: Vec<f64>) -> Self {
+        let name = name.into();
+        Self { word: Some(name.clone()), name, kind, values }
+    }
+
+    /// Distinct values, ascending.
+    fn distinct(&self) -> Vec<f64> {
+        let mut values: Vec<f64> = self.values.iter().copied().filter(|v| v.is_finite()).collect();
+        values.sort_by(f64::total_cmp);
+        let span = values.last().zip(values.first()).map_or(0.0, |(b, a)| b - a);
+        values.dedup_by(|b, a| (*b - *a).abs() <= 1e-6 * span.max(1e-300));
+        values
+    }
+}
+
+/// A direction in which a displacement may act: what one unit of it changes in the gap of each touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Direction {
+    /// Name for people.
+    pub name: String,
+    /// `at` of an effect that acts so.
+    pub at: String,
+    /// `dof` of it.
+    pub dof: String,
+    /// Unit of its size: um, or urad for a turn.
+    pub unit: String,
+    /// Change of the gap per unit, µm, at each touch.
+    pub weight: Vec<f64>,
+}
+
+impl Direction {
+    /// The machine's three directions (`at`: a linear axis), the carrier's three, and along the approach; from the
+    /// outward normals in the machine's frame and in the carrier's.
+    #[must_use]
+    pub fn of_normals(machine: &[Vector3<f64>], carrier: &[Vector3<f64>], at: &str) -> Vec<Self> {
+        let mut out = Vec::new();
+        for (frame, at, normals, sign) in [("machine", at, machine, 1.0), ("table", "workpiece", carrier, -1.0)] {
+            for (i, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+                out.push(Self {
+                    name: format!("{frame}-{axis}"),
+                    at: at.to_owned(),
+                    dof: format!("d{}", axis.to_lowercase()),
+                    unit: "um".to_owned(),
+                    weight: normals.iter().map(|n| sign * n[i]).collect(),
+                });
+            }
+        }
+        out.push(Self {
+            name: "approach".to_owned(),
+            at: "trigger".to_owned(),
+            dof: "r".to_owned(),
+            unit: "um".to_owned(),
+            weight: vec![1.0; machine.len()],
+        });
+        out
+    }
+}
+
+/// What is known of each touch, without a machine: one entry per touch in every list.
+#[derive(Debug, Clone, Default)]
+pub struct Features {
+    /// Variables that the misfit may depend on.
+    pub variables: Vec<Variable>,
+    /// Directions in which it may act.
+    pub directions: Vec<Direction>,
+    /// Number of the block.
+    pub block: Vec<usize>,
+    /// Number of the face.
+    pub face: Vec<usize>,
+    /// Number of the index visit.
+    pub visit: Vec<usize>,
+}
+
+/// A generic candidate with what it is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Indices of the variables it is a function of; empty for groups of touches.
+    pub variables: Vec<usize>,
+    /// What it depends on, in a word: `C`, `t`, `X*B`, `block`, `face`, `visit`.
+    pub depends_on: String,
+    /// Index of the direction.
+    pub direction: usize,
+    /// One list of functions per variant.
+    pub(super) functions: Vec<Vec<Function>>,
+}
+
+/// Generic candidates; `shapes[i]` belongs to candidate i of the library.
+#[derive(Debug, Clone, Default)]
+pub struct Generics {
+    /// Candidates; sizes in the unit of their direction.
+    pub library: Library,
+    /// What they are.
+    pub shapes: Vec<Shape>,
+}
+
+/// All generic shapes of a table. `whiten` turns columns of gaps (touches × columns, µm) into whitened rows, prior rows
+/// (zeros) included.
+#[must_use]
+pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f64>) -> Generics {
+    let mut plan = Plan::default();
+    for (d, direction) in features.directions.iter().enumerate() {
+        let along_approach = direction.dof == "r";
+        for (v, variable) in features.variables.iter().enumerate() {
+            plan.of_variable(d, v, variable, along_approach);
+        }
+        for (v, variable) in features.variables.iter().enumerate() {
+            for (w, other) in features.variables.iter().enumerate().skip(v + 1) {
+                plan.product(d, (v, variable), (w, other));
+            }
+        }
+    }
+    plan.of_groups(features);
+    let n = features.directions.first().map_or(0, |d| d.weight.len());
+    let n_columns = plan.shapes.iter().flat_map(|(_, s, _, _)| &s.functions).map(Vec::len).sum();
+    let mut raw = DMatrix::zeros(n, n_columns);
+    let mut columns = raw.column_iter_mut();
+    for (_, shape, _, _) in &plan.shapes {
+        let weight = &features.directions[shape.direction].weight;
+        for function in shape.functions.iter().flatten() {
+            if let Some(mut column) = columns.next() {
+                for (i, value) in column.iter_mut().enumerate().filter(|(i, _)| weight[*i] != 0.0) {
+                    *value = weight[i] * function.at_row(features, i);
+                }
+            }
+        }
+    }
+    drop(columns);
+    let white = whiten(raw);
+    let mut out = Generics { library: Library::new(white.nrows()), shapes: Vec::new() };
+    let mut at = 0;
+    for (id, shape, values, n_scanned) in plan.shapes {
+        let variants: Vec<(f64, DMatrix<f64>)> = shape
+            .functions
+            .iter()
+            .zip(&values)
+            .map(|(functions, &value)| {
+                let part = white.columns(at, functions.len()).into_owned();
+                at += functions.len();
+                (value, part)
+            })
+            .collect();
+        let id = format!("{id}:{}", features.directions[shape.direction].name);
+        out.library.push_scan(id, Origin::Generic, variants, n_scanned);
+        out.shapes.push(shape);
+    }
+    out
+}
+
+/// Id without the direction, shape, scanned values, number of scanned parameters.
+type Planned = (String, Shape, Vec<f64>, usize);
+
+#[derive(Default)]
+struct Plan {
+    shapes: Vec<Planned>,
+}
+
+impl Plan {
+    fn put(&mut self, id: String, depends_on: &str, variables: &[usize], direction: usize, functions: Vec<Function>) {
+        self.scan(id, depends_on, variables, direction, vec![(0.0, functions)], 0);
+    }
+
+    fn scan(
+        &mut self,
+        id: String,
+        depends_on: &str,
+        variables: &[usize],
+        direction: usize,
+        variants: Vec<(f64, Vec<Function>)>,
+        n_scanned: usize,
+    ) {
+        if variants.is_empty() {
+            return;
+        }
+        let (values, functions) = variants.into_iter().unzip();
+        let shape =
+            Shape { variables: variables.to_vec(), depends_on: depends_on.to_owned(), direction, functions };
+        self.shapes.push((id, shape, values, n_scanned));
+    }
+
+    fn of_variable(&mut self, d: usize, v: usize, variable: &Variable, along_approach: bool) {
+        let values = variable.distinct();
+        let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return };
+        if values.len() < 2 || variable.values.iter().any(|x| !x.is_finite()) {
+            return;
+        }
+        let name = &variable.name;
+        let id = |form: &str| format!("shape:{name}{form}");
+        let (centre, scale) = (0.5 * (low + high), 0.5 * (high - low));
+        let powers = |highest: i32| -> Vec<Function> {
+            (1..=highest).map(|k| Function::Power { variable: v, centre, scale, k }).collect()
+        };
+        let waves = |k: u32| -> Vec<Function> {
+            [false, true].map(|sine| Function::Harmonic { variable: v, k, sine }).to_vec()
+        };
+        match variable.kind {
+            Kind::Linear => {
+                self.put(id(""), name, &[v], d, powers(3));
+                self.breaks(d, v, variable, &values);
+            }
+            Kind::Rotary => {
+                self.put(id(""), name, &[v], d, (1..=3).flat_map(waves).collect());
+                self.put(id("-cubic"), name, &[v], d, powers(3));
+                let orders = (1..=ORDERS).map(|k| (f64::from(k), waves(k))).collect();
+                self.scan(id("-order"), name, &[v], d, orders, 1);
+                self.breaks(d, v, variable, &values);
+            }
+            Kind::Time => {
+                self.put(id(""), name, &[v], d, powers(4));
+                let steps = thinned(&middles(&values), CHANGE_POINTS);
+                let steps = steps.iter().map(|&at| (at, vec![Function::Step { variable: v, at }])).collect();
+                self.scan(id("-step"), name, &[v], d, steps, 1);
+                let constants = [0.03, 0.06, 0.12, 0.25, 0.5, 1.0].map(|share| {
+                    let constant = share * (high - low);
+                    (constant, vec![Function::Exponential { variable: v, from: low, constant }])
+                });
+                self.scan(id("-exponential"), name, &[v], d, constants.to_vec(), 1);
+                self.scan(id("-period"), name, &[v], d, periods(v, low, high, values.len()), 1);
+            }
+            Kind::Temperature => self.put(id(""), name, &[v], d, powers(2)),
+            Kind::Approach if along_approach => {
+                self.put(id(""), name, &[v], d, (1..=4).flat_map(waves).collect());
+            }
+            Kind::Approach => {}
+            Kind::Plain => self.put(id(""), name, &[v], d, powers(1)),
+        }
+    }
+
+    /// Steps and kinks along an axis.
+    fn breaks(&mut self, d: usize, v: usize, variable: &Variable, values: &[f64]) {
+        let name = &variable.name;
+        let scale = 0.5 * (values[values.len() - 1] - values[0]);
+        let steps = thinned(&middles(values), PLACES);
+        let steps = steps.iter().map(|&at| (at, vec![Function::Step { variable: v, at }])).collect();
+        self.scan(format!("shape:{name}-step"), name, &[v], d, steps, 1);
+        let kinks = thinned(&values[1..values.len() - 1], PLACES);
+        let kinks = kinks.iter().map(|&at| (at, vec![Function::Kink { variable: v, at, scale }])).collect();
+        self.scan(format!("shape:{name}-kink"), name, &[v], d, kinks, 1);
+    }
+
+    fn product(&mut self, d: usize, (v, a): (usize, &Variable), (w, b): (usize, &Variable)) {
+        let factors = |index: usize, variable: &Variable| -> Vec<Function> {
+            let values = variable.distinct();
+            let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return Vec::new() };
+            if values.len() < 2 || variable.values.iter().any(|x| !x.is_finite()) {
+                return Vec::new();
+            }
+            match variable.kind {
+                Kind::Approach => Vec::new(),
+                Kind::Rotary => {
+                    [false, true].map(|sine| Function::Harmonic { variable: index, k: 1, sine }).to_vec()
+                }
+                _ => {
+                    let (centre, scale) = (0.5 * (low + high), 0.5 * (high - low));
+                    vec![Function::Power { variable: index, centre, scale, k: 1 }]
+                }
+            }
+        };
+        let (left, right) = (factors(v, a), factors(w, b));
+        let products: Vec<Function> = left
+            .iter()
+            .flat_map(|l| right.iter().map(|r| Function::Product(Box::new(l.clone()), Box::new(r.clone()))))
+            .collect();
+        if !products.is_empty() {
+            let name = format!("{}*{}", a.name, b.name);
+            self.put(format!("shape:{name}"), &name, &[v, w], d, products);
+        }
+    }
+
+    /// Groups of touches that disagree, and blocks that move in mid-program.
+    fn of_groups(&mut self, features: &Features) {
+        for (of, name, numbers) in [
+            (Grouping::Block, "block", &features.block),
+            (Grouping::Face, "face", &features.face),
+            (Grouping::Visit, "visit", &features.visit),
+        ] {
+            let distinct = distinct(numbers);
+            if distinct.len() < 2 || distinct.len() > GROUPS {
+                continue;
+            }
+            for d in 0..features.directions.len() {
+                // a face is a direction: only along the approach is it something new
+                if of == Grouping::Face && features.directions[d].dof != "r" {
+                    continue;
+                }
+                let functions = distinct.iter().map(|&number| Function::Member { of, number }).collect();
+                self.put(format!("shape:{name}"), name, &[], d, functions);
+            }
+        }
+        let Some(time) = features.variables.iter().position(|v| v.kind == Kind::Time) else { return };
+        let clock = &features.variables[time];
+        for number in distinct(&features.block) {
+            let own = Variable {
+                values: clock.values.iter().zip(&features.block).filter(|(_, b)| **b == number).map(|(t, _)| *t).collect(),
+                ..clock.clone()
+            };
+            let places = thinned(&middles(&own.distinct()), PLACES);
+            for d in (0..features.directions.len()).filter(|&d| features.directions[d].at == "workpiece") {
+                let moved = |at: f64| {
+                    let after = Function::Step { variable: time, at };
+                    vec![Function::Product(
+                        Box::new(Function::Member { of: Grouping::Block, number }),
+                        Box::new(after),
+                    )]
+                };
+                let variants = places.iter().map(|&at| (at, moved(at))).collect();
+                let depends = format!("{}*block", clock.name);
+                self.scan(format!("shape:{}-step-block-{number}", clock.name), &depends, &[time], d, variants, 1);
+            }
+        }
+    }
+}
+
+fn distinct(numbers: &[usize]) -> Vec<usize> {
+    let mut out = numbers.to_vec();
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+/// Half-way between neighbours.
+fn middles(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect()
+}
+
+/// At most so many of them, evenly.
+fn thinned(values: &[f64], at_most: usize) -> Vec<f64> {
+    if values.len() <= at_most {
+        return values.to_vec();
+    }
+    (0..at_most).map(|i| values[(2 * i + 1) * values.len() / (2 * at_most)]).collect()
+}
+
+/// Cosine and sine over a grid of frequencies: from one turn in the whole time, in steps of half of that, to what the
+/// number of touches can tell.
+fn periods(v: usize, low: f64, high: f64, n_distinct: usize) -> Vec<(f64, Vec<Function>)> {
+    let span = high - low;
+    let count = FREQUENCIES.min(n_distinct);
+    (2..count + 2)
+        .map(|i| {
+            let period = 2.0 * span / i as f64;
+            (period, [false, true].map(|sine| Function::Periodic { variable: v, period, sine }).to_vec())
+        })
+        .collect()
+}

@@ -1,0 +1,200 @@
+//! Findings as groups: candidates whose traces these touches cannot tell apart stand together under one leader.
+
+use super::distributions::ln_p_of_f;
+use super::library::Origin;
+use super::moments::{Block, Moments};
+use super::score::Search;
+use nalgebra::{DMatrix, DVector};
+
+/// A candidate that explains this share of the leader's trace is aliased with it.
+pub const ALIGNED: f64 = 0.9;
+
+/// One that explains this share may still be the cause where the leader adds nothing to it.
+const RIVAL: f64 = 0.5;
+
+/// The leader adds nothing after a candidate when its p-value is above this.
+pub const ADDS_NOTHING: f64 = 0.05;
+
+/// Expected sizes above this many typical sizes are implausible.
+pub const PLAUSIBLE: f64 = 5.0;
+
+/// A candidate in a group.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Member {
+    /// Index in the library.
+    pub candidate: usize,
+    /// ‖Uᵀŵ‖²: share of the leader's trace that it explains.
+    pub alignment: f64,
+    /// Noncentrality of what of the leader's trace it does not explain, as estimated: 25 tells the two apart safely.
+    pub separation: f64,
+    /// p-value of adding the leader after it.
+    pub leader_after_p: f64,
+    /// Do these data leave it possible? The leader always; others while the leader adds nothing to them.
+    pub stays: bool,
+    /// Is its expected size at most [`PLAUSIBLE`] typical sizes?
+    pub plausible: bool,
+}
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// The most significant candidate.
+    pub leader: usize,
+    /// All of it, leader included: possible ones first, then fewest parameters, plausible size, user's own, p-value.
+    pub members: Vec<Member>,
+}
+
+impl Group {
+    /// The first by order: what to name first.
+    #[must_use]
+    pub fn first(&self) -> usize {
+        self.members.first().map_or(self.leader, |m| m.candidate)
+    }
+
+    /// Does it hold the candidate?
+    #[must_use]
+    pub fn holds(&self, candidate: usize) -> bool {
+        self.members.iter().any(|m| m.candidate == candidate)
+    }
+}
+
+impl Search<'_> {
+    /// The first groups of the ranking, at most so many; a candidate stands in one of them only.
+    #[must_use]
+    pub fn groups(&self, at_most: usize) -> Vec<Group> {
+        let mut left = self.ranking();
+        let mut out = Vec::new();
+        while out.len() < at_most && !left.is_empty() {
+            let group = self.group_of(left[0], &left);
+            left.retain(|&c| !group.holds(c));
+            out.push(group);
+        }
+        out
+    }
+
+    /// The group of a leader among candidates (the leader included). Effects with a name and generic shapes do not
+    /// stand in one group: a shape is no cause.
+    #[must_use]
+    pub fn group_of(&self, leader: usize, among: &[usize]) -> Group {
+        let trace = self.trace(leader);
+        // ŵ: the direction in the data that speaks for the leader
+        let direction = -(&trace.left * &self.scores[leader].estimate);
+        let length = direction.norm();
+        let unit = DMatrix::from_column_slice(direction.len(), 1, (direction / length.max(f64::MIN_POSITIVE)).as_slice());
+        let along_direction = Moments::cross(&unit, self.library);
+        let cross = Moments::cross(&trace.left, self.library);
+        let generic = |c: usize| self.library.candidates()[c].origin == Origin::Generic;
+        let mut members: Vec<Member> = among
+            .iter()
+            .filter(|&&j| generic(j) == generic(leader))
+            .filter_map(|&j| {
+                let span = self.span(j);
+                let block = self.block(j);
+                let alignment = block
+                    .whitener
+                    .tr_mul(&along_direction.columns(span.0, span.1).transpose())
+                    .norm_squared()
+                    .min(1.0);
+                if j != leader && alignment < RIVAL {
+                    return None;
+                }
+                let leader_after_p = if j == leader { 1.0 } else { self.leader_after(&trace, j, &block, &cross) };
+                let stays = leader_after_p > ADDS_NOTHING;
+                let alignment = if j == leader { 1.0 } else { alignment };
+                (alignment >= ALIGNED || stays).then(|| Member {
+                    candidate: j,
+                    alignment,
+                    separation: self.scores[leader].noncentrality * (1.0 - alignment),
+                    leader_after_p,
+                    stays,
+                    plausible: self.scores[j].relative_size() <= PLAUSIBLE,
+                })
+            })
+            .collect();
+        members.sort_by(|a, b| self.rank_of(a).partial_cmp(&self.rank_of(b)).unwrap_or(std::cmp::Ordering::Equal));
+        Group { leader, members }
+    }
+
+    /// Sorts members: what comes first is named first.
+    fn rank_of(&self, m: &Member) -> (bool, usize, bool, bool, f64) {
+        let score = &self.scores[m.candidate];
+        let origin = self.library.candidates()[m.candidate].origin;
+        (!m.stays, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
+    }
+
+    fn span(&self, candidate: usize) -> (usize, usize) {
+        let columns = &self.library.candidates()[candidate].variants[self.scores[candidate].variant].columns;
+        (columns.start, columns.len())
+    }
+
+    /// PJ of a candidate's best variant, with its products.
+    fn trace(&self, candidate: usize) -> Trace {
+        let columns = self.columns(candidate);
+        let raw = columns.tr_mul(&columns);
+        let left = self.question.base.project_columns(&columns);
+        let gram = left.tr_mul(&left);
+        let residual = self.moments.jr.rows(self.span(candidate).0, columns.ncols()).into_owned();
+        Trace { raw, gram, residual, left }
+    }
+
+    /// p-value of the leader once candidate j is in the model.
+    fn leader_after(&self, leader: &Trace, j: usize, block: &Block, cross: &DMatrix<f64>) -> f64 {
+        let (start, count) = self.span(j);
+        // UⱼᵀPJ of the leader and Uⱼᵀr
+        let shared = block.whitener.tr_mul(&cross.columns(start, count).transpose());
+        let along = block.whitener.tr_mul(&self.moments.jr.rows(start, count));
+        let left = &leader.gram - shared.tr_mul(&shared);
+        let after = Block::new(&leader.raw, &left);
+        let q = after.rank();
+        if q == 0 {
+            return 1.0;
+        }
+        let delta = after.whitener.tr_mul(&(&leader.residual - shared.tr_mul(&along))).norm_squared();
+        let (pure_ss, pure_dof) = match self.question.pure {
+            Some(e) if !e.within => (e.variance * e.dof, e.dof),
+            _ => (0.0, 0.0),
+        };
+        let rest = (self.moments.rr - along.norm_squared() - delta).max(0.0) + pure_ss;
+        let dof = (self.moments.n - self.moments.p) as f64 - (self.scores[j].n_parameters + q) as f64 + pure_dof;
+        if dof < 1.0 { 1.0 } else { ln_p_of_f(delta, q as f64, rest, dof).exp() }
+    }
+}
+
+/// A leader's columns after projection.
+struct Trace {
+    raw: DMatrix<f64>,
+    gram: DMatrix<f64>,
+    residual: DVector<f64>,
+    left: DMatrix<f64>,
+}
+
+/// Two candidates of a plan of which one explains the other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AliasPair {
+    /// The candidate that is explained.
+    pub explained: usize,
+    /// The candidate that explains it.
+    pub by: usize,
+    /// ‖U_bᵀU_a‖²/q_a.
+    pub share: f64,
+    /// Both ways: they cannot be told apart; else the one is contained in the other.
+    pub both_ways: bool,
+}
+
+/// Alias pairs of a plan, from no measurement: candidate `a` is explained by `b` when ‖U_bᵀU_a‖²_F/q_a is at least
+/// [`ALIGNED`]. Each candidate stands with its first variant.
+#[must_use]
+pub fn alias_pairs(base: &super::Basis, library: &super::Library) -> Vec<AliasPair> {
+    let shares = super::power::shares(base, library);
+    let mut out = Vec::new();
+    for explained in 0..shares.nrows() {
+        for by in 0..shares.ncols() {
+            let share = shares[(explained, by)];
+            if explained != by && share >= ALIGNED {
+                out.push(AliasPair { explained, by, share, both_ways: shares[(by, explained)] >= ALIGNED });
+            }
+        }
+    }
+    out
+}
+

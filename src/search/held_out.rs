@@ -1,0 +1,205 @@
+//! Does a term predict touches that had no part in choosing it?
+//!
+//! Groups of touches (set-ups, index visits) are left out one at a time. Everything that leads to a term is redone on
+//! the rest: the projection, all score tests, Holm, the choice. Inner products add up over touches, so a training set
+//! is the whole less one group, and no factorisation ever sees all touches again.
+
+use super::basis::Basis;
+use super::library::Library;
+use super::moments::{Block, Moments};
+use super::score::{Question, leader, score};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Touches whose prediction has a variance above this (in variances of a touch) judge nothing.
+pub const LARGEST_VARIANCE: f64 = 9.0;
+
+/// Directions of the base of which a training set keeps less than this share of the information are lost to it.
+const LOST: f64 = 1e-8;
+
+/// Which term is put to the test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// The choice is redone in each training set: the leader that passes Holm, or none.
+    Redone,
+    /// A given candidate, with the variant that fits the training set best; the choice is not tested.
+    Given(usize),
+}
+
+/// Squared error on held-out touches, with and without the term.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    /// Root mean square error of the base model on held-out touches, in standard deviations of a touch.
+    pub before: f64,
+    /// The same with the chosen terms.
+    pub after: f64,
+    /// Touches that could be predicted by both.
+    pub scored: usize,
+    /// Touches in groups.
+    pub touches: usize,
+    /// By how much the sum of squared errors falls.
+    pub gain: f64,
+    /// Standard error of the gain, from its spread over groups.
+    pub standard_error: f64,
+    /// Per group: its number, the candidate chosen without it, and by how much its squared error falls.
+    pub folds: Vec<Fold>,
+}
+
+/// One group left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fold {
+    /// Number of the group.
+    pub group: usize,
+    /// Candidate that was chosen without it; `None`: nothing passed.
+    pub chosen: Option<usize>,
+    /// By how much the sum of squared errors of its touches falls.
+    pub gain: f64,
+    /// Touches of it that could be predicted by both.
+    pub scored: usize,
+}
+
+impl HeldOut {
+    /// Does the error fall by more than its standard error?
+    #[must_use]
+    pub fn falls(&self) -> bool {
+        self.gain > self.standard_error && self.gain > 0.0
+    }
+}
+
+/// Leaves out each group in turn. `groups[i]` is the group of row i; rows beyond its end (priors) are always known.
+/// Rows that whitening has mixed must stand in one group.
+#[must_use]
+pub fn held_out(question: Question, library: &Library, groups: &[usize], choice: Choice) -> HeldOut {
+    let moments = Moments::new(question.residual, question.base, library);
+    let residual = question.base.project(question.residual);
+    let mut numbers: Vec<usize> = groups.to_vec();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let results: Vec<Result> = numbers
+        .par_iter()
+        .map(|&group| {
+            let rows: Vec<usize> = (0..groups.len()).filter(|&i| groups[i] == group).collect();
+            fold(question, library, &moments, &residual, group, &rows, choice)
+        })
+        .collect();
+    let scored: usize = results.iter().map(|r| r.fold.scored).sum();
+    let (before, after): (f64, f64) =
+        results.iter().fold((0.0, 0.0), |(b, a), r| (b + r.before, a + r.before - r.fold.gain));
+    let gain = before - after;
+    let folds: Vec<Fold> = results.into_iter().map(|r| r.fold).collect();
+    let n = folds.len() as f64;
+    let spread: f64 = folds.iter().map(|f| (f.gain - gain / n).powi(2)).sum();
+    let root = |ss: f64| (ss / (scored as f64).max(1.0)).sqrt();
+    HeldOut {
+        before: root(before),
+        after: root(after),
+        scored,
+        touches: groups.len(),
+        gain,
+        standard_error: if n > 1.0 { (n / (n - 1.0) * spread).sqrt() } else { f64::INFINITY },
+        folds,
+    }
+}
+
+struct Result {
+    fold: Fold,
+    before: f64,
+}
+
+/// Columns of a library at some rows.
+fn at_rows(library: &Library, rows: &[usize]) -> DMatrix<f64> {
+    let all = library.matrix();
+    let mut out = DMatrix::zeros(rows.len(), all.ncols());
+    for (mut to, from) in out.column_iter_mut().zip(all.column_iter()) {
+        for (t, &i) in to.iter_mut().zip(rows) {
+            *t = from[i];
+        }
+    }
+    out
+}
+
+/// One group left out: the training set as whole less group, in the coordinates of the full basis.
+fn fold(
+    question: Question,
+    library: &Library,
+    whole: &Moments,
+    residual: &DVector<f64>,
+    group: usize,
+    rows: &[usize],
+    choice: Choice,
+) -> Result {
+    let base: &Basis = question.base;
+    let p = base.rank();
+    // p × group, group × columns, group
+    let q_g = base.transposed().select_columns(rows);
+    let j_g = at_rows(library, rows);
+    let r_g = DVector::from_iterator(rows.len(), rows.iter().map(|&i| residual[i]));
+
+    // QᵀQ of the training set is the identity less the group's; its square root makes the basis orthonormal again
+    let information = DMatrix::identity(p, p) - &q_g * q_g.transpose();
+    let (into, lost) = if p == 0 {
+        (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0))
+    } else {
+        let eigen = information.symmetric_eigen();
+        let (seen, gone): (Vec<usize>, Vec<usize>) = (0..p).partition(|&i| eigen.eigenvalues[i] > LOST);
+        let mut into = eigen.eigenvectors.select_columns(&seen).transpose();
+        for (mut row, &i) in into.row_iter_mut().zip(&seen) {
+            row /= eigen.eigenvalues[i].sqrt();
+        }
+        (into, eigen.eigenvectors.select_columns(&gone).transpose())
+    };
+    // the projected residual has QᵀR = 0 as a whole
+    let qr = -(&into * (&q_g * &r_g));
+    let qj = &into * (&whole.qj - &q_g * &j_g);
+    let rr = whole.rr - r_g.norm_squared() - qr.norm_squared();
+    let jr = &whole.jr - j_g.tr_mul(&r_g) - qj.tr_mul(&qr);
+    let blocks: Vec<DMatrix<f64>> = library
+        .candidates()
+        .iter()
+        .flat_map(|c| &c.variants)
+        .zip(&whole.blocks)
+        .map(|(variant, block)| {
+            let part = j_g.columns(variant.columns.start, variant.columns.len());
+            block - part.transpose() * part
+        })
+        .collect();
+    let training = Moments { n: whole.n - rows.len(), p: into.nrows(), rr: rr.max(0.0), jr, qj, blocks };
+    let scores = score(&training, library, question.pure);
+    let chosen = match choice {
+        Choice::Redone => leader(&scores, library),
+        Choice::Given(c) => scores[c].visible().then_some(c),
+    };
+
+    // each touch of the group in the training basis: prediction r̂ = −… of the residual, and its variance
+    let seen_g = &into * &q_g;
+    let lost_g = &lost * &q_g;
+    let known: Vec<bool> = (0..rows.len())
+        .map(|i| lost_g.column(i).norm_squared() < 1e-12 && seen_g.column(i).norm_squared() < LARGEST_VARIANCE)
+        .collect();
+    let base_error = &r_g - seen_g.tr_mul(&qr);
+    let Some(c) = chosen else {
+        let (before, scored) = sum(&base_error, &known);
+        return Result { fold: Fold { group, chosen, gain: 0.0, scored }, before };
+    };
+    let variant = scores[c].variant;
+    let span = library.candidates()[c].variants[variant].columns.clone();
+    let index: usize = library.candidates()[..c].iter().map(|k| k.variants.len()).sum::<usize>() + variant;
+    let block: Block = training.block(index, span.start);
+    // what the touches see of the term once the training base has taken its part, in the term's own orthonormal basis
+    let own = j_g.columns(span.start, span.len()) - seen_g.tr_mul(&training.qj.columns(span.start, span.len()));
+    let own = own * &block.whitener;
+    let along = block.whitener.tr_mul(&training.jr.rows(span.start, span.len()));
+    let error = &base_error - &own * along;
+    let known: Vec<bool> = known
+        .iter()
+        .enumerate()
+        .map(|(i, &k)| k && seen_g.column(i).norm_squared() + own.row(i).norm_squared() < LARGEST_VARIANCE)
+        .collect();
+    let (before, scored) = sum(&base_error, &known);
+    let (after, _) = sum(&error, &known);
+    Result { fold: Fold { group, chosen, gain: before - after, scored }, before }
+}
+
+fn sum(error: &DVector<f64>, known: &[bool]) -> (f64, usize) {
+    error.iter().zip(known).filter(|(_, k)| **k).fold((0.0, 0), |(ss, n), (e, _)| (ss + e * e, n + 1))
+}

@@ -1,0 +1,133 @@
+//! Candidates and their columns, stacked so that one product serves all.
+
+use nalgebra::{DMatrix, DMatrixView};
+use std::ops::Range;
+
+/// Where a candidate comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// The built-in catalogue.
+    Catalogue,
+    /// The user's own file.
+    User,
+    /// A shape without a physical name.
+    Generic,
+}
+
+/// The columns of a candidate at one value of its shape parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variant {
+    /// Value of the shape parameter (0 where there is none), in the shape's unit.
+    pub shape: f64,
+    /// Which columns of the library.
+    pub columns: Range<usize>,
+}
+
+/// Something that might be missing in the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Id, unique.
+    pub id: String,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// One per scanned value of a shape parameter, neighbours next to each other; at least one.
+    pub variants: Vec<Variant>,
+    /// Shape parameters that the scan searches: each counts as a parameter.
+    pub n_scanned: usize,
+}
+
+/// Candidates with their columns: derivative of the whitened gap by each parameter in units of its typical size.
+#[derive(Debug, Clone, Default)]
+pub struct Library {
+    n_rows: usize,
+    data: Vec<f64>,
+    candidates: Vec<Candidate>,
+}
+
+impl Library {
+    /// An empty library for a regression of so many rows.
+    #[must_use]
+    pub fn new(n_rows: usize) -> Self {
+        Self { n_rows, ..Self::default() }
+    }
+
+    /// Adds a candidate without a scan. `columns`: N × q, whitened, scaled by typical size.
+    pub fn push(&mut self, id: impl Into<String>, origin: Origin, columns: &DMatrix<f64>) {
+        self.push_scan(id, origin, [(0.0, columns.clone())], 0);
+    }
+
+    /// Adds a candidate with a scanned shape; `variants` gives the shape's value and N × q columns. Matrices with
+    /// another number of rows, and candidates without a variant, are passed over.
+    pub fn push_scan(
+        &mut self,
+        id: impl Into<String>,
+        origin: Origin,
+        variants: impl IntoIterator<Item = (f64, DMatrix<f64>)>,
+        n_scanned: usize,
+    ) {
+        let mut spans = Vec::new();
+        for (shape, columns) in variants {
+            if columns.nrows() != self.n_rows {
+                continue;
+            }
+            let first = self.n_columns();
+            self.data.extend_from_slice(columns.as_slice());
+            spans.push(Variant { shape, columns: first..first + columns.ncols() });
+        }
+        if !spans.is_empty() {
+            self.candidates.push(Candidate { id: id.into(), origin, variants: spans, n_scanned });
+        }
+    }
+
+    /// Moves all candidates of another library of equal rows to the end of this one.
+    pub fn append(&mut self, other: Library) {
+        if other.n_rows != self.n_rows {
+            return;
+        }
+        let shift = self.n_columns();
+        self.data.extend_from_slice(&other.data);
+        self.candidates.extend(other.candidates.into_iter().map(|mut c| {
+            for v in &mut c.variants {
+                v.columns = v.columns.start + shift..v.columns.end + shift;
+            }
+            c
+        }));
+    }
+
+    /// The candidates.
+    #[must_use]
+    pub fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    /// Index of a candidate.
+    #[must_use]
+    pub fn position(&self, id: &str) -> Option<usize> {
+        self.candidates.iter().position(|c| c.id == id)
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn n_rows(&self) -> usize {
+        self.n_rows
+    }
+
+    /// Columns of all candidates and variants.
+    #[must_use]
+    pub fn n_columns(&self) -> usize {
+        if self.n_rows == 0 { 0 } else { self.data.len() / self.n_rows }
+    }
+
+    /// All columns.
+    #[must_use]
+    pub fn matrix(&self) -> DMatrixView<'_, f64> {
+        DMatrixView::from_slice(&self.data, self.n_rows, self.n_columns())
+    }
+
+    /// Columns of one variant, N × q.
+    #[must_use]
+    pub fn columns(&self, candidate: usize, variant: usize) -> DMatrix<f64> {
+        let span = self.candidates[candidate].variants[variant].columns.clone();
+        self.matrix().columns(span.start, span.len()).into_owned()
+    }
+}

@@ -1,0 +1,29 @@
+//! Which effect is missing: linear algebra and statistics on whitened matrices, and nothing about machines.
+//!
+//! A [`Question`] is one linearised regression, a [`Library`] the candidates with their columns. [`Search`] tests all
+//! of them at once, [`groups`] says which of them these data cannot tell apart, [`held_out`] redoes the choice without
+//! the touches that judge it, [`forward`] goes on until nothing is left to find, [`power`] says before any measurement
+//! what a plan can see, and [`generic`] and [`dependence`] say on what the misfit depends where no candidate explains it.
+
+pub mod basis;
+pub mod dependence;
+pub mod distributions;
+pub mod forward;
+pub mod generic;
+pub mod groups;
+pub mod held_out;
+pub mod library;
+mod moments;
+pub mod multiplicity;
+pub mod power;
+pub mod score;
+mod shapes;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+pub use basis::Basis;
+pub use library::{Candidate, Library, Origin, Variant};
+pub use moments::KEPT;
+pub use score::{LackOfFit, PureError, Question, Score, Search, lack_of_fit};

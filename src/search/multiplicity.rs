@@ -1,0 +1,83 @@
+//! Many tests at once: Holm's family-wise level and Benjamini and Hochberg's share of false discoveries.
+//!
+//! Candidates with a name (catalogue, user) and generic shapes are two families that share the level, so that the
+//! many shapes cost the named effects next to nothing. An adjusted p-value is stated against the whole level: Holm's
+//! within the family, times level over the family's share.
+
+use super::score::Score;
+
+/// Probability of any false proposal on clean data.
+pub const FAMILY_LEVEL: f64 = 0.05;
+
+/// The part of it that effects with a name may use.
+pub const NAMED_LEVEL: f64 = 0.04;
+
+/// The part of it that generic shapes may use.
+pub const GENERIC_LEVEL: f64 = 0.01;
+
+/// Share of false ones among the candidates that are worth a look.
+pub const WORTH_A_LOOK: f64 = 0.10;
+
+/// Holm's adjusted p-values (Scandinavian Journal of Statistics 6 (1979) 65).
+#[must_use]
+pub fn holm(p: &[f64]) -> Vec<f64> {
+    let m = p.len();
+    let mut out = vec![1.0; m];
+    let mut worst = 0.0f64;
+    for (rank, &i) in ascending(p).iter().enumerate() {
+        worst = worst.max(((m - rank) as f64 * p[i]).min(1.0));
+        out[i] = worst;
+    }
+    out
+}
+
+/// Benjamini and Hochberg's q-values (Journal of the Royal Statistical Society B 57 (1995) 289).
+#[must_use]
+pub fn benjamini_hochberg(p: &[f64]) -> Vec<f64> {
+    let m = p.len();
+    let mut out = vec![1.0; m];
+    let mut least = 1.0f64;
+    for (rank, &i) in ascending(p).iter().enumerate().rev() {
+        least = least.min(m as f64 / (rank + 1) as f64 * p[i]);
+        out[i] = least;
+    }
+    out
+}
+
+fn ascending(p: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
+    order
+}
+
+/// Fills in the adjusted p-values; what the plan cannot see was not tested and does not count.
+pub(super) fn adjust(scores: &mut [Score], generic: impl Fn(&Score) -> bool) {
+    for family in [false, true] {
+        let share = if family { GENERIC_LEVEL } else { NAMED_LEVEL } / FAMILY_LEVEL;
+        let members: Vec<usize> =
+            (0..scores.len()).filter(|&i| scores[i].visible() && generic(&scores[i]) == family).collect();
+        let p: Vec<f64> = members.iter().map(|&i| scores[i].p).collect();
+        for ((&i, adjusted), q_value) in members.iter().zip(holm(&p)).zip(benjamini_hochberg(&p)) {
+            scores[i].p_adjusted = (adjusted / share).min(1.0);
+            scores[i].q_value = q_value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(a: &[f64], b: &[f64]) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12), "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn textbook_values() {
+        // p.adjust of R for these four
+        let p = [0.01, 0.04, 0.03, 0.005];
+        near(&holm(&p), &[0.03, 0.06, 0.06, 0.02]);
+        near(&benjamini_hochberg(&p), &[0.02, 0.04, 0.04, 0.02]);
+        assert!(holm(&[]).is_empty() && benjamini_hochberg(&[]).is_empty());
+    }
+}

@@ -1,0 +1,289 @@
+//! Score tests: what each candidate would take away from the misfit, and its expected size, without a refit.
+
+use super::basis::Basis;
+use super::distributions::{ln_p_of_f, ln_p_of_scan, p_of_chi2};
+use super::library::{Library, Origin};
+use super::moments::{Block, Moments};
+use super::multiplicity;
+use nalgebra::{DMatrix, DVector};
+
+/// A variance of the touches that does not rest on the model, in units of the variance used for whitening.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PureError {
+    /// Variance (1 where σ was taken from these repeats).
+    pub variance: f64,
+    /// Degrees of freedom.
+    pub dof: f64,
+    /// True when the repeats are rows of the regression: its residual holds them already.
+    pub within: bool,
+}
+
+/// One linearised regression at the minimum of its base model.
+///
+/// Rows are touches, then prior rows, whitened to unit noise. `residual` is the whitened gap g (measured less model)
+/// and columns are derivatives of g, so that a missing effect of size θ has left g = −Jθ.
+#[derive(Debug, Clone, Copy)]
+pub struct Question<'a> {
+    /// Whitened gaps.
+    pub residual: &'a DVector<f64>,
+    /// Basis of the base model.
+    pub base: &'a Basis,
+    /// From repeats; `None` where σ is declared.
+    pub pure: Option<PureError>,
+}
+
+/// What one score test says.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// Index in the library.
+    pub candidate: usize,
+    /// Which variant of its scan fits best.
+    pub variant: usize,
+    /// Rank q of what the plan sees of it; 0: it leaves no trace with this plan.
+    pub q: usize,
+    /// Degrees of freedom that it costs: q and the scanned shape parameters.
+    pub n_parameters: usize,
+    /// Sum of squares that it takes away.
+    pub delta_ss: f64,
+    /// F on (q, `dof`) of the best variant.
+    pub f: f64,
+    /// Residual degrees of freedom.
+    pub dof: f64,
+    /// Natural logarithm of the p-value, the scan taken into account; finite where p is not.
+    pub ln_p: f64,
+    /// The p-value.
+    pub p: f64,
+    /// Holm's, over the family that the candidate belongs to; below [`multiplicity::FAMILY_LEVEL`]: proposed.
+    pub p_adjusted: f64,
+    /// Benjamini and Hochberg's; below [`multiplicity::WORTH_A_LOOK`]: worth a look.
+    pub q_value: f64,
+    /// Expected size of each parameter, in typical sizes.
+    pub estimate: DVector<f64>,
+    /// Its covariance.
+    pub covariance: DMatrix<f64>,
+    /// Share of the candidate's norm that the base model cannot follow.
+    pub kept: f64,
+    /// Noncentrality as estimated, (ΔSS/s² − q) and not below 0.
+    pub noncentrality: f64,
+    /// Sum of squares taken away by each variant: a periodogram, where the scan is one of frequencies.
+    pub scan: Vec<f64>,
+}
+
+impl Score {
+    /// Is it seen by this plan at all?
+    #[must_use]
+    pub fn visible(&self) -> bool {
+        self.q > 0
+    }
+
+    /// Does it pass Holm's test in its family?
+    #[must_use]
+    pub fn proposed(&self) -> bool {
+        self.visible() && self.p_adjusted < multiplicity::FAMILY_LEVEL
+    }
+
+    /// Largest expected size of a parameter, in typical sizes.
+    #[must_use]
+    pub fn relative_size(&self) -> f64 {
+        self.estimate.amax()
+    }
+}
+
+/// The score tests of a library, with what groups and later steps need.
+#[derive(Debug, Clone)]
+pub struct Search<'a> {
+    /// The regression.
+    pub question: Question<'a>,
+    /// The candidates.
+    pub library: &'a Library,
+    /// One per candidate, in the library's order.
+    pub scores: Vec<Score>,
+    pub(super) moments: Moments,
+    /// Index of each candidate's first variant among all variants.
+    pub(super) first_variant: Vec<usize>,
+}
+
+impl<'a> Search<'a> {
+    /// Tests all candidates.
+    #[must_use]
+    pub fn new(question: Question<'a>, library: &'a Library) -> Self {
+        let moments = Moments::new(question.residual, question.base, library);
+        let scores = score(&moments, library, question.pure);
+        let first_variant = first_variants(library);
+        Self { question, library, scores, moments, first_variant }
+    }
+
+    /// Indices of the visible candidates: those with a name first, then generic shapes; each by significance.
+    #[must_use]
+    pub fn ranking(&self) -> Vec<usize> {
+        ranking(&self.scores, self.library)
+    }
+
+    /// The first of the ranking that passes Holm's test: a generic shape only where no effect with a name does.
+    #[must_use]
+    pub fn leader(&self) -> Option<usize> {
+        leader(&self.scores, self.library)
+    }
+
+    /// What is left of a candidate's best variant.
+    pub(super) fn block(&self, candidate: usize) -> Block {
+        let variant = self.scores[candidate].variant;
+        let first = self.library.candidates()[candidate].variants[variant].columns.start;
+        self.moments.block(self.first_variant[candidate] + variant, first)
+    }
+
+    /// Columns of a candidate's best variant, N × parameters.
+    #[must_use]
+    pub fn columns(&self, candidate: usize) -> DMatrix<f64> {
+        self.library.columns(candidate, self.scores[candidate].variant)
+    }
+}
+
+pub(super) fn first_variants(library: &Library) -> Vec<usize> {
+    let mut at = 0;
+    library
+        .candidates()
+        .iter()
+        .map(|c| {
+            at += c.variants.len();
+            at - c.variants.len()
+        })
+        .collect()
+}
+
+pub(super) fn ranking(scores: &[Score], library: &Library) -> Vec<usize> {
+    let generic = |i: usize| library.candidates()[i].origin == Origin::Generic;
+    let mut order: Vec<usize> = (0..scores.len()).filter(|&i| scores[i].visible()).collect();
+    order.sort_by(|&a, &b| {
+        generic(a)
+            .cmp(&generic(b))
+            .then(scores[a].ln_p.total_cmp(&scores[b].ln_p))
+            .then(scores[b].delta_ss.total_cmp(&scores[a].delta_ss))
+    });
+    order
+}
+
+pub(super) fn leader(scores: &[Score], library: &Library) -> Option<usize> {
+    ranking(scores, library).into_iter().find(|&i| scores[i].proposed())
+}
+
+/// All score tests from inner products.
+pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError>) -> Vec<Score> {
+    let (pure_ss, pure_dof) = match pure {
+        Some(e) if !e.within => (e.variance * e.dof, e.dof),
+        _ => (0.0, 0.0),
+    };
+    let free = moments.n as f64 - moments.p as f64 + pure_dof;
+    let total = moments.rr + pure_ss;
+    let mut index = 0;
+    let mut scores: Vec<Score> = Vec::with_capacity(library.candidates().len());
+    for (c, candidate) in library.candidates().iter().enumerate() {
+        let n_scanned = if candidate.variants.len() > 1 { candidate.n_scanned } else { 0 };
+        let mut scan = Vec::with_capacity(candidate.variants.len());
+        let mut ln_each = Vec::with_capacity(candidate.variants.len());
+        let mut best: Option<(usize, Block, DVector<f64>, f64)> = None;
+        for (v, variant) in candidate.variants.iter().enumerate() {
+            let block = moments.block(index, variant.columns.start);
+            index += 1;
+            let q = block.rank();
+            let dof = free - (q + n_scanned) as f64;
+            if q == 0 || dof < 1.0 {
+                scan.push(0.0);
+                continue;
+            }
+            let along = block.whitener.tr_mul(&moments.jr.rows(variant.columns.start, variant.columns.len()));
+            // rounding may take away more than there is
+            let delta = along.norm_squared().min(moments.rr);
+            let ln_p = ln_p_of_f(delta, q as f64, total - delta, dof);
+            scan.push(delta);
+            ln_each.push(ln_p);
+            if best.as_ref().is_none_or(|b| ln_p < b.3) {
+                best = Some((v, block, along, ln_p));
+            }
+        }
+        scores.push(match best {
+            Some((variant, block, along, ln_best)) => {
+                let q = block.rank();
+                let delta_ss = along.norm_squared().min(moments.rr);
+                let dof = free - (q + n_scanned) as f64;
+                let variance = (total - delta_ss) / dof;
+                // a scanned shape is a parameter, and a long scan is bounded besides
+                let ln_p = if n_scanned > 0 {
+                    let counted = ln_p_of_f(delta_ss, (q + n_scanned) as f64, total - delta_ss, dof);
+                    counted.max(ln_p_of_scan(&ln_each, q))
+                } else {
+                    ln_p_of_scan(&ln_each, q)
+                };
+                Score {
+                    candidate: c,
+                    variant,
+                    q,
+                    n_parameters: q + n_scanned,
+                    delta_ss,
+                    f: delta_ss / q as f64 / variance,
+                    dof,
+                    ln_p: if ln_best == f64::NEG_INFINITY { ln_best } else { ln_p },
+                    p: ln_p.exp(),
+                    p_adjusted: 1.0,
+                    q_value: 1.0,
+                    estimate: -(&block.whitener * &along),
+                    covariance: &block.whitener * block.whitener.transpose() * variance,
+                    kept: block.kept,
+                    noncentrality: (delta_ss / variance - q as f64).max(0.0),
+                    scan,
+                }
+            }
+            None => {
+                let m = candidate.variants[0].columns.len();
+                Score {
+                    candidate: c,
+                    variant: 0,
+                    q: 0,
+                    n_parameters: 0,
+                    delta_ss: 0.0,
+                    f: 0.0,
+                    dof: free,
+                    ln_p: 0.0,
+                    p: 1.0,
+                    p_adjusted: 1.0,
+                    q_value: 1.0,
+                    estimate: DVector::zeros(m),
+                    covariance: DMatrix::zeros(m, m),
+                    kept: 0.0,
+                    noncentrality: 0.0,
+                    scan,
+                }
+            }
+        });
+    }
+    multiplicity::adjust(&mut scores, |s| library.candidates()[s.candidate].origin == Origin::Generic);
+    scores
+}
+
+/// Does the base model fit at all? For display: a test against everything sees little of one effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LackOfFit {
+    /// Sum of squares of the residual.
+    pub ss: f64,
+    /// Its degrees of freedom.
+    pub dof: f64,
+    /// Probability of so much misfit where the model holds.
+    pub p: f64,
+}
+
+/// Lack of fit against the pure error, or against a declared σ by χ².
+#[must_use]
+pub fn lack_of_fit(question: &Question) -> LackOfFit {
+    let ss = question.base.project(question.residual).norm_squared();
+    let dof = question.residual.len() as f64 - question.base.rank() as f64;
+    let p = match question.pure {
+        _ if dof < 1.0 => 1.0,
+        None => p_of_chi2(ss, dof),
+        Some(e) => {
+            let (own_ss, own_dof) = if e.within { (e.variance * e.dof, e.dof) } else { (0.0, 0.0) };
+            let (part, left) = (ss - own_ss, dof - own_dof);
+            if left < 1.0 { 1.0 } else { ln_p_of_f(part, left, e.variance * e.dof, e.dof).exp() }
+        }
+    };
+    LackOfFit { ss, dof, p }
+}

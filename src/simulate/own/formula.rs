@@ -1,0 +1,287 @@
+//! Formulas of a user's effects, as the virtual machine reads them: the expression crate parses and evaluates, and what a
+//! word stands for is taken from the virtual machine's own state of a touch.
+
+use crate::axes::{AxisName, Position};
+use crate::simulate::terms::TouchState;
+use exmex::prelude::*;
+use exmex::{BinOp, MakeOperators, MatchLiteral, Operator};
+
+/// Words for the state of a touch, as messages list them.
+pub const STATE_WORDS: &str = "X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB sC feed S gx gy gz L L0 bx by bz px py pz \
+    ox oy oz edge";
+
+/// Functions, as messages list them.
+pub const FUNCTION_WORDS: &str = "sin cos tan asin acos atan atan2 exp ln sqrt abs sign floor mod step";
+
+/// What a word stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Word {
+    /// Position of an axis: mm, or rad.
+    Axis(AxisName),
+    /// Sense of its last motion.
+    Sense(AxisName),
+    Hours,
+    Temperature,
+    NormalInMachine(usize),
+    NormalInProbe(usize),
+    Feed,
+    Spindle,
+    Gravity(usize),
+    Stylus,
+    OwnStylus,
+    NormalOfBlock(usize),
+    Point(usize),
+    Outward(usize),
+    Edge,
+    /// A parameter of the effect, by its number.
+    Parameter(usize),
+}
+
+impl Word {
+    fn of(text: &str, parameters: &[String]) -> Option<Self> {
+        if let Some(i) = parameters.iter().position(|p| p == text) {
+            return Some(Self::Parameter(i));
+        }
+        let axis = |word: &str| {
+            let mut letters = word.chars();
+            let first = letters.next().filter(char::is_ascii_uppercase)?;
+            if letters.next().is_some() { None } else { AxisName::from_letter(first) }
+        };
+        let along = |last: Option<char>| last.and_then(|c| "xyz".find(c));
+        Some(match text {
+            "t" => Self::Hours,
+            "T" => Self::Temperature,
+            "feed" => Self::Feed,
+            "S" => Self::Spindle,
+            "L" => Self::Stylus,
+            "L0" => Self::OwnStylus,
+            "edge" => Self::Edge,
+            _ if axis(text).is_some() => Self::Axis(axis(text)?),
+            _ if text.starts_with('s') && axis(&text[1..]).is_some() => Self::Sense(axis(&text[1..])?),
+            _ if text.len() == 2 && text.is_ascii() => {
+                let i = along(text.chars().nth(1))?;
+                match text.as_bytes()[0] {
+                    b'n' => Self::NormalInMachine(i),
+                    b'm' => Self::NormalInProbe(i),
+                    b'g' => Self::Gravity(i),
+                    b'b' => Self::NormalOfBlock(i),
+                    b'p' => Self::Point(i),
+                    b'o' => Self::Outward(i),
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        })
+    }
+
+    fn value(self, touch: &TouchState, joints: &Position, parameters: &[f64]) -> f64 {
+        match self {
+            Self::Axis(name) => joints.mm_or_rad(name),
+            Self::Sense(name) => touch.sense[name.index()],
+            Self::Hours => touch.hours,
+            Self::Temperature => touch.temperature_deg_c,
+            Self::NormalInMachine(i) => touch.normal_machine[i],
+            Self::NormalInProbe(i) => touch.normal_probe[i],
+            Self::Feed => touch.feed_mm_min,
+            Self::Spindle => touch.spindle_rad,
+            Self::Gravity(i) => touch.down_tool[i],
+            Self::Stylus => touch.stylus_mm,
+            Self::OwnStylus => touch.own_stylus_mm,
+            Self::NormalOfBlock(i) => touch.normal_carrier[i],
+            Self::Point(i) => touch.point[i],
+            Self::Outward(i) => touch.outward[i],
+            Self::Edge => touch.edge_mm,
+            Self::Parameter(i) => parameters.get(i).copied().unwrap_or(f64::NAN),
+        }
+    }
+}
+
+/// The operators that a formula may use.
+#[derive(Clone, Debug)]
+struct Operators;
+
+impl MakeOperators<f64> for Operators {
+    fn make<'a>() -> Vec<Operator<'a, f64>> {
+        let binary = |apply: fn(f64, f64) -> f64, prio, is_commutative| BinOp { apply, prio, is_commutative };
+        let step = |x: f64| f64::from(x >= 0.0);
+        let sign = |x: f64| f64::from(x > 0.0) - f64::from(x < 0.0);
+        // the remainder that has the sign of the divisor
+        let remainder = |a: f64, b: f64| a - (a / b).floor() * b;
+        vec![
+            Operator::make_bin_unary("+", binary(|a, b| a + b, 0, true), |x| x),
+            Operator::make_bin_unary("-", binary(|a, b| a - b, 1, false), |x| -x),
+            Operator::make_bin("*", binary(|a, b| a * b, 2, true)),
+            Operator::make_bin("/", binary(|a, b| a / b, 3, false)),
+            Operator::make_bin("^", binary(f64::powf, 4, false)),
+            Operator::make_bin("atan2", binary(f64::atan2, 0, false)),
+            Operator::make_bin("mod", binary(remainder, 4, false)),
+            Operator::make_unary("sin", f64::sin),
+            Operator::make_unary("cos", f64::cos),
+            Operator::make_unary("tan", f64::tan),
+            Operator::make_unary("asin", f64::asin),
+            Operator::make_unary("acos", f64::acos),
+            Operator::make_unary("atan", f64::atan),
+            Operator::make_unary("exp", f64::exp),
+            Operator::make_unary("ln", f64::ln),
+            Operator::make_unary("sqrt", f64::sqrt),
+            Operator::make_unary("abs", f64::abs),
+            Operator::make_unary("floor", f64::floor),
+            Operator::make_unary("sign", sign),
+            Operator::make_unary("step", step),
+            Operator::make_constant("pi", std::f64::consts::PI),
+            Operator::make_constant("PI", std::f64::consts::PI),
+        ]
+    }
+}
+
+/// Numbers, with an exponent too.
+#[derive(Clone, Debug)]
+struct Numbers;
+
+impl MatchLiteral for Numbers {
+    fn is_literal(text: &str) -> Option<&str> {
+        let digits = |from: usize| text.bytes().skip(from).take_while(u8::is_ascii_digit).count();
+        let whole = digits(0);
+        let mut end = whole;
+        if text.as_bytes().get(end) == Some(&b'.') {
+            end += 1 + digits(end + 1);
+        }
+        if end == 0 || &text[..end] == "." {
+            return None;
+        }
+        if text.bytes().nth(end).is_some_and(|c| c.eq_ignore_ascii_case(&b'e')) {
+            let sign = usize::from(text.bytes().nth(end + 1).is_some_and(|c| c == b'+' || c == b'-'));
+            let exponent = digits(end + 1 + sign);
+            if exponent > 0 {
+                end += 1 + sign + exponent;
+            }
+        }
+        Some(&text[..end])
+    }
+}
+
+/// A formula with the values of the parameters that stand inside it.
+#[derive(Debug, Clone)]
+pub struct Formula {
+    expression: FlatEx<f64, Operators, Numbers>,
+    words: Vec<Word>,
+    /// In the parameters' own units.
+    parameters: Vec<f64>,
+    /// `mounting/block` or `block`, where it acts on one block only.
+    only: Option<String>,
+}
+
+impl Formula {
+    /// Reads a formula of an effect with these parameters.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong, and one that says which words exist.
+    pub fn read(text: &str, parameters: &[String]) -> Result<Self, (String, String)> {
+        let help = || {
+            let own = if parameters.is_empty() { String::new() } else { format!("; {}", parameters.join(" ")) };
+            format!("words: {STATE_WORDS}{own}; functions: {FUNCTION_WORDS}; pi")
+        };
+        for (at, word) in words_in(text) {
+            let function = FUNCTION_WORDS.split(' ').any(|f| f == word);
+            if !function && !matches!(word, "pi" | "PI") && Word::of(word, parameters).is_none() {
+                return Err((format!("unknown word {word:?} at character {}", at + 1), help()));
+            }
+        }
+        let expression =
+            FlatEx::<f64, Operators, Numbers>::parse(text).map_err(|e| (e.msg().to_owned(), help()))?;
+        let words: Option<Vec<Word>> = expression.var_names().iter().map(|name| Word::of(name, parameters)).collect();
+        let Some(words) = words else {
+            return Err(("a function stands without its bracket".to_owned(), help()));
+        };
+        Ok(Self { expression, words, parameters: Vec::new(), only: None })
+    }
+
+    /// The same with values of the parameters (each in its own unit), on one block only where that is named.
+    pub fn with(&self, parameters: &[f64], only: Option<&str>) -> Self {
+        Self { parameters: parameters.to_vec(), only: only.map(str::to_owned), ..self.clone() }
+    }
+
+    /// Does it change while the linear axes move?
+    pub fn moves(&self) -> bool {
+        self.words.iter().any(|w| matches!(w, Word::Axis(name) if !name.is_rotary()))
+    }
+
+    /// Does it need the time of the touch?
+    pub fn timed(&self) -> bool {
+        self.words.iter().any(|w| matches!(w, Word::Hours | Word::Temperature))
+    }
+
+    /// Value at a touch.
+    pub fn value(&self, touch: &TouchState, joints: &Position) -> f64 {
+        let here = |only: &str| only == &*touch.label || Some(only) == touch.label.rsplit('/').next();
+        if !self.only.as_deref().is_none_or(here) {
+            return 0.0;
+        }
+        let values: Vec<f64> = self.words.iter().map(|w| w.value(touch, joints, &self.parameters)).collect();
+        self.expression.eval(&values).unwrap_or(f64::NAN)
+    }
+}
+
+/// The words of a formula with the places at which they begin.
+fn words_in(text: &str) -> Vec<(usize, &str)> {
+    let mut out = Vec::new();
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        let rest = &text[at..];
+        if let Some(number) = Numbers::is_literal(rest) {
+            at += number.len();
+        } else if c.is_alphabetic() || c == '_' {
+            let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+            out.push((text[..at].chars().count(), &rest[..end]));
+            at += end;
+        } else {
+            at += c.len_utf8();
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(text: &str) -> f64 {
+        let touch = TouchState { hours: 0.5, feed_mm_min: 60.0, point: [1.0, 2.0, 3.0], ..TouchState::default() };
+        let joints = Position([10.0, 20.0, 30.0, 0.0, 90.0, 0.0]);
+        let formula = Formula::read(text, &["tau".to_owned()]).unwrap();
+        formula.with(&[0.25], None).value(&touch, &joints)
+    }
+
+    #[test]
+    fn formulas_have_the_value_of_the_state() {
+        for (text, expected) in [
+            ("1 - exp(-t/tau)", 1.0 - (-2.0_f64).exp()),
+            ("sin(B)*X + 2.5e-1*Y^2", 10.0 + 100.0),
+            ("mod(-Z, 7) + atan2(1, 1)", 5.0 + std::f64::consts::FRAC_PI_4),
+            ("-(px + py*pz)/feed", -7.0 / 60.0),
+            ("step(t - 0.5) + step(t - 0.6) + sign(-2) + abs(-3)", 3.0),
+            ("2^3*1e1 - .5", 79.5),
+            ("cos(2*pi*X/10) + floor(1.9)", 2.0),
+        ] {
+            assert!((value(text) - expected).abs() < 1e-12, "{text}: {} {expected}", value(text));
+        }
+    }
+
+    #[test]
+    fn one_block_only() {
+        let formula = Formula::read("1", &[]).unwrap();
+        let touch = TouchState { label: "m/b".into(), ..TouchState::default() };
+        let at = |only: &str| formula.with(&[], Some(only)).value(&touch, &Position::default());
+        assert_eq!([at("b"), at("m/b"), at("c"), at("n/b")], [1.0, 1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn mistakes_name_the_word_its_place_and_the_words_that_exist() {
+        let (says, help) = Formula::read("1 - cos(Q)", &[]).unwrap_err();
+        assert_eq!(says, "unknown word \"Q\" at character 9");
+        assert!(help.contains("X Y Z A B C") && help.contains("atan2"));
+        for text in ["", "1 +", "sine(B)", "sin + 1", "(1", "1 2", "å", "2..3"] {
+            assert!(Formula::read(text, &[]).is_err(), "{text}");
+        }
+    }
+}

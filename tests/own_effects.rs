@@ -1,0 +1,254 @@
+//! A user's own effects are equal to the built-in ones: planted by the virtual machine from the file, predicted by the
+//! model from the same file, by two readings that share the expression crate only.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
+
+mod common;
+use assert_cmd::Command;
+use axiscal::diag::source;
+use axiscal::machine::{Machine, Mounting};
+use axiscal::model::catalogue::{Catalogue, Effect};
+use axiscal::model::data::{Run, assemble};
+use axiscal::model::predict::Model;
+use axiscal::simulate::{self, Scenario};
+use common::more_machines::all_machines;
+use common::random::random_plan;
+use common::*;
+use predicates::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Every place, every word, every function, shapes inside, rows for one side only, values for each block.
+const OWN: &str = r#"
+format = "axiscal-effects/1"
+[[effect]]
+id = "own-base"
+name = "Column that leans and sinks"
+at = "base"
+terms = [
+  { parameter = "b1", unit = "um", dof = "dx", formula = "sin(2*pi*t/period) + ln(1 + t)" },
+  { parameter = "b2", unit = "urad", dof = "ry", formula = "T - 20" },
+  { parameter = "b3", unit = "mm", dof = "dz", formula = "1e-3*(gx^2 + gy^2) - 2E-3*abs(gz)" },
+]
+shape = [ { parameter = "period", unit = "h", start = 1.5, min = 0.1, max = 10 } ]
+[[effect]]
+id = "own-tool"
+at = "tool"
+terms = [
+  { parameter = "t1", unit = "um", dof = "dx", formula = "(L/L0)^3*cos(S) + feed/100" },
+  { parameter = "t2", unit = "urad", dof = "rx", formula = "mx*sqrt(abs(my)) + mz*sign(feed - 100)" },
+  { parameter = "t3", unit = "ms", dof = "dz", formula = "feed/60*step(mz - 0.2)" },
+]
+[[effect]]
+id = "own-plate"
+at = "workpiece"
+terms = [
+  { parameter = "w1", unit = "um", dof = "dz", formula = "(px^2 + py^2)/1e4 + atan2(py, px) + pz/100" },
+  { parameter = "w2", unit = "urad", dof = "rz", formula = "exp(-t/2)" },
+]
+[[effect]]
+id = "own-block"
+per = "block"
+at = "block"
+terms = [
+  { parameter = "k1", unit = "um", dof = "dx", formula = "bx*edge/10 + ox" },
+  { parameter = "k2", unit = "um", dof = "dy", formula = "by*edge/10 + oy*t" },
+  { parameter = "k3", unit = "urad", dof = "rz", formula = "bz + oz" },
+]
+[[effect]]
+id = "own-trigger"
+at = "trigger"
+terms = [ { parameter = "r1", unit = "um", dof = "r", formula = "mod(10*nx + 1.3, 3) + floor(3*ny + 0.5) + tan(nz/2) + asin(nx/2)*acos(ny/2) + atan(nz)" } ]
+[[effect]]
+id = "own-reading"
+at = "reading"
+terms = [
+  { parameter = "i1", unit = "um", dof = "X", formula = "cos(2*pi*X/4) + sX*sY*sZ" },
+  { parameter = "i2", unit = "um/m", dof = "Z", formula = "Z" },
+]
+[[effect]]
+id = "own-axes"
+at = "X"
+terms = [
+  { parameter = "x1", unit = "um", dof = "dz", formula = "(X/100)^2 + Y/200", frame = "fixed" },
+  { parameter = "x2", unit = "urad", dof = "rx", formula = "X*Y/3e4 + Z/200" },
+  { parameter = "x3", unit = "um", dof = "dy", formula = "-(Y/100)^3", at = "Y" },
+  { parameter = "x2", unit = "urad", dof = "rz", formula = "1", at = "Z" },
+]
+[[effect]]
+id = "own-turn"
+side = "tool"
+at = "B"
+terms = [
+  { parameter = "q1", unit = "um", dof = "dx", formula = "cos(4*B)*sB", frame = "moving" },
+  { parameter = "q2", unit = "urad", dof = "rx", formula = "sin(7*B)" },
+]
+[[effect]]
+id = "own-turn"
+side = "workpiece"
+at = "B"
+terms = [ { parameter = "q1", unit = "um", dof = "dx", formula = "cos(4*B)*sB", frame = "moving" } ]
+[[effect]]
+id = "own-table"
+side = "workpiece"
+at = "C"
+terms = [
+  { parameter = "q1", unit = "um", dof = "dx", formula = "cos(4*C)*sC", frame = "moving" },
+  { parameter = "q2", unit = "mrad", dof = "ry", formula = "sin(7*C + A/2)" },
+  { parameter = "q3", unit = "urad", dof = "C", formula = "sA + sC", at = "reading" },
+]
+unless = ["B"]
+"#;
+
+fn values(effect: &Effect, n_sets: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let draw = |p: &axiscal::model::catalogue::Parameter, rng: &mut ChaCha8Rng| match p.shape {
+        Some((start, ..)) => start * rng.random_range(0.8..1.2),
+        None => p.typical * rng.random_range(0.3..1.0),
+    };
+    (0..n_sets).flat_map(|_| effect.parameters.iter().map(|p| draw(p, rng)).collect::<Vec<_>>()).collect()
+}
+
+/// Largest effect and what is left of it at the planted values, mm.
+fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaCha8Rng) -> (f64, f64) {
+    let plan = random_plan(machine, mounting, 40, rng);
+    let run = |touches| Run { plan: &plan, touches, mounting: None, started_s: None };
+    let touches = touch(machine, &plan, &Scenario::flawless(), None);
+    let set_ups = assemble(machine, &[run(&touches)]).set_ups;
+    let theta = values(effect, if effect.per_block { set_ups.len() } else { 1 }, rng);
+    let mut text = format!(
+        "effects_file = \"mine.toml\"\n[temperature]\nprofile = [[0.0, 18.0], [4.0, 25.0]]\n[effects.{}]\n",
+        effect.id
+    );
+    for (i, value) in theta.iter().enumerate() {
+        let p = &effect.parameters[i % effect.parameters.len()];
+        let block = set_ups.get(i / effect.parameters.len()).filter(|_| effect.per_block);
+        let name = block.map_or(p.name.clone(), |b| format!("{}@{}", p.name, b.label));
+        text += &format!("{name:?} = {{ value = {value:?}, unit = {:?} }}\n", p.unit);
+    }
+    let open = |name: &str| Ok(source(name, OWN));
+    let (scenario, _) = simulate::scenario::parse_with(&source("planted", &text), machine, &open).unwrap();
+    assert_eq!(scenario.planted.len(), theta.len());
+    let touches = touch(machine, &plan, &scenario, None);
+    let data = assemble(machine, &[run(&touches)]);
+    let model = Model::new(machine, &[effect], &data.set_ups, machine.reference.pivot);
+    let mut scratch = model.scratch();
+    let shape = |i: usize| effect.parameters[i % effect.parameters.len()].shape.is_some();
+    let without: Vec<f64> = theta.iter().enumerate().map(|(i, v)| if shape(i) { *v } else { 0.0 }).collect();
+    data.observations.iter().fold((0.0, 0.0), |(largest, left): (f64, f64), o| {
+        let (bare, planted) = (model.gap(o, &without, &mut scratch), model.gap(o, &theta, &mut scratch));
+        assert!(bare.is_finite() && planted.is_finite());
+        (largest.max(bare.abs()), left.max(planted.abs()))
+    })
+}
+
+#[test]
+fn a_users_effect_is_planted_as_it_is_predicted() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut catalogue = Catalogue::default();
+    catalogue.add_file(&source("mine.toml", OWN)).unwrap();
+    let (mut n_planted, mut worst) = (0, 0.0_f64);
+    let mut does = std::collections::BTreeMap::new();
+    for machine in all_machines() {
+        for effect in catalogue.iter().filter(|e| e.applies_to(&machine)) {
+            for mounting in &machine.mountings {
+                let (largest, left) = plant(&machine, mounting, effect, &mut rng);
+                assert!(
+                    left < 1e-8 * largest + 2e-12,
+                    "{} on {} ({}): {left:e} mm of {largest:e} mm left",
+                    effect.id,
+                    machine.name,
+                    mounting.name
+                );
+                let most = does.entry(effect.id.clone()).or_insert(0.0_f64);
+                *most = most.max(largest);
+                worst = worst.max(left);
+                n_planted += 1;
+            }
+        }
+    }
+    println!("{n_planted} plantings of own effects; left at most {worst:e} mm");
+    assert!(does.len() == 9 && does.values().all(|mm| *mm > 1e-4), "{does:?}");
+}
+
+#[test]
+fn both_readings_know_the_same_words() {
+    let machine = machine("swivel-head");
+    let file = |formula: &str| {
+        format!("[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [{{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"0*({formula})\" }}]\n")
+    };
+    let mut words: Vec<String> = axiscal::model::formula::VARIABLES.map(str::to_owned).to_vec();
+    let binary = ["atan2", "mod"];
+    for f in axiscal::model::formula::FUNCTIONS {
+        words.push(if binary.contains(&f) { format!("{f}(1, 2)") } else { format!("{f}(0.5)") });
+    }
+    words.extend(["pi", "1.5e-3", "2^3", "-(X^2)"].map(str::to_owned));
+    let plan = |formula: &str| {
+        let text = "effects_file = [\"w.toml\"]\n[effects.w]\np = 1.0\n";
+        let open = |name: &str| Ok(source(name, file(formula)));
+        simulate::scenario::parse_with(&source("s.toml", text), &machine, &open).map(|_| ())
+    };
+    for word in words {
+        Catalogue::default().add_file(&source("w.toml", file(&word))).unwrap();
+        plan(&word).unwrap();
+    }
+    for wrong in ["Q", "sine(B)", "sX2", "1 +", "q*2", "(B", "nq", "mw", "x"] {
+        assert!(Catalogue::default().add_file(&source("w.toml", file(wrong))).is_err(), "{wrong}");
+        let failure = plan(wrong).unwrap_err();
+        assert_eq!(failure.0[0].code, "effects::formula", "{wrong}");
+        assert!(failure.0[0].place().unwrap().starts_with("w.toml:4:"), "{wrong}: {:?}", failure.0[0].place());
+        assert!(failure.0[0].help.as_ref().unwrap().contains("gx gy gz L L0"), "{wrong}");
+    }
+}
+
+fn axiscal(folder: &std::path::Path) -> Command {
+    let mut command = Command::cargo_bin("axiscal").unwrap();
+    command.current_dir(folder);
+    command
+}
+
+const MINE: &str = r#"format = "axiscal-effects/1"
+[[effect]]
+id = "my-sag"
+name = "Sag of the head, steeper than a sine"
+says = "The head sinks as it tilts"
+look = "Touch tops at several angles"
+at = "B"
+terms = [ { parameter = "sag", unit = "um", dof = "dz", formula = "-(abs(sin(B))^1.5)", typical = 10 } ]
+"#;
+
+#[test]
+fn a_users_effect_goes_from_simulation_to_identification() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    file("plan.json", &plan(&machine("swivel-head"), "head").to_json());
+    file("my-effects.toml", MINE);
+    let scenario = "seed = 3\neffects_file = [\"my-effects.toml\"]\n[effects.my-sag]\nsag = 12.0\n\
+                    [effects.paper-head]\na_BZ = 0.015\nd_xBZ = 0.03\n[noise]\ntouch_um = 0.5\n";
+    file("s.toml", scenario);
+    let call = ["simulate", "--plan", "plan.json", "--machine", "swivel-head", "--scenario", "s.toml"];
+    axiscal(folder.path()).args(call).args(["--controller", "csv", "--out", "head.csv"]).assert().success();
+    file(
+        "study.toml",
+        "machine = \"swivel-head\"\neffects_file = [\"my-effects.toml\"]\n[[data]]\nplan = \"plan.json\"\nlog = \"head.csv\"\n\
+         controller = \"csv\"\n[model]\neffects = [\"paper-head\", \"my-sag\"]\n",
+    );
+    let answer = axiscal(folder.path()).args(["identify", "study.toml", "--json"]).assert().success();
+    let answer: serde_json::Value = serde_json::from_slice(&answer.get_output().stdout).unwrap();
+    let of = |name: &str| answer["parameters"].as_array().unwrap().iter().find(|p| p["name"] == name).unwrap().clone();
+    for (name, truth) in [("sag", 12.0), ("EA0B", 0.015), ("EX0B", 0.03)] {
+        let (value, expanded) = (of(name)["value"].as_f64().unwrap(), of(name)["expanded"].as_f64().unwrap());
+        assert!((value - truth).abs() < 1.5 * expanded, "{name}: {value} ± {expanded}, planted {truth}");
+        assert!(expanded < 0.2 * truth, "{name} is hardly told: {value} ± {expanded}");
+    }
+    // what it reads is not written over, and what is wrong in it is said with its place
+    let over = ["--controller", "csv", "--force", "--out", "my-effects.toml"];
+    axiscal(folder.path()).args(call).args(over).assert().code(2);
+    file("my-effects.toml", &MINE.replace("sin(B)", "sinus(B)"));
+    let run = axiscal(folder.path()).args(call).args(["--out", "other.log"]).assert().code(2);
+    run.stderr(predicate::str::contains("my-effects.toml:8:").and(predicate::str::contains("sinus")));
+    file("my-effects.toml", &MINE.replace("-(abs(sin(B))^1.5)", "1/sin(B)"));
+    let run = axiscal(folder.path()).args(call).args(["--out", "other.log"]).assert().code(2);
+    run.stderr(predicate::str::contains("has no value at touch 1"));
+    file("my-effects.toml", &MINE.replace("my-sag", "head-sag"));
+    let run = axiscal(folder.path()).args(call).args(["--out", "other.log"]).assert().code(2);
+    run.stderr(predicate::str::contains("effect \"head-sag\" exists already"));
+}
