@@ -1,8 +1,9 @@
 //! The crate beside its peers on the same touches and unknowns, in one run: answers compared, times as ratios.
 //!
 //! `cargo bench --bench peers` prints the table; `-- --write` puts it into `docs/performance.md` as well, and words such as
-//! `10000x60` choose sizes (touches x unknowns); `-- --answers` compares the answers only. Without `--bench` (as `cargo test` calls it) it compares the answers at small size only. Peers are what `benches/peers/run` finds;
-//! `AXISCAL_PEERS_REQUIRED=1` makes a missing one an error.
+//! `10000x60` choose sizes (touches x unknowns); `-- --answers` compares the answers only, at small
+//! size, as does a call without `--bench` (`cargo test`). Peers are what `benches/peers/run` finds; `AXISCAL_PEERS_REQUIRED=1`
+//! makes a missing one an error.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a benchmark that cannot run says where
 
 mod comparison;

@@ -24,14 +24,6 @@ pub const SIGMA_MM: f64 = 1e-3;
 /// Name of the mounting that holds all blocks.
 pub const MOUNTING: &str = "bench";
 
-/// An effect as a user would write it.
-const SQUARENESS: &str = r#"
-[[effect]]
-id = "squareness-xy"
-at = "Y"
-terms = [ { parameter = "EC0Y", unit = "urad", dof = "dx", formula = "-Y" } ]
-"#;
-
 /// Touches of a plan and the model that is fitted to them.
 pub struct Problem {
     pub machine: Machine,
@@ -80,11 +72,7 @@ impl Problem {
         let (raw, _) = simulate::run(&machine, &plan, &scenario, None).unwrap();
         let touches = raw.iter().map(matched).collect();
         let effects = effects.into_iter().map(str::to_owned).collect();
-        let mut catalogue = Catalogue::built_in().unwrap();
-        if !catalogue.knows("squareness-xy") {
-            catalogue.add_file(&source("squareness.toml", SQUARENESS)).unwrap();
-        }
-        Self { machine, catalogue, plan, touches, effects }
+        Self { machine, catalogue: Catalogue::built_in().unwrap(), plan, touches, effects }
     }
 
     /// The touches as the fit takes them.
