@@ -28,7 +28,24 @@ pub struct Batch<'a> {
     coefficients: Vec<f64>,
     /// Actives with a shape parameter: evaluated anew for each θ.
     shaped: Vec<usize>,
+    /// Places whose transform is another at every touch.
+    moving: Vec<usize>,
+    /// What stands in every row, then what stands in the rows of each block besides.
+    entries: Vec<Vec<Entry>>,
     roles: Roles,
+}
+
+/// A derivative in a row: the slope at a place times the coefficient of the unknown there.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    /// Place in the row.
+    at: usize,
+    slot: usize,
+    component: usize,
+    /// Where it is the same at all touches.
+    coefficient: Option<f64>,
+    active: usize,
+    has_shape: bool,
 }
 
 /// Slots outside of the axes.
@@ -77,6 +94,10 @@ struct Placed {
 
 impl Placed {
     fn new(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        if by.w == Vector3::zeros() {
+            let rigid = Rigid { r: Matrix3::identity(), t: by.d };
+            return Self { rigid, image: centre + by.d, axis_a: Vector3::x(), axis_b: Vector3::y() };
+        }
         let ((sa, ca), (sb, cb), (sc, cc)) = (by.w.x.sin_cos(), by.w.y.sin_cos(), by.w.z.sin_cos());
         // Rz(c)·Ry(b)·Rx(a), as `Displacement::rotation`
         let r = Matrix3::new(
@@ -174,7 +195,25 @@ impl Model {
             trigger: self.find(Place::Trigger),
             reading: self.find(Place::Reading),
         };
-        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, roles }
+        let moving = (0..self.slots.len()).filter(|&i| self.slots[i].changes == Changes::WithTouch).collect();
+        let entries = self.entries();
+        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, moving, entries, roles }
+    }
+
+    fn entries(&self) -> Vec<Vec<Entry>> {
+        let mut entries = vec![Vec::new(); 1 + self.set_ups().len()];
+        for (i, a) in self.active.iter().enumerate() {
+            let (list, offset) = a.set_up.map_or((0, 0), |s| (1 + s, self.layout.common.len()));
+            entries[list].push(Entry {
+                at: offset + self.layout.place(a.unknown),
+                slot: a.slot,
+                component: a.component,
+                coefficient: a.term.formula.constant().map(|value| a.factor * value),
+                active: i,
+                has_shape: a.term.formula.has_shape(),
+            });
+        }
+        entries
     }
 }
 
@@ -270,20 +309,13 @@ impl At<'_> {
         let gap = self.evaluate(touch, scratch, true);
         row.fill(0.0);
         let (model, o) = (self.batch.model, &self.batch.observations[touch]);
-        let n_common = model.layout.common.len();
-        for (i, a) in model.active.iter().enumerate() {
-            let offset = match a.set_up {
-                Some(s) if s != o.set_up => continue,
-                Some(_) => n_common,
-                None => 0,
-            };
-            let slope = scratch.gradient[a.slot][a.component];
-            let coefficient = match a.term.formula.constant() {
-                Some(value) => a.factor * value,
-                None => scratch.coefficient[i],
-            };
-            row[offset + model.layout.place(a.unknown)] += slope * coefficient;
-            if a.term.formula.has_shape() {
+        let entries = &self.batch.entries;
+        for e in entries[0].iter().chain(&entries[1 + o.set_up]) {
+            let slope = scratch.gradient[e.slot][e.component];
+            row[e.at] += slope * e.coefficient.unwrap_or_else(|| scratch.coefficient[e.active]);
+            if e.has_shape {
+                let a = &model.active[e.active];
+                let offset = if a.set_up.is_some() { model.layout.common.len() } else { 0 };
                 let amount = self.theta[a.unknown] * a.factor;
                 for (shape, derivative) in a.term.formula.partials(&o.state, &self.theta[a.first..a.first + a.count]) {
                     row[offset + model.layout.place(a.first + shape)] += slope * amount * derivative;
@@ -301,10 +333,8 @@ impl At<'_> {
         }
         let o = &batch.observations[touch];
         let base = (1 + o.set_up) * self.n_slots;
-        for (i, slot) in model.slots.iter().enumerate() {
-            if slot.changes == Changes::WithTouch {
-                scratch.displacement[i] = self.displacement[base + i];
-            }
+        for &i in &batch.moving {
+            scratch.displacement[i] = self.displacement[base + i];
         }
         let own = &batch.coefficients[touch * batch.varying.len()..(touch + 1) * batch.varying.len()];
         for (&i, &coefficient) in batch.varying.iter().zip(own) {
@@ -320,11 +350,10 @@ impl At<'_> {
                 scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * a.factor * value);
             }
         }
-        for (i, slot) in model.slots.iter().enumerate() {
-            if slot.changes == Changes::WithTouch {
-                let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
-                scratch.placed[i] = Placed::new(&scratch.displacement[i], &centre);
-            }
+        for &i in &batch.moving {
+            let slot = &model.slots[i];
+            let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
+            scratch.placed[i] = Placed::new(&scratch.displacement[i], &centre);
         }
     }
 
