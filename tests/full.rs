@@ -400,6 +400,13 @@ fn a_controller_without_a_stop_and_a_machine_without_the_stylus_say_so() {
     let failure = post.program(&machine, &g.plan, &g.path).unwrap_err();
     assert!(failure.to_string().contains("how a program waits for a person"), "{failure}");
 
+    // the first part cannot be touched at all: the ball would have to come from below
+    let below = SEVERAL.replacen("touch = [{ faces = [\"+Z\"]", "touch = [{ faces = [\"-Z\"]", 1);
+    let (spec, _) = program::load(&source("s.toml", below)).unwrap();
+    let failure = program::generate(&machine, &spec, &Options::default()).unwrap_err();
+    let why = |words: &str| failure.0.iter().any(|f| f.message.contains(words));
+    assert!(why("in the part with which the program begins") && why("nothing of \"several\""), "{failure:?}");
+
     let (spec, _) = program::load(&source("s.toml", SEVERAL.replace("\"long\"", "\"longer\""))).unwrap();
     let failure = program::generate(&machine, &spec, &Options::default()).unwrap_err();
     assert!(failure.to_string().contains("no stylus \"longer\""), "{failure}");

@@ -29,7 +29,7 @@ fn unpanicked(case: fn()) -> Check {
 
 fn main() {
     let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let cases: [Case; 8] = [
+    let cases: [Case; 9] = [
         ("rs274_accepts_every_program", || unpanicked(stops::rs274_accepts_every_program)),
         ("it_stops_with_the_name_of_the_touch", || {
             unpanicked(stops::it_stops_with_the_name_of_the_touch_and_gives_the_settings_back)
@@ -38,6 +38,7 @@ fn main() {
         ("the_papers_order_head_compensate_table_compensate", the_papers_order),
         ("drawn_errors_and_displaced_blocks_in_one_study", drawn_errors),
         ("plain_servo_latch_with_pretravel_in_the_model", servo_latch),
+        ("full_with_two_styli_and_its_stops", full_program),
         ("stock_kinematics_of_a_trunnion", stock_trunnion),
         ("stock_kinematics_of_a_swivel_table", stock_swivel_table),
     ];
@@ -51,7 +52,7 @@ fn main() {
         .collect();
     if std::env::var_os("AXISCAL_LINUXCNC").is_none() {
         println!(
-            "\nleft out: {} tests on a real LinuxCNC. They take a quarter of an hour and need Debian's linuxcnc-uspace;",
+            "\nleft out: {} tests on a real LinuxCNC. They take twenty minutes and need Debian's linuxcnc-uspace;",
             chosen.len()
         );
         println!("./run-tests installs it and runs them (AXISCAL_LINUXCNC=required cargo test --test linuxcnc)\n");
@@ -163,6 +164,52 @@ fn servo_latch() -> Check {
     let late_um = 1e3 * (found - truth.effects[2].1[0].1);
     if !(0.2..0.8).contains(&late_um) {
         return Err(format!("the latch comes {late_um:.2} um late on average, expected about 0.5"));
+    }
+    Ok(())
+}
+
+/// One run of `full`: the operator changes the stylus at both stops. The zero of B and the place of its axis, which are
+/// one number with a single stylus, come apart. The turntable also runs out once per turn, and the study is not told: the
+/// diagnosis finds it in LinuxCNC's own log.
+fn full_program() -> Check {
+    let job = Job::new("swivel-head")?;
+    let noise_um = 0.05;
+    job.generate("full", &[])?;
+    let effects: [(&str, &[(&str, f64)]); 4] = [
+        ("location-b", &[("EX0B", 0.02), ("EZ0B", -0.015), ("EA0B", 0.004), ("EC0B", -0.006)]),
+        ("location-c", &[("EX0C", 0.012), ("EY0C", -0.02), ("EA0C", -0.002), ("EB0C", 0.003)]),
+        ("zero-b", &[("EB0B", 0.003)]),
+        ("pretravel", &[("pretravel", 0.004)]),
+    ];
+    let blocks = [("full", "a", [0.2, -0.1, 0.15], [0.05, -0.1, 0.08])];
+    job.scenario(&effects, &blocks, noise_um, 5)?;
+    let run_out = "[[harmonic]]\naxis = \"C\"\ndof = \"dx\"\nk = 1\ncos_um = 3.0\nsin_um = 0.0\n\
+                   [[harmonic]]\naxis = \"C\"\ndof = \"dy\"\nk = 1\ncos_um = 0.0\nsin_um = -2.0\n";
+    let known = std::fs::read_to_string(job.dir.join("wrong.toml")).map_err(|e| e.to_string())?;
+    job.write("wrong.toml", &format!("{known}{run_out}"))?;
+    job.run("full", "full", &Control::plain())?;
+    let model = ["location-b", "location-c", "zero-b", "block-setup", "pretravel"];
+    let study = Study::new(&["full"], &["full"], &model, noise_um);
+    job.write("full.toml", &study.text(&job.machine))?;
+    let before = job.json(&["identify", "full.toml"])?["rms_um"].as_f64().unwrap_or(f64::NAN);
+    let diagnosis = job.json_whatever(&["diagnose", "full.toml"])?;
+    let first = &diagnosis["candidates"][0];
+    let group: Vec<&str> = std::iter::once(&first["effect"])
+        .chain(first["same_as"].as_array().into_iter().flatten())
+        .filter_map(Value::as_str)
+        .collect();
+    println!("  {before:.2} um left; {}: {group:?}", diagnosis["verdict"]);
+    if diagnosis["verdict"] != "missing-effect" || !group.contains(&"radial-c-1") {
+        return Err(format!("the run-out of C was not found: {diagnosis}"));
+    }
+    let fit = job.json(&["add", "full.toml", "radial-c-1"])?["after"].clone();
+    let after = fit["rms_um"].as_f64().unwrap_or(f64::NAN);
+    println!("  {after:.3} um left with it");
+    if !(after < 1.25 * noise_um) {
+        return Err(format!("{before} um before, {after} um after the run-out was added"));
+    }
+    for (_, values) in &effects {
+        within(&fit, values, None)?;
     }
     Ok(())
 }
@@ -439,6 +486,17 @@ impl Job {
         Ok(String::from_utf8_lossy(&out.stdout).into_owned())
     }
 
+    /// The answer, whether it is yes or no.
+    fn json_whatever(&self, args: &[&str]) -> Result<Value, String> {
+        let out = Command::new(env!("CARGO_BIN_EXE_axiscal"))
+            .args(args)
+            .arg("--json")
+            .current_dir(&self.dir)
+            .output()
+            .map_err(|e| e.to_string())?;
+        serde_json::from_slice(&out.stdout).map_err(|e| format!("{e}: {}", String::from_utf8_lossy(&out.stderr)))
+    }
+
     fn json(&self, args: &[&str]) -> Result<Value, String> {
         let text = self.call(&[args, &["--json"]].concat())?;
         serde_json::from_str(&text).map_err(|e| format!("{e}: {text}"))
@@ -568,7 +626,8 @@ impl Job {
     fn identify(&self, name: &str, study: &Study) -> Result<Value, String> {
         self.write(&format!("{name}.toml"), &study.text(&self.machine))?;
         let fit = self.json(&["identify", &format!("{name}.toml")])?;
-        if fit["converged"] != true || !fit["rejected"].as_array().is_some_and(Vec::is_empty) {
+        // a good touch beyond 4 standard deviations is rare, but hundreds are made
+        if fit["converged"] != true || fit["rejected"].as_array().is_none_or(|r| r.len() > 1) {
             return Err(format!("{name}: converged {}, rejected {}", fit["converged"], fit["rejected"]));
         }
         Ok(fit)

@@ -130,11 +130,10 @@ fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaC
     let touches = touch(machine, &plan, &scenario, None);
     let data = assemble(machine, &[run(&touches)]);
     let model = Model::new(machine, &[effect], &data.set_ups, machine.reference.pivot);
-    let mut scratch = model.scratch();
     let shape = |i: usize| effect.parameters[i % effect.parameters.len()].shape.is_some();
     let without: Vec<f64> = theta.iter().enumerate().map(|(i, v)| if shape(i) { *v } else { 0.0 }).collect();
     data.observations.iter().fold((0.0, 0.0), |(largest, left): (f64, f64), o| {
-        let (bare, planted) = (model.gap(o, &without, &mut scratch), model.gap(o, &theta, &mut scratch));
+        let (bare, planted) = (model.gap(o, &without), model.gap(o, &theta));
         assert!(bare.is_finite() && planted.is_finite());
         (largest.max(bare.abs()), left.max(planted.abs()))
     })
@@ -173,7 +172,9 @@ fn a_users_effect_is_planted_as_it_is_predicted() {
 fn both_readings_know_the_same_words() {
     let machine = machine("swivel-head");
     let file = |formula: &str| {
-        format!("[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [{{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"0*({formula})\" }}]\n")
+        format!(
+            "[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [{{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"0*({formula})\" }}]\n"
+        )
     };
     let mut words: Vec<String> = axiscal::model::formula::VARIABLES.map(str::to_owned).to_vec();
     let binary = ["atan2", "mod"];
@@ -251,4 +252,33 @@ fn a_users_effect_goes_from_simulation_to_identification() {
     file("my-effects.toml", &MINE.replace("my-sag", "head-sag"));
     let run = axiscal(folder.path()).args(call).args(["--out", "other.log"]).assert().code(2);
     run.stderr(predicate::str::contains("effect \"head-sag\" exists already"));
+}
+
+#[test]
+fn effects_are_listed_and_shown_at_eighty_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("mine.toml"), OWN).unwrap();
+    let said = |arguments: &[&str]| {
+        let run = axiscal(folder.path()).arg("effects").args(arguments).assert().success();
+        let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+        let longest = text.lines().map(|l| l.chars().count()).max().unwrap();
+        assert!(longest <= 80 || arguments.contains(&"--json"), "{arguments:?}: {longest} columns");
+        text
+    };
+    let all = said(&["--effects-file", "mine.toml"]);
+    for part in ["wobble", "radial-c-1", "EXC EYC", "2.2 um", "own-base"] {
+        assert!(all.contains(part), "{part}");
+    }
+    let here = said(&["--machine", "trunnion"]);
+    assert!(here.contains("tilt-a-3") && !here.contains("head-sag") && !here.contains("location-b"));
+    let one = said(&["show", "warm-up"]);
+    for part in ["ISO 230-3", "1 - exp(-t/tau)", "how to confirm", "what mends it", "every machine", "tried: 0.1 "] {
+        assert!(one.contains(part), "{part}: {one}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&said(&["show", "pitch-x", "--json"])).unwrap();
+    let row = &json["effects"][0];
+    assert_eq!(row["family"], "linear");
+    assert_eq!(row["parameters"][2]["shape"]["scan"].as_array().unwrap().len(), 7);
+    assert_eq!(row["parameters"][0]["iso"], "EXX");
+    axiscal(folder.path()).args(["effects", "show", "head-sag", "-m", "trunnion"]).assert().code(2);
 }

@@ -58,13 +58,15 @@ fn programs(machine: &str) -> &'static [&'static str] {
 #[test]
 fn noise_free_touches_give_back_everything_that_is_called_identified() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    for machine in machines() {
-        let (scenario, truth) = wrong(&machine, &mut rng);
-        let plans: Vec<_> = programs(&machine.name).iter().map(|p| plan(&machine, p)).collect();
-        let touches: Vec<_> = plans.iter().map(|p| touch(&machine, p, &scenario, None)).collect();
+    let all = machines();
+    let cases = all.iter().flat_map(|m| [(m, programs(&m.name)), (m, &["full"][..])]);
+    for (machine, programs) in cases {
+        let (scenario, truth) = wrong(machine, &mut rng);
+        let plans: Vec<_> = programs.iter().map(|p| plan(machine, p)).collect();
+        let touches: Vec<_> = plans.iter().map(|p| touch(machine, p, &scenario, None)).collect();
         let runs: Vec<_> = plans.iter().zip(&touches).map(|(p, t)| (p, &t[..])).collect();
         let [(first, _), (second, _)] = location(&machine.name);
-        let fit = identify(&machine, &runs, &[first, second, "block-setup", "pretravel"]);
+        let fit = identify(machine, &runs, &[first, second, "block-setup", "pretravel"]);
         let o = &fit.outcome;
         println!(
             "{}: {} touches, {} unknowns of rank {}, condition {:.1}, {}",

@@ -1,8 +1,6 @@
 // The problem that all peers solve: touches and unknowns as `cargo bench --bench peers` writes them, and the gap at a
 // touch with its derivatives. docs/conventions.md fixes signs and frames; README.md beside this file the file format.
 #pragma once
-#include <sys/resource.h>
-
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -148,10 +146,12 @@ inline double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+// The largest resident set of this very program, KiB (getrusage would count what the caller had before the exec).
 inline long peak_kb() {
-  rusage use{};
-  getrusage(RUSAGE_SELF, &use);
-  return use.ru_maxrss;
+  std::ifstream in("/proc/self/status");
+  for (std::string line; std::getline(in, line);)
+    if (line.rfind("VmHWM:", 0) == 0) return std::stol(line.substr(6));
+  return 0;
 }
 
 // Writes the answer as JSON: names, values, standard uncertainties (unit: those of the unknowns), times, memory.

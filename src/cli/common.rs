@@ -3,6 +3,7 @@
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
 use crate::machine::{self, Machine};
+use crate::report::plot::Paper;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -41,6 +42,17 @@ impl Io {
     #[must_use]
     pub fn new(json: bool) -> Self {
         Self { json }
+    }
+
+    /// What plots and wide tables are drawn on: the terminal as it is; in a pipe 80 columns of ASCII.
+    #[must_use]
+    pub fn paper(&self, ascii: bool) -> Paper {
+        let terminal = std::io::IsTerminal::is_terminal(&std::io::stdout());
+        let stated = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
+        let measured = console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+        let width = stated.or(measured.filter(|_| terminal)).unwrap_or(80);
+        let colour = terminal && !ascii && std::env::var_os("NO_COLOR").is_none();
+        Paper { width: width.clamp(40, 400), ascii: ascii || !terminal, colour }
     }
 
     /// A line for the person: stdout, or nothing when JSON was asked for.

@@ -12,6 +12,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::{Run, assemble};
 use crate::post::Postprocessor;
+use crate::program::path::{Step, Stop};
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
@@ -211,6 +212,14 @@ fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&
         plan.mounting,
         program::duration(path.seconds)
     ));
+    let stops: Vec<&Stop> =
+        path.steps.iter().filter_map(|s| if let Step::Stop(stop) = s { Some(stop) } else { None }).collect();
+    if !stops.is_empty() {
+        io.say("it stops for a person; the time counts 10 min for other blocks and 5 min for another stylus:");
+        for (number, stop) in (1..).zip(&stops) {
+            io.say(format!("  stop {number}: {}", stop.says.join("; ")));
+        }
+    }
     if !skipped.is_empty() {
         io.say(format!("\n{} touches were left out:", plan.skipped.len()));
         let mut t = table(&["pose (deg)", "block", "face", "points", "why"]);
@@ -240,6 +249,9 @@ fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&
         "controller_frame": plan.controller_frame,
         "touches": plan.touches.len(),
         "time_s": path.seconds,
+        "stops": stops.iter().map(|s| json!({
+            "says": s.says, "mounting": s.mounting, "tool_length_mm": s.tool_length_mm, "ball_radius_mm": s.ball_radius_mm,
+        })).collect::<Vec<_>>(),
         "setups": setups.iter().map(|s| json!({
             "stage": s.stage, "pose": s.pose, "visit": s.visit, "touches": s.touches,
         })).collect::<Vec<_>>(),

@@ -2,6 +2,7 @@
 
 use super::load::load_study;
 use super::{Answer, Io};
+use crate::design;
 use crate::diag::{Failure, Result};
 use crate::fit;
 use crate::machine::Machine;
@@ -19,6 +20,12 @@ pub struct Args {
     /// With the residual of every touch
     #[arg(long)]
     pub residuals: bool,
+    /// With the covariance matrix of the results (--json)
+    #[arg(long)]
+    pub covariance: bool,
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations
+    #[arg(long)]
+    pub quick: bool,
 }
 
 /// Runs `identify`.
@@ -29,7 +36,14 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
-    let mut outcome = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome;
+    settings.quick = args.quick;
+    let mut fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    if !settings.quick {
+        design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
+    }
+    let covariance = args.covariance.then(|| fit::uncertainty::results_covariance(&fit));
+    let mut outcome = fit.outcome;
+    outcome.covariance = covariance;
     if let Some(active) = loaded.active()? {
         outcome.warnings.push(format!(
             "a compensation with {} terms was active: the values are what it leaves, not the machine's whole errors",

@@ -85,12 +85,17 @@ fn show(m: &Machine, io: &Io) {
         "tool: {} mm from the pivot to the ball's centre\nprobe: ball {} mm, stem {} x {} mm, body {} x {} mm, head {} mm (diameters); repeatability {} um, overtravel {} mm\n       search {} mm/min, measuring touch {} mm/min, protected positioning {} mm/min",
         m.tool.length_mm, 2.0 * p.ball_radius, 2.0 * p.stem_radius, p.stem_length, 2.0 * p.body_radius, p.body_length, 2.0 * p.head_radius, p.repeatability_um, p.overtravel, p.fast_feed, p.slow_feed, p.position_feed
     ));
+    for s in &m.styli {
+        io.say(format!("stylus {:?}: {} ({:+} mm, ball {} mm)", s.name, s.says, s.longer, 2.0 * s.ball_radius));
+    }
     for mounting in &m.mountings {
         io.say(format!("mounting {:?}: {} (carried by {})", mounting.name, mounting.says, mounting.carrier));
         for b in &mounting.blocks {
             let riser = b.riser.map_or_else(String::new, |r| format!(", on a riser of {} mm", r.height));
+            let own = b.carrier != mounting.carrier;
+            let borne = if own { format!(", carried by {}", b.carrier) } else { String::new() };
             io.say(format!(
-                "  block {:<3} centre {} {} {} mm, edges {} {} {} mm{riser}",
+                "  block {:<3} centre {} {} {} mm, edges {} {} {} mm{riser}{borne}",
                 b.name, b.centre.x, b.centre.y, b.centre.z, b.size.x, b.size.y, b.size.z
             ));
         }
@@ -121,11 +126,16 @@ fn as_json(m: &Machine) -> serde_json::Value {
         .iter()
         .map(|x| {
             json!({ "name": x.name, "says": x.says, "carrier": carrier(x.carrier),
-                "blocks": x.blocks.iter().map(|b| json!({ "name": b.name, "centre": b.centre.as_slice(), "size": b.size.as_slice() })).collect::<Vec<_>>() })
+                "blocks": x.blocks.iter().map(|b| json!({ "name": b.name, "carrier": carrier(b.carrier), "centre": b.centre.as_slice(), "size": b.size.as_slice() })).collect::<Vec<_>>() })
         })
         .collect();
+    let styli: Vec<_> = m
+        .styli
+        .iter()
+        .map(|s| json!({ "name": s.name, "says": s.says, "longer_mm": s.longer, "ball_radius_mm": s.ball_radius }))
+        .collect();
     json!({ "name": m.name, "says": m.says, "workpiece_side": letters(m, Side::Workpiece), "tool_side": letters(m, Side::Tool),
-        "axes": axes, "tool_length_mm": m.tool.length_mm, "ball_radius_mm": m.probe.ball_radius, "mountings": mountings, "sha256": m.sha256 })
+        "axes": axes, "tool_length_mm": m.tool.length_mm, "ball_radius_mm": m.probe.ball_radius, "styli": styli, "mountings": mountings, "sha256": m.sha256 })
 }
 
 fn carrier(c: Carrier) -> String {

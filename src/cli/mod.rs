@@ -3,9 +3,12 @@
 //! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
 //! "no", 2 the input or the call was unusable.
 
+mod assess;
 mod common;
+mod compare;
 mod controllers;
 mod demo;
+mod diagnose;
 mod effects;
 mod export;
 mod generate;
@@ -18,6 +21,7 @@ mod programs;
 mod reproduce;
 mod schema;
 mod simulate;
+mod sketch_effect;
 
 pub use common::{Answer, Io};
 
@@ -47,6 +51,8 @@ enum Verb {
     Controllers(controllers::Args),
     /// List the probing programs that are built in or found, or show one
     Programs(programs::Args),
+    /// Before the first touch: what a plan will be able to tell, and what it cannot
+    Assess(assess::Args),
     /// Write an NC probing program and its plan
     Generate(generate::Args),
     /// The virtual machine: write the log that the controller would have written
@@ -59,6 +65,12 @@ enum Verb {
     New(new::Args),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
+    /// Which physical effect is missing: verdict, candidates, and what these touches cannot tell apart
+    Diagnose(diagnose::Args),
+    /// Write a starting formula for what no known effect explains
+    SketchEffect(sketch_effect::Args),
+    /// Model against measurement: where it fails, and on what that depends
+    Compare(compare::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -80,12 +92,16 @@ pub fn main() -> ExitCode {
         Verb::Effects(args) => effects::run(&args, &io),
         Verb::Controllers(args) => controllers::run(&args, &io),
         Verb::Programs(args) => programs::run(&args, &io),
+        Verb::Assess(args) => assess::run(&args, &io),
         Verb::Generate(args) => generate::run(&args, &io),
         Verb::Simulate(args) => simulate::run(&args, &io),
         Verb::Parse(args) => parse::run(&args, &io),
         Verb::Reproduce(args) => reproduce::run(&args, &io),
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
+        Verb::Diagnose(args) => diagnose::run(&args, &io),
+        Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
+        Verb::Compare(args) => compare::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

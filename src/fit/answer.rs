@@ -2,7 +2,7 @@
 
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
-use super::{Fit, Knowledge, Settings, noise, snoop, statement, uncertainty};
+use super::{Fit, Knowledge, Settings, held_out, noise, snoop, statement, uncertainty};
 use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -88,14 +88,14 @@ pub(super) fn outcome(
         dof: fit.dof,
         condition,
         rms_um: um_from_mm((squares / n_used.max(1) as f64).sqrt()),
-        held_out_rms_um: None,
+        held_out_rms_um: if settings.quick { None } else { held_out::by_visit(fit).map(|h| h.rms_um) },
         noise_um: um_from_mm(fit.noise.sigma_mm),
         noise_source: fit.noise.source.into(),
         visit_um: um_from_mm(fit.noise.visit_mm()),
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
-        undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, v)).collect(),
+        undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, effects, v)).collect(),
         weak: if settings.quick { Vec::new() } else { uncertainty::weak(fit) },
         parameters,
         correlations: uncertainty::correlations(fit),

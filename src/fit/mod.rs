@@ -7,13 +7,14 @@
 
 mod answer;
 pub mod candidates;
+pub mod held_out;
 mod knowledge;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
 pub mod snoop;
 pub mod solve;
-mod statement;
+pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
@@ -222,6 +223,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let solution = search.without_strangers(solution, 0.0);
     let noise = noise::estimate(&search.samples(&solution), &known);
     search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+    let first_steps = solution.iterations;
     let solution = solve::minimise(&search.touches, solution.theta, &observability);
     let before = search.touches.weights().to_vec();
     let mut solution = search.without_strangers(solution, noise.dof.unwrap_or(0.0));
@@ -233,6 +235,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         solution = solve::minimise(&search.touches, solution.theta, &observability);
         noise
     };
+    solution.iterations += first_steps;
     let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
     let snoop = Snoop::new(
         &search.touches,
@@ -287,7 +290,8 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
 
 /// Scatter of the ball's place from one index to the next as the machine file declares it, mm: of the rotary axes that
 /// stand at more than one place in these touches.
-fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
+#[must_use]
+pub fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
     let moved = |name| {
         let mut places = observations.iter().map(|o| o.position.get(name));
         let first = places.next();

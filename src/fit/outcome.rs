@@ -99,6 +99,9 @@ pub struct Undetermined {
     pub combination: BTreeMap<String, f64>,
     /// In words.
     pub says: String,
+    /// What would part them: variations of the touches, cheapest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parted_by: Vec<String>,
 }
 
 /// A combination that is known badly.

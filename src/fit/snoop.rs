@@ -15,6 +15,10 @@ const LIMIT: f64 = 4.0;
 /// More than this share of rejected touches is no longer a matter of chips: it is a finding by itself.
 pub const MOST_SHARE: f64 = 0.02;
 
+/// The scatter is never taken for less than a hundredth of the noise: what is left in a log without noise is rounding,
+/// and no touch stands out of that.
+const LEAST_SCALE2: f64 = 1e-4;
+
 /// A rejected touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rejection {
@@ -142,7 +146,8 @@ impl Snoop {
     /// Scale² without touch i.
     fn scale2(&self, i: usize) -> f64 {
         let without = self.chi2 - self.a[i] * self.a[i] / self.d[i];
-        (without.max(0.0) + self.noise_dof) / (self.dof - 1.0 + self.noise_dof).max(1.0)
+        let found = (without.max(0.0) + self.noise_dof) / (self.dof - 1.0 + self.noise_dof).max(1.0);
+        found.max(LEAST_SCALE2)
     }
 
     /// ∇ᵢ over its standard deviation; 0 for a touch that nothing else controls.
@@ -151,7 +156,7 @@ impl Snoop {
             return 0.0;
         }
         let s2 = self.scale2(i);
-        if s2 > 0.0 { self.a[i] / (self.d[i] * s2).sqrt() } else { 0.0 }
+        self.a[i] / (self.d[i] * s2).sqrt()
     }
 
     fn search(&mut self, rows: &Rows, covariance: &DMatrix<f64>) {

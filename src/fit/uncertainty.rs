@@ -3,11 +3,12 @@
 
 use super::candidates::columns;
 use super::normal::Touches;
-use super::outcome::{Combination, Correlation};
+use super::outcome::{Combination, Correlation, Covariance};
 use super::{Fit, Knowledge};
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::predict::Unknown;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::collections::BTreeMap;
 
@@ -86,7 +87,7 @@ pub(super) fn type_b(
         let Some((effect, which)) = owner else {
             findings.push(
                 Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
-                    .help("`axiscal effects` lists them, for instance sX (block-size), dL (tool-length), expansion (ambient-scale)"),
+                    .help("`axiscal effects` lists them, for instance size_X (block-size), dL (tool-length), expansion (ambient-scale)"),
             );
             continue;
         };
@@ -118,13 +119,14 @@ fn sensitivity(fit: &Fit, column: DVector<f64>) -> DVector<f64> {
 /// the model, the paper's sets, whole hypotheses and the set-up of blocks.
 #[must_use]
 pub fn unmodelled<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
-    let held = |e: &Effect| {
-        e.parameters.iter().any(|p| fit.model.unknowns.iter().any(|u| u.effect == e.id || u.name == p.name))
-    };
-    catalogue
-        .iter()
-        .filter(|e| e.applies_to(machine) && !e.paper && !e.per_block && !e.discrete && !held(e))
-        .collect()
+    unmodelled_by(&fit.model.unknowns, machine, catalogue).into_iter().filter(|e| !e.per_block).collect()
+}
+
+/// As [`unmodelled`], of a model with these unknowns; effects with parameters for each block are among them.
+#[must_use]
+pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
+    let held = |e: &Effect| e.parameters.iter().any(|p| unknowns.iter().any(|u| u.effect == e.id || u.name == p.name));
+    catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.discrete && !held(e)).collect()
 }
 
 /// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size,
@@ -134,28 +136,35 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
     let all = columns(machine, &effects, &fit.data, &fit.data.observations, fit.model.reference, None);
     let tau_mm = fit.noise.visit_mm();
     let linear = fit.linear(tau_mm);
-    let n = all.values.nrows();
     let mut b = all.values;
     for (mut column, u) in b.column_iter_mut().zip(&all.unknowns) {
         column *= u.typical;
     }
     fit.with_touches(tau_mm, |t| t.whiten(&mut b));
-    // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
-    let jacobian = linear.jacobian.rows(0, n);
-    let cross = jacobian.tr_mul(&b);
-    let mut inner = b.tr_mul(&b);
-    inner.fill_diagonal_added();
-    let Some(cholesky) = inner.cholesky() else { return DVector::from_element(fit.free.len(), f64::NAN) };
-    let taken = &cross * cholesky.solve(&cross.transpose());
-    let seen = &fit.observability;
-    let gram = linear.jacobian.tr_mul(&linear.jacobian) - taken;
-    let scaled = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
+    expected(&linear.jacobian, Some(&b), &fit.observability)
+}
+
+/// Standard uncertainty of each unknown of a whitened regression, in its unit, while effects that are not solved for act
+/// at their typical size: `b` has their whitened columns times that size, for the first rows of the Jacobian. Not a
+/// number where the normal equations cannot be solved.
+#[must_use]
+pub fn expected(jacobian: &DMatrix<f64>, b: Option<&DMatrix<f64>>, seen: &super::solve::Observability) -> DVector<f64> {
+    let p = jacobian.ncols();
+    let unknown = || DVector::from_element(p, f64::NAN);
+    let mut gram = jacobian.tr_mul(jacobian);
+    if let Some(b) = b {
+        // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
+        let cross = jacobian.rows(0, b.nrows()).tr_mul(b);
+        let mut inner = b.tr_mul(b);
+        inner.fill_diagonal_added();
+        let Some(cholesky) = inner.cholesky() else { return unknown() };
+        gram -= &cross * cholesky.solve(&cross.transpose());
+    }
+    let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
     let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
-    let Some(inverse) = reduced.cholesky().map(|c| c.inverse()) else {
-        return DVector::from_element(fit.free.len(), f64::NAN);
-    };
+    let Some(inverse) = reduced.cholesky().map(|c| c.inverse()) else { return unknown() };
     let full = if seen.full() { inverse } else { &seen.seen * inverse * seen.seen.transpose() };
-    DVector::from_fn(full.nrows(), |i, _| full[(i, i)].max(0.0).sqrt() / seen.scale[i])
+    DVector::from_fn(p, |i, _| full[(i, i)].max(0.0).sqrt() / seen.scale[i])
 }
 
 trait AddToDiagonal {
@@ -246,6 +255,16 @@ pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
         });
     }
     out
+}
+
+/// Covariance of the results (no set-ups of blocks), type A.
+#[must_use]
+pub fn results_covariance(fit: &Fit) -> Covariance {
+    let results: Vec<usize> = fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance).collect();
+    Covariance {
+        names: results.iter().map(|&i| fit.model.unknowns[i].name.clone()).collect(),
+        matrix: results.iter().map(|&i| results.iter().map(|&j| fit.covariance[(i, j)]).collect()).collect(),
+    }
 }
 
 /// Names and values of the priors that entered the fit.

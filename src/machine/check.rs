@@ -603,6 +603,28 @@ mod tests {
     }
 
     #[test]
+    fn a_stylus_is_thinner_than_its_ball_and_unlike_the_others() {
+        let at = "\n[[machine.stylus]]\nname = \"long\"\n";
+        let more = |fields: &str| format!("\n[[machine.stylus]]\nname = \"more\"\n{fields}\n{at}");
+        assert_eq!(codes(at, &more("longer = 50.0")), [] as [&str; 0]);
+        assert_eq!(codes(at, &more("ball_radius = 2.0")), [] as [&str; 0]);
+        let wrong = [
+            "longer = 100.0",
+            "longer = 0.0",
+            "longer = -75.0",
+            "longer = nan",
+            "stem_radius = 3.0",
+            "ball_radius = -1.0",
+        ];
+        for fields in wrong {
+            assert_eq!(codes(at, &more(fields)), ["machine::stylus"], "{fields}");
+        }
+        assert_eq!(codes(at, &more("longer = 50.0").replace("more", "long")), ["machine::stylus"]);
+        assert_eq!(codes("carrier = \"table\"\ncentre", "carrier = \"base\"\ncentre"), ["machine::block_carrier"]);
+        assert_eq!(codes("carrier = \"table\"\ncentre", "carrier = \"Z\"\ncentre"), ["machine::carrier"]);
+    }
+
+    #[test]
     fn a_direction_a_little_off_square_is_left_alone() {
         assert_eq!(codes("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.001, 0.0]"), [] as [&str; 0]);
     }

@@ -95,8 +95,7 @@ struct Placed {
 impl Placed {
     fn new(by: &Displacement, centre: &Vector3<f64>) -> Self {
         if by.w == Vector3::zeros() {
-            let rigid = Rigid { r: Matrix3::identity(), t: by.d };
-            return Self { rigid, image: centre + by.d, axis_a: Vector3::x(), axis_b: Vector3::y() };
+            return Self::shift(by, centre);
         }
         let ((sa, ca), (sb, cb), (sc, cc)) = (by.w.x.sin_cos(), by.w.y.sin_cos(), by.w.z.sin_cos());
         // Rz(c)·Ry(b)·Rx(a), as `Displacement::rotation`
@@ -117,6 +116,21 @@ impl Placed {
             image,
             axis_a: r.column(0).into_owned(),
             axis_b: Vector3::new(-sc, cc, 0.0),
+        }
+    }
+
+    fn shift(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        let rigid = Rigid { r: Matrix3::identity(), t: by.d };
+        Self { rigid, image: centre + by.d, axis_a: Vector3::x(), axis_b: Vector3::y() }
+    }
+
+    /// Makes it the transform of another displacement; cheap where neither turns.
+    fn set(&mut self, by: &Displacement, centre: &Vector3<f64>) {
+        if by.w == Vector3::zeros() && self.rigid.r == Matrix3::identity() {
+            self.rigid.t = by.d;
+            self.image = centre + by.d;
+        } else {
+            *self = Self::new(by, centre);
         }
     }
 
@@ -353,7 +367,7 @@ impl At<'_> {
         for &i in &batch.moving {
             let slot = &model.slots[i];
             let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
-            scratch.placed[i] = Placed::new(&scratch.displacement[i], &centre);
+            scratch.placed[i].set(&scratch.displacement[i], &centre);
         }
     }
 
@@ -381,7 +395,7 @@ impl At<'_> {
             }
         }
         let pose = &batch.poses[batch.pose[touch] as usize];
-        let rotary = |axis: &Axis, at: usize| -> Rigid { turned[axis.name.index()].unwrap_or(pose[at]) };
+        let rotary = |axis: &Axis, at: usize| -> &Rigid { turned[axis.name.index()].as_ref().unwrap_or(&pose[at]) };
         let travel = |axis: &Axis| -> Vector3<f64> {
             let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
             axis.direction.into_inner() * (sign * shown.get(axis.name))

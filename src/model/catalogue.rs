@@ -109,9 +109,8 @@ impl Effect {
     /// True when a machine has what the effect needs.
     #[must_use]
     pub fn applies_to(&self, machine: &Machine) -> bool {
-        let here = |name: &AxisName| {
-            machine.axis(*name).is_some_and(|axis| self.side.is_none_or(|side| axis.side == side))
-        };
+        let here =
+            |name: &AxisName| machine.axis(*name).is_some_and(|axis| self.side.is_none_or(|side| axis.side == side));
         self.needs.iter().all(here) && !self.unless.iter().any(here)
     }
 

@@ -275,8 +275,7 @@ impl<'a> Check<'a> {
         };
         needs.extend(needed.filter(|axis| !needs.contains(axis)));
         let text = t.formula.get_ref();
-        let formula =
-            if self.built_in { Ok(Formula::unchecked(text, names)) } else { Formula::parse(text, names) };
+        let formula = if self.built_in { Ok(Formula::unchecked(text, names)) } else { Formula::parse(text, names) };
         match formula {
             Ok(formula) => {
                 let parameter = names.iter().position(|name| name == t.parameter.get_ref())?;

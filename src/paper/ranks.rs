@@ -40,7 +40,7 @@ const UNKNOWNS: &[(&str, &str, &str, &str)] = &[
     ("dx_BA", "A", "dx", "fixed"),
     ("dy_BA", "A", "dy", "fixed"),
     ("dz_BA", "A", "dz", "fixed"),
-    ("L", "tool", "dz", ""),
+    ("dL", "tool", "dz", ""),
     ("tx", "tool", "dx", ""),
     ("ty", "tool", "dy", ""),
     ("datum_x", "block", "dx", ""),
@@ -140,10 +140,10 @@ pub fn statements(machines: &[Machine]) -> Result<Vec<Statement>> {
     let datum = ["datum_x", "datum_y", "datum_z"];
     say(head, "a b g dx dy", &five, poses, &three)?;
     say(head, "a b g dx dy dz", &six, poses, &three)?;
-    say(head, "a b g dx dy dz, L", &[&six[..], &["L"]].concat(), poses, &three)?;
+    say(head, "a b g dx dy dz, L", &[&six[..], &["dL"]].concat(), poses, &three)?;
     say(head, "a b g dx dy dz, datum", &[&six[..], &datum[..]].concat(), poses, &three)?;
-    say(head, "a b g, L, datum", &[&five[..3], &["L"], &datum[..]].concat(), poses, &three)?;
-    say(head, "a b g dx dy dz, L, datum, tip", &[&six[..], &["L"], &datum[..], &["tx", "ty"]].concat(), poses, &three)?;
+    say(head, "a b g, L, datum", &[&five[..3], &["dL"], &datum[..]].concat(), poses, &three)?;
+    say(head, "a b g dx dy dz, L, datum, tip", &[&six[..], &["dL"], &datum[..], &["tx", "ty"]].concat(), poses, &three)?;
     say(head, "a b g dx dy", &five, "B = 0, -90", &xyz(&[(0.0, 0.0), (-90.0, 0.0)]))?;
 
     let double = find("double-head")?;
@@ -181,7 +181,7 @@ pub fn statements(machines: &[Machine]) -> Result<Vec<Statement>> {
         say(double, "ten", &ten, poses, &xyz(list))?;
     }
     say(double, "all twelve", &twelve, "both axes swept, ±90", &xyz(&swept))?;
-    say(double, "ten, R, datum", &[&ten[..], &["L"], &datum[..]].concat(), "both axes swept, ±90", &xyz(&swept))?;
+    say(double, "ten, R, datum", &[&ten[..], &["dL"], &datum[..]].concat(), "both axes swept, ±90", &xyz(&swept))?;
     Ok(out)
 }
 

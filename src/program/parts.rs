@@ -112,7 +112,7 @@ impl<'a> Part<'a> {
     /// Name, ball and length of the stylus, in words.
     #[must_use]
     pub fn stylus_says(&self) -> String {
-        let name = self.stylus.map_or_else(|| "own stylus".to_owned(), |s| format!("stylus {}", s.name));
+        let name = self.stylus.map_or_else(|| "probe's own stylus".to_owned(), |s| format!("stylus {}", s.name));
         format!("{name}: {}", self.probe_says())
     }
 

@@ -15,32 +15,34 @@ impl Router<'_, '_> {
         if part == self.part {
             return Ok(());
         }
-        if let Some(mut at) = self.at {
-            let before = at;
-            at.set(self.lift.axis, self.lift.top);
+        // the plan's head says with what the program begins
+        let Some(mut at) = self.at else {
+            return Err("nothing can be touched in the part with which the program begins".to_owned());
+        };
+        let before = at;
+        at.set(self.lift.axis, self.lift.top);
+        self.scene
+            .clear_straight(&before, &at, Manner::Guarded)
+            .map_err(|hit| format!("before the stop, on the way up {hit}"))?;
+        let turns = self.turns(Some((at, self.senses)), &AxisMap::default(), &AxisMap::default())?;
+        for (axis, to, _) in &turns {
             self.scene
-                .clear_straight(&before, &at, Manner::Guarded)
-                .map_err(|hit| format!("before the stop, on the way up {hit}"))?;
-            let turns = self.turns(Some((at, self.senses)), &AxisMap::default(), &AxisMap::default())?;
-            for (axis, to, _) in &turns {
-                self.scene
-                    .clear_turn(&at, *axis, *to)
-                    .map_err(|hit| format!("before the stop, as {axis} turns to {to} {hit}"))?;
-                at.set(*axis, *to);
-            }
-            scene.clear_straight(&at, &at, Manner::Rapid).map_err(|hit| format!("after the stop {hit}"))?;
-            self.rise(self.lift.top_height());
-            for turn in &turns {
-                self.turn(turn);
-            }
-            let last = self.layout.parts.get(self.part);
-            let blocks = last.is_none_or(|p| p.label != next.label);
-            let stylus = last.is_none_or(|p| p.stylus != next.stylus);
-            self.clock.stop(blocks, stylus);
-            let stood = self.layout.parts.iter().take(part).any(|p| p.label == next.label);
-            self.push(Step::Stop(stop(last, next, stood)));
-            self.stopped = true;
+                .clear_turn(&at, *axis, *to)
+                .map_err(|hit| format!("before the stop, as {axis} turns to {to} {hit}"))?;
+            at.set(*axis, *to);
         }
+        scene.clear_straight(&at, &at, Manner::Rapid).map_err(|hit| format!("after the stop {hit}"))?;
+        self.rise(self.lift.top_height());
+        for turn in &turns {
+            self.turn(turn);
+        }
+        let last = self.layout.parts.get(self.part);
+        let blocks = last.is_none_or(|p| p.label != next.label);
+        let stylus = last.is_none_or(|p| p.stylus != next.stylus);
+        self.clock.stop(blocks, stylus);
+        let stood = self.layout.parts.iter().take(part).any(|p| p.label == next.label);
+        self.push(Step::Stop(stop(last, next, stood)));
+        self.stopped = true;
         (self.part, self.scene) = (part, scene);
         self.met.clear();
         (self.heights.over_all, self.heights.over_blocks) = (self.lift.top_height(), self.lift.top_height());

@@ -42,17 +42,11 @@ pub fn outcome(o: &Outcome) -> String {
         "{}: {} touches, {} unknowns of rank {} ({} degrees of freedom), condition {:.1}\n",
         o.machine, o.touches, o.unknowns, o.rank, o.dof, o.condition
     );
-    out += &format!(
-        "error left {} um RMS; noise of a touch {} um ({}); chi2/dof {:.3}\n",
-        significant(o.rms_um),
-        significant(o.noise_um),
-        match o.noise_source.as_str() {
-            "repeats" => "from repeated touches",
-            "declared" => "as the machine file declares it",
-            _ => "as the study states it",
-        },
-        o.chi2_per_dof
-    );
+    out += &format!("error left {} um RMS; chi2/dof {:.3}", significant(o.rms_um), o.chi2_per_dof);
+    if let Some(held_out) = o.held_out_rms_um {
+        out += &format!("; {} um on set-ups left out of the fit", significant(held_out));
+    }
+    out += &format!("\nnoise: {}\n", o.noise_says);
     out += &format!(
         "{} after {} steps: {}\n\n",
         if o.converged { "converged" } else { "NOT converged" },
@@ -60,20 +54,34 @@ pub fn outcome(o: &Outcome) -> String {
         o.stopped
     );
     let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
-    let mut t = table(&["parameter", "value", "unit", "std. unc.", "95 %", "status"]);
+    // two figures side by side: what the probe's noise leaves open, and what everything else may add
+    let unmodelled = results.iter().any(|p| p.sigma_with_unmodelled.is_some());
+    let mut head = vec!["parameter", "value", "unit", "std. unc.", "95 %"];
+    if unmodelled {
+        head.push("unmodelled");
+    }
+    head.push("status");
+    let mut t = table(&head);
     for p in results {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |a| format!("{} ({a})", p.name));
-        t.add_row(vec![
+        let mut cells = vec![
             Cell::new(name),
             number(if p.status == Status::Undetermined { "?".into() } else { digits(p.value, p.sigma) }),
             Cell::new(&p.unit),
             number(p.sigma.map_or_else(|| "-".into(), significant)),
             number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
-            Cell::new(status(p.status)),
-        ]);
+        ];
+        if unmodelled {
+            cells.push(number(p.sigma_with_unmodelled.map_or_else(|| "-".into(), significant)));
+        }
+        cells.push(Cell::new(status(p.status)));
+        t.add_row(cells);
     }
     out += &t.to_string();
     out.push('\n');
+    if unmodelled {
+        out += "unmodelled: standard uncertainty if every effect that the model leaves out acts at its typical size\n";
+    }
     let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
     if !blocks.is_empty() {
         let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
@@ -85,6 +93,19 @@ pub fn outcome(o: &Outcome) -> String {
     if o.parameters.iter().any(|p| p.effect.starts_with("location") || p.effect == "paper-table") {
         let [x, y, z] = o.reference_mm;
         out += &format!("location errors of workpiece-side axes are stated at ({x}, {y}, {z}) mm in R\n");
+    }
+    for p in &o.priors {
+        out += &format!("prior: {} = {} ± {} {}, counted once\n", p.name, p.value, significant(p.sigma), p.unit);
+    }
+    for b in &o.type_b {
+        out += &format!("type B: {} uncertain by {} {}, in the standard uncertainties\n", b.name, significant(b.sigma), b.unit);
+    }
+    if !o.correlations.is_empty() {
+        let pairs: Vec<String> = o.correlations.iter().map(|c| format!("{} ~ {} {:+.2}", c.a, c.b, c.r)).collect();
+        out += &format!("told apart worst (correlation): {}\n", pairs.join(", "));
+    }
+    for w in &o.weak {
+        out += &format!("hardly told by this data: {}\n", w.says);
     }
     for u in &o.undetermined {
         out += &format!("not told by this data: {}\n", u.says);

@@ -100,7 +100,8 @@ impl Basis {
         // twice: what is left of a nearly aliased column is mostly rounding after once
         let left = self.project_columns(&self.project_columns(&scaled));
         let gram = (left.transpose() * &left).symmetric_eigen();
-        let directions: Vec<usize> = (0..gram.eigenvalues.len()).filter(|&i| gram.eigenvalues[i] > kept * kept).collect();
+        let directions: Vec<usize> =
+            (0..gram.eigenvalues.len()).filter(|&i| gram.eigenvalues[i] > kept * kept).collect();
         if directions.is_empty() {
             return 0;
         }

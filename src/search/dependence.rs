@@ -91,7 +91,9 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
     let mut order = Vec::new();
     if let Some(&leader) = ranking.first() {
         let group = search.group_of(leader, &ranking);
-        let key = |m: &Member| (generics.shapes[m.candidate].depends_on.matches('*').count(), search.scores[m.candidate].ln_p);
+        let key = |m: &Member| {
+            (generics.shapes[m.candidate].depends_on.matches('*').count(), search.scores[m.candidate].ln_p)
+        };
         let simplest = group.members.iter().filter(|m| m.stays).min_by(|a, b| {
             let ((n, p), (k, q)) = (key(a), key(b));
             n.cmp(&k).then(p.total_cmp(&q))

@@ -78,7 +78,8 @@ pub fn ln_p_of_scan(ln_p: &[f64], q: usize) -> f64 {
     let top = roots.iter().copied().fold(0.0, f64::max);
     let half_q = 0.5 * q as f64;
     let crossings = variation
-        * ((q as f64 - 1.0) * top.max(f64::MIN_POSITIVE).ln() - 0.5 * top * top
+        * ((q as f64 - 1.0) * top.max(f64::MIN_POSITIVE).ln()
+            - 0.5 * top * top
             - half_q * std::f64::consts::LN_2
             - ln_gamma(half_q))
         .exp();

@@ -27,15 +27,28 @@ pub struct Step {
     pub held_out: Option<HeldOut>,
 }
 
-/// A leader that Holm would have proposed and the held-out touches do not bear out.
+/// Why a leader that passes Holm's test was not taken.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// Touches that had no part in choosing it are not predicted better with it.
+    HeldOut(HeldOut),
+    /// It is a shape without a cause: it says on what the misfit depends, and a person must say why.
+    NoCause,
+    /// The model follows it already.
+    Nothing,
+}
+
+/// What Holm would have proposed when the loop stopped.
 #[derive(Debug, Clone)]
 pub struct Refused {
     /// Its group.
     pub group: Group,
     /// Its Holm-adjusted p-value.
     pub p_adjusted: f64,
-    /// The hold-out that it failed.
-    pub held_out: HeldOut,
+    /// Expected size of the leader's parameters with standard uncertainties, in typical sizes.
+    pub sizes: Vec<(f64, f64)>,
+    /// Why not.
+    pub reason: Reason,
 }
 
 /// Where the loop ended.
@@ -43,7 +56,7 @@ pub struct Refused {
 pub struct Forward {
     /// The effects in the order in which they were added.
     pub steps: Vec<Step>,
-    /// What stopped the loop, where it was the hold-out.
+    /// What was not taken in the end; `None`: nothing is left to find.
     pub refused: Option<Refused>,
     /// Indices of steps whose effect says nothing any more next to the later ones (Wald p above 5 %).
     pub dropped: Vec<usize>,
@@ -61,40 +74,49 @@ impl Forward {
     }
 }
 
-/// Runs the loop for at most `at_most` effects. With `groups` (see [`held_out`]) each must also lower the error of
-/// touches that had no part in its choice.
+/// Runs the loop for at most `at_most` effects with a name. With `groups` (see [`held_out`]) each must also lower the
+/// error of touches that had no part in its choice. Generic shapes are never taken: they have no cause.
 #[must_use]
 pub fn forward(question: Question, library: &Library, at_most: usize, groups: Option<&[usize]>) -> Forward {
     let mut basis = question.base.clone();
     let mut residual = basis.project(question.residual);
     let mut steps: Vec<Step> = Vec::new();
-    let mut refused = None;
-    while steps.len() < at_most {
+    let refused = loop {
+        if steps.len() == at_most {
+            break None;
+        }
         let now = Question { residual: &residual, base: &basis, pure: question.pure };
         let search = Search::new(now, library);
-        let Some(leader) = search.leader() else { break };
+        let refuse = |leader: usize, reason: Reason| {
+            let s = &search.scores[leader];
+            let sizes = (0..s.estimate.len()).map(|i| (s.estimate[i], s.covariance[(i, i)].max(0.0).sqrt())).collect();
+            let group = search.group_of(leader, &search.ranking());
+            Some(Refused { group, p_adjusted: s.p_adjusted, sizes, reason })
+        };
+        let Some(leader) = search.leader() else {
+            break search.leading_shape().and_then(|shape| refuse(shape, Reason::NoCause));
+        };
+        let judged = groups.map(|g| held_out(now, library, g, Choice::Redone));
+        if let Some(h) = judged.as_ref().filter(|h| !h.falls()) {
+            break refuse(leader, Reason::HeldOut(h.clone()));
+        }
         let group = search.group_of(leader, &search.ranking());
         let added = group.first();
         let (variant, p_adjusted) = (search.scores[added].variant, search.scores[leader].p_adjusted);
-        let judged = groups.map(|g| held_out(now, library, g, Choice::Redone));
-        match judged {
-            Some(held_out) if !held_out.falls() => {
-                refused = Some(Refused { group, p_adjusted, held_out });
-                break;
-            }
-            _ => {}
+        let mut larger = basis.clone();
+        if larger.extend(&library.columns(added, variant), KEPT) == 0 {
+            break refuse(leader, Reason::Nothing);
         }
-        if basis.extend(&library.columns(added, variant), KEPT) == 0 {
-            break;
-        }
-        residual = basis.project(&residual);
+        residual = larger.project(&residual);
+        basis = larger;
         let rms = (residual.norm_squared() / residual.len() as f64).sqrt();
         steps.push(Step { group, added, variant, p_adjusted, rms, held_out: judged });
-    }
+    };
     let mut dropped = Vec::new();
     loop {
         let kept: Vec<usize> = (0..steps.len()).filter(|i| !dropped.contains(i)).collect();
-        let columns: Vec<DMatrix<f64>> = kept.iter().map(|&i| library.columns(steps[i].added, steps[i].variant)).collect();
+        let columns: Vec<DMatrix<f64>> =
+            kept.iter().map(|&i| library.columns(steps[i].added, steps[i].variant)).collect();
         let p = wald(question, &columns);
         let worst = (0..kept.len()).filter(|&i| p[i] > ADDS_NOTHING).max_by(|&a, &b| p[a].total_cmp(&p[b]));
         match worst {

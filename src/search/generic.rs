@@ -193,7 +193,6 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
             }
         }
     }
-    drop(columns);
     let white = whiten(raw);
     let mut out = Generics { library: Library::new(white.nrows()), shapes: Vec::new() };
     let mut at = 0;
@@ -241,8 +240,7 @@ impl Plan {
             return;
         }
         let (values, functions) = variants.into_iter().unzip();
-        let shape =
-            Shape { variables: variables.to_vec(), depends_on: depends_on.to_owned(), direction, functions };
+        let shape = Shape { variables: variables.to_vec(), depends_on: depends_on.to_owned(), direction, functions };
         self.shapes.push((id, shape, values, n_scanned));
     }
 
@@ -315,9 +313,7 @@ impl Plan {
             }
             match variable.kind {
                 Kind::Approach => Vec::new(),
-                Kind::Rotary => {
-                    [false, true].map(|sine| Function::Harmonic { variable: index, k: 1, sine }).to_vec()
-                }
+                Kind::Rotary => [false, true].map(|sine| Function::Harmonic { variable: index, k: 1, sine }).to_vec(),
                 _ => {
                     let (centre, scale) = (0.5 * (low + high), 0.5 * (high - low));
                     vec![Function::Power { variable: index, centre, scale, k: 1 }]
@@ -359,17 +355,20 @@ impl Plan {
         let clock = &features.variables[time];
         for number in distinct(&features.block) {
             let own = Variable {
-                values: clock.values.iter().zip(&features.block).filter(|(_, b)| **b == number).map(|(t, _)| *t).collect(),
+                values: clock
+                    .values
+                    .iter()
+                    .zip(&features.block)
+                    .filter(|(_, b)| **b == number)
+                    .map(|(t, _)| *t)
+                    .collect(),
                 ..clock.clone()
             };
             let places = thinned(&middles(&own.distinct()), PLACES);
             for d in (0..features.directions.len()).filter(|&d| features.directions[d].at == "workpiece") {
                 let moved = |at: f64| {
                     let after = Function::Step { variable: time, at };
-                    vec![Function::Product(
-                        Box::new(Function::Member { of: Grouping::Block, number }),
-                        Box::new(after),
-                    )]
+                    vec![Function::Product(Box::new(Function::Member { of: Grouping::Block, number }), Box::new(after))]
                 };
                 let variants = places.iter().map(|&at| (at, moved(at))).collect();
                 let depends = format!("{}*block", clock.name);

@@ -80,7 +80,8 @@ impl Search<'_> {
         // ŵ: the direction in the data that speaks for the leader
         let direction = -(&trace.left * &self.scores[leader].estimate);
         let length = direction.norm();
-        let unit = DMatrix::from_column_slice(direction.len(), 1, (direction / length.max(f64::MIN_POSITIVE)).as_slice());
+        let unit =
+            DMatrix::from_column_slice(direction.len(), 1, (direction / length.max(f64::MIN_POSITIVE)).as_slice());
         let along_direction = Moments::cross(&unit, self.library);
         let cross = Moments::cross(&trace.left, self.library);
         let generic = |c: usize| self.library.candidates()[c].origin == Origin::Generic;
@@ -90,11 +91,8 @@ impl Search<'_> {
             .filter_map(|&j| {
                 let span = self.span(j);
                 let block = self.block(j);
-                let alignment = block
-                    .whitener
-                    .tr_mul(&along_direction.columns(span.0, span.1).transpose())
-                    .norm_squared()
-                    .min(1.0);
+                let alignment =
+                    block.whitener.tr_mul(&along_direction.columns(span.0, span.1).transpose()).norm_squared().min(1.0);
                 if j != leader && alignment < RIVAL {
                     return None;
                 }
@@ -197,4 +195,3 @@ pub fn alias_pairs(base: &super::Basis, library: &super::Library) -> Vec<AliasPa
     }
     out
 }
-

@@ -20,8 +20,10 @@ const LOST: f64 = 1e-8;
 /// Which term is put to the test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
-    /// The choice is redone in each training set: the leader that passes Holm, or none.
+    /// The choice is redone in each training set: the leader with a name that passes Holm, or none.
     Redone,
+    /// The same among generic shapes.
+    ShapeRedone,
     /// A given candidate, with the variant that fits the training set best; the choice is not tested.
     Given(usize),
 }
@@ -166,7 +168,8 @@ fn fold(
     let training = Moments { n: whole.n - rows.len(), p: into.nrows(), rr: rr.max(0.0), jr, qj, blocks };
     let scores = score(&training, library, question.pure);
     let chosen = match choice {
-        Choice::Redone => leader(&scores, library),
+        Choice::Redone => leader(&scores, library, false),
+        Choice::ShapeRedone => leader(&scores, library, true),
         Choice::Given(c) => scores[c].visible().then_some(c),
     };
 

@@ -115,7 +115,7 @@ impl Library {
     /// Columns of all candidates and variants.
     #[must_use]
     pub fn n_columns(&self) -> usize {
-        if self.n_rows == 0 { 0 } else { self.data.len() / self.n_rows }
+        self.data.len().checked_div(self.n_rows).unwrap_or(0)
     }
 
     /// All columns.

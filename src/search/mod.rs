@@ -17,6 +17,8 @@ mod moments;
 pub mod multiplicity;
 pub mod power;
 pub mod score;
+#[cfg(test)]
+mod shape_tests;
 mod shapes;
 #[cfg(test)]
 mod testing;

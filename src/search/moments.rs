@@ -60,8 +60,7 @@ impl Moments {
         let jr = DVector::from_vec(
             (0..j.ncols()).into_par_iter().with_min_len(CHUNK).map(|c| j.column(c).dot(&r)).collect(),
         );
-        let spans: Vec<_> =
-            library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone()).collect();
+        let spans: Vec<_> = library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone()).collect();
         let blocks = spans
             .par_iter()
             .with_min_len(16)
@@ -89,9 +88,16 @@ impl Moments {
         }
     }
 
-    /// JᵀPM of all columns, for a matrix M that is already projected: columns of M × columns of the library.
+    /// MᵀJ for a matrix M of few columns that is already projected: columns of M × columns of the library.
     pub fn cross(projected: &DMatrix<f64>, library: &Library) -> DMatrix<f64> {
-        product(&projected.transpose(), library)
+        let (j, k) = (library.matrix(), projected.ncols());
+        let dots: Vec<f64> = (0..j.ncols())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .flat_map_iter(|c| (0..k).map(move |row| (row, c)))
+            .map(|(row, c)| projected.column(row).dot(&j.column(c)))
+            .collect();
+        DMatrix::from_vec(k, j.ncols(), dots)
     }
 
     /// JᵀPJ of a variant in pieces: what its directions are and how much of them is left.

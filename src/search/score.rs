@@ -119,10 +119,16 @@ impl<'a> Search<'a> {
         ranking(&self.scores, self.library)
     }
 
-    /// The first of the ranking that passes Holm's test: a generic shape only where no effect with a name does.
+    /// The most significant effect with a name that passes Holm's test.
     #[must_use]
     pub fn leader(&self) -> Option<usize> {
-        leader(&self.scores, self.library)
+        leader(&self.scores, self.library, false)
+    }
+
+    /// The most significant generic shape that passes Holm's test.
+    #[must_use]
+    pub fn leading_shape(&self) -> Option<usize> {
+        leader(&self.scores, self.library, true)
     }
 
     /// What is left of a candidate's best variant.
@@ -163,8 +169,9 @@ pub(super) fn ranking(scores: &[Score], library: &Library) -> Vec<usize> {
     order
 }
 
-pub(super) fn leader(scores: &[Score], library: &Library) -> Option<usize> {
-    ranking(scores, library).into_iter().find(|&i| scores[i].proposed())
+pub(super) fn leader(scores: &[Score], library: &Library, generic: bool) -> Option<usize> {
+    let wanted = |i: usize| (library.candidates()[i].origin == Origin::Generic) == generic;
+    ranking(scores, library).into_iter().find(|&i| wanted(i) && scores[i].proposed())
 }
 
 /// All score tests from inner products.

@@ -118,7 +118,9 @@ impl Function {
     /// would not be one (steps), or where nothing was scanned.
     pub fn free_parameter(&self, features: &Features) -> Option<(&'static str, &'static str, f64)> {
         match *self {
-            Self::Periodic { variable, period, .. } => Some(("period", features.variables[variable].kind.unit(), period)),
+            Self::Periodic { variable, period, .. } => {
+                Some(("period", features.variables[variable].kind.unit(), period))
+            }
             Self::Exponential { variable, constant, .. } => {
                 Some(("tau", features.variables[variable].kind.unit(), constant))
             }

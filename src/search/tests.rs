@@ -1,30 +1,29 @@
 //! Distributions, algebra and decisions of the search, against simulation and against plain least squares.
 
 use super::forward::{forward, wald};
-use super::generic::{Direction, Features, Generics, Kind, Variable, generics};
 use super::groups::alias_pairs;
 use super::held_out::{Choice, held_out};
 use super::power::{power, separation};
 use super::testing::{noise, noise_matrix, rng};
 use super::*;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 const ROWS: usize = 200;
 
-fn ask<'a>(residual: &'a DVector<f64>, base: &'a Basis) -> Question<'a> {
+pub(super) fn ask<'a>(residual: &'a DVector<f64>, base: &'a Basis) -> Question<'a> {
     Question { residual, base, pure: None }
 }
 
 /// Candidates of 1 to 3 columns that resemble each other strongly: mixtures of few directions.
-fn correlated_library(rng: &mut ChaCha8Rng, rows: usize, count: usize) -> Library {
+pub(super) fn correlated_library(rng: &mut ChaCha8Rng, rows: usize, count: usize) -> Library {
     mixtures(rng, rows, count, 0.7)
 }
 
 /// The larger `own` beside √12, the less they have in common.
-fn mixtures(rng: &mut ChaCha8Rng, rows: usize, count: usize, own: f64) -> Library {
+pub(super) fn mixtures(rng: &mut ChaCha8Rng, rows: usize, count: usize, own: f64) -> Library {
     let roots = noise_matrix(rng, rows, 12);
     let mut library = Library::new(rows);
     for i in 0..count {
@@ -348,159 +347,6 @@ fn held_out_error_of_noise_does_not_fall_and_of_an_effect_does() {
     assert!(on_noise <= 6, "{on_noise}");
     assert!(on_effect >= 190, "{on_effect}");
     assert!(naive > 60, "choosing on all touches first would have looked like an improvement: {naive}");
-}
-
-/// A small plan: nine angles of C, six of B in changing order, two blocks, five faces each touched twice; 2.2 h.
-fn table_of_touches(rng: &mut ChaCha8Rng) -> Features {
-    let mut f = Features::default();
-    let (mut x, mut b_angle, mut c_angle, mut t, mut sense) = (vec![], vec![], vec![], vec![], vec![]);
-    let (mut machine, mut carrier) = (vec![], vec![]);
-    let mut clock = 0.0;
-    for visit in 0..27usize {
-        let c = [0.0, 130.0, 45.0, 270.0, 90.0, 315.0, 200.0, 160.0, 20.0][visit % 9] * TAU / 360.0;
-        let b = [0.0, -60.0, -25.0, -90.0, -40.0, -10.0][(visit * 5 + visit / 9) % 6] * TAU / 360.0;
-        clock += 0.03;
-        for block in 0..2usize {
-            for face in 0..5usize {
-                for _ in 0..2 {
-                    let n = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z()][face];
-                    let turned = Vector3::new(c.cos() * n.x + c.sin() * n.y, c.cos() * n.y - c.sin() * n.x, n.z);
-                    carrier.push(n);
-                    machine.push(turned);
-                    x.push((60.0 * block as f64 - 30.0) * c.cos() + 200.0 * b.sin() + rng.random_range(-3.0..3.0));
-                    b_angle.push(b);
-                    c_angle.push(c);
-                    t.push(clock);
-                    sense.push(if visit % 4 < 2 { 1.0 } else { -1.0 });
-                    f.block.push(block);
-                    f.face.push(face);
-                    f.visit.push(visit);
-                    clock += 0.0025;
-                }
-            }
-        }
-    }
-    f.directions = Direction::of_normals(&machine, &carrier, "Z");
-    f.variables = vec![
-        Variable::new("X", Kind::Linear, x),
-        Variable::new("B", Kind::Rotary, b_angle),
-        Variable::new("C", Kind::Rotary, c_angle),
-        Variable::new("t", Kind::Time, t),
-        Variable::new("sC", Kind::Plain, sense),
-    ];
-    f
-}
-
-/// Place and location of this plan: each block's three coordinates, and what turns with C and B.
-fn location_base(f: &Features) -> Basis {
-    let n = f.block.len();
-    let column = |v: &dyn Fn(usize) -> f64| DVector::from_fn(n, |i, _| v(i));
-    let mut columns = Vec::new();
-    for d in 0..7 {
-        for block in 0..2 {
-            columns.push(column(&|i| f.directions[d].weight[i] * f64::from(u8::from(f.block[i] == block))));
-        }
-    }
-    for d in 0..3 {
-        columns.push(column(&|i| f.directions[d].weight[i] * f.variables[1].values[i].cos()));
-        columns.push(column(&|i| f.directions[d].weight[i] * f.variables[1].values[i].sin()));
-    }
-    Basis::new(&DMatrix::from_columns(&columns))
-}
-
-fn found(f: &Features, g: &Generics, base: &Basis, r: &DVector<f64>) -> Vec<dependence::Dependence> {
-    dependence::dependences(ask(r, base), f, g)
-}
-
-#[test]
-fn shapes_of_no_catalogue_are_named_by_their_variable() {
-    let mut rng = rng(20);
-    let f = table_of_touches(&mut rng);
-    let base = location_base(&f);
-    let g = generics(&f, |raw| raw);
-    let n = f.block.len();
-    let values = |v: usize| &f.variables[v].values;
-    type Effect<'a> = (&'a str, Box<dyn Fn(usize) -> f64 + 'a>);
-    let effects: Vec<Effect> = vec![
-        ("C", Box::new(|i| (7.0 * values(2)[i] + 0.4).sin() * f.directions[2].weight[i])),
-        ("B", Box::new(|i| f64::from(u8::from(values(1)[i] < -0.8)) * f.directions[0].weight[i])),
-        ("t", Box::new(|i| f64::from(u8::from(values(3)[i] > 1.1)) * f.directions[1].weight[i])),
-        ("t", Box::new(|i| (TAU * values(3)[i] / 0.15).cos() * f.directions[2].weight[i])),
-        (
-            "t*block",
-            Box::new(|i| {
-                f64::from(u8::from(values(3)[i] > 0.9 && f.block[i] == 1)) * f.directions[3].weight[i]
-            }),
-        ),
-        ("sC", Box::new(|i| values(4)[i] * f.directions[4].weight[i])),
-        ("X", Box::new(|i| (values(0)[i] / 100.0).powi(2) * f.directions[2].weight[i])),
-    ];
-    for (wanted, effect) in &effects {
-        let shape = DVector::from_fn(n, |i, _| effect(i));
-        let left = base.project(&shape).norm_squared();
-        let mut hits = 0;
-        for _ in 0..10 {
-            let r = noise(&mut rng, n) - &shape * (60.0 / left).sqrt();
-            let list = found(&f, &g, &base, &r);
-            hits += usize::from(list[0].on == *wanted);
-            assert!(list[0].p_adjusted < 0.05 || list[0].on != *wanted);
-        }
-        println!("{wanted}: first in {hits} of 10");
-        assert!(hits >= 8, "{wanted}: {hits}");
-    }
-    // the tooth pattern by its order, with a formula that takes it away
-    let tooth = DVector::from_fn(n, |i, _| effects[0].1(i) * 5.0);
-    let r = noise(&mut rng, n) - &tooth;
-    let first = &found(&f, &g, &base, &r)[0];
-    assert_eq!((first.scanned, first.direction.as_str(), first.dof.as_str()), (7.0, "machine-Z", "dz"));
-    assert_eq!(first.terms[0].formula.as_deref(), Some("cos(7*C)"));
-    let amplitude = first.terms[0].size.hypot(first.terms[1].size);
-    assert!((amplitude - 5.0).abs() < 0.5, "{amplitude}");
-    assert!(first.share > 0.6 && first.curve.len() > 100);
-    let peak = first.curve.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
-    assert!((peak - amplitude).abs() < 0.05 * amplitude);
-    // the cycle by its period, as a number that a fit may refine
-    let cycle = DVector::from_fn(n, |i, _| effects[3].1(i) * 3.0);
-    let r = noise(&mut rng, n) - &cycle;
-    let first = &found(&f, &g, &base, &r)[0];
-    let shape = first.shape.as_ref().unwrap();
-    assert_eq!((shape.name.as_str(), shape.unit.as_str()), ("period", "h"));
-    assert!(shape.min < 0.15 && 0.15 < shape.max, "{shape:?}");
-    assert_eq!(first.terms[1].formula.as_deref(), Some("sin(2*pi*t/period)"));
-}
-
-#[test]
-fn named_effects_and_shapes_share_one_level() {
-    let mut rng = rng(21);
-    let f = table_of_touches(&mut rng);
-    let base = location_base(&f);
-    let n = f.block.len();
-    let mut library = correlated_library(&mut rng, n, 60);
-    library.append(generics(&f, |raw| raw).library);
-    let runs = 250;
-    let (mut any, mut generic) = (0, 0);
-    for _ in 0..runs {
-        let r = noise(&mut rng, n);
-        if let Some(leader) = Search::new(ask(&r, &base), &library).leader() {
-            any += 1;
-            generic += usize::from(library.candidates()[leader].origin == Origin::Generic);
-        }
-    }
-    println!("clean data: any proposal in {any} of {runs}, generic in {generic}");
-    // 5 % and two standard errors
-    assert!(f64::from(any) < 0.078 * f64::from(runs), "{any}");
-}
-
-#[test]
-fn neighbours_that_remember_each_other_are_noticed() {
-    let mut rng = rng(22);
-    let white: Vec<f64> = noise(&mut rng, 300).iter().copied().collect();
-    let calm = dependence::serial(&white).unwrap();
-    assert!(calm.lag_1_p > 0.01 && calm.runs_p > 0.01, "{calm:?}");
-    let slow: Vec<f64> = white.iter().enumerate().map(|(i, w)| w + 2.0 * (i as f64 / 30.0).sin()).collect();
-    let drift = dependence::serial(&slow).unwrap();
-    assert!(drift.lag_1_p < 1e-6 && drift.runs_p < 1e-4, "{drift:?}");
-    assert!(dependence::serial(&[1.0; 20]).is_none());
 }
 
 #[test]

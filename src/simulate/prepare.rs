@@ -281,7 +281,11 @@ fn state(
         point: touch.point,
         outward: chain.outward_from_centre(n_links, block.centre),
         edge_mm: (0..3).map(|i| block.size[i] * normal[i].abs()).sum(),
-        label: if mounting.is_empty() { touch.block.as_str().into() } else { format!("{mounting}/{}", touch.block).into() },
+        label: if mounting.is_empty() {
+            touch.block.as_str().into()
+        } else {
+            format!("{mounting}/{}", touch.block).into()
+        },
         ..TouchState::default()
     }
 }

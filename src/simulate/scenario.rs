@@ -10,6 +10,7 @@ use crate::axes::AxisName;
 use crate::diag::{Failure, Findings, Result, Source};
 use crate::machine::Machine;
 use crate::units::Plain;
+use std::collections::BTreeMap;
 
 pub use super::written::{parse, parse_with};
 
@@ -236,7 +237,7 @@ impl Scenario {
         }
         let mut misfits = Vec::new();
         // one group for all blocks (None), and one for each block that is named
-        let mut groups: Vec<(Option<&str>, Vec<(usize, f64)>)> = Vec::new();
+        let mut groups: BTreeMap<Option<&str>, Vec<(usize, f64)>> = BTreeMap::new();
         for (i, value) in values.iter().enumerate() {
             let mut bad = |code, message: String, help: String| {
                 misfits.push(Misfit { value: Some(i), code, message, help });
@@ -267,12 +268,7 @@ impl Scenario {
                 );
                 continue;
             };
-            if !groups.iter().any(|(b, _)| *b == block) {
-                groups.push((block, Vec::new()));
-            }
-            if let Some((_, group)) = groups.iter_mut().find(|(b, _)| *b == block) {
-                group.push((row, amount));
-            }
+            groups.entry(block).or_default().push((row, amount));
             self.planted.push(Planted {
                 effect: id.clone(),
                 parameter: value.name.to_owned(),

@@ -31,7 +31,7 @@ pub struct AsWritten {
     /// What the user states about the noise.
     #[serde(default)]
     pub noise: NoiseAsWritten,
-    /// Type B rows: standard uncertainty of parameters that are not in the model, in their units (`sX = 0.5`).
+    /// Type B rows: standard uncertainty of parameters that are not in the model, in their units (`size_X = 0.5`).
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>")]
     pub uncertainty: BTreeMap<String, Spanned<f64>>,

@@ -111,6 +111,12 @@ class Operator:
         if self.errors:
             raise Stopped("a command before the program failed")
 
+    def change_stylus(self, stop):
+        """What the person does at the n-th stop."""
+        styli = self.task.get("styli", [])
+        if stop < len(styli):
+            subprocess.run(["halcmd", "setp", "probe.longer", repr(styli[stop])], check=True, timeout=20)
+
     def run(self):
         c, s, task = self.command, self.stat, self.task
         self.mode(linuxcnc.MODE_AUTO)
@@ -131,6 +137,7 @@ class Operator:
                 at = s.read_line
                 if answered[0] != at or time.monotonic() - answered[1] > 2:
                     pauses.append(at)
+                    self.change_stylus(len(pauses))
                     answered = (at, time.monotonic())
                 if len(pauses) > task["resume"]:
                     raise TimeoutError(f"paused at line {at} (M0?): more than {task['resume']} pauses")

@@ -160,7 +160,7 @@ typedef struct {
     hal_float_t *cmd[AXES], *fb[AXES];
     hal_bit_t *contact, *stem_touched;
     hal_u32_t *touches, *block_touches, *solid_touches, *stem_touches, *collisions, *visits;
-    hal_float_t *overtravel_max, *gap, *ball[3];
+    hal_float_t *overtravel_max, *gap, *ball[3], *longer;
 } pins_t;
 
 typedef struct { double q[AXES]; double overtravel; int shape; char kind; uint32_t cycle; } touch_t;
@@ -174,6 +174,7 @@ static int started, touching, redraw_due, turning;
 static uint32_t cycles;
 static double touch_noise, redraw_gap;
 static vec visit_noise;
+static double longer;           /* the stylus that is clamped, mm beyond the world file's: a person changes it */
 static uint64_t random_state;
 
 /* splitmix64: one seed, one stream, the same on every machine */
@@ -311,7 +312,9 @@ static contact_t contact_at(const double *q) {
     contact_t c;
     place_all(q, at);
     frame tool = w.tool < 0 ? still() : at[w.tool];
-    vec ball = add(add(turn(&tool.r, w.ball), tool.t), visit_noise), up = turn(&tool.r, w.up);
+    vec tip = sub(w.ball, mul(longer, w.up));
+    vec ball = add(add(turn(&tool.r, tip), tool.t), visit_noise), up = turn(&tool.r, w.up);
+    double stem = w.stem_length > 0 ? w.stem_length + longer : 0;
     double radius = w.ball_radius - w.pretravel - touch_noise;
     c.ball = ball;
     c.gap = c.ball_gap = 1e9;
@@ -329,17 +332,17 @@ static contact_t contact_at(const double *q) {
         double g = distance(s, p) - radius;
         if (g < c.ball_gap) c.ball_gap = g;
         if (g < c.gap) { c.gap = g; c.shape = i; c.kind = 'b'; }
-        if (w.stem_length > 0) {
-            vec end = add(p, mul(w.stem_length, u));
+        if (stem > 0) {
+            vec end = add(p, mul(stem, u));
             vec mid = mul(0.5, add(p, end));
-            if (length(mid) - w.stem_length / 2 - s->reach - w.stem_radius < c.gap) {
+            if (length(mid) - stem / 2 - s->reach - w.stem_radius < c.gap) {
                 g = segment_distance(s, p, end) - w.stem_radius;
                 if (g < c.gap) { c.gap = g; c.shape = i; c.kind = 's'; }
             }
         }
         for (int k = 0; k < w.bodies; k++) {
             const body_t *b = &w.body[k];
-            vec foot = add(p, mul(b->from, u)), head = add(p, mul(b->to, u));
+            vec foot = add(p, mul(b->from + longer, u)), head = add(p, mul(b->to + longer, u));
             if (length(mul(0.5, add(foot, head))) - (b->to - b->from) / 2 - s->reach - b->radius > 0) continue;
             if (segment_distance(s, foot, head) - b->radius > 0) continue;
             if (meet(s, foot, head, b->radius) && c.gap > -1) { c.gap = -1; c.shape = i; c.kind = 'c'; }
@@ -358,6 +361,7 @@ static void update(void *arg, long period) {
         fb[i] = now[i];
     }
     cycles++;
+    longer = *pins->longer;
     if (!started) { memcpy(last, now, sizeof now); started = 1; }
 
     /* an index visit ends when the rotary axes stand still again: then the next random place is drawn */
@@ -635,6 +639,7 @@ int rtapi_app_main(void) {
         hal_pin_u32_newf(HAL_OUT, &pins->visits, comp_id, "probe.visits") ||
         hal_pin_float_newf(HAL_OUT, &pins->overtravel_max, comp_id, "probe.overtravel-max") ||
         hal_pin_float_newf(HAL_OUT, &pins->gap, comp_id, "probe.gap") ||
+        hal_pin_float_newf(HAL_IN, &pins->longer, comp_id, "probe.longer") ||
         hal_pin_float_newf(HAL_OUT, &pins->ball[0], comp_id, "probe.ball-x") ||
         hal_pin_float_newf(HAL_OUT, &pins->ball[1], comp_id, "probe.ball-y") ||
         hal_pin_float_newf(HAL_OUT, &pins->ball[2], comp_id, "probe.ball-z")) goto fail;

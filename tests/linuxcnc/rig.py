@@ -272,7 +272,8 @@ def prepare(args, run):
         shutil.copyfile(args.program, program)
     except OSError as e:
         raise Unusable(f"{args.program}: {e.strerror}") from e
-    put("driver-in.json", json.dumps({"program": program, "timeout_s": args.timeout, "resume": args.resume, "mdi": args.mdi, "rig_pid": os.getpid()}))
+    put("driver-in.json", json.dumps({"program": program, "timeout_s": args.timeout, "resume": args.resume, "mdi": args.mdi,
+                                      "styli": world.styli(plan), "rig_pid": os.getpid()}))
     if args.warp > 1:
         build_shim(run)
     return machine, {f for f in os.listdir(run)}

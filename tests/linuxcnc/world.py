@@ -229,14 +229,25 @@ class Scenario:
 # ---------------------------------------------------------------------------------------------------- plan
 
 def one_mounting(plan, where):
-    """The rig cannot re-rig the machine in the middle of a program: one mounting, one stylus per run."""
+    """The rig cannot put up other blocks in the middle of a program: one mounting, one ball per run."""
     found = {t[key] for t in plan.get("touches", []) for key in ("mounting",) if t.get(key) is not None}
     if len(found) > 1:
         raise Unusable(f"{where}: touches of several mountings ({', '.join(sorted(found))}): the rig runs one per program")
-    for key in ("tool_length_mm", "ball_radius_mm"):
-        if any(key in t and t[key] != plan.get(key) for t in plan.get("touches", [])):
-            raise Unusable(f"{where}: touches with another {key} than the plan's: the rig cannot change the stylus")
+    if found - {plan.get("mounting")} and plan.get("mounting"):
+        raise Unusable(f"{where}: touches of another mounting than the plan's: the rig runs one per program")
+    if any("ball_radius_mm" in t and t["ball_radius_mm"] != plan.get("ball_radius_mm") for t in plan.get("touches", [])):
+        raise Unusable(f"{where}: touches with another ball than the plan's: the rig changes the stylus's length only")
     return plan.get("mounting") or next(iter(found), None)
+
+
+def styli(plan):
+    """How much longer than the plan's the stylus is, from stop to stop, mm."""
+    own, found = plan.get("tool_length_mm", 0.0), []
+    for t in plan.get("touches", []):
+        longer = t.get("tool_length_mm", own) - own
+        if not found or found[-1] != longer:
+            found.append(longer)
+    return found
 
 
 def find_mounting(machine, plan, named):
@@ -316,7 +327,8 @@ def text_of(machine, plan, scenario, *, latch, report, solids=True, where="plan"
         carrier = machine.carrier(b["carrier"], f"{where}: block {b['name']}")
         shift, tilt = displaced.get(b["name"], still)
         out.append(row("box", slug(b["name"]), "block", carrier, *b["centre"], *b["size"], *b["centre"], *shift, *tilt))
-        riser = (mounting or {}).get("riser")
+        described = next((d for d in (mounting or {}).get("block", []) if d["name"] == b["name"]), {})
+        riser = described.get("riser", (mounting or {}).get("riser"))
         if riser and solids:                    # stands under its block and is displaced with it
             foot = [b["centre"][0], b["centre"][1], b["centre"][2] - (b["size"][2] + riser["height"]) / 2]
             out.append(row("box", slug("riser " + b["name"]), "solid", carrier, *foot, *riser["size"], riser["height"],

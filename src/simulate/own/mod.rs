@@ -234,9 +234,8 @@ impl Reader<'_> {
         for term in &row.terms {
             let at = term.at.as_ref().unwrap_or(&row.at);
             let target = self.target(at, &term.dof, term.frame);
-            match target {
-                Some(Target::Axis { axis, .. } | Target::Reading(axis)) => needs.push(axis),
-                _ => {}
+            if let Some(Target::Axis { axis, .. } | Target::Reading(axis)) = target {
+                needs.push(axis);
             }
             let formula = match Formula::read(term.formula.get_ref(), &names) {
                 Ok(formula) => Some(formula),
@@ -261,7 +260,8 @@ impl Reader<'_> {
         let here = |name: &AxisName| {
             self.machine.axes.iter().any(|a| a.name == *name && side.is_none_or(|side| side == a.side))
         };
-        let lacks = needs.iter().find(|n| !here(n)).map(|n| format!("machine {:?} has no axis {n} there", self.machine.name));
+        let lacks =
+            needs.iter().find(|n| !here(n)).map(|n| format!("machine {:?} has no axis {n} there", self.machine.name));
         let has = unless.iter().find(|n| here(n)).map(|n| format!("machine {:?} has an axis {n}", self.machine.name));
         Some(Own { id: row.id.get_ref().clone(), parameters, acts, not_here: lacks.or(has) })
     }

@@ -1,0 +1,111 @@
+//! `axiscal assess`: what a plan will be able to tell, before the first touch.
+
+use super::common::MachineArgs;
+use super::generate::load_program;
+use super::identify::reference;
+use super::load::load_plan;
+use super::new::default_effects;
+use super::{Answer, Io};
+use crate::design::{Noise, Planned, Request, Task, assess};
+use crate::diag::{Failure, Result, source};
+use crate::files;
+use crate::fit::effects_of;
+use crate::machine::Machine;
+use crate::model::catalogue::Catalogue;
+use crate::program::plan::Plan;
+use crate::program::{self, Options};
+use crate::units::mm_from_um;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `assess`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// A plan.json, a program by name or a program file; several runs of one study with commas (head,table). Repeat it to
+    /// see plans side by side
+    #[arg(long, required = true, value_name = "PLAN[,PLAN…]")]
+    pub plan: Vec<String>,
+    /// Effects of the model (default: what `axiscal new` writes)
+    #[arg(long, value_delimiter = ',')]
+    pub effects: Vec<String>,
+    /// The blocks stand exactly where the plan says: their set-up is not solved for
+    #[arg(long)]
+    pub known_blocks: bool,
+    /// A file with effects of your own
+    #[arg(long, value_name = "FILE")]
+    pub effects_file: Vec<PathBuf>,
+    /// Standard deviation of a touch, µm (default: the probe's repeatability in the machine's file)
+    #[arg(long, value_name = "UM")]
+    pub noise_um: Option<f64>,
+    /// Scatter of the ball's place from one index to the next, µm (default: as the machine's file declares it; the
+    /// uncertainty from probe noise alone leaves it out)
+    #[arg(long, value_name = "UM")]
+    pub visit_um: Option<f64>,
+    /// Where location errors of workpiece-side axes are stated: pivot, ball, table, or X,Y,Z in mm in R
+    #[arg(long, value_name = "POINT", default_value = "pivot", allow_hyphen_values = true)]
+    pub reference: String,
+    /// No touch will carry a temperature
+    #[arg(long)]
+    pub no_temperature: bool,
+}
+
+/// Runs `assess`.
+///
+/// # Errors
+/// When machine, plan or effects are unusable.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let machine = args.machine.load(io)?;
+    let mut catalogue = Catalogue::built_in()?;
+    for file in &args.effects_file {
+        io.report(&catalogue.add_file(&source(file.display().to_string(), files::read_text(file)?))?.0);
+    }
+    let ids = if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
+    let noise_um = args.noise_um.unwrap_or(machine.probe.repeatability_um);
+    let bad = |um: f64, least: f64| !(um.is_finite() && um >= least && um < 1e6);
+    if bad(noise_um, 1e-6) || args.visit_um.is_some_and(|um| bad(um, 0.0)) {
+        return Err(Failure::new("assess::noise", "the noise is no usable size")
+            .help("write micrometres: --noise-um above 0, --visit-um 0 or more"));
+    }
+    let task = Task {
+        machine: &machine,
+        catalogue: &catalogue,
+        effects: effects_of(&ids, &catalogue, &machine)?,
+        held: Vec::new(),
+        reference: reference(&args.reference, &machine)?,
+        temperature: !args.no_temperature,
+    };
+    let mut answers = Vec::new();
+    for words in &args.plan {
+        let names: Vec<String> = words.split(',').map(|w| w.trim().to_owned()).filter(|w| !w.is_empty()).collect();
+        let runs =
+            names.iter().map(|w| plan_of(w, &machine, io).map(Planned::new)).collect::<Result<Vec<Planned>>>()?;
+        answers.push(assess(&Request {
+            task: task.clone(),
+            runs,
+            names,
+            probe: Noise { sigma_mm: mm_from_um(noise_um), tau_mm: mm_from_um(args.visit_um.unwrap_or(0.0)) },
+            acting_tau_mm: args.visit_um.map(mm_from_um),
+        })?);
+    }
+    let mut answers = answers.into_iter();
+    let Some(mut first) = answers.next() else { return Ok(Answer::Done) };
+    first.compared = answers.collect();
+    io.say(crate::report::assess::assessment(&first));
+    io.answer(&first);
+    Ok(Answer::Done)
+}
+
+/// A plan by file, or of a program by name or file.
+///
+/// # Errors
+/// When it is unusable or not for this machine.
+pub(super) fn plan_of(word: &str, machine: &Machine, io: &Io) -> Result<Plan> {
+    if word.ends_with(".json") {
+        return load_plan(Path::new(word), machine, io);
+    }
+    let spec = load_program(word, machine, io)?;
+    let (generated, findings) = program::generate(machine, &spec, &Options::default())?;
+    io.report(&findings.0);
+    Ok(generated.plan)
+}

@@ -1,0 +1,18 @@
+//! What touches would tell, before they are made, and which further touches would tell more.
+//!
+//! [`View`] is a plan linearised at an errorless machine; [`habits()`] are variations of its touches as data, each with what
+//! it costs; [`assess()`] says what a plan will be able to tell (`axiscal-assessment/1`); [`explain()`] names the touches
+//! that part what a fit cannot tell apart. All verdicts are computed from the varied touches, none is looked up.
+
+mod assess;
+mod explain;
+pub mod habits;
+pub mod record;
+mod score;
+pub mod vary;
+pub mod view;
+
+pub use assess::{Request, assess};
+pub use explain::explain;
+pub use habits::{Habit, habits};
+pub use view::{Known, Noise, Planned, Task, View};

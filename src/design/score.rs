@@ -1,0 +1,80 @@
+//! One word for a plan, with the reason (the thresholds stand in docs/guide/assess.md).
+
+use super::record::{Assessment, Expected, Score};
+use super::view::Task;
+
+/// The noise of a touch alone must leave a location error to this share of its typical size.
+const NOISE_SHARE: f64 = 0.25;
+
+/// A good plan knows location errors to this share of their typical size whatever else acts.
+const UNMODELLED_SHARE: f64 = 1.0;
+
+/// A good plan leaves at most so many effects without a trace, those not counted that equal a parameter with any touches
+/// or do not move these touches at all …
+const MOST_INVISIBLE: usize = 4;
+
+/// … and at most so many pairs of effects that cannot be told apart, for each effect.
+const PAIRS_PER_EFFECT: f64 = 0.5;
+
+/// Score and reason.
+pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
+    // an axis that no touch sees is not what this plan is for
+    let unseen_effect = |effect: &str| {
+        a.parameters.iter().filter(|p| p.effect == effect).all(|p| p.sigma.is_none())
+    };
+    let location: Vec<&Expected> = a.parameters.iter().filter(|p| is_location(&p.effect)).collect();
+    let typical = |p: &Expected| {
+        let effect = task.effects.iter().find(|e| e.id == p.effect);
+        effect.and_then(|e| e.parameters.iter().find(|q| q.name == p.name)).map_or(f64::INFINITY, |q| q.typical)
+    };
+    let silent: Vec<&str> = {
+        let mut ids: Vec<&str> = location.iter().map(|p| p.effect.as_str()).filter(|e| unseen_effect(e)).collect();
+        ids.dedup();
+        ids
+    };
+    let judged: Vec<&&Expected> = location.iter().filter(|p| !silent.contains(&p.effect.as_str())).collect();
+    let not_for = if silent.is_empty() { String::new() } else { format!("; it says nothing of {}", silent.join(", ")) };
+    let lost: Vec<&str> = judged.iter().filter(|p| p.sigma.is_none()).map(|p| p.name.as_str()).collect();
+    if !lost.is_empty() {
+        return (Score::NotEnough, format!("it cannot tell {}{not_for}", lost.join(", ")));
+    }
+    if judged.is_empty() && !location.is_empty() {
+        return (Score::NotEnough, "it sees no location error at all".into());
+    }
+    let coarse = |share: f64, of: fn(&Expected) -> Option<f64>| -> Vec<&str> {
+        let over = judged.iter().filter(|p| of(p).is_none_or(|s| s > share * typical(p)));
+        over.map(|p| p.name.as_str()).collect()
+    };
+    let noisy = coarse(NOISE_SHARE, |p| p.sigma);
+    if !noisy.is_empty() {
+        let says = format!("the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size", noisy.join(", "));
+        return (Score::NotEnough, format!("{says}{not_for}"));
+    }
+    let mut reasons = Vec::new();
+    let open: Vec<&str> = {
+        let over = judged.iter().filter(|p| {
+            p.holds.is_empty() && p.sigma_with_unmodelled.is_none_or(|s| s > UNMODELLED_SHARE * typical(p))
+        });
+        over.map(|p| p.name.as_str()).collect()
+    };
+    if !open.is_empty() {
+        reasons.push(format!("effects that are not in the model could shift {} by more than its usual size", open.join(", ")));
+    }
+    let equal = |id: &str| a.parameters.iter().any(|p| p.holds.iter().any(|h| h == id));
+    let invisible = a.effects.iter().filter(|e| !e.visible && e.typical_um > 0.0 && !equal(&e.effect)).count();
+    if invisible > MOST_INVISIBLE {
+        reasons.push(format!("{invisible} effects leave no trace"));
+    }
+    if a.alias_pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
+        reasons.push(format!("{} pairs of effects cannot be told apart", a.alias_pairs));
+    }
+    if reasons.is_empty() {
+        let says = "it tells the location errors also while other errors act, and can name nearly all of them";
+        return (Score::Good, format!("{says}{not_for}"));
+    }
+    (Score::Enough, format!("it tells the location errors of a machine without other errors, but {}{not_for}", reasons.join("; ")))
+}
+
+fn is_location(effect: &str) -> bool {
+    effect.starts_with("location-") || effect.starts_with("paper-") || effect == "double-head-10"
+}

@@ -1,0 +1,159 @@
+//! A touch made another way: another pose, spindle, stylus, feed or face, with all axis positions anew.
+
+use super::view::{INDEX_S, TOUCH_S, times_s};
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::machine::{Carrier, Machine};
+use crate::program::plan::{Plan, PlanTouch};
+use nalgebra::Vector3;
+
+/// A face may look away from the spindle by so much (cosine) that the ball still meets it before the stem does.
+const TURNED_AWAY: f64 = -0.05;
+
+/// Touches of one face of one block that a variation repeats at most.
+const MOST_PER_FACE: usize = 2;
+
+/// Blocks that a variation touches at most.
+const MOST_BLOCKS: usize = 2;
+
+/// What is to be different.
+#[derive(Debug, Clone, Default)]
+pub struct Change {
+    /// Angles of rotary axes, deg; those that are not given stay.
+    pub pose: AxisMap,
+    /// Sense in which rotary axes come to the pose.
+    pub from: AxisMap,
+    /// Orientation of the spindle, deg.
+    pub spindle_deg: Option<f64>,
+    /// Pivot to ball's centre, mm.
+    pub length_mm: Option<f64>,
+    /// Feed of the measuring touch, mm/min.
+    pub feed_mm_min: Option<f64>,
+}
+
+/// Touches of one index visit.
+#[derive(Debug, Clone)]
+pub struct Visit<'a> {
+    /// Which run.
+    pub run: usize,
+    /// Its touches.
+    pub touches: Vec<&'a PlanTouch>,
+}
+
+impl Visit<'_> {
+    /// Angles of the rotary axes, deg.
+    #[must_use]
+    pub fn pose(&self) -> Position {
+        self.touches.first().map_or_else(Position::default, |t| t.pose.position())
+    }
+
+    /// A light pattern: few touches of each face, few blocks.
+    #[must_use]
+    pub fn light(&self) -> Vec<PlanTouch> {
+        let mut out: Vec<PlanTouch> = Vec::new();
+        let mut blocks: Vec<&str> = Vec::new();
+        for t in &self.touches {
+            if !blocks.contains(&t.block.as_str()) {
+                blocks.push(&t.block);
+            }
+            let is_early = blocks.iter().position(|b| *b == t.block).is_some_and(|i| i < MOST_BLOCKS);
+            let of_face = |o: &&PlanTouch| o.block == t.block && o.normal == t.normal;
+            let again = out.iter().any(|o| of_face(&o) && o.point == t.point);
+            if is_early && !again && out.iter().filter(of_face).count() < MOST_PER_FACE {
+                out.push((*t).clone());
+            }
+        }
+        out
+    }
+}
+
+/// The index visits of a plan, in order.
+#[must_use]
+pub fn visits(run: usize, plan: &Plan) -> Vec<Visit<'_>> {
+    let mut out: Vec<Visit> = Vec::new();
+    for t in &plan.touches {
+        let same = out.last().and_then(|v| v.touches.last()).is_some_and(|p| {
+            p.visit == t.visit
+                && p.pose == t.pose
+                && p.spindle_deg == t.spindle_deg
+                && p.tool_length_mm == t.tool_length_mm
+                && p.mounting == t.mounting
+        });
+        match out.last_mut() {
+            Some(visit) if same => visit.touches.push(t),
+            _ => out.push(Visit { run, touches: vec![t] }),
+        }
+    }
+    out
+}
+
+/// The touch made another way; `None` where an axis does not go there or the face looks away from the spindle.
+#[must_use]
+pub fn again(machine: &Machine, plan: &Plan, touch: &PlanTouch, change: &Change) -> Option<PlanTouch> {
+    let pose = change.pose.or(&touch.pose);
+    let length_mm = change.length_mm.or(touch.tool_length_mm).unwrap_or(plan.tool_length_mm);
+    let radius_mm = touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm);
+    let carrier = machine.carrier(&touch.carrier)?;
+    let at = pose.position();
+    if !faces_the_spindle(machine, carrier, &at, &touch.normal.into()) {
+        return None;
+    }
+    for (name, angle) in pose.iter() {
+        let [low, high] = machine.axis(name)?.range;
+        if !(low..=high).contains(&angle) {
+            return None;
+        }
+    }
+    let (point, normal) = (Vector3::from(touch.point), Vector3::from(touch.normal));
+    let place = |off_face: f64| -> Option<AxisMap> {
+        let ball = point + normal * (radius_mm + off_face);
+        let at = machine.linear_for_ball(carrier, &at, &ball, length_mm)?;
+        let inside = |name: AxisName| {
+            machine.axis(name).is_none_or(|axis| {
+                let [low, high] = axis.program_range();
+                (low..=high).contains(&at.get(name))
+            })
+        };
+        let xyz = at.xyz_mm();
+        [AxisName::X, AxisName::Y, AxisName::Z].into_iter().all(inside).then(|| AxisMap::xyz(xyz.x, xyz.y, xyz.z))
+    };
+    Some(PlanTouch {
+        pose,
+        start: place(machine.probe.approach)?,
+        nominal: place(0.0)?,
+        end: place(-machine.probe.search)?,
+        repeat: 1,
+        from: change.from.or(&touch.from),
+        spindle_deg: change.spindle_deg.or(touch.spindle_deg),
+        tool_length_mm: change.length_mm.or(touch.tool_length_mm),
+        feed_mm_min: change.feed_mm_min.or(touch.feed_mm_min),
+        first: false,
+        ..touch.clone()
+    })
+}
+
+/// Can a straight stylus meet a face that looks along `normal` (carrier's frame)?
+#[must_use]
+pub fn faces_the_spindle(machine: &Machine, carrier: Carrier, at: &Position, normal: &Vector3<f64>) -> bool {
+    let in_r = machine.carrier_frame(carrier, at).rotation * normal;
+    let spindle = machine.tool_frame(at).rotation * machine.tool.direction.into_inner();
+    in_r.dot(&spindle) > TURNED_AWAY
+}
+
+/// Adds visits at the end of a plan; returns what they cost, s. Empty visits are passed over.
+pub fn append(plan: &mut Plan, added: Vec<Vec<PlanTouch>>) -> f64 {
+    let begin_s = times_s(&plan.touches).last().copied().unwrap_or(0.0);
+    let mut clock_s = begin_s;
+    let mut id = plan.touches.iter().map(|t| t.id).max().unwrap_or(0);
+    let mut visit = plan.touches.iter().filter_map(|t| t.visit).max().unwrap_or(0);
+    for touches in added.into_iter().filter(|t| !t.is_empty()) {
+        clock_s += INDEX_S;
+        visit += 1;
+        for mut touch in touches {
+            clock_s += TOUCH_S;
+            id += 1;
+            (touch.id, touch.visit, touch.time_s) = (id, Some(visit), Some(clock_s));
+            plan.touches.push(touch);
+        }
+    }
+    clock_s - begin_s
+}

@@ -1,0 +1,308 @@
+//! A plan linearised at an errorless machine: the whitened columns of a model and of every effect that it leaves out.
+
+use crate::axes::AxisName;
+use crate::diag::{Failure, Result};
+use crate::fit::candidates::columns;
+use crate::fit::normal::Touches;
+use crate::fit::uncertainty::unmodelled_by;
+use crate::log::{Status, Touch};
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::data::{Data, Run, assemble};
+use crate::model::predict::Model;
+use crate::program::plan::{Plan, PlanTouch};
+use crate::search::{Basis, KEPT, Library, Origin};
+use crate::units::um_from_mm;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// A touch with its way there, s, where a plan does not predict its times.
+pub const TOUCH_S: f64 = 12.0;
+
+/// Turning the rotary axes to another pose, s.
+pub const INDEX_S: f64 = 60.0;
+
+/// Putting up other blocks, s.
+pub const MOUNTING_S: f64 = 600.0;
+
+/// Changing the stylus, s.
+pub const STYLUS_S: f64 = 300.0;
+
+/// The room as it is assumed before anything is measured: 20 °C, swinging by this much, K …
+const SWING_K: f64 = 1.0;
+
+/// … once in this time, s: a hall whose heating or cooling comes and goes.
+const SWING_S: f64 = 5400.0;
+
+/// Scanned shapes that are tried at most for an effect that leaves no trace at its usual shape.
+const MOST_SHAPES: usize = 16;
+
+/// What is looked at: machine, model and everything that could act beside it.
+#[derive(Debug, Clone)]
+pub struct Task<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// All effects that exist.
+    pub catalogue: &'a Catalogue,
+    /// The effects of the model.
+    pub effects: Vec<&'a Effect>,
+    /// Parameters of the model that are held.
+    pub held: Vec<String>,
+    /// Where location errors of workpiece-side axes are stated, mm in R.
+    pub reference: Vector3<f64>,
+    /// Does every touch carry a temperature?
+    pub temperature: bool,
+}
+
+/// Expected noise, mm, 1 sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of a touch along its approach.
+    pub sigma_mm: f64,
+    /// Of each component of the ball's place from one index to the next.
+    pub tau_mm: f64,
+}
+
+/// A run that is planned.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// Its touches.
+    pub plan: Plan,
+    /// Runs of equal mounting share the blocks' set-up.
+    pub mounting: Option<String>,
+    /// When it begins, s on the study's clock; runs without it follow one another.
+    pub started_s: Option<f64>,
+}
+
+impl Planned {
+    /// A run of a plan.
+    #[must_use]
+    pub fn new(plan: Plan) -> Self {
+        Self { plan, mounting: None, started_s: None }
+    }
+}
+
+/// Something that is known beside the touches: Σ coefficient · unknown, with a standard uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Known {
+    /// Names of unknowns with their coefficients.
+    pub sum: Vec<(String, f64)>,
+    /// Standard uncertainty of the sum.
+    pub sigma: f64,
+}
+
+/// What planned touches see.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// The touches as an errorless machine makes them.
+    pub data: Data,
+    /// The model.
+    pub model: Model,
+    /// Indices of the unknowns that are not held.
+    pub free: Vec<usize>,
+    /// Whitened Jacobian of the free unknowns: touches, then what is known beside them.
+    pub jacobian: DMatrix<f64>,
+    /// What the model can follow.
+    pub base: Basis,
+    /// The effects that it leaves out: whitened columns in units of typical sizes, one variant each.
+    pub library: Library,
+    /// Their columns before whitening, µm at typical size.
+    pub raw_um: DMatrix<f64>,
+    /// Value of the scanned shape at which each candidate stands; `None` where it has none.
+    pub shapes: Vec<Option<f64>>,
+    /// The noise.
+    pub noise: Noise,
+    /// When the last touch is made, s.
+    pub end_s: f64,
+}
+
+impl View {
+    /// Looks at planned runs.
+    ///
+    /// # Errors
+    /// When no touch can be used.
+    pub fn new(task: &Task, runs: &[Planned], known: &[Known], noise: Noise) -> Result<Self> {
+        let mut view = Self::of_model(task, runs, known, noise)?;
+        let candidates = unmodelled_by(&view.model.unknowns, task.machine, task.catalogue);
+        view.add(task, &candidates);
+        Ok(view)
+    }
+
+    /// Looks at planned runs, without the effects that the model leaves out.
+    ///
+    /// # Errors
+    /// When no touch can be used.
+    pub fn of_model(task: &Task, runs: &[Planned], known: &[Known], noise: Noise) -> Result<Self> {
+        let (data, end_s) = nominal(task, runs);
+        if data.nominal.is_empty() {
+            return Err(Failure::new("assess::no_touches", "the plan has no touch that this machine can make")
+                .help("is it a plan for this machine, and does it touch any block?"));
+        }
+        let model = Model::new(task.machine, &task.effects, &data.set_ups, task.reference);
+        let is_held = |name: &str| task.held.iter().any(|h| crate::symbols::same(h, name));
+        let free: Vec<usize> = (0..model.n_unknowns()).filter(|&i| !is_held(&model.unknowns[i].name)).collect();
+        let start = DVector::from_iterator(free.len(), free.iter().map(|&i| model.unknowns[i].start));
+        let touched = whitening(&model, &data, &free, noise, |t| {
+            let mut jacobian = t.unwhitened(&start).1;
+            t.whiten(&mut jacobian);
+            jacobian
+        });
+        let n = touched.nrows();
+        let mut jacobian = touched.resize_vertically(n + known.len(), 0.0);
+        for (row, k) in known.iter().enumerate() {
+            for (name, coefficient) in &k.sum {
+                if let Some(c) = free.iter().position(|&i| model.unknowns[i].name == *name) {
+                    jacobian[(n + row, c)] += coefficient / k.sigma;
+                }
+            }
+        }
+        let base = Basis::new(&jacobian);
+        let library = Library::new(jacobian.nrows());
+        let raw_um = DMatrix::zeros(jacobian.nrows(), 0);
+        Ok(Self { data, model, free, jacobian, base, library, raw_um, shapes: Vec::new(), noise, end_s })
+    }
+
+    /// Puts effects into the library, each at its usual shape, or where that leaves no trace at the one that leaves most.
+    fn add(&mut self, task: &Task, effects: &[&Effect]) {
+        let all = columns(task.machine, effects, &self.data, &self.data.nominal, task.reference, None);
+        let rows = self.jacobian.nrows();
+        let mut raw = Vec::new();
+        for effect in effects {
+            let own: Vec<usize> =
+                (0..all.unknowns.len()).filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape).collect();
+            let scaled = |values: &DMatrix<f64>, which: &[usize], unknowns: &[crate::model::predict::Unknown]| {
+                let mut out = values.select_columns(which).resize_vertically(rows, 0.0);
+                for (mut column, &i) in out.column_iter_mut().zip(which) {
+                    column *= unknowns[i].typical;
+                }
+                out
+            };
+            let mut plain = scaled(&all.values, &own, &all.unknowns);
+            let mut whitened = self.whitened(&plain);
+            let start = effect.parameters.iter().find_map(|p| p.shape.map(|s| s.0));
+            let scan: &[f64] = effect.parameters.iter().find(|p| !p.scan.is_empty()).map_or(&[], |p| &p.scan);
+            let mut shape = start;
+            if self.kept(&whitened) < KEPT {
+                let step = scan.len().div_ceil(MOST_SHAPES).max(1);
+                let mut best = KEPT;
+                for &value in scan.iter().step_by(step) {
+                    let at = columns(task.machine, &[effect], &self.data, &self.data.nominal, task.reference, Some(&[value]));
+                    let which: Vec<usize> = (0..at.unknowns.len()).filter(|&i| !at.unknowns[i].shape).collect();
+                    let tried = scaled(&at.values, &which, &at.unknowns);
+                    let seen = self.whitened(&tried);
+                    let kept = self.kept(&seen);
+                    if kept > best {
+                        (best, shape, plain, whitened) = (kept, Some(value), tried, seen);
+                    }
+                }
+            }
+            let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
+            self.library.push(effect.id.clone(), origin, &whitened);
+            self.shapes.push(shape);
+            raw.push(plain);
+        }
+        let count = raw.iter().map(DMatrix::ncols).sum();
+        self.raw_um = DMatrix::zeros(rows, count);
+        let mut at = 0;
+        for part in raw {
+            self.raw_um.columns_mut(at, part.ncols()).copy_from(&part.map(um_from_mm));
+            at += part.ncols();
+        }
+    }
+
+    /// Columns whitened: touches only, what is known beside them has no part in it.
+    fn whitened(&self, plain: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.data.nominal.len();
+        let mut touched = plain.rows(0, n).into_owned();
+        whitening(&self.model, &self.data, &self.free, self.noise, |t| t.whiten(&mut touched));
+        touched.resize_vertically(plain.nrows(), 0.0)
+    }
+
+    /// Share of a block's norm that the model cannot follow.
+    fn kept(&self, columns: &DMatrix<f64>) -> f64 {
+        let norm = columns.norm();
+        if norm > 0.0 { self.base.project_columns(columns).norm() / norm } else { 0.0 }
+    }
+
+    /// Rows that are touches.
+    #[must_use]
+    pub fn n_touches(&self) -> usize {
+        self.data.nominal.len()
+    }
+
+    /// Whitened columns of every effect that the model leaves out, touches only.
+    #[must_use]
+    pub fn left_out(&self) -> DMatrix<f64> {
+        self.library.matrix().rows(0, self.n_touches()).into_owned()
+    }
+}
+
+/// Calls `f` with the nominal touches as a problem.
+fn whitening<T>(model: &Model, data: &Data, free: &[usize], noise: Noise, f: impl FnOnce(&Touches) -> T) -> T {
+    let batch = model.prepare(&data.nominal);
+    f(&Touches::new(&batch, &data.visits, model.start(), free, &[], (noise.sigma_mm, noise.tau_mm)))
+}
+
+/// The touches of runs as an errorless machine makes them, and when the last one is made, s.
+fn nominal(task: &Task, runs: &[Planned]) -> (Data, f64) {
+    let mut clock_s = 0.0;
+    let mut last_mounting: Option<&str> = None;
+    let mut touched: Vec<(f64, Vec<Touch>)> = Vec::new();
+    for run in runs {
+        let mounting = run.mounting.as_deref().unwrap_or(&run.plan.mounting);
+        let change_s = if last_mounting.is_some_and(|m| m != mounting) { MOUNTING_S } else { 0.0 };
+        last_mounting = Some(mounting);
+        let started_s = run.started_s.unwrap_or(clock_s + change_s);
+        let times = times_s(&run.plan.touches);
+        let touches = run
+            .plan
+            .touches
+            .iter()
+            .zip(&times)
+            .map(|(t, &after_s)| {
+                let time_s = started_s + after_s;
+                clock_s = f64::max(clock_s, time_s);
+                let swing = SWING_K * (std::f64::consts::TAU * time_s / SWING_S).sin();
+                Touch {
+                    id: t.id,
+                    position: t.nominal_position(),
+                    status: Status::Hit,
+                    time_s: Some(time_s),
+                    temperature_deg_c: task.temperature.then_some(20.0 + swing),
+                    line: 0,
+                }
+            })
+            .collect();
+        touched.push((started_s, touches));
+    }
+    let runs: Vec<Run> = runs
+        .iter()
+        .zip(&touched)
+        .map(|(run, (started_s, touches))| Run {
+            plan: &run.plan,
+            touches,
+            mounting: run.mounting.as_deref(),
+            started_s: Some(*started_s),
+        })
+        .collect();
+    (assemble(task.machine, &runs), clock_s)
+}
+
+/// When each touch is made, s after the program's begin: the plan's prediction, else ordinary times.
+#[must_use]
+pub fn times_s(touches: &[PlanTouch]) -> Vec<f64> {
+    let mut clock_s = 0.0;
+    let mut previous: Option<&PlanTouch> = None;
+    let mut out = Vec::with_capacity(touches.len());
+    for t in touches {
+        let turned = previous.is_none_or(|p| {
+            AxisName::ALL.into_iter().any(|a| p.pose.get(a) != t.pose.get(a)) || p.visit != t.visit || p.spindle_deg != t.spindle_deg
+        });
+        clock_s += TOUCH_S + if turned { INDEX_S } else { 0.0 };
+        if let Some(s) = t.time_s {
+            clock_s = s;
+        }
+        out.push(clock_s);
+        previous = Some(t);
+    }
+    out
+}

@@ -1,0 +1,219 @@
+//! Generic shapes on a small plan: which variable is named, how often clean data are suspected, and how long it takes.
+
+use super::dependence::{Dependence, dependences, serial};
+use super::generic::{Direction, Features, Generics, Kind, Variable, generics};
+use super::held_out::{Choice, held_out};
+use super::testing::{noise, noise_matrix, rng};
+use super::tests::{ask, correlated_library, mixtures};
+use super::*;
+use nalgebra::{DMatrix, DVector, Vector3};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+
+/// A small plan: nine angles of C, six of B in changing order, two blocks, five faces each touched twice; 2.2 h.
+fn table_of_touches(rng: &mut ChaCha8Rng) -> Features {
+    let mut f = Features::default();
+    let (mut x, mut b_angle, mut c_angle, mut t, mut sense) = (vec![], vec![], vec![], vec![], vec![]);
+    let (mut machine, mut carrier) = (vec![], vec![]);
+    let mut clock = 0.0;
+    for visit in 0..27usize {
+        let c = [0.0, 130.0, 45.0, 270.0, 90.0, 315.0, 200.0, 160.0, 20.0][visit % 9] * TAU / 360.0;
+        let b = [0.0, -60.0, -25.0, -90.0, -40.0, -10.0][(visit * 5 + visit / 9) % 6] * TAU / 360.0;
+        clock += 0.03;
+        for block in 0..2usize {
+            for face in 0..5usize {
+                for _ in 0..2 {
+                    let n = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z()][face];
+                    let turned = Vector3::new(c.cos() * n.x + c.sin() * n.y, c.cos() * n.y - c.sin() * n.x, n.z);
+                    carrier.push(n);
+                    machine.push(turned);
+                    x.push((60.0 * block as f64 - 30.0) * c.cos() + 200.0 * b.sin() + rng.random_range(-3.0..3.0));
+                    b_angle.push(b);
+                    c_angle.push(c);
+                    t.push(clock);
+                    sense.push(if visit % 4 < 2 { 1.0 } else { -1.0 });
+                    f.block.push(block);
+                    f.face.push(face);
+                    f.visit.push(visit);
+                    clock += 0.0025;
+                }
+            }
+        }
+    }
+    f.directions = Direction::of_normals(&machine, &carrier, "Z");
+    f.variables = vec![
+        Variable::new("X", Kind::Linear, x),
+        Variable::new("B", Kind::Rotary, b_angle),
+        Variable::new("C", Kind::Rotary, c_angle),
+        Variable::new("t", Kind::Time, t),
+        Variable::new("sC", Kind::Plain, sense),
+    ];
+    f
+}
+
+/// Place and location of this plan: each block's three coordinates, and what turns with C and B.
+fn location_base(f: &Features) -> Basis {
+    let n = f.block.len();
+    let column = |v: &dyn Fn(usize) -> f64| DVector::from_fn(n, |i, _| v(i));
+    let mut columns = Vec::new();
+    for d in 0..7 {
+        for block in 0..2 {
+            columns.push(column(&|i| f.directions[d].weight[i] * f64::from(u8::from(f.block[i] == block))));
+        }
+    }
+    for d in 0..3 {
+        columns.push(column(&|i| f.directions[d].weight[i] * f.variables[1].values[i].cos()));
+        columns.push(column(&|i| f.directions[d].weight[i] * f.variables[1].values[i].sin()));
+    }
+    Basis::new(&DMatrix::from_columns(&columns))
+}
+
+fn found(f: &Features, g: &Generics, base: &Basis, r: &DVector<f64>) -> Vec<Dependence> {
+    dependences(ask(r, base), f, g)
+}
+
+#[test]
+fn shapes_of_no_catalogue_are_named_by_their_variable() {
+    let mut rng = rng(20);
+    let f = table_of_touches(&mut rng);
+    let base = location_base(&f);
+    let g = generics(&f, |raw| raw);
+    let n = f.block.len();
+    let values = |v: usize| &f.variables[v].values;
+    type Effect<'a> = (&'a str, Box<dyn Fn(usize) -> f64 + 'a>);
+    let effects: Vec<Effect> = vec![
+        ("C", Box::new(|i| (7.0 * values(2)[i] + 0.4).sin() * f.directions[2].weight[i])),
+        ("B", Box::new(|i| f64::from(u8::from(values(1)[i] < -0.8)) * f.directions[0].weight[i])),
+        ("t", Box::new(|i| f64::from(u8::from(values(3)[i] > 1.1)) * f.directions[1].weight[i])),
+        ("t", Box::new(|i| (TAU * values(3)[i] / 0.15).cos() * f.directions[2].weight[i])),
+        (
+            "t*block",
+            Box::new(|i| f64::from(u8::from(values(3)[i] > 0.9 && f.block[i] == 1)) * f.directions[3].weight[i]),
+        ),
+        ("sC", Box::new(|i| values(4)[i] * f.directions[4].weight[i])),
+        ("X", Box::new(|i| (values(0)[i] / 100.0).powi(2) * f.directions[2].weight[i])),
+    ];
+    for (wanted, effect) in &effects {
+        let shape = DVector::from_fn(n, |i, _| effect(i));
+        let left = base.project(&shape).norm_squared();
+        let mut hits = 0;
+        for _ in 0..10 {
+            let r = noise(&mut rng, n) - &shape * (60.0 / left).sqrt();
+            let list = found(&f, &g, &base, &r);
+            hits += usize::from(list[0].on == *wanted);
+            assert!(list[0].p_adjusted < 0.05 || list[0].on != *wanted);
+        }
+        println!("{wanted}: first in {hits} of 10");
+        assert!(hits >= 8, "{wanted}: {hits}");
+    }
+    // the tooth pattern by its order, with a formula that takes it away
+    let tooth = DVector::from_fn(n, |i, _| effects[0].1(i) * 5.0);
+    let r = noise(&mut rng, n) - &tooth;
+    let first = &found(&f, &g, &base, &r)[0];
+    assert_eq!((first.scanned, first.direction.as_str(), first.dof.as_str()), (7.0, "machine-Z", "dz"));
+    assert_eq!(first.terms[0].formula.as_deref(), Some("cos(7*C)"));
+    let amplitude = first.terms[0].size.hypot(first.terms[1].size);
+    assert!((amplitude - 5.0).abs() < 0.5, "{amplitude}");
+    assert!(first.share > 0.6 && first.curve.len() > 100);
+    let peak = first.curve.iter().map(|p| p.y.abs()).fold(0.0, f64::max);
+    assert!((peak - amplitude).abs() < 0.05 * amplitude);
+    // the cycle by its period, as a number that a fit may refine
+    let cycle = DVector::from_fn(n, |i, _| effects[3].1(i) * 3.0);
+    let r = noise(&mut rng, n) - &cycle;
+    let first = &found(&f, &g, &base, &r)[0];
+    let shape = first.shape.as_ref().unwrap();
+    assert_eq!((shape.name.as_str(), shape.unit.as_str()), ("period", "h"));
+    assert!(shape.min < 0.15 && 0.15 < shape.max, "{shape:?}");
+    assert_eq!(first.terms[1].formula.as_deref(), Some("sin(2*pi*t/period)"));
+}
+
+#[test]
+fn named_effects_and_shapes_share_one_level() {
+    let mut rng = rng(21);
+    let f = table_of_touches(&mut rng);
+    let base = location_base(&f);
+    let n = f.block.len();
+    let mut library = correlated_library(&mut rng, n, 60);
+    library.append(generics(&f, |raw| raw).library);
+    let runs = std::env::var("RUNS").map_or(250, |r| r.parse().unwrap());
+    let (mut any, mut generic) = (0, 0);
+    for _ in 0..runs {
+        let r = noise(&mut rng, n);
+        let search = Search::new(ask(&r, &base), &library);
+        any += usize::from(search.leader().is_some() || search.leading_shape().is_some());
+        generic += usize::from(search.leading_shape().is_some());
+    }
+    println!("clean data: any proposal in {any} of {runs}, generic in {generic}");
+    // 5 % and two standard errors
+    assert!(any * 1000 < 78 * runs, "{any}");
+}
+
+/// Milliseconds of one sweep: `cargo test --release --lib search::shape_tests::speed -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement, not a check"]
+fn speed() {
+    let mut rng = rng(30);
+    for rows in [356, 10_000] {
+        let a = noise_matrix(&mut rng, rows, 60);
+        let mut library = Library::new(rows);
+        for i in 0..100 {
+            library.push(format!("c{i}"), Origin::Catalogue, &noise_matrix(&mut rng, rows, 2 + i % 2));
+        }
+        let r = noise(&mut rng, rows);
+        let mut times = [Vec::new(), Vec::new(), Vec::new()];
+        for _ in 0..15 {
+            let start = std::time::Instant::now();
+            let base = Basis::new(&a);
+            times[0].push(start.elapsed().as_secs_f64() * 1e3);
+            let start = std::time::Instant::now();
+            let search = Search::new(ask(&r, &base), &library);
+            times[1].push(start.elapsed().as_secs_f64() * 1e3);
+            let start = std::time::Instant::now();
+            assert!(!search.groups(3).is_empty());
+            times[2].push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        let [base, score, groups] = times.map(|t| t.into_iter().fold(f64::INFINITY, f64::min));
+        let n = library.n_columns();
+        println!("{rows} x 60, {n} columns: base {base:.2} ms, score {score:.2} ms, groups {groups:.2} ms");
+    }
+    let rows = 700;
+    let base = Basis::new(&noise_matrix(&mut rng, rows, 60));
+    let library = mixtures(&mut rng, rows, 125, 4.0);
+    let r = noise(&mut rng, rows) - library.columns(4, 0).column(0) * 0.3;
+    let groups: Vec<usize> = (0..rows).map(|i| i / 24).collect();
+    let start = std::time::Instant::now();
+    let result = held_out(ask(&r, &base), &library, &groups, Choice::Redone);
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "nested hold-out, {rows} x 60, {} columns, {} groups: {seconds:.3} s",
+        library.n_columns(),
+        result.folds.len()
+    );
+    let f = table_of_touches(&mut rng);
+    let base = location_base(&f);
+    let r = noise(&mut rng, f.block.len());
+    let start = std::time::Instant::now();
+    let g = generics(&f, |raw| raw);
+    let built = start.elapsed().as_secs_f64();
+    let _ = found(&f, &g, &base, &r);
+    println!(
+        "generic shapes, {} touches, {} candidates, {} columns: built {built:.3} s, all {:.3} s",
+        r.len(),
+        g.shapes.len(),
+        g.library.n_columns(),
+        start.elapsed().as_secs_f64()
+    );
+}
+
+#[test]
+fn neighbours_that_remember_each_other_are_noticed() {
+    let mut rng = rng(22);
+    let white: Vec<f64> = noise(&mut rng, 300).iter().copied().collect();
+    let calm = serial(&white).unwrap();
+    assert!(calm.lag_1_p > 0.01 && calm.runs_p > 0.01, "{calm:?}");
+    let slow: Vec<f64> = white.iter().enumerate().map(|(i, w)| w + 2.0 * (i as f64 / 30.0).sin()).collect();
+    let drift = serial(&slow).unwrap();
+    assert!(drift.lag_1_p < 1e-6 && drift.runs_p < 1e-4, "{drift:?}");
+    assert!(serial(&[1.0; 20]).is_none());
+}
