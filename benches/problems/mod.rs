@@ -130,7 +130,7 @@ fn block(i: usize, rng: &mut ChaCha8Rng) -> PlanBlock {
     let mut spread = |size: f64| rng.random_range(-size..size);
     PlanBlock {
         name: format!("b{i}"),
-        carrier: if i % 2 == 0 { "C" } else { "table" }.into(),
+        carrier: if i.is_multiple_of(2) { "C" } else { "table" }.into(),
         mounting: None,
         centre: [spread(120.0), spread(120.0), -202.684 + spread(30.0)],
         size: [10.0; 3],
