@@ -7,7 +7,7 @@
 
 use super::solve::{Normal, Problem};
 use crate::model::batch::{At, Batch, Scratch};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -335,6 +335,7 @@ impl<'a> Touches<'a> {
                 part.sum -= seen.gaps.dot(&(m * seen.gaps));
             }
         }
+        part.blocks.iter_mut().flatten().for_each(Block::multiply);
         part
     }
 }
@@ -375,32 +376,47 @@ struct Partial {
     sum: f64,
 }
 
-/// Gram (upper triangle, row by row) and gradient of the touches of one block.
+/// Rows of one block that wait to be multiplied together.
+const ROWS: usize = 64;
+
+/// Gram matrix and gradient of the touches of one block.
 #[derive(Debug, Clone)]
 struct Block {
-    gram: Vec<f64>,
+    gram: DMatrix<f64>,
     gradient: Vec<f64>,
+    /// Rows that are not in the Gram matrix yet, one after the other.
+    waiting: Vec<f64>,
 }
 
 impl Block {
     fn new(k: usize, with_gram: bool) -> Self {
-        Self { gram: vec![0.0; if with_gram { k * k } else { 0 }], gradient: vec![0.0; k] }
+        let (size, room) = if with_gram { (k, ROWS * k) } else { (0, 0) };
+        Self { gram: DMatrix::zeros(size, size), gradient: vec![0.0; k], waiting: Vec::with_capacity(room) }
     }
 
     fn add(&mut self, gap: f64, row: &[f64], with_gram: bool) {
-        let k = row.len();
         for (g, x) in self.gradient.iter_mut().zip(row) {
             *g += x * gap;
         }
         if with_gram {
-            for (a, &x) in row.iter().enumerate() {
-                if x != 0.0 {
-                    for (g, y) in self.gram[a * k + a..(a + 1) * k].iter_mut().zip(&row[a..]) {
-                        *g += x * y;
-                    }
-                }
+            self.waiting.extend_from_slice(row);
+            if self.waiting.len() == ROWS * row.len() {
+                self.multiply();
             }
         }
+    }
+
+    /// Adds the waiting rows: a product of matrices uses the processor far better than row by row.
+    fn multiply(&mut self) {
+        if self.waiting.is_empty() {
+            return;
+        }
+        let k = self.gradient.len();
+        let n = self.waiting.len() / k;
+        let turned = DMatrixView::from_slice(&self.waiting, k, n);
+        let rows = DMatrixView::from_slice_with_strides(&self.waiting, n, k, k, 1);
+        self.gram.gemm(1.0, &turned, &rows, 1.0);
+        self.waiting.clear();
     }
 }
 
@@ -428,7 +444,7 @@ impl Problem for Touches<'_> {
                     if with_gram {
                         for (b, cb) in row.iter().enumerate().skip(a) {
                             if let Some(cb) = *cb {
-                                let value = block.gram[a * row.len() + b];
+                                let value = block.gram[(a, b)];
                                 gram[(ca, cb)] += value;
                                 if ca != cb {
                                     gram[(cb, ca)] += value;

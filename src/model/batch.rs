@@ -28,6 +28,8 @@ pub struct Batch<'a> {
     coefficients: Vec<f64>,
     /// Actives with a shape parameter: evaluated anew for each θ.
     shaped: Vec<usize>,
+    /// Places whose transform is another at every touch.
+    moving: Vec<usize>,
     /// What the rows of each block hold.
     entries: Vec<Vec<Entry>>,
     n_rotary_workpiece: usize,
@@ -92,6 +94,9 @@ struct Placed {
 
 impl Placed {
     fn new(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        if by.w == Vector3::zeros() {
+            return Self::shift(by, centre);
+        }
         let ((sa, ca), (sb, cb), (sc, cc)) = (by.w.x.sin_cos(), by.w.y.sin_cos(), by.w.z.sin_cos());
         // Rz(c)·Ry(b)·Rx(a), as `Displacement::rotation`
         let r = Matrix3::new(
@@ -111,6 +116,21 @@ impl Placed {
             image,
             axis_a: r.column(0).into_owned(),
             axis_b: Vector3::new(-sc, cc, 0.0),
+        }
+    }
+
+    fn shift(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        let rigid = Rigid { r: Matrix3::identity(), t: by.d };
+        Self { rigid, image: centre + by.d, axis_a: Vector3::x(), axis_b: Vector3::y() }
+    }
+
+    /// Makes it the transform of another displacement; cheap where neither turns.
+    fn set(&mut self, by: &Displacement, centre: &Vector3<f64>) {
+        if by.w == Vector3::zeros() && self.rigid.r == Matrix3::identity() {
+            self.rigid.t = by.d;
+            self.image = centre + by.d;
+        } else {
+            *self = Self::new(by, centre);
         }
     }
 
@@ -202,7 +222,8 @@ impl Model {
             trigger: self.find(Place::Trigger),
             reading: self.find(Place::Reading),
         };
-        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, entries, n_rotary_workpiece, roles }
+        let moving = (0..self.slots.len()).filter(|&i| self.slots[i].changes == Changes::WithTouch).collect();
+        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, moving, entries, n_rotary_workpiece, roles }
     }
 }
 
@@ -327,10 +348,8 @@ impl At<'_> {
         }
         let o = &batch.observations[touch];
         let base = (1 + o.set_up) * self.n_slots;
-        for (i, slot) in model.slots.iter().enumerate() {
-            if slot.changes == Changes::WithTouch {
-                scratch.displacement[i] = self.displacement[base + i];
-            }
+        for &i in &batch.moving {
+            scratch.displacement[i] = self.displacement[base + i];
         }
         let own = &batch.coefficients[touch * batch.varying.len()..(touch + 1) * batch.varying.len()];
         for (&i, &coefficient) in batch.varying.iter().zip(own) {
@@ -346,11 +365,10 @@ impl At<'_> {
                 scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * a.factor * value);
             }
         }
-        for (i, slot) in model.slots.iter().enumerate() {
-            if slot.changes == Changes::WithTouch {
-                let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
-                scratch.placed[i] = Placed::new(&scratch.displacement[i], &centre);
-            }
+        for &i in &batch.moving {
+            let slot = &model.slots[i];
+            let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
+            scratch.placed[i].set(&scratch.displacement[i], &centre);
         }
     }
 
