@@ -71,3 +71,16 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<()> {
     temporary.persist(path).map_err(|e| fail(e.error))?;
     Ok(())
 }
+/// Takes a file away; one that is not there is no error.
+///
+/// # Errors
+/// When it is there and cannot be removed.
+pub fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(Failure::new("files::remove", format!("cannot remove {}: {e}", path.display()))
+                .help("check that you may write there"))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,24 +1,12 @@
-//! `axiscal demo`: the whole loop on built-in data, in seconds, with every file left behind to look at.
+//! `axiscal demo`: the whole loop on built-in data, in seconds, with every file left behind to look at. It calls the very
+//! verbs that a user calls, one after the other, and prints each call.
 
-use super::{Answer, Io};
-use crate::diag::{Result, source};
+use super::load::load_study;
+use super::{Answer, Io, call};
+use crate::diag::{Failure, Result};
 use crate::files;
-use crate::fit::outcome::{Outcome, Status};
-use crate::fit::{self, Fit, Settings};
-use crate::log::{self, Touch, Writer};
-use crate::machine::Machine;
-use crate::model::catalogue::Catalogue;
-use crate::model::data::Run;
-use crate::post::{LogRecord, Postprocessor};
-use crate::program::{self, Generated, ProgramSpec, plan::Plan};
-use crate::report::fit::{digits, number, significant, table};
-use crate::simulate::{self, Compensation, Scenario};
-use crate::study::{DataEntry, Study};
-use crate::tables::compensation::Provenance;
-use crate::tables::correction::Correction;
-use crate::tables::linuxcnc;
-use comfy_table::Cell;
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::fit::{self, Fit};
+use crate::report::fit::significant;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -30,266 +18,159 @@ pub struct Args {
     pub out: PathBuf,
 }
 
-const MACHINE: &str = "swivel-head";
+/// What is wrong with the machine of the demo; no verb but `simulate` is told.
+const SCENARIO: &str = include_str!("demo_wrong.toml");
 
-/// What is wrong with the machine of the demo; `identify` is not told.
-const SCENARIO: &str = "\
-# what is wrong with the virtual machine of the demo
-seed = 20
+/// Files of an earlier demo: written anew, where the folder is one of the demo.
+const WRITTEN: [&str; 8] = [
+    "full.log",
+    "study.toml",
+    "study.history.json",
+    "check-before.log",
+    "check-after.log",
+    "check-before.toml",
+    "check-after.toml",
+    "wrong.toml",
+];
 
-[effects.location-b]
-EX0B = 0.021
-EZ0B = -0.013
-EA0B = 0.0061
-EC0B = -0.0038
-
-[effects.location-c]
-EX0C = -0.017
-EY0C = 0.012
-EA0C = 0.0045
-EB0C = -0.0052
-
-[effects.pretravel]
-pretravel = 0.004
-
-[[block]]
-mounting = \"head\"
-name = \"x-\"
-shift = [0.12, -0.08, 0.05]
-tilt = [0.04, -0.03, 0.08]
-
-[[block]]
-mounting = \"table\"
-name = \"x+\"
-shift = [-0.10, 0.06, 0.03]
-tilt = [-0.02, 0.05, -0.06]
-
-[noise]
-touch_um = 0.5
-";
-
-/// The steps, as they are announced.
-const STEPS: u64 = 6;
+/// A step: what it is for, and the call; `OUT/` stands for the folder.
+const STEPS: [(&str, &str); 16] = [
+    (
+        "a probing program for LinuxCNC: every move checked for limits and collisions",
+        "generate --machine swivel-head --program full --controller linuxcnc --out OUT",
+    ),
+    (
+        "the virtual machine runs it, with errors that nobody else is told of, and writes the control's log",
+        "simulate --plan OUT/full.plan.json --machine swivel-head --scenario OUT/wrong.toml --controller linuxcnc --out OUT/full.log",
+    ),
+    (
+        "a study: what was measured, and what the model holds",
+        "new --machine swivel-head --plan OUT/full.plan.json --log OUT/full.log --controller linuxcnc --out OUT/study.toml",
+    ),
+    ("the machine's errors with their doubt: the model misses the touches", "identify OUT/study.toml"),
+    ("where does it fail?", "compare OUT/study.toml"),
+    ("which physical effect is missing?", "diagnose OUT/study.toml"),
+    ("the effects are added one by one, until nothing is left to find", "solve OUT/study.toml --yes"),
+    ("every model tried, and the error falling", "history OUT/study.toml"),
+    ("the errors again, now that nothing is missing", "identify OUT/study.toml"),
+    (
+        "the compensation as the control's own tables",
+        "export OUT/study.toml --controller linuxcnc --out OUT/compensation",
+    ),
+    (
+        "does it work? other points, before ...",
+        "generate --machine swivel-head --program OUT/check.toml --controller linuxcnc --out OUT",
+    ),
+    (
+        "... without the compensation",
+        "simulate --plan OUT/check.plan.json --machine swivel-head --scenario OUT/wrong.toml --controller linuxcnc --out OUT/check-before.log",
+    ),
+    (
+        "... and with it",
+        "simulate --plan OUT/check.plan.json --machine swivel-head --scenario OUT/wrong.toml --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.log",
+    ),
+    (
+        "one study for each",
+        "new --machine swivel-head --plan OUT/check.plan.json --log OUT/check-before.log --controller linuxcnc --out OUT/check-before.toml",
+    ),
+    (
+        "(the control says which compensation was active)",
+        "new --machine swivel-head --plan OUT/check.plan.json --log OUT/check-after.log --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.toml",
+    ),
+    ("before and after, side by side", "verify OUT/check-before.toml OUT/check-after.toml"),
+];
 
 /// Runs `demo`.
 ///
 /// # Errors
-/// When the folder cannot be written.
+/// When the folder cannot be written, or holds something else.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let bench = Bench::new(&args.out, io)?;
-    let step = Steps::new(io);
-
-    step.next("probing programs: every move checked for limits and collisions");
-    let (head, table_run) = (bench.generate("head")?, bench.generate("table")?);
-    let check = bench
-        .generate_from(&program::load(&source("check program of the demo", include_str!("demo_check.toml")))?.0)?;
-
-    step.next("the virtual machine runs them and writes the control's logs");
-    let before = [bench.touch(&head, "head.log", None)?, bench.touch(&table_run, "table.log", None)?];
-    let check_before = bench.touch(&check, "check-before.log", None)?;
-
-    step.next("identification: all errors at once, from both logs");
-    let fit =
-        bench.identify(&[(&head.plan, &before[0]), (&table_run.plan, &before[1])], &["location-b", "location-c"])?;
-    bench.write_study(&fit)?;
-
-    step.next("the compensation as the control's own tables");
-    let n_files = bench.export(&fit)?;
-
-    step.next("the control applies it; other points are probed again");
-    let compensation = bench.compensation()?;
-    let check_after = bench.touch(&check, "check-after.log", Some(&compensation))?;
-
-    step.next("before and after");
-    // with no location error in the model, only a block's set-up and the pre-travel can explain a reading
-    let left = |touches: &[Touch]| bench.identify(&[(&check.plan, touches)], &[]).map(|f| f.outcome.rms_um);
-    let (rms_before, rms_after) = (left(&check_before)?, left(&check_after)?);
-    step.done();
-
-    say(&fit.outcome, &bench.scenario, io);
-    io.say(format!(
-        "At {} other points: {} um RMS before, {} um after, with a probe that scatters by {} um\n",
-        check.plan.touches.len(),
-        significant(rms_before),
-        significant(rms_after),
-        significant(crate::units::um_from_mm(bench.scenario.noise.touch_mm)),
-    ));
+    prepare(&args.out)?;
+    let inner = io.inner();
+    let study = args.out.join("study.toml");
+    let mut before = None;
+    let mut done = Vec::new();
+    for (i, (what, line)) in STEPS.iter().enumerate() {
+        let words: Vec<String> = line.split(' ').map(|w| in_folder(w, &args.out)).collect();
+        io.say(format!("\n=== {} of {}: {what}\n$ axiscal {}\n", i + 1, STEPS.len(), words.join(" ")));
+        // "no" is an answer: the model that lacks something does not fit
+        let answer = call(&words, &inner)?;
+        done.push(json!({ "what": what, "call": words, "answer": if answer == Answer::Done { "yes" } else { "no" } }));
+        if words[0] == "new" && before.is_none() {
+            before = Some(look(&study, &inner)?);
+        }
+    }
+    let Some(before) = before else {
+        return Err(
+            Failure::new("demo::no_study", "the demo wrote no study").help("report this: it is a fault of the program")
+        );
+    };
+    let after = look(&study, &inner)?;
+    let (readings_before, readings_after) =
+        (readings(&args.out, "before", &inner)?, readings(&args.out, "after", &inner)?);
     let out = args.out.display();
+    io.say(format!(
+        "\n=== what the demo has shown\nThe model missed the touches by {} um RMS, and by {} um with what was found missing; the noise is {} um.\n\
+         At other points the machine was off by {} um RMS before, and by {} um with its compensation.\n",
+        significant(before.outcome.rms_um),
+        significant(after.outcome.rms_um),
+        significant(after.outcome.noise_um),
+        significant(readings_before),
+        significant(readings_after),
+    ));
     io.say("Where to look:");
     for (file, what) in [
-        ("head.ngc", "the first program (table.ngc is the second): its head says what to set up where"),
-        ("head.log", "what LinuxCNC would have written"),
+        ("full.ngc", "the program: its head says what to set up where, and when it stops for the operator"),
+        ("full.log", "what LinuxCNC would have written"),
         ("wrong.toml", "what was wrong with the machine"),
-        ("study.toml", "the study: `axiscal identify` takes it"),
+        ("study.toml", "the study, with the effects that were added"),
         ("compensation/README.txt", "how to load the compensation, and what must be set again"),
     ] {
         io.say(format!("  {:<38} {what}", format!("{out}/{file}")));
     }
-    io.say(format!("Next: axiscal identify {out}/study.toml"));
     io.answer(&json!({
-        "out": args.out.display().to_string(), "fit": brief(&fit.outcome), "planted": bench.scenario.planted,
-        "check": { "touches": check.plan.touches.len(), "rms_before_um": rms_before, "rms_after_um": rms_after },
-        "compensation_files": n_files,
+        "out": args.out.display().to_string(), "steps": done,
+        "before": brief(&before), "after": brief(&after),
+        "check": { "rms_before_um": readings_before, "rms_after_um": readings_after },
     }));
     // the machine is one of our own: an error that does not fall is a fault of the program
-    Ok(if rms_after < 0.5 * rms_before { Answer::Done } else { Answer::No })
+    let fell = after.outcome.rms_um < 0.8 * before.outcome.rms_um && readings_after < 0.5 * readings_before;
+    Ok(if fell { Answer::Done } else { Answer::No })
 }
 
-struct Bench<'a> {
-    machine: Machine,
-    catalogue: Catalogue,
-    post: Postprocessor,
-    scenario: Scenario,
-    out: &'a Path,
-    io: &'a Io,
-}
-
-impl<'a> Bench<'a> {
-    fn new(out: &'a Path, io: &'a Io) -> Result<Self> {
-        let machine = super::common::load_machine(MACHINE, None, io)?;
-        let text = source("wrong.toml", SCENARIO);
-        let (scenario, _) = simulate::scenario::parse(&text, &machine)?;
-        files::write_whole(&out.join("wrong.toml"), SCENARIO.as_bytes())?;
-        let (post, _) = Postprocessor::load_built_in_or_file(linuxcnc::CONTROLLER)?;
-        Ok(Self { machine, catalogue: Catalogue::built_in()?, post, scenario, out, io })
-    }
-
-    fn write(&self, name: &str, contents: &[u8]) -> Result<()> {
-        files::write_whole(&self.out.join(name), contents)
-    }
-
-    fn generate(&self, name: &str) -> Result<Generated> {
-        self.generate_from(&program::choose(program::built_in()?, name, &self.machine)?)
-    }
-
-    fn generate_from(&self, spec: &ProgramSpec) -> Result<Generated> {
-        let (generated, findings) = program::generate(&self.machine, spec, &program::Options::default())?;
-        self.io.report(&findings.0);
-        let nc = self.post.program(&self.machine, &generated.plan, &generated.path)?;
-        self.io.report(&nc.findings.0);
-        let name = &generated.plan.program;
-        self.write(&format!("{name}.{}", nc.extension), nc.text.as_bytes())?;
-        self.write(&format!("{name}.plan.json"), generated.plan.to_json().as_bytes())?;
-        Ok(generated)
-    }
-
-    /// Through the log's own text: simulated and real data walk the same path from there on.
-    fn touch(&self, run: &Generated, log_name: &str, compensation: Option<&Compensation>) -> Result<Vec<Touch>> {
-        let (raw, _) = simulate::run(&self.machine, &run.plan, &self.scenario, compensation)?;
-        let records: Vec<LogRecord> =
-            raw.iter().filter_map(|t| Some(LogRecord { id: t.id?, status: t.status, position: t.position })).collect();
-        let text = self.post.log_text(&self.machine, &run.plan, &records);
-        self.write(log_name, text.as_bytes())?;
-        let writer = Writer::Controller(&self.post);
-        let (matched, findings) = log::read(text.as_bytes(), log_name, writer, &self.machine, &run.plan)?;
-        self.io.report(&findings.0);
-        Ok(matched.touches)
-    }
-
-    fn identify(&self, runs: &[(&Plan, &[Touch])], location: &[&str]) -> Result<Fit> {
-        let runs: Vec<Run> =
-            runs.iter().map(|(plan, touches)| Run { plan, touches, mounting: None, started_s: None }).collect();
-        let effects = location.iter().copied().chain(["block-setup", "pretravel"]).map(str::to_owned).collect();
-        let settings = Settings { effects, touch_sigma_mm: Some(self.scenario.noise.touch_mm), visit_sigma_mm: Some(0.0), ..Settings::default() };
-        fit::identify(&self.machine, &self.catalogue, &runs, &settings)
-    }
-
-    fn write_study(&self, fit: &Fit) -> Result<()> {
-        let entry = |name: &str| DataEntry {
-            plan: format!("{name}.plan.json"),
-            log: format!("{name}.log"),
-            controller: linuxcnc::CONTROLLER.into(),
-            started_s: None,
-            mounting: None,
-            compensation: None,
-        };
-        let study = Study {
-            machines: None,
-            machine: self.machine.name.clone(),
-            effects_files: Vec::new(),
-            data: vec![entry("head"), entry("table")],
-            effects: fit.outcome.effects.clone(),
-            knowledge: std::collections::BTreeMap::new(),
-            touch_sigma_mm: Some(self.scenario.noise.touch_mm),
-            visit_sigma_mm: Some(0.0),
-            type_b: std::collections::BTreeMap::new(),
-            masked: Vec::new(),
-        };
-        self.write("study.toml", study.fresh()?.as_bytes())
-    }
-
-    fn export(&self, fit: &Fit) -> Result<usize> {
-        let provenance = Provenance {
-            study: "study.toml of the demo".into(),
-            study_sha256: String::new(),
-            data_date: "simulated".into(),
-        };
-        let (correction, _) = Correction::collect(&self.machine, &self.catalogue, &fit.outcome, None, provenance)?;
-        let (export, _) = linuxcnc::export(&self.machine, &correction, &linuxcnc::Options::default())?;
-        for (name, contents) in &export.files {
-            self.write(&format!("compensation/{name}"), contents)?;
-        }
-        Ok(export.files.len())
-    }
-
-    fn compensation(&self) -> Result<Compensation> {
-        let file = self.out.join("compensation").join("compensation.json");
-        let text = source(file.display().to_string(), files::read_text(&file)?);
-        Ok(Compensation::parse(&text, &self.machine)?.0)
+fn in_folder(word: &str, out: &Path) -> String {
+    match word.strip_prefix("OUT") {
+        Some(rest) => out.join(rest.trim_start_matches('/')).display().to_string().trim_end_matches('/').to_owned(),
+        None => word.to_owned(),
     }
 }
 
-/// Progress: a bar for a person, nothing in a pipe.
-struct Steps(ProgressBar);
-
-impl Steps {
-    fn new(io: &Io) -> Self {
-        if io.json {
-            return Self(ProgressBar::hidden());
-        }
-        let bar = ProgressBar::new(STEPS);
-        match ProgressStyle::with_template("{bar:24} {pos}/{len} {msg}") {
-            Ok(style) => Self(bar.with_style(style)),
-            Err(_) => Self(bar),
+/// Takes the files of an earlier demo away, and writes what the machine has wrong with it. A folder of somebody else is
+/// left alone: the verbs do not write over what is there.
+fn prepare(out: &Path) -> Result<()> {
+    if files::read_text(&out.join("wrong.toml")).is_ok_and(|text| text == SCENARIO) {
+        for name in WRITTEN {
+            files::remove(&out.join(name))?;
         }
     }
-
-    fn next(&self, what: &'static str) {
-        self.0.inc(1);
-        self.0.println(format!("{}/{STEPS} {what}", self.0.position()));
-        self.0.set_message(what);
-    }
-
-    fn done(&self) {
-        self.0.finish_and_clear();
-    }
+    files::write_whole(&out.join("wrong.toml"), SCENARIO.as_bytes())?;
+    files::write_whole(&out.join("check.toml"), include_str!("demo_check.toml").as_bytes())
 }
 
-fn say(o: &Outcome, scenario: &Scenario, io: &Io) {
-    let mut t = table(&["parameter", "planted", "identified", "std. uncertainty", "off by", "unit"]);
-    for planted in &scenario.planted {
-        let Some(p) = o.parameters.iter().find(|p| p.name == planted.parameter && p.effect == planted.effect) else {
-            continue;
-        };
-        let off = p.sigma.map_or_else(|| "-".to_owned(), |s| format!("{:+.1} sigma", (p.value - planted.value) / s));
-        t.add_row(vec![
-            Cell::new(&p.name),
-            number(planted.value),
-            number(if p.status == Status::Identified { digits(p.value, p.sigma) } else { "?".into() }),
-            number(p.sigma.map_or_else(|| "-".into(), significant)),
-            number(off),
-            Cell::new(&p.unit),
-        ]);
-    }
-    io.say(format!(
-        "\n{} touches, {} unknowns of rank {}; {} um RMS left\n{t}\n",
-        o.touches,
-        o.unknowns,
-        o.rank,
-        significant(o.rms_um)
-    ));
+fn look(study: &Path, io: &Io) -> Result<Fit> {
+    let loaded = load_study(study, io)?;
+    fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())
 }
 
-fn brief(o: &Outcome) -> Outcome {
-    Outcome { residuals: None, ..o.clone() }
+/// RMS of the readings at the check points, µm: only the blocks' places and the probe are solved for.
+fn readings(out: &Path, when: &str, io: &Io) -> Result<f64> {
+    let loaded = load_study(&out.join(format!("check-{when}.toml")), io)?;
+    let mut settings = loaded.settings();
+    settings.quick = true;
+    settings.effects.retain(|id| loaded.catalogue.get(id, &loaded.machine).is_some_and(|e| e.nuisance));
+    Ok(fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome.rms_um)
+}
+
+fn brief(fit: &Fit) -> fit::outcome::Outcome {
+    fit::outcome::Outcome { residuals: None, ..fit.outcome.clone() }
 }

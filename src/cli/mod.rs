@@ -102,30 +102,42 @@ pub fn main() -> ExitCode {
         Err(e) => e.exit(),
     };
     let io = Io::new(cli.json);
-    let answer = match cli.verb {
-        Verb::Demo(args) => demo::run(&args, &io),
-        Verb::Machines(args) => machines::run(&args, &io),
-        Verb::Effects(args) => effects::run(&args, &io),
-        Verb::Controllers(args) => controllers::run(&args, &io),
-        Verb::Programs(args) => programs::run(&args, &io),
-        Verb::Assess(args) => assess::run(&args, &io),
-        Verb::Generate(args) => generate::run(&args, &io),
-        Verb::Simulate(args) => simulate::run(&args, &io),
-        Verb::Parse(args) => parse::run(&args, &io),
-        Verb::Reproduce(args) => reproduce::run(&args, &io),
-        Verb::New(args) => new::run(&args, &io),
-        Verb::Identify(args) => identify::run(&args, &io),
-        Verb::Diagnose(args) => diagnose::run(&args, &io),
-        Verb::Solve(args) => solve::run(&args, &io),
-        Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
-        Verb::Compare(args) => compare::run(&args, &io),
-        Verb::PlanNext(args) => plan_next::run(&args, &io),
-        Verb::Add(args) => add::add(&args, &io),
-        Verb::Remove(args) => add::remove(&args, &io),
-        Verb::History(args) => add::history(&args, &io),
-        Verb::Verify(args) => verify::run(&args, &io),
-        Verb::Export(args) => export::run(&args, &io),
-        Verb::Schema(args) => schema::run(&args, &io),
-    };
-    io.finish(answer)
+    io.finish(dispatch(cli.verb, &io))
+}
+
+/// Another verb, called by one of them with the words that a user would type.
+fn call(words: &[String], io: &Io) -> crate::diag::Result<Answer> {
+    let typed = std::iter::once("axiscal").chain(words.iter().map(String::as_str));
+    let cli = Cli::try_parse_from(typed).map_err(|e| {
+        crate::diag::Failure::new("cli::call", e.to_string()).help("report this: it is a fault of the program")
+    })?;
+    dispatch(cli.verb, io)
+}
+
+fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
+    match verb {
+        Verb::Demo(args) => demo::run(&args, io),
+        Verb::Machines(args) => machines::run(&args, io),
+        Verb::Effects(args) => effects::run(&args, io),
+        Verb::Controllers(args) => controllers::run(&args, io),
+        Verb::Programs(args) => programs::run(&args, io),
+        Verb::Assess(args) => assess::run(&args, io),
+        Verb::Generate(args) => generate::run(&args, io),
+        Verb::Simulate(args) => simulate::run(&args, io),
+        Verb::Parse(args) => parse::run(&args, io),
+        Verb::Reproduce(args) => reproduce::run(&args, io),
+        Verb::New(args) => new::run(&args, io),
+        Verb::Identify(args) => identify::run(&args, io),
+        Verb::Diagnose(args) => diagnose::run(&args, io),
+        Verb::Solve(args) => solve::run(&args, io),
+        Verb::SketchEffect(args) => sketch_effect::run(&args, io),
+        Verb::Compare(args) => compare::run(&args, io),
+        Verb::PlanNext(args) => plan_next::run(&args, io),
+        Verb::Add(args) => add::add(&args, io),
+        Verb::Remove(args) => add::remove(&args, io),
+        Verb::History(args) => add::history(&args, io),
+        Verb::Verify(args) => verify::run(&args, io),
+        Verb::Export(args) => export::run(&args, io),
+        Verb::Schema(args) => schema::run(&args, io),
+    }
 }
