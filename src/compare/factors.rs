@@ -56,13 +56,14 @@ pub(super) fn splits(fit: &Fit, points: &[Point], misfit: &Misfit) -> Vec<Split>
         let (by, angle) =
             if axis.is_rotary() { (format!("pose.{letter}"), Some(values.clone())) } else { (letter.clone(), None) };
         let what = if axis.is_rotary() { letter } else { format!("the position of {letter}") };
-        add(&by, &what, measured(&values, 1e-2), Common::Displacement, angle);
+        let levels = measured(&values, 1e-2, if axis.is_rotary() { MOST_LEVELS } else { N_BINS });
+        add(&by, &what, levels, Common::Displacement, angle);
     }
     let of = |value: &dyn Fn(&Point) -> f64| points.iter().map(value).collect::<Vec<f64>>();
     add("time", "the time", bins(&of(&|p| p.time_h), 1e-9), Common::Displacement, None);
-    add("feed", "the feed", measured(&of(&|p| p.feed_mm_min), 1e-6), Common::Residual, None);
-    add("spindle", "the orientation of the spindle", measured(&of(&|p| p.spindle_deg), 1e-2), Common::Displacement, None);
-    add("stylus", "the stylus", measured(&of(&|p| p.stylus_mm), 1e-6), Common::Displacement, None);
+    add("feed", "the feed", measured(&of(&|p| p.feed_mm_min), 1e-6, MOST_LEVELS), Common::Residual, None);
+    add("spindle", "the orientation of the spindle", measured(&of(&|p| p.spindle_deg), 1e-2, MOST_LEVELS), Common::Displacement, None);
+    add("stylus", "the stylus", measured(&of(&|p| p.stylus_mm), 1e-6, MOST_LEVELS), Common::Displacement, None);
     if points.iter().all(|p| p.temperature_deg_c.is_some()) {
         let values = of(&|p| p.temperature_deg_c.unwrap_or(20.0));
         add("temperature", "the temperature", bins(&values, 1e-3), Common::Displacement, None);
@@ -106,12 +107,12 @@ fn approach(points: &[Point]) -> Levels {
 }
 
 /// Each value a group where they are few, else bins.
-fn measured(values: &[f64], resolution: f64) -> Levels {
+fn measured(values: &[f64], resolution: f64, most: usize) -> Levels {
     let key = |v: f64| (v / resolution).round() as i64;
     let mut keys: Vec<i64> = values.iter().map(|v| key(*v)).collect();
     keys.sort_unstable();
     keys.dedup();
-    if keys.len() > MOST_LEVELS {
+    if keys.len() > most {
         return bins(values, resolution);
     }
     let of: Vec<usize> = values.iter().map(|v| keys.binary_search(&key(*v)).unwrap_or(0)).collect();
@@ -205,11 +206,11 @@ fn split(
         })
         .collect();
     let joint: Vec<usize> = (first..first + 6 * orders).collect();
-    let joint_share = if orders > 0 { beside.share(&joint) } else { Share { share: 0.0, p: 1.0, rank: 0 } };
-    let best = if joint_share.share > groups_share.share { joint_share } else { groups_share };
+    let joint_share = if orders > 0 { beside.share(&joint) } else { Share { share: 0.0, p: 1.0, rank: 0, evidence: f64::NEG_INFINITY } };
+    let best = if joint_share.evidence > groups_share.evidence { joint_share } else { groups_share };
     let groups = groups(fit, points, levels);
     let says = says(what, best.share, &harmonics, &groups, common);
-    Split { by: by.into(), share: best.share, p: best.p, harmonics, groups, says }
+    Split { by: by.into(), share: best.share, p: best.p, columns: best.rank, evidence: best.evidence.max(-1e9), harmonics, groups, says }
 }
 
 fn groups(fit: &Fit, points: &[Point], levels: &Levels) -> Vec<Group> {
