@@ -200,8 +200,12 @@ pub fn compare(fit: &Fit) -> Comparison {
     let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
     let says = match (fit.dof, explained_by_noise, first) {
         (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
-        (_, true, _) => format!("what is left, {rms_um:.2} um, is what a noise of {noise_um:.2} um leaves: the model does not fail"),
-        (_, false, Some(split)) => format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says),
+        (_, true, _) => {
+            format!("what is left, {rms_um:.2} um, is what a noise of {noise_um:.2} um leaves: the model does not fail")
+        }
+        (_, false, Some(split)) => {
+            format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says)
+        }
         (_, false, None) => format!(
             "the model misses the touches by {:.1} times their noise, and what is left goes with nothing in particular",
             chi2_per_dof.sqrt()
@@ -273,7 +277,12 @@ fn worst(fit: &Fit, points: &[Point]) -> Vec<Worst> {
             standardised: p.standardised,
             block: p.block.clone(),
             face: p.face.clone(),
-            pose: p.axes.iter().filter(|(a, _)| matches!(a.as_str(), "A" | "B" | "C")).map(|(a, v)| (a.clone(), *v)).collect(),
+            pose: p
+                .axes
+                .iter()
+                .filter(|(a, _)| matches!(a.as_str(), "A" | "B" | "C"))
+                .map(|(a, v)| (a.clone(), *v))
+                .collect(),
             rejected: fit.rejected.get(&i).cloned(),
         }
     });
