@@ -45,7 +45,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let same_plans = before.runs.len() == after.runs.len()
         && before.runs.iter().zip(&after.runs).all(|(b, a)| {
             let points = |p: &crate::program::plan::Plan| {
-                p.touches.iter().map(|t| (t.point, t.normal, t.pose.clone())).collect::<Vec<_>>()
+                p.touches.iter().map(|t| (t.point, t.normal, t.pose)).collect::<Vec<_>>()
             };
             points(&b.plan) == points(&a.plan)
         });

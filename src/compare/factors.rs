@@ -140,10 +140,10 @@ fn bins(values: &[f64], resolution: f64) -> Levels {
     let bin = |v: f64| edges.iter().filter(|e| v >= **e - 0.5 * resolution).count();
     let mut levels = Levels { of: Vec::new(), names: Vec::new(), at: Vec::new() };
     let mut place = vec![usize::MAX; edges.len() + 1];
-    for k in 0..=edges.len() {
+    for (k, place) in place.iter_mut().enumerate() {
         let inside: Vec<f64> = sorted.iter().copied().filter(|v| bin(*v) == k).collect();
         if let (Some(first), Some(last)) = (inside.first(), inside.last()) {
-            place[k] = levels.names.len();
+            *place = levels.names.len();
             let same = last - first <= resolution;
             levels.names.push(if same { plain(*first) } else { format!("{} … {}", plain(*first), plain(*last)) });
             levels.at.push(Some(inside.iter().sum::<f64>() / inside.len() as f64));

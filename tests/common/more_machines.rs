@@ -26,8 +26,10 @@ fn text() -> String {
     for (name, workpiece, tool, carrier) in CHAINS {
         let letters: String = format!("{workpiece}{tool}");
         let origin: Vec<String> = letters.chars().map(|c| format!("{c} = 0.0")).collect();
-        out +=
-            &format!("\n[[machine]]\nname = \"{name}\"\nsays = \"for tests\"\norigin = {{ {} }}\n", origin.join(", "));
+        out += &format!(
+            "\n[[machine]]\nname = \"{name}\"\nsays = \"for tests\"\norigin = {{ {} }}\n",
+            origin.join(", ")
+        );
         let mut parents = Vec::new();
         for side in [workpiece, tool] {
             let mut parent = "base".to_owned();
