@@ -102,9 +102,8 @@ fn run(args: &Args, io: &Io, edit: impl Fn(&Loaded, &str) -> Result<String>) -> 
     let edited = edit(&loaded, &text)?;
     let history_path = history_path(&args.study);
     let mut history = read_history(&history_path)?.unwrap_or_default();
-    let fit_of = |loaded: &Loaded| {
-        fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())
-    };
+    let fit_of =
+        |loaded: &Loaded| fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings());
     let before = fit_of(&loaded)?;
     history.push(step(&loaded, &before));
     let (study, _) = crate::study::Study::parse(&source(args.study.display().to_string(), edited.clone()))?;
@@ -144,7 +143,8 @@ fn run(args: &Args, io: &Io, edit: impl Fn(&Loaded, &str) -> Result<String>) -> 
 pub fn history(args: &HistoryArgs, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut history = read_history(&history_path(&args.study))?.unwrap_or_default();
-    let current = history.steps.last().is_some_and(|s| s.effects == loaded.study.effects && s.data_sha256 == loaded.data_sha256);
+    let current =
+        history.steps.last().is_some_and(|s| s.effects == loaded.study.effects && s.data_sha256 == loaded.data_sha256);
     if !current {
         let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
         history.push(step(&loaded, &fit));

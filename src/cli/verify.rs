@@ -45,7 +45,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let same_plans = before.runs.len() == after.runs.len()
         && before.runs.iter().zip(&after.runs).all(|(b, a)| {
             let points = |p: &crate::program::plan::Plan| {
-                p.touches.iter().map(|t| (t.point, t.normal, t.pose.clone())).collect::<Vec<_>>()
+                p.touches.iter().map(|t| (t.point, t.normal, t.pose)).collect::<Vec<_>>()
             };
             points(&b.plan) == points(&a.plan)
         });
@@ -93,13 +93,8 @@ fn figures(loaded: &Loaded, fit: &Fit) -> Result<Figures> {
             (0..batch.len()).filter(|&i| fit.weight[i] > 0.0).map(|i| at.gap(i, &mut scratch).powi(2)).sum();
         (um_from_mm((squares / fit.n_used().max(1) as f64).sqrt()), fit.n_used())
     } else {
-        let settings = Settings {
-            effects,
-            knowledge: BTreeMap::new(),
-            type_b: BTreeMap::new(),
-            quick: true,
-            ..loaded.settings()
-        };
+        let settings =
+            Settings { effects, knowledge: BTreeMap::new(), type_b: BTreeMap::new(), quick: true, ..loaded.settings() };
         let bare = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
         (bare.outcome.rms_um, bare.dof)
     };

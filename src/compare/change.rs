@@ -39,9 +39,8 @@ fn known(p: &Parameter) -> Option<(f64, f64)> {
 /// Compares two fits of the same touches.
 #[must_use]
 pub fn change(before: &Outcome, after: &Outcome) -> Change {
-    let results = |o: &Outcome| -> Vec<Parameter> {
-        o.parameters.iter().filter(|p| !p.name.contains('@')).cloned().collect()
-    };
+    let results =
+        |o: &Outcome| -> Vec<Parameter> { o.parameters.iter().filter(|p| !p.name.contains('@')).cloned().collect() };
     let (was, is) = (results(before), results(after));
     let kept: Vec<Pair> = was
         .iter()

@@ -2,6 +2,7 @@
 
 use super::share::{Misfit, Share};
 use super::{Group, Harmonic, Point, Split};
+use crate::axes::AxisName;
 use crate::fit::Fit;
 use crate::units::rad_from_deg;
 use nalgebra::DMatrix;
@@ -38,7 +39,7 @@ struct Levels {
 
 pub(super) fn splits(fit: &Fit, points: &[Point], misfit: &Misfit) -> Vec<Split> {
     let mut out = Vec::new();
-    let mut add = |by: &str, what: &str, levels: Levels, common: Common, angle_deg: Option<Vec<f64>>| {
+    let mut add = |by: &str, what: &str, levels: Levels, common: Common, angle_deg: Option<(AxisName, Vec<f64>)>| {
         if levels.names.len() > 1 {
             out.push(split(fit, points, misfit, (by, what), &levels, common, angle_deg));
         }
@@ -53,16 +54,26 @@ pub(super) fn splits(fit: &Fit, points: &[Point], misfit: &Misfit) -> Vec<Split>
     for axis in fit.model.axes() {
         let letter = axis.letter().to_string();
         let values: Vec<f64> = points.iter().map(|p| p.axes.get(&letter).copied().unwrap_or(0.0)).collect();
-        let (by, angle) =
-            if axis.is_rotary() { (format!("pose.{letter}"), Some(values.clone())) } else { (letter.clone(), None) };
+        let (by, angle) = if axis.is_rotary() {
+            (format!("pose.{letter}"), Some((axis, values.clone())))
+        } else {
+            (letter.clone(), None)
+        };
         let what = if axis.is_rotary() { letter } else { format!("the position of {letter}") };
-        add(&by, &what, measured(&values, 1e-2), Common::Displacement, angle);
+        let levels = measured(&values, 1e-2, if axis.is_rotary() { MOST_LEVELS } else { N_BINS });
+        add(&by, &what, levels, Common::Displacement, angle);
     }
     let of = |value: &dyn Fn(&Point) -> f64| points.iter().map(value).collect::<Vec<f64>>();
     add("time", "the time", bins(&of(&|p| p.time_h), 1e-9), Common::Displacement, None);
-    add("feed", "the feed", measured(&of(&|p| p.feed_mm_min), 1e-6), Common::Residual, None);
-    add("spindle", "the orientation of the spindle", measured(&of(&|p| p.spindle_deg), 1e-2), Common::Displacement, None);
-    add("stylus", "the stylus", measured(&of(&|p| p.stylus_mm), 1e-6), Common::Displacement, None);
+    add("feed", "the feed", measured(&of(&|p| p.feed_mm_min), 1e-6, MOST_LEVELS), Common::Residual, None);
+    add(
+        "spindle",
+        "the orientation of the spindle",
+        measured(&of(&|p| p.spindle_deg), 1e-2, MOST_LEVELS),
+        Common::Displacement,
+        None,
+    );
+    add("stylus", "the stylus", measured(&of(&|p| p.stylus_mm), 1e-6, MOST_LEVELS), Common::Displacement, None);
     if points.iter().all(|p| p.temperature_deg_c.is_some()) {
         let values = of(&|p| p.temperature_deg_c.unwrap_or(20.0));
         add("temperature", "the temperature", bins(&values, 1e-3), Common::Displacement, None);
@@ -106,12 +117,12 @@ fn approach(points: &[Point]) -> Levels {
 }
 
 /// Each value a group where they are few, else bins.
-fn measured(values: &[f64], resolution: f64) -> Levels {
+fn measured(values: &[f64], resolution: f64, most: usize) -> Levels {
     let key = |v: f64| (v / resolution).round() as i64;
     let mut keys: Vec<i64> = values.iter().map(|v| key(*v)).collect();
     keys.sort_unstable();
     keys.dedup();
-    if keys.len() > MOST_LEVELS {
+    if keys.len() > most {
         return bins(values, resolution);
     }
     let of: Vec<usize> = values.iter().map(|v| keys.binary_search(&key(*v)).unwrap_or(0)).collect();
@@ -129,10 +140,10 @@ fn bins(values: &[f64], resolution: f64) -> Levels {
     let bin = |v: f64| edges.iter().filter(|e| v >= **e - 0.5 * resolution).count();
     let mut levels = Levels { of: Vec::new(), names: Vec::new(), at: Vec::new() };
     let mut place = vec![usize::MAX; edges.len() + 1];
-    for k in 0..=edges.len() {
+    for (k, place) in place.iter_mut().enumerate() {
         let inside: Vec<f64> = sorted.iter().copied().filter(|v| bin(*v) == k).collect();
         if let (Some(first), Some(last)) = (inside.first(), inside.last()) {
-            place[k] = levels.names.len();
+            *place = levels.names.len();
             let same = last - first <= resolution;
             levels.names.push(if same { plain(*first) } else { format!("{} … {}", plain(*first), plain(*last)) });
             levels.at.push(Some(inside.iter().sum::<f64>() / inside.len() as f64));
@@ -156,7 +167,7 @@ fn split(
     (by, what): (&str, &str),
     levels: &Levels,
     common: Common,
-    angle_deg: Option<Vec<f64>>,
+    angle_deg: Option<(AxisName, Vec<f64>)>,
 ) -> Split {
     let n = points.len();
     let width = match common {
@@ -168,6 +179,10 @@ fn split(
     let n_turns = if angle_deg.is_some() { ORDERS } else { 0 };
     let mut columns = DMatrix::zeros(n, width * n_levels + 6 * n_turns);
     for (i, p) in points.iter().enumerate() {
+        // blocks beside a turntable do not see its errors
+        if angle_deg.as_ref().is_some_and(|(axis, _)| !fit.model.sees(*axis, &fit.data.observations[i])) {
+            continue;
+        }
         match common {
             Common::Residual => columns[(i, levels.of[i])] = 1.0,
             Common::Displacement => (0..3).for_each(|k| columns[(i, 3 * levels.of[i] + k)] = p.normal[k]),
@@ -176,7 +191,7 @@ fn split(
                 columns[(i, 4 * levels.of[i] + 3)] = 1.0;
             }
         }
-        if let Some(angle) = &angle_deg {
+        if let Some((_, angle)) = &angle_deg {
             for k in 1..=ORDERS {
                 let (sin, cos) = (k as f64 * rad_from_deg(angle[i])).sin_cos();
                 for c in 0..3 {
@@ -205,11 +220,24 @@ fn split(
         })
         .collect();
     let joint: Vec<usize> = (first..first + 6 * orders).collect();
-    let joint_share = if orders > 0 { beside.share(&joint) } else { Share { share: 0.0, p: 1.0, rank: 0 } };
-    let best = if joint_share.share > groups_share.share { joint_share } else { groups_share };
+    let joint_share = if orders > 0 {
+        beside.share(&joint)
+    } else {
+        Share { share: 0.0, p: 1.0, rank: 0, evidence: f64::NEG_INFINITY }
+    };
+    let best = if joint_share.evidence > groups_share.evidence { joint_share } else { groups_share };
     let groups = groups(fit, points, levels);
     let says = says(what, best.share, &harmonics, &groups, common);
-    Split { by: by.into(), share: best.share, p: best.p, harmonics, groups, says }
+    Split {
+        by: by.into(),
+        share: best.share,
+        p: best.p,
+        columns: best.rank,
+        evidence: best.evidence.max(-1e9),
+        harmonics,
+        groups,
+        says,
+    }
 }
 
 fn groups(fit: &Fit, points: &[Point], levels: &Levels) -> Vec<Group> {
@@ -243,9 +271,17 @@ fn says(what: &str, share: f64, harmonics: &[Harmonic], groups: &[Group], common
             _ => "three times",
         };
         let most = h.along.iter().copied().fold(0.0, f64::max);
-        let along: Vec<&str> =
-            ["X", "Y", "Z"].into_iter().zip(h.along).filter(|(_, s)| *s > 0.5 * most && most > 0.0).map(|(c, _)| c).collect();
-        return format!("{} of what is left goes with {what}, {times} per turn, along {}", percent(share), along.join(" and "));
+        let along: Vec<&str> = ["X", "Y", "Z"]
+            .into_iter()
+            .zip(h.along)
+            .filter(|(_, s)| *s > 0.5 * most && most > 0.0)
+            .map(|(c, _)| c)
+            .collect();
+        return format!(
+            "{} of what is left goes with {what}, {times} per turn, along {}",
+            percent(share),
+            along.join(" and ")
+        );
     }
     let size = |g: &&Group| if common == Common::Residual { g.mean_um.abs() } else { g.rms_um };
     match groups.iter().filter(|g| g.n > 0).max_by(|a, b| size(a).total_cmp(&size(b))) {

@@ -47,7 +47,7 @@ pub struct Comparison {
     pub explained_by_noise: bool,
     /// All in a sentence.
     pub says: String,
-    /// Ways to split the touches, the one that explains most first.
+    /// Ways to split the touches, the one that explains most with the fewest groups first.
     pub splits: Vec<Split>,
     /// The touches furthest off, worst first, those that were not used included.
     pub worst: Vec<Worst>,
@@ -64,6 +64,10 @@ pub struct Split {
     pub share: f64,
     /// Probability that noise alone does as well.
     pub p: f64,
+    /// Free numbers that it has beside the model.
+    pub columns: usize,
+    /// Schwarz's criterion: how much better the touches are described, less the price of the columns. Splits are sorted by it.
+    pub evidence: f64,
     /// Of a rotary axis: harmonics of its position, each alone.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub harmonics: Vec<Harmonic>,
@@ -189,14 +193,19 @@ pub fn compare(fit: &Fit) -> Comparison {
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
     let explained_by_noise = fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof);
     let mut splits = factors::splits(fit, &points, &Misfit::new(fit));
-    splits.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let rank = |s: &Split| (s.share >= factors::WORTH_NAMING, s.evidence);
+    splits.sort_by(|a, b| rank(b).0.cmp(&rank(a).0).then(rank(b).1.total_cmp(&rank(a).1)));
     let rms_um = fit.outcome.rms_um;
     let noise_um = um_from_mm(fit.noise.sigma_mm);
     let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
     let says = match (fit.dof, explained_by_noise, first) {
         (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
-        (_, true, _) => format!("what is left, {rms_um:.2} um, is what a noise of {noise_um:.2} um leaves: the model does not fail"),
-        (_, false, Some(split)) => format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says),
+        (_, true, _) => {
+            format!("what is left, {rms_um:.2} um, is what a noise of {noise_um:.2} um leaves: the model does not fail")
+        }
+        (_, false, Some(split)) => {
+            format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says)
+        }
         (_, false, None) => format!(
             "the model misses the touches by {:.1} times their noise, and what is left goes with nothing in particular",
             chi2_per_dof.sqrt()
@@ -268,7 +277,12 @@ fn worst(fit: &Fit, points: &[Point]) -> Vec<Worst> {
             standardised: p.standardised,
             block: p.block.clone(),
             face: p.face.clone(),
-            pose: p.axes.iter().filter(|(a, _)| matches!(a.as_str(), "A" | "B" | "C")).map(|(a, v)| (a.clone(), *v)).collect(),
+            pose: p
+                .axes
+                .iter()
+                .filter(|(a, _)| matches!(a.as_str(), "A" | "B" | "C"))
+                .map(|(a, v)| (a.clone(), *v))
+                .collect(),
             rejected: fit.rejected.get(&i).cloned(),
         }
     });

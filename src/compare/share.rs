@@ -16,6 +16,9 @@ pub struct Share {
     pub p: f64,
     /// Degrees of freedom that the columns add.
     pub rank: usize,
+    /// How much better the touches are described, less the price of the columns: n·ln(χ²/χ²after) − rank·ln n
+    /// (Schwarz's criterion). Of two splits that explain alike, the one with fewer groups says more.
+    pub evidence: f64,
 }
 
 /// A fit at its minimum, whitened.
@@ -50,6 +53,7 @@ impl<'f> Misfit<'f> {
         let seen = self.jacobian.tr_mul(&columns);
         let gram = columns.tr_mul(&columns) - seen.tr_mul(&(&self.covariance * &seen));
         Beside {
+            n: self.fit.n_used() as f64,
             gram,
             slope: columns.tr_mul(&self.residual),
             chi2: self.fit.chi2,
@@ -60,6 +64,8 @@ impl<'f> Misfit<'f> {
 
 /// Columns beside the model.
 pub(super) struct Beside {
+    /// Touches used.
+    n: f64,
     gram: DMatrix<f64>,
     slope: DVector<f64>,
     chi2: f64,
@@ -87,13 +93,15 @@ impl Beside {
         let q = rank as f64;
         let rest = self.dof - q;
         if rank == 0 || rest < 1.0 {
-            return Share { share: 0.0, p: 1.0, rank };
+            return Share { share: 0.0, p: 1.0, rank, evidence: f64::NEG_INFINITY };
         }
         let left = (self.chi2 - taken).max(0.0);
         let per_dof = (left / rest).max(1.0);
         let excess = (self.chi2 - self.dof).max(4.0 * (2.0 * self.dof).sqrt());
         let share = ((taken - q * per_dof) / excess).clamp(0.0, 1.0);
         let p = FisherSnedecor::new(q, rest).map_or(1.0, |f| f.sf(taken / q / (left / rest).max(1e-300)));
-        Share { share, p, rank }
+        let n = self.n;
+        let evidence = n * (self.chi2 / left.max(1e-9 * self.chi2)).ln() - q * n.ln();
+        Share { share, p, rank, evidence }
     }
 }

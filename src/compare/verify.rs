@@ -133,7 +133,10 @@ pub fn verify(
         Verdict::Improved => format!("the compensation works: {readings}"),
         Verdict::NotImproved => format!("no improvement: {readings}"),
         Verdict::Changed => {
-            format!("the machine has changed: {n_changed} of {} errors by more than their doubt; {readings}", rows.len())
+            format!(
+                "the machine has changed: {n_changed} of {} errors by more than their doubt; {readings}",
+                rows.len()
+            )
         }
         Verdict::NotChanged => {
             format!("no change: none of {} errors differs by more than its doubt; {readings}", rows.len())

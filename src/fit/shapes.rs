@@ -62,7 +62,8 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
         }
         (gain, step.component_div(&scale))
     };
-    let mut best: Vec<f64> = shaped.iter().map(|&i| effect.parameters[i].shape.map_or(0.0, |(start, _, _)| start)).collect();
+    let mut best: Vec<f64> =
+        shaped.iter().map(|&i| effect.parameters[i].shape.map_or(0.0, |(start, _, _)| start)).collect();
     let mut found = judge(&best);
     // one after another, twice: shapes of one effect are few
     for _ in 0..if shaped.len() > 1 { 2 } else { 1 } {

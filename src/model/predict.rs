@@ -294,6 +294,13 @@ impl Model {
         names
     }
 
+    /// Does an error of this axis move the ball against the touched block? Blocks beside a turntable do not see it.
+    #[must_use]
+    pub fn sees(&self, axis: crate::axes::AxisName, touch: &Observation) -> bool {
+        let carried = self.carrier_length(self.set_ups[touch.set_up].carrier);
+        self.tool.iter().chain(&self.workpiece[..carried]).any(|l| l.axis.name == axis)
+    }
+
     /// The set-ups of the blocks.
     #[must_use]
     pub fn set_ups(&self) -> &[SetUp] {

@@ -122,7 +122,17 @@ pub fn csv(c: &Comparison) -> String {
     let mut head: Vec<&str> =
         vec!["run", "id", "line", "order", "residual_um", "standardised", "used", "stage", "block", "face", "visit"];
     head.extend(axes.iter().map(|a| a.as_str()));
-    head.extend(["nx", "ny", "nz", "approach_deg", "time_h", "temperature_degC", "feed_mm_min", "spindle_deg", "stylus_mm"]);
+    head.extend([
+        "nx",
+        "ny",
+        "nz",
+        "approach_deg",
+        "time_h",
+        "temperature_degC",
+        "feed_mm_min",
+        "spindle_deg",
+        "stylus_mm",
+    ]);
     let mut out = head.join(",") + "\n";
     for p in &c.points {
         let mut row: Vec<String> = [p.run, p.id as usize, p.line, p.order].iter().map(ToString::to_string).collect();

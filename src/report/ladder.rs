@@ -18,7 +18,13 @@ fn stated(value: Option<(f64, f64)>) -> String {
 
 /// Before and after a change of the model.
 #[must_use]
-pub fn change(before: &Outcome, after: &Outcome, c: &Change, later: (Option<f64>, Option<f64>), paper: Paper) -> String {
+pub fn change(
+    before: &Outcome,
+    after: &Outcome,
+    c: &Change,
+    later: (Option<f64>, Option<f64>),
+    paper: Paper,
+) -> String {
     let mut t = table(&["", "before", "after"]);
     let mut row = |what: &str, b: String, a: String| {
         t.add_row(vec![Cell::new(what), number(b), number(a)]);

@@ -12,7 +12,8 @@ use std::ops::Range;
 /// # Errors
 /// When the study cannot be read, or would not be read back as meant.
 pub fn add(text: &str, ids: &[String]) -> Result<String> {
-    ids.iter().try_fold(text.to_owned(), |text, id| change(&text, |text, list| put(text, list, id), |e| e.push(id.clone())))
+    ids.iter()
+        .try_fold(text.to_owned(), |text, id| change(&text, |text, list| put(text, list, id), |e| e.push(id.clone())))
 }
 
 /// The text without effects in `model.effects`.
@@ -52,7 +53,10 @@ fn change(
     let edited = edit(text, &list);
     match effects(&edited) {
         Ok(now) if now == expected => Ok(edited),
-        _ => Err(Failure::new("study::edit", "the study cannot be edited in place").help("edit the list of effects by hand")),
+        _ => {
+            Err(Failure::new("study::edit", "the study cannot be edited in place")
+                .help("edit the list of effects by hand"))
+        }
     }
 }
 
@@ -121,7 +125,12 @@ fn take(text: &str, list: &List, at: usize) -> String {
     let behind = comma(text, item.end).map_or(item.end, |c| c + 1);
     // a line of its own, but for a remark about it
     let alone = start > list.whole.start && text[start..item.start].trim().is_empty();
-    if let Some(stop) = stop.filter(|s| alone && { let rest = text[behind..*s].trim(); rest.is_empty() || rest.starts_with('#') }) {
+    if let Some(stop) = stop.filter(|s| {
+        alone && {
+            let rest = text[behind..*s].trim();
+            rest.is_empty() || rest.starts_with('#')
+        }
+    }) {
         let mut out = text[..start].to_owned();
         if let Some(before) = list.items[..at].last().filter(|_| is_last && behind == item.end)
             && let Some(comma) = comma(text, before.end)

@@ -58,8 +58,8 @@ impl History {
     /// When the text is no history.
     pub fn parse(source: &Source) -> Result<Self> {
         let help = "it is written by `axiscal add` and `remove`; delete it to begin a new ladder";
-        let history: Self = serde_json::from_str(source.inner())
-            .map_err(|e| from_json(&e, source, "history::not_json").help(help))?;
+        let history: Self =
+            serde_json::from_str(source.inner()).map_err(|e| from_json(&e, source, "history::not_json").help(help))?;
         if history.format != FORMAT {
             return Err(Failure::new(
                 "history::format",
@@ -98,6 +98,10 @@ impl History {
     /// Steps that were fitted on other data than these.
     #[must_use]
     pub fn on_other_data(&self, data_sha256: &str) -> Vec<usize> {
-        self.steps.iter().filter(|s| !s.data_sha256.is_empty() && s.data_sha256 != data_sha256).map(|s| s.step).collect()
+        self.steps
+            .iter()
+            .filter(|s| !s.data_sha256.is_empty() && s.data_sha256 != data_sha256)
+            .map(|s| s.step)
+            .collect()
     }
 }
