@@ -58,13 +58,13 @@ pub(super) fn put_together(
     } else {
         Vec::new()
     };
-    let significant = seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL);
+    let significant = || seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL);
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
     let depends: Vec<Where> = if verdict == Verdict::Adequate {
         Vec::new()
     } else {
-        significant
+        significant()
             .take(MOST_WHERE)
             .map(|d| Where {
                 by: by(&d.on),
@@ -75,7 +75,7 @@ pub(super) fn put_together(
             })
             .collect()
     };
-    let shape = seen.dependences.first().filter(|_| !depends.is_empty()).and_then(|d| {
+    let shape = significant().next().filter(|_| !depends.is_empty()).and_then(|d| {
         let kind = features.variables.iter().find(|v| v.name == d.on).map(|v| v.kind);
         let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };
         (!d.curve.is_empty()).then(|| Shape {

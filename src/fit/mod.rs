@@ -12,6 +12,7 @@ mod knowledge;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
+mod scan;
 pub mod snoop;
 pub mod solve;
 pub mod statement;
@@ -179,13 +180,24 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     }
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
     let model = Model::new(machine, &effects, &data.set_ups, reference);
-    let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
+    let mut knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
     knowledge::every_formula_has_a_value(&effects, &data)?;
     let mut theta = model.start();
     for (value, known) in theta.iter_mut().zip(&knowledge) {
         match known {
             Some(Knowledge::Fixed(v)) | Some(Knowledge::Prior { value: v, .. }) => *value = *v,
             None => {}
+        }
+    }
+    for start in scan::starts(machine, &effects, &model, &data, &theta, &|i| knowledge[i].is_some()) {
+        theta[start.unknown] = start.value;
+        for (factor, value) in start.factors {
+            if knowledge[factor].is_none() {
+                theta[factor] = value;
+            }
+        }
+        if !start.smooth {
+            knowledge[start.unknown] = Some(Knowledge::Fixed(start.value));
         }
     }
     let free: Vec<usize> = (0..theta.len()).filter(|&i| !matches!(knowledge[i], Some(Knowledge::Fixed(_)))).collect();
