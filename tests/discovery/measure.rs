@@ -121,8 +121,16 @@ pub fn outcome(bench: &Bench, base: &str, case: &Sized, seed: u64) -> Outcome {
     }
 }
 
+/// What was said of a clean machine.
+#[derive(Debug, Clone)]
+pub struct Clean {
+    pub verdict: Verdict,
+    /// Why, where it is not adequate.
+    pub because: String,
+}
+
 /// Clean machines: how often each verdict falls.
-pub fn clean(bench: &Bench, count: u64, visit_told_um: Option<f64>, seed: u64) -> Vec<Verdict> {
+pub fn clean(bench: &Bench, count: u64, visit_told_um: Option<f64>, seed: u64) -> Vec<Clean> {
     let catalogue = Catalogue::built_in().unwrap();
     (0..count)
         .into_par_iter()
@@ -132,7 +140,19 @@ pub fn clean(bench: &Bench, count: u64, visit_told_um: Option<f64>, seed: u64) -
             let touches = bench.measure(&base, "", 1.0, rng.random::<u64>() >> 12);
             let data = find::data(&bench.machine, &bench.plans, &touches);
             let (fit, settings) = find::fit(&bench.machine, &catalogue, data, &[], visit_told_um);
-            find::look(&bench.machine, &catalogue, &fit, &settings, &LEAN).verdict
+            let d = find::look(&bench.machine, &catalogue, &fit, &settings, &LEAN);
+            let first = d.candidates.first();
+            let because = format!(
+                "{} p {:.1e}; {} p {:.1e}; lack of fit {:.1e}; sigma {:.2} tau {:.2}",
+                first.map_or("", |c| &c.effect),
+                first.map_or(1.0, |c| c.p_adjusted),
+                d.depends.first().map_or("", |w| &w.id),
+                d.depends.first().map_or(1.0, |w| w.p_adjusted),
+                d.lack_of_fit_p,
+                d.noise_um,
+                d.visit_um
+            );
+            Clean { verdict: d.verdict, because }
         })
         .collect()
 }
