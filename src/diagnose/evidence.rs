@@ -27,10 +27,15 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Of a fit.
+    /// Of a fit, with the scatter of index visits that tests must allow for.
     #[must_use]
     pub fn of(fit: &Fit) -> Self {
-        let tau_mm = fit.noise.tau_test_mm;
+        Self::with_visits(fit, fit.noise.tau_test_mm)
+    }
+
+    /// Of a fit, with a given scatter of index visits, mm.
+    #[must_use]
+    pub fn with_visits(fit: &Fit, tau_mm: f64) -> Self {
         let linear = fit.linear(tau_mm);
         let n = fit.data.observations.len();
         let used: Vec<usize> = (0..n).filter(|&i| fit.weight[i] > 0.0).collect();

@@ -43,7 +43,11 @@ pub(super) fn put_together(
     }
     candidates.truncate(options.at_most);
     let found: Vec<&Group> =
-        seen.groups.iter().filter(|g| seen.search.scores[g.leader].p_adjusted < FAMILY_LEVEL).collect();
+        seen
+        .groups
+        .iter()
+        .filter(|g| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL))
+        .collect();
     let powers = if options.power {
         let detectable = power::power(&seen.evidence.base, &seen.named.library, Some(&used_rows(seen)), noise_um(fit));
         let not_found = detectable.iter().filter(|p| !found.iter().any(|g| g.holds(p.candidate)));
@@ -58,13 +62,13 @@ pub(super) fn put_together(
     } else {
         Vec::new()
     };
-    let significant = seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL);
+    let significant = || seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL);
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
     let depends: Vec<Where> = if verdict == Verdict::Adequate {
         Vec::new()
     } else {
-        significant
+        significant()
             .take(MOST_WHERE)
             .map(|d| Where {
                 by: by(&d.on),
@@ -75,7 +79,7 @@ pub(super) fn put_together(
             })
             .collect()
     };
-    let shape = seen.dependences.first().filter(|_| !depends.is_empty()).and_then(|d| {
+    let shape = significant().next().filter(|_| !depends.is_empty()).and_then(|d| {
         let kind = features.variables.iter().find(|v| v.name == d.on).map(|v| v.kind);
         let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };
         (!d.curve.is_empty()).then(|| Shape {
@@ -138,8 +142,11 @@ fn used_rows(seen: &Examination) -> DMatrix<f64> {
 fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, borne_out: bool) -> Candidate {
     let fit = subject.fit;
     let chosen = group.first();
-    let score = &seen.search.scores[chosen];
-    let leader = &seen.search.scores[group.leader];
+    // sizes and what is left come from the order, probabilities from the tests
+    let score = &seen.order.scores[chosen];
+    let tests = || group.members.iter().map(|m| &seen.search.scores[m.candidate]);
+    let p = tests().map(|s| s.p).fold(1.0, f64::min);
+    let p_adjusted = tests().map(|s| s.p_adjusted).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
     let um = noise_um(fit);
     let held = if first && seen.search.leader().is_some() {
@@ -165,15 +172,16 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
             sigma: None,
         });
     }
-    let total = seen.lack_of_fit.ss.max(f64::MIN_POSITIVE);
+    let question = seen.order.question;
+    let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
     let left = (1.0 - score.delta_ss / total).max(0.0);
     Candidate {
         effect: effect.id.clone(),
         name: effect.name.clone(),
-        p: score.p,
-        // Holm's figure is the leader's: the group is one finding
-        p_adjusted: leader.p_adjusted,
-        proposed: first && borne_out && leader.proposed(),
+        // the group is one finding: its figures are those of its most significant member
+        p,
+        p_adjusted,
+        proposed: first && borne_out && p_adjusted < FAMILY_LEVEL,
         rms_after_um: fit.outcome.rms_um * left.sqrt(),
         held_out_before_um: Some(um * held.before).filter(|x| x.is_finite()),
         held_out_after_um: Some(um * held.after).filter(|x| x.is_finite()),
@@ -196,10 +204,10 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
 
 /// Results that an added effect makes less certain, from the one fit: C′ = C + G·C_c·Gᵀ with G how they move with it.
 fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
-    let score = &seen.search.scores[chosen];
-    let columns = seen.search.columns(chosen);
+    let score = &seen.order.scores[chosen];
+    let columns = seen.order.columns(chosen);
     let covariance = crate::fit::uncertainty::free_covariance(fit);
-    let moves = &covariance * seen.evidence.jacobian.tr_mul(&columns);
+    let moves = &covariance * seen.jacobian.tr_mul(&columns);
     let added = &moves * &score.covariance * moves.transpose();
     let mut out = Vec::new();
     for (c, &i) in fit.free.iter().enumerate() {

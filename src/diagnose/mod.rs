@@ -24,10 +24,11 @@ use crate::search::dependence::{Dependence, dependences};
 use crate::search::generic::{Features, Generics};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, HeldOut, held_out};
-use crate::search::{LackOfFit, Search, lack_of_fit};
+use crate::search::{LackOfFit, Question, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::{Diagnosis, Verdict};
 use evidence::Evidence;
+use nalgebra::DMatrix;
 use named::Named;
 
 /// What is diagnosed.
@@ -68,6 +69,10 @@ pub struct Examination<'a> {
     pub named: &'a Named<'a>,
     /// Their tests.
     pub search: Search<'a>,
+    /// The same for sizes and order: see [`Ordering`].
+    pub order: Search<'a>,
+    /// Whitened Jacobian of the base model as in `order`.
+    pub jacobian: &'a DMatrix<f64>,
     /// What these touches cannot tell apart, best first.
     pub groups: Vec<Group>,
     /// On what the misfit depends, best first.
@@ -78,19 +83,65 @@ pub struct Examination<'a> {
     pub nested: HeldOut,
 }
 
+/// The same touches with index visits that come back exactly.
+///
+/// Where the scatter of visits is only declared, tests must allow for it, and it takes most of what a plan with few
+/// visits says. Which effect it is that the touches speak for is another question: where one effect explains all of the
+/// misfit without any scatter of visits, these touches order the candidates.
+pub struct Ordering<'c> {
+    evidence: Evidence,
+    named: Named<'c>,
+}
+
+impl<'c> Ordering<'c> {
+    /// Where the scatter of visits is only declared.
+    #[must_use]
+    pub fn of(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Option<Self> {
+        let declared = fit.noise.visit_source == "declared" && fit.noise.tau_test_mm > 0.0;
+        declared.then(|| {
+            let evidence = Evidence::with_visits(fit, 0.0);
+            Self { named: Named::of(fit, &evidence, machine, catalogue), evidence }
+        })
+    }
+
+    /// The tests, if one effect explains all and tests that allow for scatter do not speak for another one.
+    fn search<'a>(&'a self, tested: &Search) -> Option<Search<'a>> {
+        let question = self.evidence.question();
+        let search = Search::new(question, &self.named.library);
+        let &first = search.ranking().first()?;
+        let mut base = self.evidence.base.clone();
+        base.extend(&search.columns(first), crate::search::KEPT);
+        let with = lack_of_fit(&Question { base: &base, ..question });
+        let agrees = match tested.leader() {
+            None => true,
+            Some(_) => {
+                let group = search.group_of(first, &search.ranking());
+                group.members.iter().any(|m| tested.scores[m.candidate].proposed())
+            }
+        };
+        (with.p > 0.05 && agrees).then_some(search)
+    }
+}
+
 /// The tests of a fit without the answer in words.
 #[must_use]
 pub fn examine<'a>(
     evidence: &'a Evidence,
     named: &'a Named<'a>,
+    ordering: Option<&'a Ordering<'a>>,
     features: &Features,
     generics: &Generics,
     at_most: usize,
 ) -> Examination<'a> {
     let question = evidence.question();
     let search = Search::new(question, &named.library);
+    let (order, jacobian) = ordering
+        .and_then(|o| Some((o.search(&search)?, &o.evidence.jacobian)))
+        .unwrap_or_else(|| (search.clone(), &evidence.jacobian));
     Examination {
-        groups: search.groups(at_most),
+        groups: order.groups(at_most),
+        order,
+        jacobian,
         dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),
         nested: held_out(question, &named.library, &evidence.visits, Choice::Redone),
@@ -110,7 +161,8 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let named = Named::of(fit, &evidence, machine, catalogue);
     let features = features::features(fit, machine);
     let generics = features::shapes(fit, &evidence, &features);
-    let seen = examine(&evidence, &named, &features, &generics, options.at_most);
+    let ordering = Ordering::of(fit, machine, catalogue);
+    let seen = examine(&evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
     let verdict = verdict::of(&seen);
     let gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
     let mut out = findings::put_together(subject, &seen, &features, verdict, gross, options);

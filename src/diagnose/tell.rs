@@ -11,7 +11,7 @@ pub(super) fn words(subject: Subject, seen: &Examination, group: &Group) -> Stri
     let chosen = group.first();
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
     let trace = |c: usize| -> DVector<f64> {
-        let score = &seen.search.scores[c];
+        let score = &seen.order.scores[c];
         let span = seen.named.library.candidates()[c].variants[score.variant].columns.clone();
         &seen.named.raw_um.columns(span.start, span.len()) * &score.estimate
     };

@@ -175,9 +175,15 @@ pub fn identify(machine: &Machine, catalogue: &Catalogue, runs: &[Run], settings
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
     let starts = starts(machine, catalogue, &effects, &data, settings)?;
-    let fit = identify_from(machine, catalogue, &effects, data, settings, &starts)?;
-    let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
     let mut held_settings = settings.clone();
+    for effect in effects.iter().filter(|e| starts.contains_key(&e.parameters[0].name)) {
+        let values: Vec<f64> = effect.parameters.iter().map(|p| starts.get(&p.name).copied().unwrap_or(0.0)).collect();
+        for (name, value) in shapes::jumps(effect, &values, &data) {
+            held_settings.knowledge.entry(name.to_owned()).or_insert(Knowledge::Fixed(value));
+        }
+    }
+    let fit = identify_from(machine, catalogue, &effects, data, &held_settings, &starts)?;
+    let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
     held_settings.knowledge.insert(name.clone(), held);
     let mut fit = identify_from(machine, catalogue, &effects, fit.data, &held_settings, &starts)?;
     fit.outcome.warnings.push(format!("{name} ran out of its range in the search and is held at the end of it"));

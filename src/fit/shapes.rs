@@ -8,6 +8,8 @@ use super::candidates::columns;
 use super::{Fit, Knowledge, Settings, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect, Parameter};
+use crate::model::data::Data;
+use crate::model::predict::Observation;
 use nalgebra::{DMatrix, DVector};
 
 /// Values that are tried where the catalogue names none.
@@ -86,6 +88,20 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
         sizes.iter().zip(size.iter()).for_each(|(&i, v)| values[i] = *v);
     }
     Some(Start { values, gain, shown })
+}
+
+/// Shape parameters at which something jumps, as the moment at which a block slips: there is no slope that a search could
+/// follow, and the best of the scan is held. By name, with its value.
+pub(super) fn jumps<'e>(effect: &'e Effect, values: &[f64], data: &Data) -> Vec<(&'e str, f64)> {
+    let n = data.observations.len();
+    let slope = |which: usize, o: &Observation| {
+        effect.terms.iter().any(|t| t.formula.partials(&o.state, values).any(|(k, d)| k == which && d != 0.0))
+    };
+    (0..effect.parameters.len())
+        .filter(|&i| effect.parameters[i].shape.is_some())
+        .filter(|&i| data.observations.iter().filter(|o| slope(i, o)).count() <= n / 20)
+        .map(|i| (effect.parameters[i].name.as_str(), values[i]))
+        .collect()
 }
 
 /// Values of a shape parameter that are tried.

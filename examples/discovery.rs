@@ -1,0 +1,114 @@
+//! Hidden effects at full count: `cargo run --release --example discovery [-- PART COUNT]`. The table stands in
+//! docs/discovery.md. Parts: planted, clean, two, strange, speed; all of them without an argument.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a measurement that cannot be made shall stop
+#![allow(missing_docs)]
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/discovery/mod.rs"]
+mod discovery;
+
+use discovery::measure::{Clean, Outcome, both_named, clean, planted, two};
+use discovery::plant::Bench;
+use axiscal::diagnose::Verdict;
+use std::collections::BTreeMap;
+
+fn percent(part: usize, of: usize) -> String {
+    format!("{:5.1} %", 100.0 * part as f64 / of.max(1) as f64)
+}
+
+fn share(outcomes: &[Outcome], what: impl Fn(&Outcome) -> bool) -> String {
+    percent(outcomes.iter().filter(|o| what(o)).count(), outcomes.len())
+}
+
+fn report_planted(name: &str, outcomes: &[Outcome]) {
+    let n = outcomes.len();
+    println!("planted, {name}: {n} cases, {} with another shape", share(outcomes, |o| o.other_shape));
+    println!("  proposed {}  missing-effect {}", share(outcomes, |o| o.proposed), share(outcomes, |o| o.verdict == Verdict::MissingEffect));
+    println!(
+        "  by name {}  first group {} (mean size {:.1})  first three {}",
+        share(outcomes, |o| o.by_name),
+        share(outcomes, |o| o.first_group),
+        outcomes.iter().map(|o| o.group_size as f64).sum::<f64>() / n as f64,
+        share(outcomes, |o| o.first_three)
+    );
+    for bent in [false, true] {
+        let part: Vec<Outcome> = outcomes.iter().filter(|o| o.other_shape == bent).cloned().collect();
+        println!(
+            "    {}: by name {}  first group {}  first three {}",
+            if bent { "another shape" } else { "own shape" },
+            share(&part, |o| o.by_name),
+            share(&part, |o| o.first_group),
+            share(&part, |o| o.first_three)
+        );
+    }
+    let mean = |f: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(f).sum::<f64>() / n as f64;
+    println!(
+        "  reduced RMS {:.2} -> {:.3} um  held-out falls {}",
+        mean(&|o| o.reduced_before),
+        mean(&|o| o.reduced_after),
+        share(outcomes, |o| o.held_out_falls)
+    );
+    let mut verdicts: BTreeMap<String, usize> = BTreeMap::new();
+    outcomes.iter().for_each(|o| *verdicts.entry(format!("{:?}", o.verdict)).or_default() += 1);
+    println!("  verdicts {verdicts:?}");
+    for o in outcomes.iter().filter(|o| !o.first_group || !o.by_name) {
+        println!(
+            "  - {}{} lambda {:.0}: {}{:?}",
+            o.truth,
+            if o.other_shape { " (bent)" } else { "" },
+            o.lambda,
+            if o.first_group { "" } else { "MISSED " },
+            o.groups
+        );
+    }
+}
+
+fn report_clean(name: &str, verdicts: &[Clean]) {
+    let count = |v: Verdict| verdicts.iter().filter(|x| x.verdict == v).count();
+    println!(
+        "clean, {name}: {} runs, not adequate {} (missing-effect {}, unexplained {})",
+        verdicts.len(),
+        percent(verdicts.len() - count(Verdict::Adequate), verdicts.len()),
+        count(Verdict::MissingEffect),
+        count(Verdict::Unexplained)
+    );
+    for c in verdicts.iter().filter(|c| c.verdict != Verdict::Adequate) {
+        println!("  - {}", c.because);
+    }
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let part = arguments.first().map_or("all", String::as_str);
+    let count = |full: usize| arguments.get(1).map_or(full, |n| n.parse().unwrap());
+    let wanted = |name: &str| part == "all" || part == name;
+    let began = std::time::Instant::now();
+    if wanted("planted") || part == "paper" {
+        report_planted("paper's plan", &planted(&Bench::paper(), count(400), 1));
+        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+    }
+    if wanted("planted") || part == "full" {
+        report_planted("full", &planted(&Bench::full(), count(400), 2));
+        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+    }
+    if wanted("clean") {
+        let n = count(2000) as u64;
+        report_clean("paper's plan", &clean(&Bench::paper(), n, None, 3));
+        // two axes with 0.5 um each, as the machine file declares
+        report_clean("paper's plan, 0.7 um per visit as declared", &clean(&Bench::paper().with_visits(0.5f64.hypot(0.5)), n, None, 5));
+        report_clean("full", &clean(&Bench::full(), n, None, 4));
+        report_clean("full, 0.5 um per visit", &clean(&Bench::full().with_visits(0.5), n, None, 6));
+        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+    }
+    if wanted("two") {
+        let found = two(&Bench::full(), count(400), 7);
+        let both = found.iter().filter(|(t, s)| both_named(t, s)).count();
+        let more = found.iter().filter(|(_, s)| s.len() > 2).count();
+        println!("two hidden, full: {} cases, both named {}, more than two {}", found.len(), percent(both, found.len()), percent(more, found.len()));
+        for (truths, steps) in found.iter().filter(|(t, s)| !both_named(t, s)) {
+            println!("  - {truths:?}: {steps:?}");
+        }
+        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+    }
+}
