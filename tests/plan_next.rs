@@ -28,12 +28,42 @@ fn study(dir: &Path, hidden: &str) {
         ok(dir, &["generate", "--machine", "swivel-head", "--program", p, "--controller", "linuxcnc", "--out", "."]);
         simulate(dir, p);
     }
-    ok(dir, &["new", "--machine", "swivel-head", "--plan", "head.plan.json", "--log", "head.log", "--plan", "table.plan.json", "--log", "table.log"]);
+    ok(
+        dir,
+        &[
+            "new",
+            "--machine",
+            "swivel-head",
+            "--plan",
+            "head.plan.json",
+            "--log",
+            "head.log",
+            "--plan",
+            "table.plan.json",
+            "--log",
+            "table.log",
+        ],
+    );
 }
 
 fn simulate(dir: &Path, name: &str) {
     let (plan, log) = (format!("{name}.plan.json"), format!("{name}.log"));
-    ok(dir, &["simulate", "--plan", &plan, "--machine", "swivel-head", "--scenario", "hidden.toml", "--controller", "linuxcnc", "--out", &log]);
+    ok(
+        dir,
+        &[
+            "simulate",
+            "--plan",
+            &plan,
+            "--machine",
+            "swivel-head",
+            "--scenario",
+            "hidden.toml",
+            "--controller",
+            "linuxcnc",
+            "--out",
+            &log,
+        ],
+    );
 }
 
 fn separation(answer: &serde_json::Value, key: &str) -> f64 {
@@ -95,7 +125,8 @@ fn what_cannot_be_asked_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     study(dir, "");
-    let out = axiscal(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--effects", "no-such"]);
+    let out =
+        axiscal(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--effects", "no-such"]);
     assert_eq!(out.status.code(), Some(2));
     let out = axiscal(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--minutes", "0"]);
     assert_eq!(out.status.code(), Some(2));

@@ -70,8 +70,9 @@ impl Questions {
         let values = values.resize_vertically(linear.jacobian.nrows(), 0.0);
         let mut library = Library::new(values.nrows());
         for effect in &effects {
-            let own: Vec<usize> =
-                (0..all.unknowns.len()).filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape).collect();
+            let own: Vec<usize> = (0..all.unknowns.len())
+                .filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape)
+                .collect();
             library.push(effect.id.clone(), Origin::Catalogue, &values.select_columns(&own));
         }
         let base = Basis::new(&linear.jacobian);
@@ -79,7 +80,8 @@ impl Questions {
         let id = |c: usize| library.candidates()[c].id.clone();
         let Some(leader) = search.leader() else { return Ok(Self::of_plan(view)) };
         let group = search.group_of(leader, &search.ranking());
-        let mut rivals: Vec<usize> = group.members.iter().filter(|m| m.candidate != leader).map(|m| m.candidate).collect();
+        let mut rivals: Vec<usize> =
+            group.members.iter().filter(|m| m.candidate != leader).map(|m| m.candidate).collect();
         rivals.truncate(MOST_PAIRS);
         let mut sizes = BTreeMap::new();
         for c in rivals.iter().copied().chain([leader]) {
@@ -95,7 +97,11 @@ impl Questions {
                 says: format!("the data name {} alone: further touches confirm it", id(leader)),
             });
         }
-        let says = format!("{} explains what the model leaves over, and so does {}", id(leader), rivals.iter().map(|&c| id(c)).collect::<Vec<_>>().join(", "));
+        let says = format!(
+            "{} explains what the model leaves over, and so does {}",
+            id(leader),
+            rivals.iter().map(|&c| id(c)).collect::<Vec<_>>().join(", ")
+        );
         let pairs = rivals.iter().map(|&c| Pair { one: id(leader), other: Some(id(c)) }).collect();
         Ok(Self { pairs, sizes, says })
     }
@@ -116,7 +122,8 @@ impl Questions {
         Self {
             pairs: pairs.into_iter().take(MOST_PAIRS).map(|(_, p)| p).collect(),
             sizes: BTreeMap::new(),
-            says: "nothing is missing that the data can show; these effects would be confounded if one of them acted".into(),
+            says: "nothing is missing that the data can show; these effects would be confounded if one of them acted"
+                .into(),
         }
     }
 }

@@ -42,7 +42,9 @@ pub fn undetermined(unknowns: &[&Unknown], effects: &[&Effect], direction: &DVec
     }
     let says = match &members[..] {
         [] => "a combination of many parameters leaves no trace in these touches".to_owned(),
-        [one] => format!("{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"),
+        [one] => format!(
+            "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
+        ),
         several => format!(
             "{} are one number with these touches: only their sum is seen, and by convention the part that leaves no trace is 0, so that each value holds a share of that sum",
             join(several)
@@ -78,7 +80,9 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
         }
         Place::Tool if effect.id == "tip-eccentricity" => format!("the tip's offset {component}"),
         // several components of one effect are told apart by where they point
-        _ if effect.parameters.iter().filter(|p| p.shape.is_none()).count() > 1 && !matches!(term.place, Place::Trigger | Place::Reading) => {
+        _ if effect.parameters.iter().filter(|p| p.shape.is_none()).count() > 1
+            && !matches!(term.place, Place::Trigger | Place::Reading) =>
+        {
             format!("{} {component}", the(&effect.name))
         }
         _ => the(&effect.name),
