@@ -74,7 +74,8 @@ fn separation(answer: &serde_json::Value, key: &str) -> f64 {
 fn a_hidden_pair_is_told_apart() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    study(dir, "[effects.radial-c-1]\nEXC1c = 5.0\nEYC1s = 5.0");
+    // counter to C: the part that turns with it is an offset of the block and could not be seen
+    study(dir, "[effects.radial-c-1]\nEXC1c = 5.0\nEYC1s = -5.0");
     let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
     std::fs::write(dir.join("study.toml"), format!("# a comment of mine\n{text}")).unwrap();
     let next = ["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc"];
