@@ -58,7 +58,7 @@ pub fn habits(machine: &Machine, runs: &[Planned], model: &Model) -> Vec<Habit> 
     let all: Vec<Visit> = runs.iter().enumerate().flat_map(|(i, r)| visits(i, &r.plan)).collect();
     pool.at_the_best(&all);
     for axis in machine.rotary() {
-        pool.from_the_other_side(&all, axis);
+        pool.both_sides(&all, axis);
         pool.other_angles(&all, axis);
     }
     pool.other_stylus(&all);
@@ -130,7 +130,7 @@ impl Pool<'_> {
         self.push("feed", format!("touch again at {} times the feed", FASTER), vec![(best.run, vec![faster])], 0.0);
     }
 
-    fn from_the_other_side(&mut self, all: &[Visit], axis: &Axis) {
+    fn both_sides(&mut self, all: &[Visit], axis: &Axis) {
         let Some(best) = Self::best(all) else { return };
         let come = |sense: f64| Change { from: AxisMap::default().with(axis.name, sense), ..Change::default() };
         let both = vec![self.once_more(best, &come(1.0)), self.once_more(best, &come(-1.0))];
@@ -294,11 +294,9 @@ impl Pool<'_> {
     /// A block once more, standing elsewhere: its place and tilt are unknown again.
     fn moved_block(
         &mut self,
-        id: &str,
-        says: &str,
+        (id, says): (&str, &str),
         all: &[Visit],
-        of: &PlanTouch,
-        run: usize,
+        (run, of): (usize, &PlanTouch),
         place: impl Fn(&Vector3<f64>) -> Vector3<f64>,
         most: usize,
     ) {
@@ -345,7 +343,7 @@ impl Pool<'_> {
             return;
         };
         let says = format!("put a block {HIGHER_MM} mm higher (a riser) and touch it in the same poses");
-        self.moved_block("riser", &says, all, &first, run, |c| c + Vector3::z() * HIGHER_MM, 4);
+        self.moved_block(("riser", &says), all, (run, &first), |c| c + Vector3::z() * HIGHER_MM, 4);
     }
 
     /// A block on the other side of the axis that carries it, where it stands there alone.
@@ -361,7 +359,7 @@ impl Pool<'_> {
                 }
                 let half = crate::geometry::rotation_about(&axis.point, &axis.direction, std::f64::consts::PI);
                 let says = format!("put a second block on the other side of {letter} and touch it in the same poses");
-                self.moved_block("second-block", &says, all, &first, run, |c| apply(&half, c), usize::MAX);
+                self.moved_block(("second-block", &says), all, (run, &first), |c| apply(&half, c), usize::MAX);
                 return;
             }
         }
