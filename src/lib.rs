@@ -14,7 +14,9 @@ pub mod symbols;
 pub mod units;
 
 pub mod cli;
+pub mod compare;
 pub mod design;
+pub mod diagnose;
 pub mod fit;
 pub mod log;
 pub mod machine;

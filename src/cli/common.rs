@@ -3,6 +3,7 @@
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
 use crate::machine::{self, Machine};
+use crate::report::plot::Paper;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -34,25 +35,44 @@ pub fn print(text: &str) {
 pub struct Io {
     /// One JSON object on stdout, messages on stderr.
     pub json: bool,
+    /// A verb that another one calls: it says and answers nothing, findings go to stderr all the same.
+    pub within: bool,
 }
 
 impl Io {
     /// For a call with or without `--json`.
     #[must_use]
     pub fn new(json: bool) -> Self {
-        Self { json }
+        Self { json, within: false }
+    }
+
+    /// For a verb that this one calls: the caller answers.
+    #[must_use]
+    pub fn inner(&self) -> Self {
+        Self { within: self.json, ..*self }
+    }
+
+    /// What plots and wide tables are drawn on: the terminal as it is; in a pipe 80 columns of ASCII.
+    #[must_use]
+    pub fn paper(&self, ascii: bool) -> Paper {
+        let terminal = std::io::IsTerminal::is_terminal(&std::io::stdout());
+        let stated = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
+        let measured = console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+        let width = stated.or(measured.filter(|_| terminal)).unwrap_or(80);
+        let colour = terminal && !ascii && std::env::var_os("NO_COLOR").is_none();
+        Paper { width: width.clamp(40, 400), ascii: ascii || !terminal, colour }
     }
 
     /// A line for the person: stdout, or nothing when JSON was asked for.
     pub fn say(&self, text: impl AsRef<str>) {
-        if !self.json {
+        if !self.json && !self.within {
             print(text.as_ref());
         }
     }
 
     /// The answer as one JSON object, when it was asked for.
     pub fn answer(&self, value: &impl serde::Serialize) {
-        if self.json {
+        if self.json && !self.within {
             let text = serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"));
             print(&text);
         }

@@ -30,6 +30,8 @@ pub struct Loaded {
     pub runs: Vec<LoadedRun>,
     /// SHA-256 over the study and every file that it names, hexadecimal.
     pub sha256: String,
+    /// SHA-256 over the plans and logs alone, hexadecimal.
+    pub data_sha256: String,
 }
 
 /// One run, read.
@@ -152,6 +154,7 @@ pub fn load_compensation(path: &Path, machine: &Machine) -> Result<Compensation>
 pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     let text = files::read_text(path)?;
     let mut hash = Sha256::new();
+    let mut data = Sha256::new();
     hash.update(text.as_bytes());
     let src = source(path.display().to_string(), text);
     let (study, findings) = Study::parse(&src)?;
@@ -188,8 +191,10 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
             let active = load_compensation(&folder.join(path), &machine)?;
             io.report(&beside_the_axis(&active, &machine, &plan).into_iter().collect::<Vec<_>>());
         }
-        hash.update(plan.to_json().as_bytes());
-        hash.update(&bytes);
+        for hash in [&mut hash, &mut data] {
+            hash.update(plan.to_json().as_bytes());
+            hash.update(&bytes);
+        }
         let touches = read_log(&bytes, &log_path, &controller_path(&entry.controller, &folder), &machine, &plan, io)?;
         runs.push(LoadedRun {
             plan,
@@ -199,8 +204,9 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
             compensation: entry.compensation.as_ref().map(|c| folder.join(c)),
         });
     }
-    let sha256 = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
-    Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256 })
+    let hexadecimal = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    let (sha256, data_sha256) = (hexadecimal(hash), hexadecimal(data));
+    Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256, data_sha256 })
 }
 
 /// Findings that name a word of the study get its place.

@@ -3,10 +3,13 @@
 //! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
 //! "no", 2 the input or the call was unusable.
 
+mod add;
 mod assess;
 mod common;
+mod compare;
 mod controllers;
 mod demo;
+mod diagnose;
 mod effects;
 mod export;
 mod generate;
@@ -20,6 +23,9 @@ mod programs;
 mod reproduce;
 mod schema;
 mod simulate;
+mod sketch_effect;
+mod solve;
+mod verify;
 
 pub use common::{Answer, Io};
 
@@ -63,8 +69,24 @@ enum Verb {
     New(new::Args),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
+    /// Which physical effect is missing: verdict, candidates, and what these touches cannot tell apart
+    Diagnose(diagnose::Args),
+    /// The loop, step by step: diagnose, add, look again, until nothing is left to find
+    Solve(solve::Args),
+    /// Write a starting formula for what no known effect explains
+    SketchEffect(sketch_effect::Args),
+    /// Model against measurement: where it fails, and on what that depends
+    Compare(compare::Args),
     /// The probing program that best separates what the data cannot tell apart
     PlanNext(plan_next::Args),
+    /// Put effects into the study's model, refit, and say what that changed
+    Add(add::Args),
+    /// Take effects out of the study's model, refit, and say what that changed
+    Remove(add::Args),
+    /// The ladder: every model tried, with its error on the touches and on touches left out
+    History(add::HistoryArgs),
+    /// Two studies side by side: did the compensation work, has the machine changed?
+    Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
@@ -93,7 +115,15 @@ pub fn main() -> ExitCode {
         Verb::Reproduce(args) => reproduce::run(&args, &io),
         Verb::New(args) => new::run(&args, &io),
         Verb::Identify(args) => identify::run(&args, &io),
+        Verb::Diagnose(args) => diagnose::run(&args, &io),
+        Verb::Solve(args) => solve::run(&args, &io),
+        Verb::SketchEffect(args) => sketch_effect::run(&args, &io),
+        Verb::Compare(args) => compare::run(&args, &io),
         Verb::PlanNext(args) => plan_next::run(&args, &io),
+        Verb::Add(args) => add::add(&args, &io),
+        Verb::Remove(args) => add::remove(&args, &io),
+        Verb::History(args) => add::history(&args, &io),
+        Verb::Verify(args) => verify::run(&args, &io),
         Verb::Export(args) => export::run(&args, &io),
         Verb::Schema(args) => schema::run(&args, &io),
     };

@@ -2,7 +2,7 @@
 
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
-use super::{Fit, Knowledge, Settings, noise, snoop, statement, uncertainty};
+use super::{Fit, Knowledge, Settings, held_out, noise, snoop, statement, uncertainty};
 use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -23,7 +23,7 @@ pub(super) fn outcome(
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
     let type_b = uncertainty::type_b(fit, machine, catalogue, &settings.type_b)?;
-    let unmodelled = (!settings.quick).then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
+    let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED).then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
     let b_variance =
         DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
@@ -88,7 +88,7 @@ pub(super) fn outcome(
         dof: fit.dof,
         condition,
         rms_um: um_from_mm((squares / n_used.max(1) as f64).sqrt()),
-        held_out_rms_um: None,
+        held_out_rms_um: if settings.quick { None } else { held_out::by_visit(fit).map(|h| h.rms_um) },
         noise_um: um_from_mm(fit.noise.sigma_mm),
         noise_source: fit.noise.source.into(),
         visit_um: um_from_mm(fit.noise.visit_mm()),
@@ -96,7 +96,7 @@ pub(super) fn outcome(
         noise_says: fit.noise.says(),
         chi2_per_dof,
         undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, effects, v)).collect(),
-        weak: if settings.quick { Vec::new() } else { uncertainty::weak(fit) },
+        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED { Vec::new() } else { uncertainty::weak(fit) },
         parameters,
         correlations: uncertainty::correlations(fit),
         priors: uncertainty::priors(fit),
@@ -131,6 +131,12 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
     }
     if fit.dof == 0 {
         out.push("as many unknowns as touches: nothing is left over to judge the model by".into());
+    }
+    if fit.data.observations.len() > uncertainty::MOST_UNMODELLED {
+        out.push(format!(
+            "what unmodelled effects may add is worked out for up to {} touches only",
+            uncertainty::MOST_UNMODELLED
+        ));
     }
     let n_out = fit.rejected.values().filter(|r| !r.starts_with("taken out")).count();
     let n = fit.data.observations.len();

@@ -7,21 +7,23 @@
 
 mod answer;
 pub mod candidates;
+pub mod held_out;
 mod knowledge;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
+pub mod shapes;
 pub mod snoop;
 pub mod solve;
 pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
+pub use shapes::start_shapes;
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
-use crate::model::batch::Batch;
-use crate::model::catalogue::Catalogue;
+use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::{Data, Run, assemble};
 use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation};
@@ -172,15 +174,62 @@ pub fn identify(machine: &Machine, catalogue: &Catalogue, runs: &[Run], settings
 /// As [`identify`].
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
+    let starts = starts(machine, catalogue, &effects, &data, settings)?;
+    let fit = identify_from(machine, catalogue, &effects, data, settings, &starts)?;
+    let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
+    let mut held_settings = settings.clone();
+    held_settings.knowledge.insert(name.clone(), held);
+    let mut fit = identify_from(machine, catalogue, &effects, fit.data, &held_settings, &starts)?;
+    fit.outcome.warnings.push(format!("{name} ran out of its range in the search and is held at the end of it"));
+    Ok(fit)
+}
+
+/// Where the search begins for effects with shape parameters, by name of the unknown.
+fn starts(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    data: &Data,
+    settings: &Settings,
+) -> Result<BTreeMap<String, f64>> {
+    let mut out = BTreeMap::new();
+    let shaped: Vec<&Effect> =
+        effects.iter().copied().filter(|e| !e.per_block && e.parameters.iter().any(|p| p.shape.is_some())).collect();
+    if shaped.is_empty() || data.observations.is_empty() {
+        return Ok(out);
+    }
+    let base = shapes::without(settings, &shaped);
+    let others = effects_of(&base.effects, catalogue, machine)?;
+    let fit = identify_from(machine, catalogue, &others, data.clone(), &base, &out)?;
+    for effect in shaped {
+        if let Some(start) = shapes::start_shapes(&fit, machine, effect) {
+            out.extend(effect.parameters.iter().zip(start.values).map(|(p, v)| (p.name.clone(), v)));
+        }
+    }
+    Ok(out)
+}
+
+/// Fits a model from given starts.
+fn identify_from(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    data: Data,
+    settings: &Settings,
+    starts: &BTreeMap<String, f64>,
+) -> Result<Fit> {
     if data.observations.is_empty() {
         return Err(Failure::new("fit::no_touches", "no touch can be used")
             .help("does the log belong to this plan? `axiscal parse` lists what it holds"));
     }
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
-    let model = Model::new(machine, &effects, &data.set_ups, reference);
+    let model = Model::new(machine, effects, &data.set_ups, reference);
     let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
-    knowledge::every_formula_has_a_value(&effects, &data)?;
+    knowledge::every_formula_has_a_value(effects, &data)?;
     let mut theta = model.start();
+    for (value, u) in theta.iter_mut().zip(&model.unknowns) {
+        *value = starts.get(&u.name).copied().unwrap_or(*value);
+    }
     for (value, known) in theta.iter_mut().zip(&knowledge) {
         match known {
             Some(Knowledge::Fixed(v)) | Some(Knowledge::Prior { value: v, .. }) => *value = *v,
@@ -202,22 +251,20 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         stated_tau_mm: settings.visit_sigma_mm,
     };
     let first_noise = (settings.touch_sigma_mm.unwrap_or(known.declared_sigma_mm), 0.0);
-    let (observability, condition) = {
-        let nominal = model.prepare(&data.nominal);
-        observe(&nominal, &data.visits, &theta, &free, &priors, first_noise)
-    };
     let batch = model.prepare(&data.observations);
     let start = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
-    let touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &priors, first_noise);
-    let mut search = Search { data: &data, observability: &observability, touches, masked: vec![false; batch.len()] };
-    for mask in &settings.masked {
-        let is = |o: &Observation| o.run == mask.run && o.id == mask.id;
-        if let Some(i) = data.observations.iter().position(is) {
-            search.masked[i] = true;
-        }
+    let mut touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &priors, first_noise);
+    let masked: Vec<bool> = {
+        let is = |m: &Mask, o: &Observation| o.run == m.run && o.id == m.id;
+        data.observations.iter().map(|o| settings.masked.iter().any(|m| is(m, o))).collect()
+    };
+    if masked.contains(&true) {
+        touches.set_weights(masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
     }
-    search.touches.set_weights(search.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
-    let solution = solve::minimise(&search.touches, start, &observability);
+    let first = solve::Problem::normal(&touches, &start, true);
+    let (observability, condition) = observe(&first.gram, &model, &data, &theta, &free, &priors, first_noise);
+    let mut search = Search { data: &data, observability: &observability, touches, masked };
+    let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
     let solution = search.without_strangers(solution, 0.0);
     let noise = noise::estimate(&search.samples(&solution), &known);
@@ -283,7 +330,7 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         dof,
         outcome: Outcome::default(),
     };
-    fit.outcome = answer::outcome(&fit, machine, catalogue, &effects, settings, &solution, condition)?;
+    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition)?;
     Ok(fit)
 }
 
@@ -451,29 +498,56 @@ impl Search<'_> {
     }
 }
 
-/// Rank and null directions of a model at nominal touches, and its condition where the unknowns are least correlated.
+/// Condition up to which the touches as they were made show the rank that the nominal ones have: the two Jacobians differ
+/// by what errors and set-ups of some tenths of a millimetre make of levers of some hundred.
+const CLEARLY_SEEN: f64 = 300.0;
+
+/// Rank and null directions, and the condition where the unknowns are least correlated. From the Gram matrix of the
+/// touches as they were made where that is beyond doubt, else from the nominal touches: errors of the machine itself
+/// must not make a combination look seen.
 fn observe(
-    nominal: &Batch,
-    visits: &[usize],
+    gram: &DMatrix<f64>,
+    model: &Model,
+    data: &Data,
     theta: &[f64],
     free: &[usize],
     priors: &[Prior],
     noise: (f64, f64),
 ) -> (solve::Observability, f64) {
-    let touches = Touches::new(nominal, visits, theta.to_vec(), free, priors, noise);
-    let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
-    let gram = solve::Problem::normal(&touches, &at, true).gram;
-    let seen = solve::observe_gram(&gram)
-        .unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
-    let least = nominal.model().least_correlated(nominal.observations());
+    let clear = solve::observe_gram(gram).filter(|seen| seen.condition < CLEARLY_SEEN);
+    let (seen, nominal) = match clear {
+        Some(seen) => (seen, None),
+        None => {
+            let (seen, gram) = observe_nominal(model, data, theta, free, priors, noise);
+            (seen, Some(gram))
+        }
+    };
     let mut change = DMatrix::identity(free.len(), free.len());
-    for (offset, tilt, lever) in least {
+    for (offset, tilt, lever) in model.least_correlated(&data.observations) {
         if let (Ok(o), Ok(t)) = (free.binary_search(&offset), free.binary_search(&tilt)) {
             change[(o, t)] += lever;
         }
     }
-    let condition = solve::condition(&(change.tr_mul(&gram) * &change), seen.rank);
+    let condition = solve::condition(&(change.tr_mul(nominal.as_ref().unwrap_or(gram)) * &change), seen.rank);
     (seen, condition)
+}
+
+/// Rank and null directions at the nominal touches, with the Gram matrix there.
+fn observe_nominal(
+    model: &Model,
+    data: &Data,
+    theta: &[f64],
+    free: &[usize],
+    priors: &[Prior],
+    noise: (f64, f64),
+) -> (solve::Observability, DMatrix<f64>) {
+    let nominal = model.prepare(&data.nominal);
+    let touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, noise);
+    let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
+    let gram = solve::Problem::normal(&touches, &at, true).gram;
+    let seen =
+        solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+    (seen, gram)
 }
 
 /// Rank of a model on given (nominal) touches, without measurements: what a plan can tell.
@@ -490,6 +564,6 @@ pub fn observe_plan(
     let model = Model::new(machine, &effects, &data.set_ups, machine.reference.pivot);
     let theta = model.start();
     let free: Vec<usize> = (0..theta.len()).collect();
-    let seen = observe(&model.prepare(&data.nominal), &data.visits, &theta, &free, &[], (1.0, 0.0)).0;
+    let seen = observe_nominal(&model, data, &theta, &free, &[], (1.0, 0.0)).0;
     Ok((model, seen))
 }

@@ -9,6 +9,7 @@
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use std::collections::HashMap;
 
 /// Fewer degrees of freedom than this say too little: their 95 % interval for σ spans more than a factor of two.
 const LEAST_REPEATS: usize = 8;
@@ -174,9 +175,9 @@ fn revisits(samples: &[Sample]) -> Revisits {
             rows.push((Sample { residual_mm: mean, ..group[0] }, (group.len() as f64).sqrt()));
         }
         // only points that stand in several visits say anything
-        let count = |rows: &[(Sample, f64)], point: usize| rows.iter().filter(|r| r.0.point == point).count();
-        let again: Vec<bool> = rows.iter().map(|r| count(&rows, r.0.point) > 1).collect();
-        let rows: Vec<(Sample, f64)> = rows.into_iter().zip(again).filter(|r| r.1).map(|r| r.0).collect();
+        let mut times: HashMap<usize, usize> = HashMap::new();
+        rows.iter().for_each(|r| *times.entry(r.0.point).or_default() += 1);
+        rows.retain(|r| times[&r.0.point] > 1);
         if rows.len() < 2 || rows.len() > MOST_ROWS {
             continue;
         }

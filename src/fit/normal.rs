@@ -7,7 +7,7 @@
 
 use super::solve::{Normal, Problem};
 use crate::model::batch::{At, Batch, Scratch};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -182,6 +182,30 @@ impl<'a> Touches<'a> {
         *columns /= self.sigma_mm;
     }
 
+    /// Gaps and rows of all touches with only the free unknowns that they see.
+    #[must_use]
+    pub(super) fn short_rows(&self, free: &DVector<f64>) -> ShortRows {
+        let theta = self.full(free);
+        let at = self.batch.at(&theta);
+        let column_of = self.columns();
+        let layout = self.batch.model().layout();
+        // places of the free unknowns in the rows of each block, and their columns
+        let kept: Vec<(Vec<usize>, Vec<usize>)> = (0..layout.own.len())
+            .map(|s| layout.row(s).enumerate().filter_map(|(place, u)| Some((place, column_of[u]?))).unzip())
+            .collect();
+        let mut out = ShortRows { columns: kept.iter().map(|k| k.1.clone()).collect(), ..ShortRows::default() };
+        let mut scratch = self.batch.scratch();
+        let mut row = Vec::new();
+        for (i, o) in self.batch.observations().iter().enumerate() {
+            row.resize(layout.row_length(o.set_up), 0.0);
+            out.gap.push(at.gap_and_row(i, &mut scratch, &mut row));
+            out.set_up.push(o.set_up);
+            out.start.push(out.values.len());
+            out.values.extend(kept[o.set_up].0.iter().map(|&place| row[place]));
+        }
+        out
+    }
+
     /// Gaps, mm, and Jacobian of the free unknowns, mm per unit; touches only.
     #[must_use]
     pub fn unwhitened(&self, free: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
@@ -311,8 +335,23 @@ impl<'a> Touches<'a> {
                 part.sum -= seen.gaps.dot(&(m * seen.gaps));
             }
         }
+        part.blocks.iter_mut().flatten().for_each(Block::multiply);
         part
     }
+}
+
+/// Rows one after the other, each with the free unknowns that its touch sees.
+#[derive(Debug, Default)]
+pub(super) struct ShortRows {
+    /// Free columns of the rows of each block.
+    pub columns: Vec<Vec<usize>>,
+    /// Block of each touch.
+    pub set_up: Vec<usize>,
+    /// Where each row begins.
+    pub start: Vec<usize>,
+    pub values: Vec<f64>,
+    /// Gaps, mm.
+    pub gap: Vec<f64>,
 }
 
 /// Sums over one visit.
@@ -337,32 +376,47 @@ struct Partial {
     sum: f64,
 }
 
-/// Gram (upper triangle, row by row) and gradient of the touches of one block.
+/// Rows of one block that wait to be multiplied together.
+const ROWS: usize = 64;
+
+/// Gram matrix and gradient of the touches of one block.
 #[derive(Debug, Clone)]
 struct Block {
-    gram: Vec<f64>,
+    gram: DMatrix<f64>,
     gradient: Vec<f64>,
+    /// Rows that are not in the Gram matrix yet, one after the other.
+    waiting: Vec<f64>,
 }
 
 impl Block {
     fn new(k: usize, with_gram: bool) -> Self {
-        Self { gram: vec![0.0; if with_gram { k * k } else { 0 }], gradient: vec![0.0; k] }
+        let (size, room) = if with_gram { (k, ROWS * k) } else { (0, 0) };
+        Self { gram: DMatrix::zeros(size, size), gradient: vec![0.0; k], waiting: Vec::with_capacity(room) }
     }
 
     fn add(&mut self, gap: f64, row: &[f64], with_gram: bool) {
-        let k = row.len();
         for (g, x) in self.gradient.iter_mut().zip(row) {
             *g += x * gap;
         }
         if with_gram {
-            for (a, &x) in row.iter().enumerate() {
-                if x != 0.0 {
-                    for (g, y) in self.gram[a * k + a..(a + 1) * k].iter_mut().zip(&row[a..]) {
-                        *g += x * y;
-                    }
-                }
+            self.waiting.extend_from_slice(row);
+            if self.waiting.len() == ROWS * row.len() {
+                self.multiply();
             }
         }
+    }
+
+    /// Adds the waiting rows: a product of matrices uses the processor far better than row by row.
+    fn multiply(&mut self) {
+        if self.waiting.is_empty() {
+            return;
+        }
+        let k = self.gradient.len();
+        let n = self.waiting.len() / k;
+        let turned = DMatrixView::from_slice(&self.waiting, k, n);
+        let rows = DMatrixView::from_slice_with_strides(&self.waiting, n, k, k, 1);
+        self.gram.gemm(1.0, &turned, &rows, 1.0);
+        self.waiting.clear();
     }
 }
 
@@ -390,7 +444,7 @@ impl Problem for Touches<'_> {
                     if with_gram {
                         for (b, cb) in row.iter().enumerate().skip(a) {
                             if let Some(cb) = *cb {
-                                let value = block.gram[a * row.len() + b];
+                                let value = block.gram[(a, b)];
                                 gram[(ca, cb)] += value;
                                 if ca != cb {
                                     gram[(cb, ca)] += value;

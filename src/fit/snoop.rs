@@ -57,16 +57,31 @@ pub struct Snoop {
     noise_dof: f64,
 }
 
-/// Rows of the touches, whitened by V⁻¹ where they stand at both sides of C.
+/// Rows of the touches: only the free unknowns that a touch sees, one after the other.
 struct Rows<'t, 'a> {
     touches: &'t Touches<'a>,
-    jacobian: DMatrix<f64>,
-    gap: DVector<f64>,
+    /// Free columns of the rows of each block.
+    columns: Vec<Vec<usize>>,
+    set_up: Vec<usize>,
+    start: Vec<usize>,
+    values: Vec<f64>,
+    gap: Vec<f64>,
 }
 
 impl Rows<'_, '_> {
+    fn row(&self, touch: usize) -> (&[usize], &[f64]) {
+        let columns = &self.columns[self.set_up[touch]];
+        (columns, &self.values[self.start[touch]..self.start[touch] + columns.len()])
+    }
+
+    /// Row times a vector of all free unknowns.
+    fn dot(&self, touch: usize, x: &[f64]) -> f64 {
+        let (columns, values) = self.row(touch);
+        columns.iter().zip(values).map(|(&c, v)| v * x[c]).sum()
+    }
+
     /// V⁻¹·x for one column over all touches, 1/mm² times mm.
-    fn inverse_noise(&self, x: &mut DVector<f64>) {
+    fn inverse_noise(&self, x: &mut [f64]) {
         let (sigma, tau) = self.touches.noise_mm();
         if tau > 0.0 {
             for visit in self.touches.visits_in(0..x.len()) {
@@ -84,39 +99,32 @@ impl Rows<'_, '_> {
             *value *= w / (sigma * sigma);
         }
     }
-}
 
-impl Snoop {
-    /// At a fit: touches with weight 0 are out already and stay out. `covariance` is that of the free unknowns, with
-    /// `rank` seen directions; `noise_dof` the degrees of freedom of σ (0 where it is not known).
-    #[must_use]
-    pub fn new(
-        touches: &Touches,
-        theta: &DVector<f64>,
-        covariance: &DMatrix<f64>,
-        (chi2, dof): (f64, usize),
-        noise_dof: f64,
-    ) -> Self {
-        let (gap, jacobian) = touches.unwhitened(theta);
-        let rows = Rows { touches, jacobian, gap };
-        let n = rows.gap.len();
-        let (sigma, tau) = touches.noise_mm();
-        let w = touches.weights();
-        let mut a = rows.gap.clone();
-        rows.inverse_noise(&mut a);
-        // diagonal of V⁻¹ − V⁻¹JCJᵀV⁻¹, visit by visit
-        let jc = &rows.jacobian * covariance;
+    /// Diagonal of V⁻¹ − V⁻¹JCJᵀV⁻¹, visit by visit; 0 for touches that are not used.
+    fn diagonal(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
+        let (sigma, tau) = self.touches.noise_mm();
+        let (w, s2) = (self.touches.weights(), sigma * sigma);
+        let own: Vec<DMatrix<f64>> = self
+            .columns
+            .iter()
+            .map(|c| DMatrix::from_fn(c.len(), c.len(), |a, b| covariance[(c[a], c[b])]))
+            .collect();
+        let n = self.gap.len();
         let mut d = vec![0.0; n];
-        let visits = if tau > 0.0 { touches.visits_in(0..n) } else { vec![0..n] };
-        let s2 = sigma * sigma;
+        let visits = if tau > 0.0 { self.touches.visits_in(0..n) } else { vec![0..n] };
         for visit in visits {
-            let (mut m, mut shared) = (Matrix3::zeros(), DMatrix::zeros(0, 0));
-            let mut square = Matrix3::zeros();
+            let (mut m, mut shared, mut square) = (Matrix3::zeros(), DMatrix::zeros(0, 0), Matrix3::zeros());
             if tau > 0.0 {
-                m = touches.visit_inverse(&touches.normals_square(visit.clone()));
-                let mut sums = DMatrix::zeros(3, rows.jacobian.ncols());
+                m = self.touches.visit_inverse(&self.touches.normals_square(visit.clone()));
+                let mut sums = DMatrix::zeros(3, covariance.nrows());
                 for i in visit.clone() {
-                    sums.ger(w[i], &touches.normal_in_r(i), &rows.jacobian.row(i).transpose(), 1.0);
+                    let n = self.touches.normal_in_r(i) * w[i];
+                    let (columns, values) = self.row(i);
+                    for (&c, v) in columns.iter().zip(values) {
+                        for k in 0..3 {
+                            sums[(k, c)] += n[k] * v;
+                        }
+                    }
                 }
                 shared = covariance * sums.transpose();
                 let full = &sums * &shared;
@@ -126,19 +134,69 @@ impl Snoop {
                 if w[i] == 0.0 {
                     continue;
                 }
-                let (mut noise, mut fit) = (1.0 / s2, jc.row(i).dot(&rows.jacobian.row(i)) / (s2 * s2));
+                let (_, values) = self.row(i);
+                let block = &own[self.set_up[i]];
+                let quadratic: f64 = values
+                    .iter()
+                    .zip(block.column_iter())
+                    .map(|(v, column)| v * values.iter().zip(column.iter()).map(|(x, c)| x * c).sum::<f64>())
+                    .sum();
+                let (mut noise, mut fit) = (1.0 / s2, quadratic / (s2 * s2));
                 if tau > 0.0 {
-                    let mn = m * touches.normal_in_r(i);
-                    noise -= touches.normal_in_r(i).dot(&mn) / s2;
-                    let row = rows.jacobian.row(i);
-                    let cross: Vector3<f64> = Vector3::from_fn(|k, _| row.transpose().dot(&shared.column(k)));
+                    let mn = m * self.touches.normal_in_r(i);
+                    noise -= self.touches.normal_in_r(i).dot(&mn) / s2;
+                    let cross = Vector3::from_fn(|k, _| self.dot(i, shared.column(k).as_slice()));
                     fit += (mn.dot(&(square * mn)) - 2.0 * cross.dot(&mn)) / (s2 * s2);
                 }
                 d[i] = noise - fit;
             }
         }
-        let mut snoop =
-            Self { a: a.as_slice().to_vec(), d, u: Vec::new(), chi2, dof: dof as f64, noise_dof };
+        d
+    }
+
+    /// Column i of V⁻¹ − V⁻¹JCJᵀV⁻¹.
+    fn column(&self, i: usize, covariance: &DMatrix<f64>) -> Vec<f64> {
+        let n = self.gap.len();
+        let mut unit = vec![0.0; n];
+        unit[i] = 1.0;
+        self.inverse_noise(&mut unit);
+        let mut b = DVector::zeros(covariance.nrows());
+        for (k, u) in unit.iter().enumerate().filter(|(_, u)| **u != 0.0) {
+            let (columns, values) = self.row(k);
+            columns.iter().zip(values).for_each(|(&c, v)| b[c] += u * v);
+        }
+        let moved = covariance * b;
+        let mut column: Vec<f64> = (0..n).map(|k| self.dot(k, moved.as_slice())).collect();
+        self.inverse_noise(&mut column);
+        column.iter_mut().zip(&unit).for_each(|(c, u)| *c = u - *c);
+        column
+    }
+}
+
+impl Snoop {
+    /// At a fit: touches with weight 0 are out already and stay out. `covariance` is that of the free unknowns;
+    /// `noise_dof` the degrees of freedom of σ (0 where it is not known).
+    #[must_use]
+    pub fn new(
+        touches: &Touches,
+        theta: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        (chi2, dof): (f64, usize),
+        noise_dof: f64,
+    ) -> Self {
+        let short = touches.short_rows(theta);
+        let rows = Rows {
+            touches,
+            columns: short.columns,
+            set_up: short.set_up,
+            start: short.start,
+            values: short.values,
+            gap: short.gap,
+        };
+        let mut a = rows.gap.clone();
+        rows.inverse_noise(&mut a);
+        let d = rows.diagonal(covariance);
+        let mut snoop = Self { a, d, u: Vec::new(), chi2, dof: dof as f64, noise_dof };
         snoop.search(&rows, covariance);
         snoop
     }
@@ -174,19 +232,13 @@ impl Snoop {
                 break;
             }
             // column i of P, less what the touches dropped before take of it
-            let mut unit = DVector::zeros(n);
-            unit[i] = 1.0;
-            rows.inverse_noise(&mut unit);
-            let b = rows.jacobian.tr_mul(&unit);
-            let mut column = &rows.jacobian * (covariance * b);
-            rows.inverse_noise(&mut column);
-            column = unit - column;
+            let mut column = rows.column(i, covariance);
             for (_, u) in &self.u {
                 let at = u[i];
                 column.iter_mut().zip(u).for_each(|(c, x)| *c -= x * at);
             }
             let root = self.d[i].sqrt();
-            column /= root;
+            column.iter_mut().for_each(|c| *c /= root);
             let amount = self.a[i] / root;
             self.chi2 -= amount * amount;
             self.dof -= 1.0;
@@ -196,7 +248,7 @@ impl Snoop {
             }
             self.d[i] = 0.0;
             self.a[i] = 0.0;
-            self.u.push((i, column.as_slice().to_vec()));
+            self.u.push((i, column));
         }
     }
 

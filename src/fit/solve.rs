@@ -237,6 +237,17 @@ impl Observability {
 /// about the speed of convergence and not about the answer.
 #[must_use]
 pub fn minimise(problem: &impl Problem, start: DVector<f64>, seen: &Observability) -> Solution {
+    minimise_from(problem, start, seen, None)
+}
+
+/// The same, with the sums at the start where they are known already.
+#[must_use]
+pub fn minimise_from(
+    problem: &impl Problem,
+    start: DVector<f64>,
+    seen: &Observability,
+    first: Option<Normal>,
+) -> Solution {
     let p = start.len();
     let mut theta = start;
     if seen.rank == 0 {
@@ -248,7 +259,8 @@ pub fn minimise(problem: &impl Problem, start: DVector<f64>, seen: &Observabilit
     }
     // moves are judged by their root mean square over the touches
     let to_mm = problem.noise() / (problem.n_rows().max(1) as f64).sqrt();
-    let mut normal = problem.normal(&theta, true);
+    let mut normal = first.unwrap_or_else(|| problem.normal(&theta, true));
+    let mut last_mm = f64::INFINITY;
     let mut factor = Factor::new(problem, &theta, &normal, seen);
     let mut iterations = 0;
     let mut converged = false;
@@ -261,6 +273,16 @@ pub fn minimise(problem: &impl Problem, start: DVector<f64>, seen: &Observabilit
         let moved_mm = length * to_mm;
         let again = moved_mm > SAME_FACTOR_MM;
         iterations += 1;
+        // steps shrink by their ratio: when the next one would be below the tolerance, this one is the last, and what
+        // it takes from the sum of squares is known without looking
+        if moved_mm < SAME_FACTOR_MM && moved_mm * (moved_mm / last_mm) < STEP_TOLERANCE_MM {
+            theta += &step;
+            normal.sum = (normal.sum - length * length).max(0.0);
+            converged = true;
+            stopped = format!("a further step would move no touch by more than {STEP_TOLERANCE_MM:e} mm");
+            break;
+        }
+        last_mm = moved_mm;
         let mut part = 1.0;
         let accepted = loop {
             let candidate = &theta + &step * part;

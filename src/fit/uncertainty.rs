@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 /// Correlations above this are worth a line.
 const WORTH_NAMING: f64 = 0.8;
 
+/// With more touches the columns of the whole catalogue would need gigabytes.
+pub(super) const MOST_UNMODELLED: usize = 20_000;
+
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
 
@@ -212,36 +215,38 @@ pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
         return Vec::new();
     }
     let linear = fit.linear(fit.noise.tau_mm);
-    let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
-    let mut own = linear.jacobian.select_columns(&physical);
-    for (mut column, &c) in own.column_iter_mut().zip(&physical) {
-        column *= typical(c);
-    }
+    let gram = linear.jacobian.tr_mul(&linear.jacobian);
+    // every unknown in its typical size; the set-ups by the norms of their columns, which leaves their span as it is
+    let scale = |c: usize| match is_nuisance(fit.free[c]) {
+        true if gram[(c, c)] > 0.0 => gram[(c, c)].sqrt().recip(),
+        true => 0.0,
+        false => fit.model.unknowns[fit.free[c]].typical,
+    };
+    let part = |rows: &[usize], columns: &[usize]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+            gram[(rows[i], columns[j])] * scale(rows[i]) * scale(columns[j])
+        })
+    };
+    let mut own = part(&physical, &physical);
     if !nuisance.is_empty() {
-        let mut others = linear.jacobian.select_columns(&nuisance);
-        for mut column in others.column_iter_mut() {
-            let norm = column.norm();
-            if norm > 0.0 {
-                column /= norm;
-            }
-        }
-        let svd = others.svd(true, false);
-        if let Some(u) = svd.u {
-            let top = svd.singular_values.max();
-            let kept: Vec<usize> = (0..u.ncols()).filter(|&k| svd.singular_values[k] > 1e-9 * top).collect();
-            let q = u.select_columns(&kept);
-            let inside = q.tr_mul(&own);
-            own -= &q * inside;
+        // what the set-ups can follow is projected out
+        let eigen = part(&nuisance, &nuisance).symmetric_eigen();
+        let top = eigen.eigenvalues.max();
+        let cross = eigen.eigenvectors.tr_mul(&part(&nuisance, &physical));
+        for (k, value) in eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v > 1e-12 * top) {
+            let row = cross.row(k);
+            own -= row.transpose() * row / *value;
         }
     }
-    let svd = own.svd(false, true);
-    let (Some(v_t), top) = (svd.v_t, svd.singular_values.max()) else { return Vec::new() };
+    let eigen = own.symmetric_eigen();
+    let top = eigen.eigenvalues.max().max(0.0).sqrt();
     let mut out = Vec::new();
-    for (k, s) in svd.singular_values.iter().enumerate() {
-        if *s >= 1.0 || *s <= 1e-8 * top {
+    for (k, value) in eigen.eigenvalues.iter().enumerate() {
+        let s = value.max(0.0).sqrt();
+        if s >= 1.0 || s <= 1e-6 * top {
             continue;
         }
-        let direction = v_t.row(k);
+        let direction = eigen.eigenvectors.column(k);
         let weights = physical
             .iter()
             .zip(direction.iter())

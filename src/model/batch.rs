@@ -6,7 +6,7 @@
 //! or at all touches of a block; what is left per touch is a handful of 3 × 3 products.
 
 use super::catalogue::Place;
-use super::predict::{Changes, Model, Observation};
+use super::predict::{Active, Changes, Model, Observation};
 use crate::axes::{AxisName, Position};
 use crate::geometry::Displacement;
 use crate::machine::{Axis, Side};
@@ -28,7 +28,24 @@ pub struct Batch<'a> {
     coefficients: Vec<f64>,
     /// Actives with a shape parameter: evaluated anew for each θ.
     shaped: Vec<usize>,
+    /// Places whose transform is another at every touch.
+    moving: Vec<usize>,
+    /// What the rows of each block hold.
+    entries: Vec<Vec<Entry>>,
+    n_rotary_workpiece: usize,
     roles: Roles,
+}
+
+/// One displacement of a row: where its slope stands, and by what it is multiplied.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    slot: u32,
+    component: u32,
+    /// Place in the row.
+    at: u32,
+    active: u32,
+    /// Its coefficient; not a number where that changes from touch to touch.
+    coefficient: f64,
 }
 
 /// Slots outside of the axes.
@@ -77,6 +94,9 @@ struct Placed {
 
 impl Placed {
     fn new(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        if by.w == Vector3::zeros() {
+            return Self::shift(by, centre);
+        }
         let ((sa, ca), (sb, cb), (sc, cc)) = (by.w.x.sin_cos(), by.w.y.sin_cos(), by.w.z.sin_cos());
         // Rz(c)·Ry(b)·Rx(a), as `Displacement::rotation`
         let r = Matrix3::new(
@@ -96,6 +116,21 @@ impl Placed {
             image,
             axis_a: r.column(0).into_owned(),
             axis_b: Vector3::new(-sc, cc, 0.0),
+        }
+    }
+
+    fn shift(by: &Displacement, centre: &Vector3<f64>) -> Self {
+        let rigid = Rigid { r: Matrix3::identity(), t: by.d };
+        Self { rigid, image: centre + by.d, axis_a: Vector3::x(), axis_b: Vector3::y() }
+    }
+
+    /// Makes it the transform of another displacement; cheap where neither turns.
+    fn set(&mut self, by: &Displacement, centre: &Vector3<f64>) {
+        if by.w == Vector3::zeros() && self.rigid.r == Matrix3::identity() {
+            self.rigid.t = by.d;
+            self.image = centre + by.d;
+        } else {
+            *self = Self::new(by, centre);
         }
     }
 
@@ -122,6 +157,8 @@ pub struct Scratch {
     moved: Vec<Vector3<f64>>,
     /// Points in front of each place of the workpiece chain, in order of application.
     met: Vec<Vector3<f64>>,
+    /// Rotations of axes whose reading is in error.
+    turned: [Option<Rigid>; 6],
 }
 
 /// A batch at one θ.
@@ -166,6 +203,17 @@ impl Model {
                 coefficients.push(if here { a.factor * a.term.formula.eval(&o.state, &[]) } else { 0.0 });
             }
         }
+        let n_common = self.layout.common.len();
+        let entry = |(i, a): (usize, &Active)| Entry {
+            slot: a.slot as u32,
+            component: a.component as u32,
+            at: (self.layout.place(a.unknown) + if a.set_up.is_some() { n_common } else { 0 }) as u32,
+            active: i as u32,
+            coefficient: a.term.formula.constant().map_or(f64::NAN, |value| a.factor * value),
+        };
+        let of = |s: usize| self.active.iter().enumerate().filter(move |(_, a)| a.set_up.is_none_or(|own| own == s));
+        let entries = (0..self.set_ups().len()).map(|s| of(s).map(entry).collect()).collect();
+        let n_rotary_workpiece = self.workpiece.iter().filter(|l| l.axis.name.is_rotary()).count();
         let roles = Roles {
             tool: self.find(Place::Tool),
             base: self.find(Place::Base),
@@ -174,7 +222,8 @@ impl Model {
             trigger: self.find(Place::Trigger),
             reading: self.find(Place::Reading),
         };
-        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, roles }
+        let moving = (0..self.slots.len()).filter(|&i| self.slots[i].changes == Changes::WithTouch).collect();
+        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, moving, entries, n_rotary_workpiece, roles }
     }
 }
 
@@ -215,6 +264,7 @@ impl Batch<'_> {
             coefficient: vec![0.0; self.model.active.len()],
             moved: Vec::with_capacity(3 * self.model.tool.len() + 2),
             met: Vec::with_capacity(3 * self.model.workpiece.len() + 2),
+            turned: [None; 6],
         }
     }
 
@@ -270,24 +320,21 @@ impl At<'_> {
         let gap = self.evaluate(touch, scratch, true);
         row.fill(0.0);
         let (model, o) = (self.batch.model, &self.batch.observations[touch]);
-        let n_common = model.layout.common.len();
-        for (i, a) in model.active.iter().enumerate() {
+        for e in &self.batch.entries[o.set_up] {
+            let coefficient =
+                if e.coefficient.is_nan() { scratch.coefficient[e.active as usize] } else { e.coefficient };
+            row[e.at as usize] += scratch.gradient[e.slot as usize][e.component as usize] * coefficient;
+        }
+        for &i in &self.batch.shaped {
+            let a = &model.active[i];
             let offset = match a.set_up {
                 Some(s) if s != o.set_up => continue,
-                Some(_) => n_common,
+                Some(_) => model.layout.common.len(),
                 None => 0,
             };
-            let slope = scratch.gradient[a.slot][a.component];
-            let coefficient = match a.term.formula.constant() {
-                Some(value) => a.factor * value,
-                None => scratch.coefficient[i],
-            };
-            row[offset + model.layout.place(a.unknown)] += slope * coefficient;
-            if a.term.formula.has_shape() {
-                let amount = self.theta[a.unknown] * a.factor;
-                for (shape, derivative) in a.term.formula.partials(&o.state, &self.theta[a.first..a.first + a.count]) {
-                    row[offset + model.layout.place(a.first + shape)] += slope * amount * derivative;
-                }
+            let amount = scratch.gradient[a.slot][a.component] * self.theta[a.unknown] * a.factor;
+            for (shape, derivative) in a.term.formula.partials(&o.state, &self.theta[a.first..a.first + a.count]) {
+                row[offset + model.layout.place(a.first + shape)] += amount * derivative;
             }
         }
         gap
@@ -301,10 +348,8 @@ impl At<'_> {
         }
         let o = &batch.observations[touch];
         let base = (1 + o.set_up) * self.n_slots;
-        for (i, slot) in model.slots.iter().enumerate() {
-            if slot.changes == Changes::WithTouch {
-                scratch.displacement[i] = self.displacement[base + i];
-            }
+        for &i in &batch.moving {
+            scratch.displacement[i] = self.displacement[base + i];
         }
         let own = &batch.coefficients[touch * batch.varying.len()..(touch + 1) * batch.varying.len()];
         for (&i, &coefficient) in batch.varying.iter().zip(own) {
@@ -320,11 +365,10 @@ impl At<'_> {
                 scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * a.factor * value);
             }
         }
-        for (i, slot) in model.slots.iter().enumerate() {
-            if slot.changes == Changes::WithTouch {
-                let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
-                scratch.placed[i] = Placed::new(&scratch.displacement[i], &centre);
-            }
+        for &i in &batch.moving {
+            let slot = &model.slots[i];
+            let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
+            scratch.placed[i].set(&scratch.displacement[i], &centre);
         }
     }
 
@@ -332,15 +376,15 @@ impl At<'_> {
         let (batch, model) = (self.batch, self.batch.model);
         let o = &batch.observations[touch];
         let base = (1 + o.set_up) * self.n_slots;
-        let Scratch { placed, displacement, gradient, moved, met, .. } = scratch;
+        let Scratch { placed, displacement, gradient, moved, met, turned, .. } = scratch;
         let changes = |i: usize| model.slots[i].changes == Changes::WithTouch;
         let at_slot = |i: usize| -> &Placed { if changes(i) { &placed[i] } else { &self.placed[base + i] } };
         let by_slot = |i: usize| -> &Displacement { if changes(i) { &displacement[i] } else { &self.displacement[base + i] } };
 
         // what the control shows, corrected by the reading's own error
         let mut shown = o.position;
-        let mut turned: [Option<Rigid>; 6] = [None; 6];
         if let Some(slot) = batch.roles.reading {
+            turned.fill(None);
             for link in model.workpiece.iter().chain(&model.tool) {
                 let name = link.axis.name;
                 let amount = by_slot(slot).get(name.index());
@@ -352,13 +396,14 @@ impl At<'_> {
             }
         }
         let pose = &batch.poses[batch.pose[touch] as usize];
-        let rotary = |axis: &Axis, at: usize| -> Rigid { turned[axis.name.index()].unwrap_or(pose[at]) };
+        let rotary = |axis: &Axis, at: usize| -> &Rigid {
+            let by_reading = if batch.roles.reading.is_some() { turned[axis.name.index()].as_ref() } else { None };
+            by_reading.unwrap_or(&pose[at])
+        };
         let travel = |axis: &Axis| -> Vector3<f64> {
             let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
             axis.direction.into_inner() * (sign * shown.get(axis.name))
         };
-        let n_rotary_workpiece = model.workpiece.iter().filter(|l| l.axis.name.is_rotary()).count();
-
         // --- the ball from the tool's frame to R
         moved.clear();
         let mut point = o.ball_at_zero;
@@ -411,7 +456,7 @@ impl At<'_> {
                 point = at_slot(i).rigid.undo(&point);
             }
         }
-        debug_assert!(at_rotary <= n_rotary_workpiece);
+        debug_assert!(at_rotary <= batch.n_rotary_workpiece);
         for i in [batch.roles.workpiece, batch.roles.block].into_iter().flatten() {
             met.push(point);
             point = at_slot(i).rigid.undo(&point);
@@ -466,7 +511,7 @@ impl At<'_> {
                 *g = place.rigid.r.tr_mul(g);
             }
         };
-        let mut at_rotary = n_rotary_workpiece;
+        let mut at_rotary = batch.n_rotary_workpiece;
         if let Some(i) = batch.roles.base {
             applied(back.next(), i, &mut g, gradient);
         }

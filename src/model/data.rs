@@ -35,6 +35,19 @@ pub struct Unusable {
     pub reason: String,
 }
 
+/// Where a touch comes from, in the words of its plan and log.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Line in the log, from 1.
+    pub line: usize,
+    /// Stage of the program.
+    pub stage: String,
+    /// The block as it stood: label of its set-up.
+    pub block: String,
+    /// The block's own face at all axes 0.
+    pub face: String,
+}
+
 /// All runs, ready for the model.
 #[derive(Debug, Clone, Default)]
 pub struct Data {
@@ -46,6 +59,8 @@ pub struct Data {
     pub unusable: Vec<Unusable>,
     /// The blocks as they stood.
     pub set_ups: Vec<SetUp>,
+    /// For each observation: where it comes from.
+    pub origins: Vec<Origin>,
     /// For each observation: touches of one point made right after each other share a number.
     pub repeats: Vec<usize>,
     /// For each observation: its index visit, counted through all runs; touches of a visit follow one another.
@@ -140,6 +155,12 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let ideal = machine
                 .linear_for_ball(carrier, &planned.pose.position(), &(point + normal * ball_radius), length_mm)
                 .unwrap_or(touch.position);
+            data.origins.push(Origin {
+                line: touch.line,
+                stage: planned.stage.clone(),
+                block: data.set_ups[set_up].label.clone(),
+                face: planned.face.clone(),
+            });
             data.nominal.push(Observation { position: ideal, ..observation.clone() });
             data.repeats.push(repeat_group(&data, run.plan, planned, index));
             let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));

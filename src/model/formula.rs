@@ -5,7 +5,7 @@
 
 use exmex::prelude::*;
 use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
 pub const VARIABLES: [&str; 37] = [
@@ -110,7 +110,7 @@ pub struct Formula {
     text: String,
     /// Names of the effect's parameters that may stand inside.
     shapes: Vec<String>,
-    parts: OnceLock<Option<Parts>>,
+    parts: OnceLock<Option<Arc<Parts>>>,
 }
 
 impl Formula {
@@ -119,7 +119,7 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
-        let parts = OnceLock::from(Some(compile(text, shapes)?));
+        let parts = OnceLock::from(Some(Arc::new(compile(text, shapes)?)));
         Ok(Self { parts, ..Self::unchecked(text, shapes) })
     }
 
@@ -131,7 +131,7 @@ impl Formula {
 
     fn parts(&self) -> Option<&Parts> {
         let compiled = || compile(&self.text, &self.shapes.iter().map(String::as_str).collect::<Vec<_>>()).ok();
-        self.parts.get_or_init(compiled).as_ref()
+        self.parts.get_or_init(|| compiled().map(Arc::new)).as_deref()
     }
 
     /// The formula as it was written.

@@ -286,6 +286,14 @@ impl Model {
         self.unknowns.len()
     }
 
+    /// The axes of the machine, X to C.
+    #[must_use]
+    pub fn axes(&self) -> Vec<crate::axes::AxisName> {
+        let mut names: Vec<_> = self.workpiece.iter().chain(&self.tool).map(|l| l.axis.name).collect();
+        names.sort_by_key(|n| n.index());
+        names
+    }
+
     /// The set-ups of the blocks.
     #[must_use]
     pub fn set_ups(&self) -> &[SetUp] {

@@ -6,6 +6,8 @@
 mod join;
 
 pub use join::{Joined, join};
+pub mod edit;
+pub mod history;
 
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
 use crate::fit::{Knowledge, Mask};

@@ -1,0 +1,259 @@
+//! Runs the peers and the crate on one problem, and compares their answers.
+
+use crate::problems::{MOUNTING, Problem, SIGMA_MM, matched, solve, swivel_head};
+use axiscal::fit;
+use axiscal::log;
+use axiscal::program;
+use axiscal::simulate::{self, Scenario};
+use peak_alloc::PeakAlloc;
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+/// What a solver says of a problem.
+#[derive(serde::Deserialize)]
+pub struct Answer {
+    pub solver: String,
+    pub fit_s: f64,
+    pub covariance_s: f64,
+    pub iterations: usize,
+    /// Memory with the touches read, KiB.
+    pub loaded_kb: f64,
+    /// The most that there was until the end, KiB.
+    pub peak_kb: f64,
+    pub name: Vec<String>,
+    pub value: Vec<f64>,
+    pub sigma: Vec<f64>,
+}
+
+impl Answer {
+    pub fn total_s(&self) -> f64 {
+        self.fit_s + self.covariance_s
+    }
+}
+
+/// The peers that are installed, by name.
+pub struct Peers(BTreeMap<String, PathBuf>);
+
+impl Peers {
+    /// Asks `benches/peers/run`, which installs what is missing if it may.
+    pub fn find(install: bool) -> Self {
+        let mut command = Command::new("bash");
+        command.arg(folder().join("run")).stderr(std::process::Stdio::inherit());
+        if !install {
+            command.arg("--no-install");
+        }
+        let said = command.output().expect("bash runs").stdout;
+        let lines = String::from_utf8(said).unwrap();
+        let peers = Self(lines.lines().filter_map(|l| l.split_once('\t')).map(|(n, p)| (n.into(), p.into())).collect());
+        if std::env::var_os("AXISCAL_PEERS_REQUIRED").is_some() {
+            assert_eq!(peers.0.len(), 3, "peers are missing");
+        }
+        peers
+    }
+
+    pub fn newton(&self, problem: &Path, n_threads: usize, repeats: usize) -> Option<Answer> {
+        self.run("newton_fit", &[path(problem), &n_threads.to_string(), &repeats.to_string()], n_threads)
+    }
+
+    pub fn scipy(&self, problem: &Path, n_threads: usize, repeats: usize) -> Option<Answer> {
+        let script = folder().join("scipy_fit.py");
+        self.run("python", &[path(&script), path(problem), "lm", &repeats.to_string()], n_threads)
+    }
+
+    pub fn ceres(
+        &self,
+        problem: &Path,
+        derivatives: &str,
+        solver: &str,
+        covariance: &str,
+        n_threads: usize,
+        repeats: usize,
+    ) -> Option<Answer> {
+        let (threads, repeats) = (n_threads.to_string(), repeats.to_string());
+        self.run("ceres_fit", &[path(problem), derivatives, solver, covariance, &threads, &repeats], n_threads)
+    }
+
+    fn run(&self, name: &str, arguments: &[&str], n_threads: usize) -> Option<Answer> {
+        let mut command = Command::new(self.0.get(name)?);
+        command.args(arguments).env("OPENBLAS_NUM_THREADS", n_threads.to_string());
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{name} {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        Some(serde_json::from_slice(&output.stdout).unwrap())
+    }
+}
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers")
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().expect("a path that is text")
+}
+
+/// The crate's own answer, the fastest of `repeats`; memory is what the heap holds.
+pub fn run_crate(problem: &Problem, n_threads: usize, repeats: usize, heap: &PeakAlloc) -> Answer {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+    let data = problem.data();
+    let mut best: Option<Answer> = None;
+    for _ in 0..repeats {
+        let loaded_kb = f64::from(heap.current_usage_as_kb());
+        heap.reset_peak_usage();
+        let start = Instant::now();
+        let model = problem.model(&data);
+        let solution = pool.install(|| solve(&model, &data));
+        let fit_s = start.elapsed().as_secs_f64();
+        if best.as_ref().is_none_or(|b| fit_s < b.fit_s) {
+            best = Some(Answer {
+                solver: "axiscal".into(),
+                fit_s,
+                covariance_s: 0.0,
+                iterations: solution.iterations,
+                loaded_kb,
+                peak_kb: f64::from(heap.peak_usage_as_kb()),
+                name: model.unknowns.iter().map(|u| u.name.clone()).collect(),
+                value: solution.theta.as_slice().to_vec(),
+                sigma: solution.covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+            });
+        }
+    }
+    best.expect("at least one repeat")
+}
+
+/// All of `identify` on a problem in memory, the fastest of `repeats`: time, s, and what the heap holds at most, KiB.
+pub fn run_identify(problem: &Problem, n_threads: usize, repeats: usize, heap: &PeakAlloc) -> (f64, f64) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+    let (data, settings) = (problem.data(), problem.settings());
+    let mut best = (f64::INFINITY, 0.0);
+    for _ in 0..repeats {
+        let data = data.clone();
+        let loaded_kb = heap.current_usage_as_kb();
+        heap.reset_peak_usage();
+        let start = Instant::now();
+        let fit = pool
+            .install(|| fit::identify_data(&problem.machine, &problem.catalogue, data, &settings))
+            .unwrap_or_else(|e| panic!("{e:?}"));
+        let seconds = start.elapsed().as_secs_f64();
+        assert!(fit.outcome.converged && fit.outcome.rank == fit.free.len(), "{}", fit.outcome.stopped);
+        if seconds < best.0 {
+            best = (seconds, f64::from(heap.peak_usage_as_kb() - loaded_kb));
+        }
+    }
+    best
+}
+
+/// Writes the problem file of `benches/peers/README.md`; `names` in the model's order.
+pub fn write_problem(problem: &Problem, names: &[String], file: &Path) {
+    let plan = &problem.plan;
+    let mut out = std::io::BufWriter::new(std::fs::File::create(file).unwrap());
+    writeln!(out, "axiscal-peers/1\n{} {} {} {SIGMA_MM}", problem.touches.len(), plan.blocks.len(), names.len())
+        .unwrap();
+    for b in &plan.blocks {
+        writeln!(out, "{} {} {} {}", b.carrier, b.centre[0], b.centre[1], b.centre[2]).unwrap();
+    }
+    names.iter().for_each(|name| writeln!(out, "{name}").unwrap());
+    let in_order: Vec<String> = plan.blocks.iter().map(|b| format!("SX@{MOUNTING}/{}", b.name)).collect();
+    assert!(names.iter().filter(|n| n.starts_with("SX@")).eq(&in_order), "the model orders the blocks as the plan");
+    let ball = problem.machine.tool.ball_at_zero(plan.tool_length_mm);
+    for (t, planned) in problem.touches.iter().zip(&plan.touches) {
+        let [x, y, z, _, b, c] = t.position.0;
+        let block = plan.blocks.iter().position(|b| b.name == planned.block).unwrap();
+        let numbers = [x, y, z, b, c].into_iter().chain(planned.point).chain(planned.normal);
+        let rest = [plan.ball_radius_mm, ball.x, ball.y, ball.z, block as f64];
+        for number in numbers.chain(rest) {
+            out.write_all(&number.to_le_bytes()).unwrap();
+        }
+    }
+    out.flush().unwrap();
+}
+
+/// Panics unless two answers are the same: within 1e-9 mm and deg without noise, 1e-4 of the standard uncertainty with it.
+pub fn compare(ours: &Answer, theirs: &Answer, noisy: bool) {
+    assert_eq!(ours.name, theirs.name);
+    for (i, name) in ours.name.iter().enumerate() {
+        // um/m and urad are a thousandth of a millimetre's kind
+        let fine = if ["EXX", "EYY", "EC0Y"].contains(&name.as_str()) { 1e-6 } else { 1e-9 };
+        let tolerance = if noisy { 1e-4 * ours.sigma[i] } else { fine };
+        let off = (ours.value[i] - theirs.value[i]).abs();
+        assert!(
+            off <= tolerance,
+            "{name}: {} says {}, {} says {}",
+            ours.solver,
+            ours.value[i],
+            theirs.solver,
+            theirs.value[i]
+        );
+        let ratio = theirs.sigma[i] / ours.sigma[i];
+        assert!((ratio - 1.0).abs() < 1e-6, "{name}: sigma of {} is {ratio} times ours", theirs.solver);
+    }
+}
+
+/// Times of a program that was run several times, s.
+pub struct Times {
+    pub median_s: f64,
+    pub least_s: f64,
+}
+
+/// `axiscal identify` and SciPy's script on a study of the paper's touches, each run `repeats` times; their answers agree.
+pub fn identify_both(peers: &Peers, folder: &Path, repeats: usize) -> [Option<Times>; 2] {
+    let study = write_study(folder);
+    let run = |command: &mut Command| -> (Times, BTreeMap<String, f64>) {
+        let mut times_s = Vec::new();
+        let mut said = Vec::new();
+        for _ in 0..repeats {
+            let start = Instant::now();
+            let output = command.output().unwrap();
+            times_s.push(start.elapsed().as_secs_f64());
+            assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+            said = output.stdout;
+        }
+        times_s.sort_by(f64::total_cmp);
+        let answer: serde_json::Value = serde_json::from_slice(&said).unwrap();
+        let identified = answer["parameters"].as_array().unwrap().iter().filter(|p| p["status"] == "identified");
+        let values =
+            identified.map(|p| (p["name"].as_str().unwrap().to_owned(), p["value"].as_f64().unwrap())).collect();
+        (Times { median_s: times_s[times_s.len() / 2], least_s: times_s[0] }, values)
+    };
+    let (ours, our_values) = run(Command::new(env!("CARGO_BIN_EXE_axiscal")).arg("identify").arg(&study).arg("--json"));
+    let theirs = peers.0.get("python").map(|python| {
+        let script = self::folder().join("identify.py");
+        let (times, values) = run(Command::new(python).arg(script).arg(&study));
+        assert!(our_values.keys().eq(values.keys()), "both identify the same parameters");
+        for (name, value) in &our_values {
+            assert!((value - values[name]).abs() < 1e-9, "{name}: identify says {value}, SciPy {}", values[name]);
+        }
+        times
+    });
+    [Some(ours), theirs]
+}
+
+/// The paper's head and table runs with everything that the whole-process comparison reads; noise-free, so that two noise
+/// models cannot differ.
+fn write_study(folder: &Path) -> PathBuf {
+    let machine = swivel_head();
+    let scenario = Scenario::flawless()
+        .with(&machine, "location-b", &[("EX0B", 0.031), ("EZ0B", -0.022), ("EA0B", 0.004), ("EC0B", -0.003)])
+        .and_then(|s| {
+            s.with(&machine, "location-c", &[("EX0C", 0.012), ("EY0C", -0.027), ("EA0C", 0.002), ("EB0C", 0.005)])
+        })
+        .and_then(|s| s.with(&machine, "pretravel", &[("pretravel", 0.006)]))
+        .unwrap();
+    let mut study = String::from("machine = \"swivel-head\"\n");
+    for name in ["head", "table"] {
+        let spec = program::choose(program::built_in().unwrap(), name, &machine).unwrap();
+        let plan = program::generate(&machine, &spec, &program::Options::default()).unwrap().0.plan;
+        let (raw, _) = simulate::run(&machine, &plan, &scenario, None).unwrap();
+        let touches: Vec<log::Touch> = raw.iter().map(matched).collect();
+        std::fs::write(folder.join(format!("{name}.plan.json")), plan.to_json()).unwrap();
+        std::fs::write(folder.join(format!("{name}.csv")), log::csv::write(&machine, &touches)).unwrap();
+        study.push_str(&format!("[[data]]\nplan = \"{name}.plan.json\"\nlog = \"{name}.csv\"\ncontroller = \"csv\"\n"));
+    }
+    study.push_str(
+        "[model]\neffects = [\"location-b\", \"location-c\", \"pretravel\", \"block-setup\"]\n[noise]\ntouch_um = 1.0\n",
+    );
+    let path = folder.join("study.toml");
+    std::fs::write(&path, study).unwrap();
+    path
+}

@@ -1,0 +1,45 @@
+//! `axiscal compare`: model against measurement, where it fails.
+
+use super::load::load_study;
+use super::{Answer, Io};
+use crate::diag::Result;
+use crate::{compare, files, fit, report};
+use std::path::PathBuf;
+
+/// Arguments of `compare`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The study
+    pub study: PathBuf,
+    /// Every touch with its residual and what it may depend on, as CSV
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// All groups and plots, not only those that explain something
+    #[arg(long)]
+    pub all: bool,
+    /// Plots of plain ASCII signs (as in a pipe)
+    #[arg(long)]
+    pub ascii: bool,
+}
+
+/// Runs `compare`.
+///
+/// # Errors
+/// When the study or a file that it names is unusable, or the CSV cannot be written.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let loaded = load_study(&args.study, io)?;
+    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
+    let comparison = compare::compare(&fit);
+    if let Some(path) = &args.csv {
+        files::write_whole(path, report::compare::csv(&comparison).as_bytes())?;
+    }
+    io.say(report::compare::comparison(&comparison, io.paper(args.ascii), args.all));
+    for u in &fit.outcome.undetermined {
+        io.say(format!("not told by this data: {}", u.says));
+    }
+    if !comparison.explained_by_noise {
+        io.say(format!("next: axiscal diagnose {}", args.study.display()));
+    }
+    io.answer(&comparison);
+    Ok(Answer::Done)
+}

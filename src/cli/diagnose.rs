@@ -1,0 +1,43 @@
+//! `axiscal diagnose`: which physical effect is missing.
+
+use super::load::load_study;
+use super::{Answer, Io};
+use crate::diag::Result;
+use crate::diagnose::{Options, Subject, Verdict, diagnose};
+use crate::fit;
+use std::path::PathBuf;
+
+/// Arguments of `diagnose`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The study
+    pub study: PathBuf,
+    /// Most candidates that are listed
+    #[arg(long, value_name = "N", default_value_t = Options::default().at_most)]
+    pub at_most: usize,
+}
+
+/// Runs `diagnose`. The answer is "no" when the model does not fit.
+///
+/// # Errors
+/// When the study or a file that it names is unusable.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let loaded = load_study(&args.study, io)?;
+    let mut settings = loaded.settings();
+    settings.quick = true;
+    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let subject =
+        Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+    let options = Options { at_most: args.at_most.max(1), ..Options::default() };
+    let found = diagnose(subject, &options)?;
+    io.say(crate::report::diagnosis::diagnosis(&found).trim_end());
+    if matches!(found.verdict, Verdict::MissingEffect) && !io.json {
+        if let Some(first) = found.candidates.first() {
+            io.say(format!("next: axiscal add {} {}", args.study.display(), first.effect));
+        }
+    } else if matches!(found.verdict, Verdict::Unexplained) {
+        io.say(format!("next: axiscal sketch-effect {} --out my-effects.toml", args.study.display()));
+    }
+    io.answer(&found);
+    Ok(if matches!(found.verdict, Verdict::MissingEffect | Verdict::Unexplained) { Answer::No } else { Answer::Done })
+}

@@ -1,0 +1,55 @@
+//! `axiscal sketch-effect`: a starting formula for what no known effect explains.
+
+use super::load::load_study;
+use super::{Answer, Io};
+use crate::diag::{Result, source};
+use crate::diagnose::{Subject, sketch::sketch};
+use crate::files;
+use crate::fit;
+use crate::model::catalogue::Catalogue;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `sketch-effect`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The study
+    pub study: PathBuf,
+    /// The effects file to which the effect is added; other effects in it stay as they are
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// Runs `sketch-effect`.
+///
+/// # Errors
+/// When the study is unusable, or nothing is left over that a formula could say.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let loaded = load_study(&args.study, io)?;
+    let mut settings = loaded.settings();
+    settings.quick = true;
+    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let name = args.out.display().to_string();
+    let before = if args.out.exists() { files::read_text(&args.out)? } else { String::new() };
+    // what stands in the file must be readable: its ids are taken, whether or not the study names the file
+    let mut own = Catalogue::default();
+    if !before.trim().is_empty() {
+        own.add_file(&source(&name, before.clone()))?;
+    }
+    let taken = |id: &str| loaded.catalogue.knows(id) || own.knows(id);
+    let subject =
+        Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+    let made = sketch(subject, &taken)?;
+    let gap = match before.trim_end() {
+        "" => "",
+        _ if before.ends_with('\n') => "\n",
+        _ => "\n\n",
+    };
+    let text = format!("{before}{gap}{}", made.toml);
+    Catalogue::built_in()?.add_file(&source(&name, text.clone()))?;
+    files::write_whole(&args.out, text.as_bytes())?;
+    io.say(format!("{}\n{} = {}\nwritten to {name}: change its id and name to what it is,", made.says, made.id, made.formula));
+    io.say(format!("put effects_file = [\"{name}\"] into the study, then: axiscal add {} {}", args.study.display(), made.id));
+    io.answer(&json!({ "effect": made.id, "says": made.says, "formula": made.formula, "file": name, "toml": made.toml }));
+    Ok(Answer::Done)
+}

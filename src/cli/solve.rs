@@ -1,0 +1,301 @@
+//! `axiscal solve`: the loop, step by step. Each step is proposed with its reason and confirmed by the user, or by
+//! `--yes`; the loop never goes past what the test with all candidates counted in and the held-out touches allow.
+
+use super::load::{Loaded, load_study};
+use super::{Answer, Io, add};
+use crate::diag::{Failure, Result};
+use crate::diagnose::answer::{Candidate, Diagnosis};
+use crate::diagnose::{Options, Subject, Verdict, diagnose};
+use crate::fit::outcome::{Outcome, Parameter};
+use crate::fit::{self, Fit};
+use crate::report::fit::{digits, significant};
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `solve`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The study; effects that you agree to are added in place
+    pub study: PathBuf,
+    /// Agree to everything that is proposed
+    #[arg(long)]
+    pub yes: bool,
+    /// Most effects that are added
+    #[arg(long, value_name = "N", default_value_t = 6)]
+    pub at_most: usize,
+}
+
+/// An effect whose size has at least this chance under pure noise says nothing any more beside the later ones.
+const DROP_P: f64 = 0.05;
+
+/// What was done.
+#[derive(Debug, Serialize)]
+struct Solution {
+    format: &'static str,
+    steps: Vec<Step>,
+    /// Why the loop ended.
+    stopped: String,
+    /// The last verdict.
+    verdict: Verdict,
+    /// Effects that were added and say nothing beside the later ones: they were taken out again.
+    dropped: Vec<String>,
+    /// What stays open.
+    open: Vec<String>,
+    rms_um: f64,
+    noise_um: f64,
+    held_out_rms_um: Option<f64>,
+    effects: Vec<String>,
+}
+
+/// One step of the loop.
+#[derive(Debug, Serialize)]
+struct Step {
+    added: String,
+    /// Effects that these touches cannot tell from it.
+    same_as: Vec<String>,
+    p_adjusted: f64,
+    rms_before_um: f64,
+    rms_after_um: f64,
+    held_out_before_um: Option<f64>,
+    held_out_after_um: Option<f64>,
+}
+
+/// What the user says to a proposal.
+enum Reply {
+    Take(String),
+    Stop,
+}
+
+/// Runs `solve`. The answer is "no" when something is left that nothing explains.
+///
+/// # Errors
+/// When the study is unusable, or nobody is there to agree.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let mut steps: Vec<Step> = Vec::new();
+    let (loaded, fit, found, stopped) = loop {
+        let (loaded, fit) = look(&args.study, io)?;
+        let o = &fit.outcome;
+        io.say(format!(
+            "--- step {}: {} um RMS left, noise {} um, chi2/dof {:.2}{}",
+            steps.len() + 1,
+            significant(o.rms_um),
+            significant(o.noise_um),
+            o.chi2_per_dof,
+            o.held_out_rms_um.map_or_else(String::new, |h| format!(", {} um on set-ups left out", significant(h)))
+        ));
+        let mut settings = loaded.settings();
+        settings.quick = true;
+        let subject =
+            Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+        let found = diagnose(subject, &Options::default())?;
+        io.say(&found.says);
+        let stopped = match (&found.verdict, found.candidates.first()) {
+            (Verdict::MissingEffect, Some(first)) if first.proposed => {
+                if steps.len() >= args.at_most {
+                    Some(format!("{} effects were added, as many as --at-most allows", steps.len()))
+                } else {
+                    propose(first, io);
+                    match ask(first, args.yes)? {
+                        Reply::Take(id) => {
+                            let change =
+                                add::Args { study: args.study.clone(), effects: vec![id.clone()], dry_run: false };
+                            add::add(&change, &io.inner())?;
+                            let after = look(&args.study, io)?.1.outcome;
+                            let mut same_as: Vec<String> =
+                                std::iter::once(first.effect.clone()).chain(first.same_as.clone()).collect();
+                            same_as.retain(|s| *s != id);
+                            steps.push(Step {
+                                added: id,
+                                same_as,
+                                p_adjusted: first.p_adjusted,
+                                rms_before_um: o.rms_um,
+                                rms_after_um: after.rms_um,
+                                held_out_before_um: o.held_out_rms_um,
+                                held_out_after_um: after.held_out_rms_um,
+                            });
+                            None
+                        }
+                        Reply::Stop => Some("you stopped it".to_owned()),
+                    }
+                }
+            }
+            (Verdict::Unexplained, _) => Some(format!(
+                "no known effect explains what is left: `axiscal sketch-effect {} --out my-effects.toml` writes its curve as a formula",
+                args.study.display()
+            )),
+            (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
+            _ => Some("nothing is left that these touches can show".to_owned()),
+        };
+        if let Some(stopped) = stopped {
+            break (loaded, fit, found, stopped);
+        }
+    };
+    let dropped = drop_idle(args, &steps, &fit, io)?;
+    let fit = if dropped.is_empty() { fit } else { look(&args.study, io)?.1 };
+    let solution = Solution {
+        format: "axiscal-solution/1",
+        open: open(&steps, &found, &fit.outcome),
+        verdict: found.verdict,
+        stopped,
+        dropped,
+        rms_um: fit.outcome.rms_um,
+        noise_um: fit.outcome.noise_um,
+        held_out_rms_um: fit.outcome.held_out_rms_um,
+        effects: fit.outcome.effects.clone(),
+        steps,
+    };
+    tell(&solution, &fit.outcome, &args.study, io);
+    io.answer(&solution);
+    drop(loaded);
+    Ok(if matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) { Answer::No } else { Answer::Done })
+}
+
+fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
+    let loaded = load_study(study, &io.inner())?;
+    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
+    Ok((loaded, fit))
+}
+
+/// The proposal and its reason.
+fn propose(first: &Candidate, io: &Io) {
+    let sizes: Vec<String> = first
+        .parameters
+        .iter()
+        .map(|p| match p.sigma {
+            Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, Some(sigma)), significant(sigma), p.unit),
+            None => format!("{} {} {}", p.name, significant(p.value), p.unit),
+        })
+        .collect();
+    io.say(format!("proposed: {} ({}): {}", first.effect, first.name, sizes.join(", ")));
+    io.say(format!("  {}", first.says));
+    io.say(format!("  to confirm it: {}", first.look));
+    if !first.same_as.is_empty() {
+        io.say(format!("  these touches cannot tell it from: {}", first.same_as.join(", ")));
+        io.say(format!("  to tell them apart: {}", first.tell_apart));
+    }
+    for w in &first.weakens {
+        io.say(format!("  it makes {} more than three times less certain", w.name));
+    }
+}
+
+/// Asks on the terminal; the first of the group is taken with `--yes`.
+fn ask(first: &Candidate, yes: bool) -> Result<Reply> {
+    if yes {
+        return Ok(Reply::Take(first.effect.clone()));
+    }
+    if !std::io::stdin().is_terminal() {
+        return Err(Failure::new("solve::nobody", "nobody is there to agree: the input is no terminal")
+            .help("call with --yes to agree to everything that is proposed"));
+    }
+    let members: Vec<&String> = std::iter::once(&first.effect).chain(&first.same_as).collect();
+    loop {
+        let choice = if members.len() > 1 {
+            let list: Vec<String> = members.iter().enumerate().map(|(i, m)| format!("{} {m}", i + 1)).collect();
+            format!("add it? [Y]es, [n]o, or a number ({})", list.join(", "))
+        } else {
+            "add it? [Y]es or [n]o".to_owned()
+        };
+        let _ = write!(std::io::stderr(), "{choice}: ");
+        let mut line = String::new();
+        if std::io::stdin().lock().read_line(&mut line).unwrap_or(0) == 0 {
+            return Ok(Reply::Stop);
+        }
+        match line.trim().to_lowercase().as_str() {
+            "" | "y" | "yes" => return Ok(Reply::Take(first.effect.clone())),
+            "n" | "no" | "q" => return Ok(Reply::Stop),
+            word => {
+                if let Some(member) = word.parse::<usize>().ok().and_then(|n| members.get(n.wrapping_sub(1))) {
+                    return Ok(Reply::Take((*member).clone()));
+                }
+            }
+        }
+    }
+}
+
+/// Effects that the loop added and that say nothing any more beside the later ones (Wald), taken out again.
+fn drop_idle(args: &Args, steps: &[Step], fit: &Fit, io: &Io) -> Result<Vec<String>> {
+    let mut dropped = Vec::new();
+    // the last one was needed a moment ago
+    for step in steps.iter().rev().skip(1) {
+        let of: Vec<usize> = fit.free.iter().copied().filter(|&i| fit.model.unknowns[i].effect == step.added).collect();
+        let linear: Vec<usize> = of.into_iter().filter(|&i| !fit.model.unknowns[i].shape).collect();
+        let theta = DVector::from_iterator(linear.len(), linear.iter().map(|&i| fit.theta[i]));
+        let c = DMatrix::from_fn(linear.len(), linear.len(), |a, b| fit.covariance[(linear[a], linear[b])]);
+        let Some(weight) = c.try_inverse() else { continue };
+        let size2 = theta.dot(&(weight * &theta));
+        let p = ChiSquared::new(linear.len() as f64).map_or(0.0, |d| d.sf(size2));
+        if p > DROP_P {
+            io.say(format!(
+                "{} says nothing any more beside the later effects (p = {p:.2}): it is taken out",
+                step.added
+            ));
+            let change = add::Args { study: args.study.clone(), effects: vec![step.added.clone()], dry_run: false };
+            add::remove(&change, &io.inner())?;
+            dropped.push(step.added.clone());
+            break;
+        }
+    }
+    Ok(dropped)
+}
+
+/// What nobody knows yet.
+fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
+    let mut out = Vec::new();
+    for s in steps.iter().filter(|s| !s.same_as.is_empty()) {
+        out.push(format!("{} could as well be {}", s.added, s.same_as.join(" or ")));
+    }
+    out.extend(outcome.undetermined.iter().map(|u| u.says.clone()));
+    out.extend(outcome.weak.iter().map(|w| w.says.clone()));
+    if !found.not_seen.is_empty() {
+        out.push(format!("these touches cannot see: {}", found.not_seen.join(", ")));
+    }
+    out
+}
+
+fn tell(s: &Solution, outcome: &Outcome, study: &Path, io: &Io) {
+    io.say(format!("\n--- the end: {}", s.stopped));
+    let sizes = |id: &str| -> String {
+        let of = |p: &&Parameter| p.effect == id && p.sigma.is_some();
+        let words: Vec<String> = outcome
+            .parameters
+            .iter()
+            .filter(of)
+            .map(|p| {
+                format!(
+                    "{} {} ± {} {}",
+                    p.name,
+                    digits(p.value, p.sigma),
+                    p.sigma.map_or_else(String::new, significant),
+                    p.unit
+                )
+            })
+            .collect();
+        words.join(", ")
+    };
+    for step in &s.steps {
+        io.say(format!(
+            "found: {}: {} > {} um RMS: {}",
+            step.added,
+            significant(step.rms_before_um),
+            significant(step.rms_after_um),
+            sizes(&step.added)
+        ));
+    }
+    io.say(format!(
+        "left: {} um RMS of a noise of {} um{}",
+        significant(s.rms_um),
+        significant(s.noise_um),
+        s.held_out_rms_um
+            .map_or_else(String::new, |h| format!("; {} um on set-ups left out of the fit", significant(h)))
+    ));
+    for line in &s.open {
+        io.say(format!("open: {line}"));
+    }
+    if s.steps.iter().any(|step| !step.same_as.is_empty()) {
+        io.say(format!("next: axiscal plan-next {} --controller … --out next", study.display()));
+    }
+    io.say(format!("next: axiscal history {}", study.display()));
+}

@@ -1,0 +1,276 @@
+//! Model against measurement: where does it fail?
+//!
+//! [`compare`] is a pure function of a fit. What it returns is what the terminal, the report and the workbench draw.
+
+pub mod change;
+mod factors;
+mod share;
+pub mod verify;
+
+pub use share::Share;
+
+use crate::fit::{Fit, noise};
+use crate::model::formula::slot;
+use crate::units::um_from_mm;
+use serde::{Deserialize, Serialize};
+use share::Misfit;
+use std::collections::BTreeMap;
+
+/// The format line of a comparison.
+pub const FORMAT: &str = "axiscal-comparison/1";
+
+/// Worst touches that are listed.
+const N_WORST: usize = 10;
+
+/// Where a model fails.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// `axiscal-comparison/1`
+    pub format: String,
+    /// Name of the machine.
+    pub machine: String,
+    /// Ids of the effects in the model.
+    pub effects: Vec<String>,
+    /// √(Σr²/n) over the touches used, µm.
+    pub rms_um: f64,
+    /// RMS on index visits that were left out of the fit, µm.
+    pub held_out_rms_um: Option<f64>,
+    /// Standard deviation of a touch, µm.
+    pub noise_um: f64,
+    /// Where that comes from: `repeats`, `declared`, `study`.
+    pub noise_source: String,
+    /// Reduced chi-square.
+    pub chi2_per_dof: f64,
+    /// Degrees of freedom.
+    pub dof: usize,
+    /// True when the noise explains what is left (99.9 %).
+    pub explained_by_noise: bool,
+    /// All in a sentence.
+    pub says: String,
+    /// Ways to split the touches, the one that explains most first.
+    pub splits: Vec<Split>,
+    /// The touches furthest off, worst first, those that were not used included.
+    pub worst: Vec<Worst>,
+    /// Every touch with what it may depend on.
+    pub points: Vec<Point>,
+}
+
+/// One way to split the touches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Split {
+    /// `stage`, `pose.C`, `block`, `face`, `direction`, `X`, `time`, `feed`, `spindle`, `stylus`, `run`.
+    pub by: String,
+    /// Share of the misfit (its excess over the noise) that goes with it, 0 to 1. Splits overlap: shares need not add up.
+    pub share: f64,
+    /// Probability that noise alone does as well.
+    pub p: f64,
+    /// Of a rotary axis: harmonics of its position, each alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub harmonics: Vec<Harmonic>,
+    /// The groups in their order.
+    pub groups: Vec<Group>,
+    /// In words.
+    pub says: String,
+}
+
+/// A harmonic of the position of a rotary axis, as a displacement in R.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Harmonic {
+    /// Times per turn.
+    pub order: usize,
+    /// Share of the misfit, all directions together.
+    pub share: f64,
+    /// Share of the misfit in X, Y and Z alone.
+    pub along: [f64; 3],
+}
+
+/// Touches with one value of what they are split by.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Group {
+    /// The value, or the range of a bin.
+    pub value: String,
+    /// Mean value, where it is a number: mm, deg, h, mm/min.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<f64>,
+    /// Touches used.
+    pub n: usize,
+    /// Mean residual, µm.
+    pub mean_um: f64,
+    /// Root mean square of the residuals, µm.
+    pub rms_um: f64,
+}
+
+/// A touch that is far off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Worst {
+    /// Which run of the study, from 1.
+    pub run: usize,
+    /// Number in the plan.
+    pub id: u64,
+    /// Line in the log, from 1.
+    pub line: usize,
+    /// Measured less model along the outward normal, µm.
+    pub residual_um: f64,
+    /// Externally studentised.
+    pub standardised: f64,
+    /// The block as it stood.
+    pub block: String,
+    /// Its face.
+    pub face: String,
+    /// Rotary axes, deg.
+    pub pose: BTreeMap<String, f64>,
+    /// Why it was not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rejected: Option<String>,
+}
+
+/// One touch with what its residual may depend on. Lengths mm, angles deg.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Which run of the study, from 1.
+    pub run: usize,
+    /// Number in the plan.
+    pub id: u64,
+    /// Line in the log, from 1.
+    pub line: usize,
+    /// Order in the study, from 1.
+    pub order: usize,
+    /// Measured less model along the outward normal, µm.
+    pub residual_um: f64,
+    /// Externally studentised.
+    pub standardised: f64,
+    /// False for a touch that is not used.
+    pub used: bool,
+    /// Stage of the program.
+    pub stage: String,
+    /// The block as it stood.
+    pub block: String,
+    /// Its face.
+    pub face: String,
+    /// Index visit, counted through all runs.
+    pub visit: usize,
+    /// Axis positions at the trigger: those of the machine.
+    pub axes: BTreeMap<String, f64>,
+    /// Outward normal in R.
+    pub normal: [f64; 3],
+    /// Direction of the approach about the probe's axis, deg, −180 to 180; none along the axis.
+    pub approach_deg: Option<f64>,
+    /// Hours since the first touch.
+    pub time_h: f64,
+    /// Temperature, °C.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(rename = "temperature_degC")]
+    pub temperature_deg_c: Option<f64>,
+    /// Feed of the touch, mm/min.
+    pub feed_mm_min: f64,
+    /// Orientation of the spindle.
+    pub spindle_deg: f64,
+    /// Pivot to ball.
+    pub stylus_mm: f64,
+}
+
+impl Point {
+    /// Value of something to plot against: an axis letter, `time`, `order`, `approach`.
+    #[must_use]
+    pub fn value(&self, variable: &str) -> Option<f64> {
+        match variable {
+            "time" => Some(self.time_h),
+            "order" => Some(self.order as f64),
+            "approach" => self.approach_deg,
+            axis => self.axes.get(axis).copied(),
+        }
+    }
+}
+
+/// Compares a fit with its touches.
+#[must_use]
+pub fn compare(fit: &Fit) -> Comparison {
+    let points = points(fit);
+    let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
+    let explained_by_noise = fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof);
+    let mut splits = factors::splits(fit, &points, &Misfit::new(fit));
+    splits.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let rms_um = fit.outcome.rms_um;
+    let noise_um = um_from_mm(fit.noise.sigma_mm);
+    let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
+    let says = match (fit.dof, explained_by_noise, first) {
+        (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
+        (_, true, _) => format!("what is left, {rms_um:.2} um, is what a noise of {noise_um:.2} um leaves: the model does not fail"),
+        (_, false, Some(split)) => format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says),
+        (_, false, None) => format!(
+            "the model misses the touches by {:.1} times their noise, and what is left goes with nothing in particular",
+            chi2_per_dof.sqrt()
+        ),
+    };
+    Comparison {
+        format: FORMAT.into(),
+        machine: fit.outcome.machine.clone(),
+        effects: fit.outcome.effects.clone(),
+        rms_um,
+        held_out_rms_um: fit.outcome.held_out_rms_um,
+        noise_um,
+        noise_source: fit.noise.source.into(),
+        chi2_per_dof,
+        dof: fit.dof,
+        explained_by_noise,
+        says,
+        splits,
+        worst: worst(fit, &points),
+        points,
+    }
+}
+
+fn points(fit: &Fit) -> Vec<Point> {
+    let axes: Vec<crate::axes::AxisName> = fit.model.axes();
+    let each = fit.data.observations.iter().zip(&fit.data.origins).enumerate().map(|(i, (o, origin))| {
+        let s = &o.state;
+        let across = (s[slot::NORMAL_IN_PROBE], s[slot::NORMAL_IN_PROBE + 1]);
+        Point {
+            run: o.run + 1,
+            id: o.id,
+            line: origin.line,
+            order: i + 1,
+            residual_um: um_from_mm(fit.residual_mm[i]),
+            standardised: fit.studentised[i],
+            used: fit.weight[i] > 0.0,
+            stage: origin.stage.clone(),
+            block: origin.block.clone(),
+            face: origin.face.clone(),
+            visit: fit.data.visits[i] + 1,
+            axes: axes.iter().map(|a| (a.letter().to_string(), o.position.get(*a))).collect(),
+            normal: [0, 1, 2].map(|k| s[slot::NORMAL_IN_R + k]),
+            // the ball comes against the normal
+            approach_deg: (across.0.hypot(across.1) > 0.1)
+                .then(|| crate::units::deg_from_rad((-across.1).atan2(-across.0))),
+            time_h: s[slot::HOURS],
+            temperature_deg_c: o.has_temperature.then_some(s[slot::TEMPERATURE]),
+            feed_mm_min: s[slot::FEED],
+            spindle_deg: crate::units::deg_from_rad(s[slot::SPINDLE]),
+            stylus_mm: s[slot::LENGTHS],
+        }
+    });
+    each.collect()
+}
+
+fn worst(fit: &Fit, points: &[Point]) -> Vec<Worst> {
+    let badness = |i: usize| {
+        if fit.weight[i] > 0.0 { fit.studentised[i].abs() } else { fit.residual_mm[i].abs() / fit.noise.sigma_mm }
+    };
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&a, &b| badness(b).total_cmp(&badness(a)));
+    let each = order.into_iter().take(N_WORST).map(|i| {
+        let p = &points[i];
+        Worst {
+            run: p.run,
+            id: p.id,
+            line: p.line,
+            residual_um: p.residual_um,
+            standardised: p.standardised,
+            block: p.block.clone(),
+            face: p.face.clone(),
+            pose: p.axes.iter().filter(|(a, _)| matches!(a.as_str(), "A" | "B" | "C")).map(|(a, v)| (a.clone(), *v)).collect(),
+            rejected: fit.rejected.get(&i).cloned(),
+        }
+    });
+    each.collect()
+}

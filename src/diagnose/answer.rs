@@ -1,0 +1,198 @@
+//! What a diagnosis says (`axiscal-diagnosis/1`).
+
+use serde::Serialize;
+
+/// The format line of a diagnosis.
+pub const FORMAT: &str = "axiscal-diagnosis/1";
+
+/// Is something missing?
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing is missing that these touches can show.
+    Adequate,
+    /// At least one effect passes Holm's test and the held-out touches.
+    MissingEffect,
+    /// The model fails, and no effect passes.
+    Unexplained,
+    /// Too few touches to judge.
+    TooLittleData,
+}
+
+/// The answer of `diagnose`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Diagnosis {
+    /// `axiscal-diagnosis/1`
+    pub format: &'static str,
+    /// Is something missing?
+    pub verdict: Verdict,
+    /// The verdict in a sentence.
+    pub says: String,
+    /// √(Σr²/n) over the touches used, µm.
+    pub rms_um: f64,
+    /// Standard deviation of a touch, µm.
+    pub noise_um: f64,
+    /// Scatter of index visits that the tests allow for, µm.
+    pub visit_um: f64,
+    /// Probability of so much misfit where the model holds.
+    pub lack_of_fit_p: f64,
+    /// On what the misfit depends, best first.
+    #[serde(rename = "where")]
+    pub depends: Vec<Where>,
+    /// The misfit against the variable that it depends on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
+    /// Effects that may be missing, best first, one per group that these touches cannot tell apart.
+    pub candidates: Vec<Candidate>,
+    /// Suppositions that were tried because the error is gross, best first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub gross: Vec<Gross>,
+    /// Touches that were not used, and what became of them with the first candidate in the model.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<Outlier>,
+    /// How many effects were tested.
+    pub tested: usize,
+    /// Effects that were tested and not found, and from which size on these touches would have shown them.
+    pub power: Vec<Power>,
+    /// Effects that leave no trace in these touches.
+    pub not_seen: Vec<String>,
+    /// Remarks.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+}
+
+/// On what the misfit depends.
+#[derive(Debug, Clone, Serialize)]
+pub struct Where {
+    /// `pose.C`, `axis.X`, `time`, `block`, …
+    pub by: String,
+    /// Share of the misfit that goes with it.
+    pub share: f64,
+    /// Family-wise probability of so much where nothing is missing.
+    pub p_adjusted: f64,
+    /// In a sentence.
+    pub says: String,
+    /// The generic shape that shows it best.
+    pub id: String,
+}
+
+/// The misfit against a variable.
+#[derive(Debug, Clone, Serialize)]
+pub struct Shape {
+    /// Which variable, as in `where`.
+    pub by: String,
+    /// Unit of x.
+    pub x_unit: String,
+    /// Unit of y.
+    pub y_unit: String,
+    /// Direction in which it acts.
+    pub direction: String,
+    /// Values of the variable.
+    pub x: Vec<f64>,
+    /// The misfit.
+    pub y: Vec<f64>,
+    /// Half the width of its 95 % band.
+    pub band: Vec<f64>,
+    /// What kind of thing does that.
+    pub kind: String,
+}
+
+/// An effect that may be missing.
+#[derive(Debug, Clone, Serialize)]
+pub struct Candidate {
+    /// Its id.
+    pub effect: String,
+    /// Name for people.
+    pub name: String,
+    /// Probability of so much misfit in its direction where nothing is missing.
+    pub p: f64,
+    /// The same, with all effects that were tested counted in (Holm).
+    pub p_adjusted: f64,
+    /// Does it pass Holm's test, and do the held-out touches bear it out?
+    pub proposed: bool,
+    /// RMS with it in the model, µm.
+    pub rms_after_um: f64,
+    /// RMS on touches of set-ups that had no part in fit and choice, µm.
+    pub held_out_before_um: Option<f64>,
+    /// The same with it.
+    pub held_out_after_um: Option<f64>,
+    /// Expected sizes.
+    pub parameters: Vec<Parameter>,
+    /// Effects that these touches cannot tell from it.
+    pub same_as: Vec<String>,
+    /// Which touches would tell them apart.
+    pub tell_apart: String,
+    /// What it is.
+    pub says: String,
+    /// Where to look on the machine and how to confirm it.
+    pub look: String,
+    /// Share of the misfit's sum of squares that it takes away.
+    pub share: f64,
+    /// Are the expected sizes usual ones?
+    pub plausible: bool,
+    /// Parameters of the model that it makes more than three times less certain.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub weakens: Vec<Weakened>,
+    /// Does the model still fail with it?
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remains: Option<bool>,
+}
+
+/// An expected size.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Name.
+    pub name: String,
+    /// Expected value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Standard uncertainty; null for a value that was picked from a scan.
+    pub sigma: Option<f64>,
+}
+
+/// A parameter that an added effect makes less certain.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Weakened {
+    /// Name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Standard uncertainty without the effect.
+    pub sigma_before: f64,
+    /// With it.
+    pub sigma_after: f64,
+}
+
+/// A supposition about a gross mistake.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gross {
+    /// What was supposed: `flip_B`, `swap_XY`, `inch`, …
+    pub hypothesis: String,
+    /// In words.
+    pub says: String,
+    /// RMS if it is true, µm.
+    pub rms_um: f64,
+}
+
+/// A touch that was not used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outlier {
+    /// Number in the plan.
+    pub id: u64,
+    /// Which run of the study, from 1.
+    pub run: usize,
+    /// Why.
+    pub reason: String,
+    /// True where it belongs to the rest once the first candidate is in the model.
+    pub comes_back: bool,
+}
+
+/// What would have been found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Power {
+    /// The effect.
+    pub effect: String,
+    /// From this size on (peak over the touches, µm) it would have been found nearly always.
+    pub minimal_detectable_um: f64,
+}

@@ -1,0 +1,85 @@
+//! A fit as the statistics see it: whitened rows of the touches that are used, then the priors, and the base model's
+//! space.
+
+use crate::fit::Fit;
+use crate::search::{Basis, PureError, Question};
+use nalgebra::{DMatrix, DVector};
+
+/// The regression that all tests share.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// Whitened residuals.
+    pub residual: DVector<f64>,
+    /// What the base model can follow.
+    pub base: Basis,
+    /// Whitened Jacobian of the base model's free unknowns, in their units.
+    pub jacobian: DMatrix<f64>,
+    /// Observations that are used, in their order: the first rows.
+    pub used: Vec<usize>,
+    /// Index visit of each row of a touch: what is held out together.
+    pub visits: Vec<usize>,
+    /// From repeats, where there were enough.
+    pub pure: Option<PureError>,
+    /// Scatter of index visits that the tests allow for, mm.
+    pub tau_mm: f64,
+    /// Rows of priors.
+    n_priors: usize,
+}
+
+impl Evidence {
+    /// Of a fit.
+    #[must_use]
+    pub fn of(fit: &Fit) -> Self {
+        let tau_mm = fit.noise.tau_test_mm;
+        let linear = fit.linear(tau_mm);
+        let n = fit.data.observations.len();
+        let used: Vec<usize> = (0..n).filter(|&i| fit.weight[i] > 0.0).collect();
+        let rows: Vec<usize> = used.iter().copied().chain(n..linear.residual.len()).collect();
+        let residual = DVector::from_iterator(rows.len(), rows.iter().map(|&i| linear.residual[i]));
+        let jacobian = linear.jacobian.select_rows(&rows);
+        // σ was estimated from repeats that are rows of this regression
+        let pure = fit.noise.dof.map(|dof| PureError { variance: 1.0, dof, within: true });
+        Self {
+            base: Basis::new(&jacobian),
+            visits: used.iter().map(|&i| fit.data.visits[i]).collect(),
+            n_priors: linear.residual.len() - n,
+            residual,
+            jacobian,
+            used,
+            pure,
+            tau_mm,
+        }
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn n_rows(&self) -> usize {
+        self.residual.len()
+    }
+
+    /// Degrees of freedom of the residual.
+    #[must_use]
+    pub fn dof(&self) -> usize {
+        self.n_rows().saturating_sub(self.base.rank())
+    }
+
+    /// The question that the tests answer.
+    #[must_use]
+    pub fn question(&self) -> Question<'_> {
+        Question { residual: &self.residual, base: &self.base, pure: self.pure }
+    }
+
+    /// Columns of gaps (all observations × columns, mm) as rows of this regression.
+    #[must_use]
+    pub fn whiten(&self, fit: &Fit, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
+        fit.with_touches(self.tau_mm, |t| t.whiten(&mut columns_mm));
+        let mut out = DMatrix::zeros(self.n_rows(), columns_mm.ncols());
+        for (mut to, from) in out.column_iter_mut().zip(columns_mm.column_iter()) {
+            for (value, &i) in to.iter_mut().zip(&self.used) {
+                *value = from[i];
+            }
+        }
+        debug_assert_eq!(self.n_priors + self.used.len(), self.n_rows());
+        out
+    }
+}

@@ -1,0 +1,155 @@
+//! What is known of each touch, for shapes that no effect has a name for.
+
+use super::evidence::Evidence;
+use crate::axes::AxisName;
+use crate::fit::Fit;
+use crate::fit::candidates::columns;
+use crate::machine::{Machine, Side};
+use crate::model::catalogue::Catalogue;
+use crate::model::formula::slot;
+use crate::search::generic::{Direction, Features, Generics, Kind, Variable, generics};
+use crate::units::{mm_from_um, um_from_mm};
+use nalgebra::Vector3;
+
+/// The table of what is known: one entry per touch in the fit's order.
+#[must_use]
+pub fn features(fit: &Fit, machine: &Machine) -> Features {
+    let observations = &fit.data.observations;
+    let column = |s: usize| -> Vec<f64> { observations.iter().map(|o| o.state[s]).collect() };
+    let mut variables = Vec::new();
+    for axis in &machine.axes {
+        let kind = if axis.name.is_rotary() { Kind::Rotary } else { Kind::Linear };
+        variables.push(Variable::new(axis.name.to_string(), kind, column(slot::AXES + axis.name.index())));
+    }
+    variables.push(Variable::new("t", Kind::Time, column(slot::HOURS)));
+    if observations.iter().any(|o| o.has_temperature) {
+        variables.push(Variable::new("T", Kind::Temperature, column(slot::TEMPERATURE)));
+    }
+    for axis in &machine.axes {
+        variables.push(Variable::new(
+            format!("s{}", axis.name),
+            Kind::Plain,
+            column(slot::SENSES + axis.name.index()),
+        ));
+    }
+    for axis in machine.rotary() {
+        variables.push(before(fit, axis.name));
+    }
+    variables.push(Variable::new("feed", Kind::Plain, column(slot::FEED)));
+    variables.push(Variable::new("S", Kind::Rotary, column(slot::SPINDLE)));
+    variables.push(Variable::new("L", Kind::Plain, column(slot::LENGTHS)));
+    variables.push(approach(fit));
+
+    let vector = |s: usize| -> Vec<Vector3<f64>> {
+        observations.iter().map(|o| Vector3::new(o.state[s], o.state[s + 1], o.state[s + 2])).collect()
+    };
+    let carrier: Vec<Vector3<f64>> = observations.iter().map(|o| o.normal).collect();
+    let mut directions = Direction::of_normals(&vector(slot::NORMAL_IN_R), &carrier, "base");
+    directions.extend(turns(fit, machine));
+    Features {
+        variables,
+        directions,
+        block: observations.iter().map(|o| o.set_up).collect(),
+        face: faces(fit),
+        visit: fit.data.visits.clone(),
+    }
+}
+
+/// Where a rotary axis stood at the index visit before: hysteresis. Formulas have no word for it.
+fn before(fit: &Fit, axis: AxisName) -> Variable {
+    let (mut now, mut earlier) = (None, 0.0);
+    let values = fit.data.observations.iter().map(|o| {
+        let at = o.state[slot::AXES + axis.index()];
+        if let Some(last) = now
+            && f64::abs(at - last) > 1e-6
+        {
+            earlier = last;
+        }
+        now = Some(at);
+        earlier
+    });
+    Variable { word: None, ..Variable::new(format!("{axis} before"), Kind::Plain, values.collect()) }
+}
+
+/// Angle of the approach in the probe's frame.
+fn approach(fit: &Fit) -> Variable {
+    let s = slot::NORMAL_IN_PROBE;
+    let angles = fit.data.observations.iter().map(|o| {
+        let (x, y) = (o.state[s], o.state[s + 1]);
+        if x.hypot(y) > 1e-6 { y.atan2(x) } else { 0.0 }
+    });
+    let mut out = Variable::new("approach", Kind::Approach, angles.collect());
+    out.word = Some("atan2(my, mx)".into());
+    out
+}
+
+/// Touches of one face of one block share a number.
+fn faces(fit: &Fit) -> Vec<usize> {
+    let mut seen: Vec<(usize, [i8; 3])> = Vec::new();
+    let key = |v: &Vector3<f64>| [v.x, v.y, v.z].map(|c| (10.0 * c).round() as i8);
+    fit.data
+        .observations
+        .iter()
+        .map(|o| {
+            let face = (o.set_up, key(&o.normal));
+            seen.iter().position(|f| *f == face).unwrap_or_else(|| {
+                seen.push(face);
+                seen.len() - 1
+            })
+        })
+        .collect()
+}
+
+/// Turns about the rotary axes: their lever arms are the model's own.
+fn turns(fit: &Fit, machine: &Machine) -> Vec<Direction> {
+    let dof = |axis: AxisName| match axis {
+        AxisName::A => "rx",
+        AxisName::B => "ry",
+        _ => "rz",
+    };
+    let mut out = Vec::new();
+    for axis in machine.rotary() {
+        let text = format!(
+            "[[effect]]\nid = \"turn\"\nat = \"{0}\"\nterms = [{{ parameter = \"turn\", unit = \"urad\", dof = \"{1}\", formula = \"1\" }}]",
+            axis.name,
+            dof(axis.name)
+        );
+        let mut own = Catalogue::default();
+        if own.add_file(&crate::diag::source("turn", text)).is_err() {
+            continue;
+        }
+        let Some(effect) = own.get("turn", machine) else { continue };
+        let made = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, None);
+        let weight: Vec<f64> = made.values.column(0).iter().map(|v| um_from_mm(*v)).collect();
+        if weight.iter().any(|w| w.abs() > 1e-6) {
+            out.push(Direction {
+                name: format!("turn-{}", axis.name),
+                at: axis.name.to_string(),
+                dof: dof(axis.name).to_owned(),
+                unit: "urad".to_owned(),
+                weight,
+            });
+        }
+    }
+    out
+}
+
+/// All generic shapes of a fit, whitened as its touches are.
+#[must_use]
+pub fn shapes(fit: &Fit, evidence: &Evidence, features: &Features) -> Generics {
+    generics(features, |raw_um| evidence.whiten(fit, raw_um.map(mm_from_um)))
+}
+
+/// In which frame a direction's name stands, for people.
+#[must_use]
+pub fn direction_words(name: &str, machine: &Machine) -> String {
+    match name.split_once('-') {
+        Some(("machine", axis)) => format!("in {axis} of the machine"),
+        Some(("table", axis)) => {
+            let turns = machine.axes.iter().any(|a| a.name.is_rotary() && a.side == Side::Workpiece);
+            if turns { format!("in {axis} of the table, turning with it") } else { format!("in {axis} of the table") }
+        }
+        Some(("turn", axis)) => format!("as a turn about {axis}"),
+        _ => "along the approach".to_owned(),
+    }
+}

@@ -1,0 +1,232 @@
+//! From tests to the answer: candidates with sizes in their units, what was not found, touches that come back.
+
+use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Power, Shape, Verdict, Weakened, Where};
+use super::verdict::Decision;
+use super::{Examination, Subject, gross, noise_um, tell, words};
+use crate::fit::Fit;
+use crate::search::generic::{Features, Kind};
+use crate::search::groups::Group;
+use crate::search::held_out::{Choice, held_out};
+use crate::search::multiplicity::FAMILY_LEVEL;
+use crate::search::power;
+use crate::units::um_from_mm;
+use nalgebra::DMatrix;
+
+/// A parameter is flagged when an added effect makes it this many times less certain.
+const WEAKENED: f64 = 3.0;
+
+/// Most variables that are named.
+const MOST_WHERE: usize = 5;
+
+pub(super) fn put_together(
+    subject: Subject,
+    seen: &Examination,
+    features: &Features,
+    decision: Decision,
+    gross: Vec<Gross>,
+    options: &super::Options,
+) -> Diagnosis {
+    let fit = subject.fit;
+    let mut verdict = decision.verdict;
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let gross_found = gross.first().is_some_and(|g| g.rms_um < 0.1 * fit.outcome.rms_um);
+    if let Some(first) = gross.first().filter(|_| gross_found)
+        && let Some(candidate) = gross::candidate(subject, first)
+    {
+        verdict = Verdict::MissingEffect;
+        candidates.push(candidate);
+    }
+    if verdict != Verdict::TooLittleData {
+        candidates.extend(
+            seen.groups.iter().enumerate().map(|(i, g)| candidate(subject, seen, g, i == 0, decision.borne_out)),
+        );
+    }
+    candidates.truncate(options.at_most);
+    let found: Vec<&Group> =
+        seen.groups.iter().filter(|g| seen.search.scores[g.leader].p_adjusted < FAMILY_LEVEL).collect();
+    let powers = if options.power {
+        let detectable = power::power(&seen.evidence.base, &seen.named.library, Some(&used_rows(seen)), noise_um(fit));
+        let not_found = detectable.iter().filter(|p| !found.iter().any(|g| g.holds(p.candidate)));
+        let mut powers: Vec<Power> = not_found
+            .filter_map(|p| {
+                let effect = seen.named.effects[p.candidate].id.clone();
+                Some(Power { effect, minimal_detectable_um: p.minimal_detectable? })
+            })
+            .collect();
+        powers.sort_by(|a, b| b.minimal_detectable_um.total_cmp(&a.minimal_detectable_um));
+        powers
+    } else {
+        Vec::new()
+    };
+    let significant = seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL);
+    let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
+    let by = |on: &str| words::by(on, &named_axes);
+    let depends: Vec<Where> = if verdict == Verdict::Adequate {
+        Vec::new()
+    } else {
+        significant
+            .take(MOST_WHERE)
+            .map(|d| Where {
+                by: by(&d.on),
+                share: d.share,
+                p_adjusted: d.p_adjusted,
+                says: words::says(d, fit, subject.machine),
+                id: d.id.clone(),
+            })
+            .collect()
+    };
+    let shape = seen.dependences.first().filter(|_| !depends.is_empty()).and_then(|d| {
+        let kind = features.variables.iter().find(|v| v.name == d.on).map(|v| v.kind);
+        let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };
+        (!d.curve.is_empty()).then(|| Shape {
+            by: by(&d.on),
+            x_unit: match kind {
+                Some(Kind::Rotary) => "deg",
+                Some(Kind::Linear) => "mm",
+                Some(Kind::Time) => "h",
+                Some(Kind::Temperature) => "degC",
+                _ => "1",
+            }
+            .to_owned(),
+            y_unit: d.unit.clone(),
+            direction: super::features::direction_words(&d.direction, subject.machine),
+            x: d.curve.iter().map(|p| to_deg(p.x)).collect(),
+            y: d.curve.iter().map(|p| p.y).collect(),
+            band: d.curve.iter().map(|p| 1.96 * p.sigma).collect(),
+            kind: words::kind(d),
+        })
+    });
+    let outliers = fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).map(|(&i, reason)| {
+        let o = &fit.data.observations[i];
+        Outlier { id: o.id, run: o.run + 1, reason: reason.clone(), comes_back: false }
+    });
+    Diagnosis {
+        format: FORMAT,
+        verdict,
+        says: String::new(),
+        rms_um: fit.outcome.rms_um,
+        noise_um: noise_um(fit),
+        visit_um: um_from_mm(seen.evidence.tau_mm),
+        lack_of_fit_p: seen.lack_of_fit.p,
+        depends,
+        shape,
+        candidates,
+        gross,
+        outliers: outliers.collect(),
+        tested: seen.search.scores.iter().filter(|s| s.visible()).count(),
+        power: powers,
+        not_seen: seen
+            .search
+            .scores
+            .iter()
+            .filter(|s| !s.visible())
+            .map(|s| seen.named.effects[s.candidate].id.clone())
+            .collect(),
+        warnings: Vec::new(),
+    }
+}
+
+/// Columns in µm at the rows of the regression; rows of priors are zero.
+fn used_rows(seen: &Examination) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(seen.evidence.n_rows(), seen.named.raw_um.ncols());
+    for (row, &i) in seen.evidence.used.iter().enumerate() {
+        out.row_mut(row).copy_from(&seen.named.raw_um.row(i));
+    }
+    out
+}
+
+fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, borne_out: bool) -> Candidate {
+    let fit = subject.fit;
+    let chosen = group.first();
+    let score = &seen.search.scores[chosen];
+    let leader = &seen.search.scores[group.leader];
+    let effect = seen.named.effects[chosen];
+    let um = noise_um(fit);
+    let held = if first && seen.search.leader().is_some() {
+        seen.nested.clone()
+    } else {
+        held_out(seen.evidence.question(), &seen.named.library, &seen.evidence.visits, Choice::Given(chosen))
+    };
+    let mut parameters: Vec<Parameter> = seen.named.columns[chosen]
+        .iter()
+        .enumerate()
+        .map(|(i, c)| Parameter {
+            name: c.name.clone(),
+            value: score.estimate[i] * c.typical,
+            unit: c.unit.clone(),
+            sigma: Some(score.covariance[(i, i)].max(0.0).sqrt() * c.typical),
+        })
+        .collect();
+    if let Some(scanned) = &seen.named.scanned[chosen] {
+        parameters.push(Parameter {
+            name: scanned.name.clone(),
+            value: seen.named.library.candidates()[chosen].variants[score.variant].shape,
+            unit: scanned.unit.clone(),
+            sigma: None,
+        });
+    }
+    let total = seen.lack_of_fit.ss.max(f64::MIN_POSITIVE);
+    let left = (1.0 - score.delta_ss / total).max(0.0);
+    Candidate {
+        effect: effect.id.clone(),
+        name: effect.name.clone(),
+        p: score.p,
+        // Holm's figure is the leader's: the group is one finding
+        p_adjusted: leader.p_adjusted,
+        proposed: first && borne_out && leader.proposed(),
+        rms_after_um: fit.outcome.rms_um * left.sqrt(),
+        held_out_before_um: Some(um * held.before).filter(|x| x.is_finite()),
+        held_out_after_um: Some(um * held.after).filter(|x| x.is_finite()),
+        parameters,
+        same_as: group
+            .members
+            .iter()
+            .filter(|m| m.candidate != chosen)
+            .map(|m| seen.named.effects[m.candidate].id.clone())
+            .collect(),
+        tell_apart: tell::words(subject, seen, group),
+        says: effect.says.clone(),
+        look: effect.look.clone(),
+        share: score.delta_ss / total,
+        plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,
+        weakens: weakened(fit, seen, chosen),
+        remains: None,
+    }
+}
+
+/// Results that an added effect makes less certain, from the one fit: C′ = C + G·C_c·Gᵀ with G how they move with it.
+fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
+    let score = &seen.search.scores[chosen];
+    let columns = seen.search.columns(chosen);
+    let covariance = crate::fit::uncertainty::free_covariance(fit);
+    let moves = &covariance * seen.evidence.jacobian.tr_mul(&columns);
+    let added = &moves * &score.covariance * moves.transpose();
+    let mut out = Vec::new();
+    for (c, &i) in fit.free.iter().enumerate() {
+        let u = &fit.model.unknowns[i];
+        let p = &fit.outcome.parameters[i];
+        if u.nuisance || p.sigma.is_none() || p.status != crate::fit::outcome::Status::Identified {
+            continue;
+        }
+        let (before, after) = (covariance[(c, c)], covariance[(c, c)] + added[(c, c)].max(0.0));
+        if after > WEAKENED * WEAKENED * before {
+            out.push(Weakened {
+                name: u.name.clone(),
+                unit: u.unit.clone(),
+                sigma_before: before.sqrt(),
+                sigma_after: after.sqrt(),
+            });
+        }
+    }
+    out
+}
+
+/// Touches that are used again with the first candidate in the model.
+pub(super) fn outliers_again(out: &mut Diagnosis, before: &Fit, after: &Fit) {
+    for (&i, _) in before.rejected.iter().filter(|(i, _)| after.weight[**i] > 0.0) {
+        let o = &before.data.observations[i];
+        if let Some(outlier) = out.outliers.iter_mut().find(|x| x.id == o.id && x.run == o.run + 1) {
+            outlier.comes_back = true;
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Gross mistakes, tried first where the error is far beyond anything that a machine has: a sign, two axes taken for each
+//! other, inches, a log that belongs to another program.
+
+use super::Subject;
+use super::answer::{Candidate, Gross, Parameter};
+use crate::axes::AxisName;
+use crate::fit::{Knowledge, Settings, identify_data};
+use crate::model::data::Data;
+use crate::units::mm_from_inch;
+use rayon::prelude::*;
+
+/// Above this RMS something is wrong that is no error of a machine, µm.
+pub const GROSS_UM: f64 = 50.0;
+
+/// Effect of the catalogue whose parameters are the suppositions.
+const EFFECT: &str = "sign-or-axis-swap";
+
+/// All suppositions with the error that they leave, best first.
+#[must_use]
+pub fn hypotheses(subject: Subject) -> Vec<Gross> {
+    let mut out = signs_and_swaps(subject);
+    out.extend(units(subject));
+    out.extend(elsewhere(subject));
+    out.sort_by(|a, b| a.rms_um.total_cmp(&b.rms_um));
+    out
+}
+
+fn settings(subject: Subject) -> Settings {
+    let mut settings = subject.settings.clone();
+    settings.quick = true;
+    settings
+}
+
+fn signs_and_swaps(subject: Subject) -> Vec<Gross> {
+    let Some(effect) = subject.catalogue.get(EFFECT, subject.machine) else { return Vec::new() };
+    if subject.settings.effects.iter().any(|e| e == EFFECT) {
+        return Vec::new();
+    }
+    effect
+        .parameters
+        .par_iter()
+        .filter_map(|supposed| {
+            let mut settings = settings(subject);
+            settings.effects.push(EFFECT.to_owned());
+            for p in &effect.parameters {
+                let value = if p.name == supposed.name { 1.0 } else { 0.0 };
+                settings.knowledge.insert(p.name.clone(), Knowledge::Fixed(value));
+            }
+            let fit = identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings).ok()?;
+            let says = match supposed.name.split_once('_') {
+                Some(("flip", axis)) => format!("axis {axis} is counted the wrong way round"),
+                Some((_, axes)) => {
+                    let (a, b) = axes.split_at(1.min(axes.len()));
+                    format!("axes {a} and {b} are taken for each other")
+                }
+                None => supposed.name.clone(),
+            };
+            Some(Gross { hypothesis: supposed.name.clone(), says, rms_um: fit.outcome.rms_um })
+        })
+        .collect()
+}
+
+/// Lengths in the other unit.
+fn units(subject: Subject) -> Vec<Gross> {
+    [
+        ("inch", mm_from_inch(1.0), "the log is in inches and was read as millimetres"),
+        ("mm", 1.0 / mm_from_inch(1.0), "the log is in millimetres and was read as inches"),
+    ]
+    .into_par_iter()
+    .filter_map(|(hypothesis, factor, says)| {
+        let data = scaled(&subject.fit.data, factor);
+        let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
+        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um: fit.outcome.rms_um })
+    })
+    .collect()
+}
+
+fn scaled(data: &Data, factor: f64) -> Data {
+    let mut data = data.clone();
+    for o in &mut data.observations {
+        for axis in AxisName::ALL.into_iter().filter(|a| !a.is_rotary()) {
+            let value = o.position.get(axis) * factor;
+            o.position.set(axis, value);
+            o.state[axis.index()] = value;
+        }
+    }
+    data
+}
+
+/// Touches that lie nowhere near their plan: where no sign, swap or unit helps, the log belongs to something else.
+fn elsewhere(subject: Subject) -> Option<Gross> {
+    const FAR_MM: f64 = 5.0;
+    let data = &subject.fit.data;
+    let off = |i: usize| {
+        let (a, b) = (&data.observations[i].position, &data.nominal[i].position);
+        (a.xyz_mm() - b.xyz_mm()).norm()
+    };
+    let n = data.observations.len();
+    let mut by: Vec<f64> = (0..n).map(off).collect();
+    by.sort_by(f64::total_cmp);
+    let median = by.get(n / 2).copied().unwrap_or(0.0);
+    (median > FAR_MM).then(|| Gross {
+        hypothesis: "another-program".to_owned(),
+        says: format!(
+            "half of the touches lie more than {median:.0} mm off where the plan has them: a log of another program or machine, or another origin"
+        ),
+        rms_um: subject.fit.outcome.rms_um,
+    })
+}
+
+/// A supposition of the catalogue as a candidate.
+pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
+    let effect = subject.catalogue.get(EFFECT, subject.machine)?;
+    effect.parameters.iter().find(|p| p.name == gross.hypothesis)?;
+    Some(Candidate {
+        effect: effect.id.clone(),
+        name: gross.says.clone(),
+        p: 0.0,
+        p_adjusted: 0.0,
+        proposed: true,
+        rms_after_um: gross.rms_um,
+        held_out_before_um: None,
+        held_out_after_um: None,
+        parameters: vec![Parameter { name: gross.hypothesis.clone(), value: 1.0, unit: "1".into(), sigma: None }],
+        same_as: Vec::new(),
+        tell_apart: String::new(),
+        says: effect.says.clone(),
+        look: effect.look.clone(),
+        share: 1.0 - (gross.rms_um / subject.fit.outcome.rms_um).powi(2),
+        plausible: true,
+        weakens: Vec::new(),
+        remains: Some(gross.rms_um > GROSS_UM),
+    })
+}

@@ -1,0 +1,163 @@
+//! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
+
+use super::evidence::Evidence;
+use crate::fit::Fit;
+use crate::fit::candidates::columns;
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect};
+use crate::search::{Library, Origin};
+use crate::units::um_from_mm;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// A parameter of a candidate: one column.
+#[derive(Debug, Clone)]
+pub struct Column {
+    /// Name; block parameters carry `@mounting/block`.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its usual size: columns are per so much of it.
+    pub typical: f64,
+}
+
+/// A shape parameter whose values are tried.
+#[derive(Debug, Clone)]
+pub struct Scanned {
+    /// Name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// Effects that may be missing; candidate i of the library is `effects[i]`.
+#[derive(Debug, Clone)]
+pub struct Named<'c> {
+    /// The effects.
+    pub effects: Vec<&'c Effect>,
+    /// Their whitened columns, per typical size.
+    pub library: Library,
+    /// The same before whitening, µm per typical size; touches that are not used are zero.
+    pub raw_um: DMatrix<f64>,
+    /// What each column is, by candidate.
+    pub columns: Vec<Vec<Column>>,
+    /// The scanned shape of each candidate.
+    pub scanned: Vec<Option<Scanned>>,
+}
+
+/// Effects of catalogue and user that the model does not hold. Not the paper's sets, not whole hypotheses (gross
+/// mistakes), and none that shares a parameter with the model under another name.
+#[must_use]
+pub fn missing<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
+    let held = |e: &Effect| {
+        fit.model.unknowns.iter().any(|u| u.effect == e.id)
+            || (!e.per_block && e.parameters.iter().any(|p| fit.model.unknowns.iter().any(|u| u.name == p.name)))
+    };
+    catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.discrete && !held(e)).collect()
+}
+
+/// Index of the scanned shape among an effect's shape parameters, with the values.
+fn scan_of(effect: &Effect) -> Option<(usize, &[f64])> {
+    let shapes = effect.parameters.iter().filter(|p| p.shape.is_some());
+    shapes.enumerate().find(|(_, p)| p.scan.len() > 1).map(|(i, p)| (i, &p.scan[..]))
+}
+
+impl<'c> Named<'c> {
+    /// All candidates of a fit.
+    #[must_use]
+    pub fn of(fit: &Fit, evidence: &Evidence, machine: &Machine, catalogue: &'c Catalogue) -> Self {
+        Self::with(fit, evidence, machine, missing(fit, machine, catalogue))
+    }
+
+    /// Given effects as candidates.
+    #[must_use]
+    pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
+        let make = |effects: &[&Effect], shapes: Option<&[f64]>| {
+            columns(machine, effects, &fit.data, &fit.data.observations, fit.model.reference, shapes)
+        };
+        let fixed: Vec<&Effect> = effects.iter().copied().filter(|e| scan_of(e).is_none()).collect();
+        let together = make(&fixed, None);
+        let variants: Vec<(usize, f64, Vec<f64>)> = effects
+            .iter()
+            .enumerate()
+            .filter_map(|(i, e)| Some((i, scan_of(e)?, e)))
+            .flat_map(|(i, (which, values), e)| {
+                values.iter().map(move |&value| {
+                    let starts = e.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start));
+                    let shapes = starts.enumerate().map(|(k, s)| if k == which { value } else { s }).collect();
+                    (i, value, shapes)
+                })
+            })
+            .collect();
+        let scans: Vec<_> =
+            variants.par_iter().map(|(i, value, shapes)| (*i, *value, make(&[effects[*i]], Some(shapes)))).collect();
+
+        // one matrix of all variants, whitened at once
+        let mut parts: Vec<(usize, f64, DMatrix<f64>)> = Vec::new();
+        let mut info: Vec<Vec<Column>> = Vec::new();
+        let mut scanned = Vec::new();
+        for (i, effect) in effects.iter().enumerate() {
+            let scan = scan_of(effect);
+            let mut push = |made: &crate::fit::candidates::Columns, shape: f64| -> Vec<Column> {
+                let own = |c: &usize| made.unknowns[*c].effect == effect.id && !made.unknowns[*c].shape;
+                let of: Vec<usize> = (0..made.unknowns.len()).filter(own).collect();
+                let mut values = made.values.select_columns(&of);
+                let columns: Vec<Column> = of
+                    .iter()
+                    .map(|&c| {
+                        let u = &made.unknowns[c];
+                        let typical = if u.typical > 0.0 { u.typical } else { 1.0 };
+                        Column { name: u.name.clone(), unit: u.unit.clone(), typical }
+                    })
+                    .collect();
+                for (mut column, c) in values.column_iter_mut().zip(&columns) {
+                    column *= c.typical;
+                    // a formula without a value at some touch says nothing at all
+                    if column.iter().any(|v| !v.is_finite()) {
+                        column.fill(0.0);
+                    }
+                }
+                parts.push((i, shape, values));
+                columns
+            };
+            let mut columns = Vec::new();
+            if scan.is_some() {
+                for (_, shape, made) in scans.iter().filter(|s| s.0 == i) {
+                    columns = push(made, *shape);
+                }
+            } else {
+                columns = push(&together, 0.0);
+            }
+            info.push(columns);
+            let shapes: Vec<_> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
+            scanned.push(scan.map(|(k, _)| Scanned { name: shapes[k].name.clone(), unit: shapes[k].unit.clone() }));
+        }
+        let n = fit.data.observations.len();
+        let n_columns = parts.iter().map(|p| p.2.ncols()).sum();
+        let mut all = DMatrix::zeros(n, n_columns);
+        let mut at = 0;
+        for (_, _, values) in &parts {
+            all.columns_mut(at, values.ncols()).copy_from(values);
+            at += values.ncols();
+        }
+        let mut raw_um = all.map(um_from_mm);
+        for (mut row, w) in raw_um.row_iter_mut().zip(&fit.weight) {
+            row *= *w;
+        }
+        let white = evidence.whiten(fit, all);
+        let mut library = Library::new(evidence.n_rows());
+        let (mut at, mut part) = (0, 0);
+        for (i, effect) in effects.iter().enumerate() {
+            let mut variants = Vec::new();
+            while part < parts.len() && parts[part].0 == i {
+                let width = parts[part].2.ncols();
+                variants.push((parts[part].1, white.columns(at, width).into_owned()));
+                at += width;
+                part += 1;
+            }
+            let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
+            library.push_scan(&effect.id, origin, variants, usize::from(scanned[i].is_some()));
+        }
+        Self { effects, library, raw_um, columns: info, scanned }
+    }
+}

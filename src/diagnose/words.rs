@@ -1,0 +1,135 @@
+//! Findings in the words of the shop floor.
+
+use super::features::direction_words;
+use crate::fit::Fit;
+use crate::machine::Machine;
+use crate::search::dependence::Dependence;
+use crate::units::deg_from_rad;
+
+/// `a`, `a or b`, `a, b or c`.
+#[must_use]
+pub fn list(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [all @ .., last] => format!("{} or {last}", all.join(", ")),
+    }
+}
+
+/// What a variable is called in `where`.
+#[must_use]
+pub fn by(on: &str, is_rotary: &dyn Fn(&str) -> bool) -> String {
+    match on {
+        "t" => "time".into(),
+        "T" => "temperature".into(),
+        "S" => "spindle".into(),
+        "L" => "length".into(),
+        "t*block" => "time*block".into(),
+        "X" | "Y" | "Z" => format!("axis.{on}"),
+        _ if is_rotary(on) => format!("pose.{on}"),
+        _ => match on.strip_suffix(" before") {
+            Some(axis) => format!("before.{axis}"),
+            None if on.len() == 2 && on.starts_with('s') => format!("sense.{}", &on[1..]),
+            None => on.to_owned(),
+        },
+    }
+}
+
+/// The form of a shape, from its id: `order`, `step`, …, or nothing for the smooth ones.
+fn form(d: &Dependence) -> &str {
+    let middle = d.id.split(':').nth(1).unwrap_or_default();
+    middle.strip_prefix(&d.on).map_or(middle, |rest| rest.trim_start_matches('-'))
+}
+
+fn turns(order: f64) -> String {
+    match order.round() as i64 {
+        1 => "once per turn".into(),
+        2 => "twice per turn".into(),
+        k => format!("{k} times per turn"),
+    }
+}
+
+fn place(d: &Dependence, rotary: bool) -> String {
+    match d.on.as_str() {
+        "t" => format!("{:.2} h after the first touch", d.scanned),
+        _ if rotary => format!("{:.0} deg", deg_from_rad(d.scanned)),
+        _ => format!("{:.0} mm", d.scanned),
+    }
+}
+
+fn duration(hours: f64) -> String {
+    if hours < 1.5 { format!("{:.1} min", 60.0 * hours) } else { format!("{hours:.1} h") }
+}
+
+/// On what the misfit depends, in a sentence.
+#[must_use]
+pub fn says(d: &Dependence, fit: &Fit, machine: &Machine) -> String {
+    let percent = (100.0 * d.share).round();
+    let rotary = machine.rotary().any(|a| a.name.to_string() == d.on) || d.on == "S";
+    let direction = direction_words(&d.direction, machine);
+    let (on, how) = match d.on.as_str() {
+        "t" => ("time".to_owned(), match form(d) {
+            "step" => format!("a jump {}", place(d, false)),
+            "period" => format!("a cycle of {}", duration(d.scanned)),
+            "exponential" => format!("settling with a time constant of {}", duration(d.scanned)),
+            _ => "slowly".to_owned(),
+        }),
+        "t*block" => {
+            let number: Option<usize> = d.id.split("block-").nth(1).and_then(|w| w.split(':').next()?.parse().ok());
+            let block = number.and_then(|n| fit.data.set_ups.get(n)).map_or("one block", |s| s.label.as_str());
+            (format!("block {block}"), format!("it stands elsewhere from {:.2} h after the first touch on", d.scanned))
+        }
+        "T" => ("the temperature".to_owned(), "smoothly".to_owned()),
+        "block" => ("the block".to_owned(), "blocks disagree".to_owned()),
+        "face" => ("the face".to_owned(), "faces disagree".to_owned()),
+        "visit" => ("the index visit".to_owned(), "visits disagree".to_owned()),
+        "S" => ("the orientation of the spindle".to_owned(), harmonic(d)),
+        "L" => ("the length of the stylus".to_owned(), "longer against shorter".to_owned()),
+        "feed" => ("the feed".to_owned(), "fast against slow".to_owned()),
+        "approach" => ("the direction of approach".to_owned(), "around the probe".to_owned()),
+        on if on.contains('*') => (on.replace('*', " and "), "both together".to_owned()),
+        on => match (on.strip_suffix(" before"), on.strip_prefix('s')) {
+            (Some(axis), _) => (format!("where {axis} stood before"), "the way it came from".to_owned()),
+            (_, Some(axis)) if axis.len() == 1 => (format!("the sense of {axis}'s last motion"), "up against down".to_owned()),
+            _ => (on.to_owned(), match form(d) {
+                "step" => format!("a jump at {}", place(d, rotary)),
+                "kink" => format!("a corner at {}", place(d, rotary)),
+                _ if rotary => harmonic(d),
+                _ => "smoothly".to_owned(),
+            }),
+        },
+    };
+    format!("{percent} % of what is left goes with {on} ({how}), {direction}")
+}
+
+fn harmonic(d: &Dependence) -> String {
+    if form(d) == "order" { turns(d.scanned) } else { "smoothly over the turn".to_owned() }
+}
+
+/// What kind of thing makes such a misfit.
+#[must_use]
+pub fn kind(d: &Dependence) -> String {
+    let text = match (d.on.as_str(), form(d)) {
+        ("t", "step") => "something moved at one moment: a knocked fixture, a clamp or probe that gave way, a collision",
+        ("t", "period") => "something that cycles: a cooling unit, a lubrication pump, doors and draughts",
+        ("t", "exponential") => "warming up: it moves fast at first and comes to rest",
+        ("t", _) => "slow change: temperature, creep of a clamp",
+        ("t*block", _) => "a moved block: loose, knocked, or dirt under it",
+        ("block", _) => "a block that stands or measures otherwise than the rest: loose, tilted, another size",
+        ("face", _) => "single faces that lie elsewhere: chips, burrs, coolant",
+        ("visit", _) => "poses that do not come back: clamping or indexing scatter",
+        ("T", _) => "temperature",
+        ("S" | "approach", _) => "the probe: stylus run-out, or a trigger that depends on the direction",
+        ("L", _) => "the stylus: its length or bending",
+        ("feed", _) => "a delay between trigger and recorded position",
+        (on, _) if on.ends_with(" before") => "hysteresis: friction or wind-up that depends on where the axis came from",
+        (on, _) if on.len() == 2 && on.starts_with('s') => "looseness: backlash or a reversal error",
+        (on, _) if on.contains('*') => "two axes together: sag or squareness that changes with the pose",
+        (_, "order") if d.scanned >= 3.5 => return format!("a tooth or bolt pattern with {} periods per turn: gear, worm wheel, coupling, clamping ring", d.scanned.round()),
+        (_, "order") => "an eccentric or wobbling bearing, or an encoder ring mounted off its centre",
+        (_, "step") => "looseness that lets go at one place: a stop, a clamp, a worn spot",
+        (_, "kink") => "contact that changes at one place: a counterweight, a guideway joint, slack that is taken up",
+        _ => "a guideway or scale that is bent, or weight that shifts",
+    };
+    text.to_owned()
+}

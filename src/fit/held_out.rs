@@ -1,0 +1,187 @@
+//! How well a model predicts touches that had no part in its fit.
+//!
+//! A group of touches (an index visit of a mounting, or a whole run: never single touches, whose neighbours share their
+//! visit's errors) is left out, and the rest predicts it. From the fit linearised at its minimum: with the whitened rows,
+//! G the Gram matrix of all and G_g that of the group, C = (G − G_g + Λ)⁻¹ and θ − C·(gradient without the group), so that
+//! nothing is fitted again. Λ, 1/(1000 typical sizes)², keeps C finite where only the group sees an unknown; touches
+//! that then cannot be predicted, because the prediction is more uncertain than three touches' noise, judge nothing.
+
+use super::Fit;
+use crate::units::um_from_mm;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Touches whose prediction has a variance above this (in variances of a touch) judge nothing.
+pub const LARGEST_VARIANCE: f64 = 9.0;
+
+/// Standard deviation of what is assumed of each unknown, in typical sizes.
+const WIDE: f64 = 1000.0;
+
+/// What a fit says about touches that were left out of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    /// Root mean square of the errors of prediction, µm.
+    pub rms_um: f64,
+    /// Touches that could be predicted.
+    pub scored: usize,
+    /// Used touches that the rest cannot predict.
+    pub unpredicted: usize,
+    /// Groups that were left out, one at a time.
+    pub groups: usize,
+    /// Measured less predicted, mm, by observation; `None` where it was not used or cannot be predicted.
+    pub error_mm: Vec<Option<f64>>,
+}
+
+impl HeldOut {
+    /// In words.
+    #[must_use]
+    pub fn says(&self) -> String {
+        let lost = match self.unpredicted {
+            0 => String::new(),
+            n => format!("; {n} touches cannot be predicted without their own group"),
+        };
+        format!("{} groups of touches left out in turn, {} touches predicted{lost}", self.groups, self.scored)
+    }
+}
+
+/// Leaves out each index visit in turn; `None` where no touch can be predicted.
+#[must_use]
+pub fn by_visit(fit: &Fit) -> Option<HeldOut> {
+    by_group(fit, &fit.data.visits)
+}
+
+/// Leaves out each group in turn. `groups[i]` is the group of observation i; touches of a visit stand in one group.
+#[must_use]
+pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
+    let rows = Rows::new(fit);
+    let mut members: Vec<Vec<usize>> = Vec::new();
+    for i in (0..groups.len()).filter(|&i| fit.weight[i] > 0.0) {
+        if groups[i] >= members.len() {
+            members.resize(groups[i] + 1, Vec::new());
+        }
+        members[groups[i]].push(i);
+    }
+    members.retain(|m| !m.is_empty());
+    if members.len() < 2 {
+        return None;
+    }
+    let predicted: Vec<Vec<Option<f64>>> = members.par_iter().map(|m| rows.predict(m, &[])).collect();
+    let mut error_mm = vec![None; groups.len()];
+    for (group, errors) in members.iter().zip(predicted) {
+        group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
+    }
+    collect(fit, error_mm, members.len(), 0)
+}
+
+/// The last run of a study of several, predicted from the others. Where its blocks were set up anew, their places are
+/// taken from the run itself (nothing else can know them), and counted as lost degrees of freedom.
+#[must_use]
+pub fn later_run(fit: &Fit) -> Option<HeldOut> {
+    let observations = &fit.data.observations;
+    let last = observations.iter().map(|o| o.run).max().filter(|last| *last > 0)?;
+    let used = |i: &usize| fit.weight[*i] > 0.0;
+    let group: Vec<usize> = (0..observations.len()).filter(used).filter(|&i| observations[i].run == last).collect();
+    if group.is_empty() || group.len() == fit.n_used() {
+        return None;
+    }
+    let elsewhere = |set_up: usize| {
+        (0..observations.len()).filter(used).any(|i| observations[i].run != last && observations[i].set_up == set_up)
+    };
+    let own: Vec<usize> = (0..fit.free.len())
+        .filter(|&c| {
+            let u = &fit.model.unknowns[fit.free[c]];
+            u.nuisance && u.set_up.is_some_and(|s| !elsewhere(s))
+        })
+        .collect();
+    let rows = Rows::new(fit);
+    let mut errors = rows.predict(&group, &own);
+    let n_own = rows.without_own(&group, &own, &mut errors);
+    let mut error_mm = vec![None; observations.len()];
+    group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
+    let mut out = collect(fit, error_mm, 1, n_own)?;
+    out.unpredicted = group.len() - out.scored;
+    Some(out)
+}
+
+fn collect(fit: &Fit, error_mm: Vec<Option<f64>>, groups: usize, n_own: usize) -> Option<HeldOut> {
+    let scored = error_mm.iter().flatten().count();
+    let dof = scored.checked_sub(n_own).filter(|d| *d > 0)?;
+    let squares: f64 = error_mm.iter().flatten().map(|e| e * e).sum();
+    let unpredicted = fit.n_used().saturating_sub(scored);
+    Some(HeldOut { rms_um: um_from_mm((squares / dof as f64).sqrt()), scored, unpredicted, groups, error_mm })
+}
+
+/// The rows of a fit at its minimum.
+struct Rows<'f> {
+    fit: &'f Fit,
+    /// mm per unit.
+    jacobian: DMatrix<f64>,
+    whitened: DMatrix<f64>,
+    residual: DVector<f64>,
+    gradient: DVector<f64>,
+    gram: DMatrix<f64>,
+    /// Scale of each unknown, so that the Gram matrix has about unit diagonal.
+    scale: DVector<f64>,
+}
+
+impl<'f> Rows<'f> {
+    fn new(fit: &'f Fit) -> Self {
+        let at = fit.free_theta();
+        let ((_, jacobian), (residual, whitened)) =
+            fit.with_touches(fit.noise.tau_mm, |t| (t.unwhitened(&at), t.dense(&at)));
+        let gram = whitened.tr_mul(&whitened);
+        let gradient = whitened.tr_mul(&residual);
+        let scale = gram.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
+        Self { fit, jacobian, whitened, residual, gradient, gram, scale }
+    }
+
+    /// Measured less predicted at the touches of a group that the rest predicts, mm; `own` unknowns are left aside.
+    fn predict(&self, group: &[usize], own: &[usize]) -> Vec<Option<f64>> {
+        let p = self.scale.len();
+        let part = self.whitened.select_rows(group);
+        let r = DVector::from_iterator(group.len(), group.iter().map(|&i| self.residual[i]));
+        let mut rest = &self.gram - part.tr_mul(&part);
+        for a in 0..p {
+            for b in 0..p {
+                rest[(a, b)] /= self.scale[a] * self.scale[b];
+            }
+            let wide = WIDE * self.fit.model.unknowns[self.fit.free[a]].typical * self.scale[a];
+            rest[(a, a)] += wide.powi(-2);
+        }
+        let Some(factor) = rest.cholesky() else { return vec![None; group.len()] };
+        let gradient = (&self.gradient - part.tr_mul(&r)).component_div(&self.scale);
+        let mut step = -factor.solve(&gradient);
+        own.iter().for_each(|&c| step[c] = 0.0);
+        let limit = LARGEST_VARIANCE * self.fit.noise.sigma_mm.powi(2);
+        group
+            .iter()
+            .map(|&i| {
+                let mut row = self.jacobian.row(i).transpose().component_div(&self.scale);
+                own.iter().for_each(|&c| row[c] = 0.0);
+                let variance = row.dot(&factor.solve(&row));
+                (variance < limit).then(|| self.fit.residual_mm[i] + row.dot(&step))
+            })
+            .collect()
+    }
+
+    /// Takes off what `own` unknowns can explain of the errors; their number.
+    fn without_own(&self, group: &[usize], own: &[usize], errors: &mut [Option<f64>]) -> usize {
+        let seen: Vec<usize> = (0..group.len()).filter(|&k| errors[k].is_some()).collect();
+        if own.is_empty() || seen.is_empty() {
+            return 0;
+        }
+        let b = DMatrix::from_fn(seen.len(), own.len(), |k, c| {
+            self.jacobian[(group[seen[k]], own[c])] / self.scale[own[c]]
+        });
+        let e = DVector::from_iterator(seen.len(), seen.iter().filter_map(|&k| errors[k]));
+        let svd = b.svd(true, false);
+        let Some(u) = svd.u else { return 0 };
+        let top = svd.singular_values.max();
+        let kept: Vec<usize> =
+            (0..svd.singular_values.len()).filter(|&k| svd.singular_values[k] > 1e-9 * top).collect();
+        let u = u.select_columns(&kept);
+        let left = &e - &u * u.tr_mul(&e);
+        seen.iter().zip(left.iter()).for_each(|(&k, e)| errors[k] = Some(*e));
+        kept.len()
+    }
+}

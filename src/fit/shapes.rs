@@ -1,0 +1,126 @@
+//! Where the search for a shape parameter begins.
+//!
+//! A time constant or a pitch leaves no trace while its effect has no size, so that a search from size 0 never moves it.
+//! Its values are tried one after another beside the fit of everything else, as a score test does, and the best one is
+//! taken with the size that it asks for.
+
+use super::candidates::columns;
+use super::{Fit, Knowledge, Settings, uncertainty};
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect, Parameter};
+use nalgebra::{DMatrix, DVector};
+
+/// Values that are tried where the catalogue names none.
+const TRIED: usize = 12;
+
+/// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
+const LEAST_GAIN: f64 = 9.0;
+
+/// Where to begin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// Values of all parameters of the effect in their order, in their units; sizes are 0 where the data does not show it.
+    pub values: Vec<f64>,
+    /// By how much χ² falls.
+    pub gain: f64,
+    /// Does the data show the effect?
+    pub shown: bool,
+}
+
+/// The best start for the parameters of an effect that is not in a fit; `None` for one without shape parameters, or with
+/// a set of its own for each block.
+#[must_use]
+pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Start> {
+    let shaped: Vec<usize> = (0..effect.parameters.len()).filter(|&i| effect.parameters[i].shape.is_some()).collect();
+    if shaped.is_empty() || effect.per_block {
+        return None;
+    }
+    let linear = fit.linear(fit.noise.tau_mm);
+    let n = fit.data.observations.len();
+    let (jacobian, residual) = (linear.jacobian.rows(0, n).into_owned(), linear.residual.rows(0, n).into_owned());
+    let covariance = uncertainty::free_covariance(fit);
+    let sizes: Vec<usize> = (0..effect.parameters.len()).filter(|i| !shaped.contains(i)).collect();
+    let judge = |shapes: &[f64]| -> (f64, DVector<f64>) {
+        let all = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, Some(shapes));
+        let mut a: DMatrix<f64> = all.values.select_columns(&sizes);
+        fit.with_touches(fit.noise.tau_mm, |t| t.whiten(&mut a));
+        let seen = jacobian.tr_mul(&a);
+        let raw = a.tr_mul(&a);
+        let gram = &raw - seen.tr_mul(&(&covariance * &seen));
+        let slope = a.tr_mul(&residual);
+        let scale = raw.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
+        let scaled = DMatrix::from_fn(sizes.len(), sizes.len(), |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+        let rhs = slope.component_div(&scale);
+        let eigen = scaled.symmetric_eigen();
+        let (mut gain, mut step) = (0.0, DVector::zeros(sizes.len()));
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > 1e-6 {
+                let along = vector.dot(&rhs);
+                gain += along * along / value;
+                step -= vector * (along / value);
+            }
+        }
+        (gain, step.component_div(&scale))
+    };
+    let mut best: Vec<f64> = shaped.iter().map(|&i| effect.parameters[i].shape.map_or(0.0, |(start, _, _)| start)).collect();
+    let mut found = judge(&best);
+    // one after another, twice: shapes of one effect are few
+    for _ in 0..if shaped.len() > 1 { 2 } else { 1 } {
+        for (k, &i) in shaped.iter().enumerate() {
+            for value in tried(&effect.parameters[i]) {
+                let mut shapes = best.clone();
+                shapes[k] = value;
+                let now = judge(&shapes);
+                if now.0 > found.0 {
+                    (best, found) = (shapes, now);
+                }
+            }
+        }
+    }
+    let (gain, size) = found;
+    let shown = gain > LEAST_GAIN * effect.parameters.len() as f64;
+    let mut values = vec![0.0; effect.parameters.len()];
+    shaped.iter().zip(&best).for_each(|(&i, v)| values[i] = *v);
+    if shown {
+        sizes.iter().zip(size.iter()).for_each(|(&i, v)| values[i] = *v);
+    }
+    Some(Start { values, gain, shown })
+}
+
+/// Values of a shape parameter that are tried.
+fn tried(p: &Parameter) -> Vec<f64> {
+    let Some((start, low, high)) = p.shape else { return Vec::new() };
+    if !p.scan.is_empty() {
+        return p.scan.clone();
+    }
+    let at = |k: usize| {
+        let share = k as f64 / (TRIED - 1) as f64;
+        if low > 0.0 && high > 10.0 * low { low * (high / low).powf(share) } else { low + (high - low) * share }
+    };
+    (0..TRIED).map(at).chain([start]).collect()
+}
+
+/// Settings of the fit beside which the shapes of some effects are tried: everything but them, and quickly.
+pub(super) fn without(settings: &Settings, shaped: &[&Effect]) -> Settings {
+    let of_them = |name: &str| shaped.iter().any(|e| e.parameters.iter().any(|p| crate::symbols::same(&p.name, name)));
+    Settings {
+        effects: settings.effects.iter().filter(|id| !shaped.iter().any(|e| e.id == **id)).cloned().collect(),
+        knowledge: settings.knowledge.iter().filter(|(name, _)| !of_them(name)).map(|(n, k)| (n.clone(), *k)).collect(),
+        type_b: Default::default(),
+        quick: true,
+        ..settings.clone()
+    }
+}
+
+/// A shape that ran out of its range, with the value at which it is held instead.
+pub(super) fn out_of_range(fit: &Fit, catalogue: &Catalogue, machine: &Machine) -> Option<(String, Knowledge)> {
+    fit.free.iter().find_map(|&i| {
+        let u = &fit.model.unknowns[i];
+        let name = u.name.split('@').next().unwrap_or(&u.name);
+        let p = catalogue.get(&u.effect, machine)?.parameters.iter().find(|p| p.name == name)?;
+        let (_, low, high) = p.shape?;
+        let value = fit.theta[i];
+        let out = !(low..=high).contains(&value);
+        out.then(|| (u.name.clone(), Knowledge::Fixed(if value.is_finite() { value.clamp(low, high) } else { high })))
+    })
+}

@@ -1,0 +1,124 @@
+//! A changed model, the ladder of models, and two studies side by side.
+
+use super::fit::{digits, number, significant, table};
+use super::plot::{Paper, line};
+use crate::compare::change::Change;
+use crate::compare::verify::Verification;
+use crate::fit::outcome::Outcome;
+use crate::study::history::History;
+use comfy_table::Cell;
+
+fn or_dash(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".into(), significant)
+}
+
+fn stated(value: Option<(f64, f64)>) -> String {
+    value.map_or_else(|| "?".into(), |(v, s)| format!("{} ± {}", digits(v, Some(s)), significant(s)))
+}
+
+/// Before and after a change of the model.
+#[must_use]
+pub fn change(before: &Outcome, after: &Outcome, c: &Change, later: (Option<f64>, Option<f64>), paper: Paper) -> String {
+    let mut t = table(&["", "before", "after"]);
+    let mut row = |what: &str, b: String, a: String| {
+        t.add_row(vec![Cell::new(what), number(b), number(a)]);
+    };
+    row("error left, um RMS", significant(before.rms_um), significant(after.rms_um));
+    row("on touches left out, um RMS", or_dash(before.held_out_rms_um), or_dash(after.held_out_rms_um));
+    if later.0.is_some() || later.1.is_some() {
+        row("on the last run, um RMS", or_dash(later.0), or_dash(later.1));
+    }
+    row("chi2/dof", format!("{:.3}", before.chi2_per_dof), format!("{:.3}", after.chi2_per_dof));
+    row("unknowns", before.unknowns.to_string(), after.unknowns.to_string());
+    for p in &c.kept {
+        let unit = &p.unit;
+        row(&format!("{}, {unit}", p.name), stated(p.before), stated(p.after));
+    }
+    t.set_width(paper.width.min(100) as u16);
+    let mut out = format!("{t}\n");
+    if !c.new.is_empty() {
+        let mut t = table(&["new", "value", "unit", "std. unc.", "95 %"]);
+        for p in &c.new {
+            t.add_row(vec![
+                Cell::new(&p.name),
+                number(if p.sigma.is_some() { digits(p.value, p.sigma) } else { "?".into() }),
+                Cell::new(&p.unit),
+                number(or_dash(p.sigma)),
+                number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
+            ]);
+        }
+        out += &format!("\n{t}\n");
+    }
+    for r in &c.remarks {
+        out += &format!("note: {r}\n");
+    }
+    out
+}
+
+/// The ladder as a table and a chart.
+#[must_use]
+pub fn history(h: &History, paper: Paper) -> String {
+    let mut t = table(&["step", "change", "effects", "left um", "held out um", "later run um", "chi2/dof"]);
+    for s in &h.steps {
+        let signed = |sign: &str, ids: &[String]| ids.iter().map(|e| format!("{sign}{e}")).collect::<Vec<_>>();
+        let mut what = signed("+", &s.added);
+        what.extend(signed("-", &s.removed));
+        let first = if s.step == 1 { s.effects.join(" ") } else { what.join(" ") };
+        t.add_row(vec![
+            number(s.step),
+            Cell::new(first),
+            number(s.effects.len()),
+            number(significant(s.rms_um)),
+            number(or_dash(s.held_out_rms_um)),
+            number(or_dash(s.later_run_rms_um)),
+            number(format!("{:.3}", s.chi2_per_dof)),
+        ]);
+    }
+    t.set_width(paper.width.min(120) as u16);
+    let points = |value: &dyn Fn(&crate::study::history::Step) -> Option<f64>| -> Vec<(f64, f64)> {
+        h.steps.iter().filter_map(|s| Some((s.step as f64, value(s)?))).collect()
+    };
+    let mut out = format!("{t}\n");
+    for (title, p) in [
+        ("error left, um RMS, by step", points(&|s| Some(s.rms_um))),
+        ("error on touches left out, um RMS, by step", points(&|s| s.held_out_rms_um)),
+    ] {
+        let drawn = line(title, &p, paper);
+        if !drawn.is_empty() {
+            out += &format!("\n{drawn}");
+        }
+    }
+    out
+}
+
+/// Two studies side by side.
+#[must_use]
+pub fn verification(v: &Verification, paper: Paper) -> String {
+    let mut out = format!("{}\n{}\n\n", v.machine, v.says);
+    let mut t = table(&["", "before", "after"]);
+    let mut row = |what: &str, b: f64, a: f64| {
+        t.add_row(vec![Cell::new(what), number(significant(b)), number(significant(a))]);
+    };
+    row("readings, blocks placed, um RMS", v.before.readings_rms_um, v.after.readings_rms_um);
+    row("left by the model, um RMS", v.before.fit_rms_um, v.after.fit_rms_um);
+    row("noise of a touch, um", v.before.noise_um, v.after.noise_um);
+    out += &format!("{t}\n\n");
+    let mut t = table(&["error", "unit", "before", "after", "difference", "95 %", ""]);
+    for r in &v.parameters {
+        t.add_row(vec![
+            Cell::new(&r.name),
+            Cell::new(&r.unit),
+            number(digits(r.before.0, Some(r.before.1))),
+            number(digits(r.after.0, Some(r.after.1))),
+            number(digits(r.difference, Some(r.expanded))),
+            number(format!("± {}", significant(r.expanded))),
+            Cell::new(if r.changed { "changed" } else { "not changed" }),
+        ]);
+    }
+    t.set_width(paper.width.min(110) as u16);
+    out += &format!("{t}\n");
+    for r in &v.remarks {
+        out += &format!("note: {r}\n");
+    }
+    out
+}
