@@ -8,6 +8,8 @@ use crate::design::next::{Design, Separation};
 use crate::design::questions::Questions;
 use crate::design::{Noise, Planned, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::answer::Candidate;
+use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::files;
 use crate::fit::{self, Fit, effects_of};
 use crate::machine::{Machine, Mounting};
@@ -18,7 +20,9 @@ use crate::program::{self, Generated, Options};
 use crate::report::fit::significant;
 use crate::search::power::SEEN;
 use crate::study;
+use nalgebra::DVector;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Rounds of choosing, generating and leaving out what cannot be reached.
@@ -78,8 +82,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let setting = Setting::new(&loaded, &settings.effects, &fit)?;
     let questions = if named.is_empty() {
-        let view = View::new(&setting.task, &setting.runs, &[], setting.noise)?;
-        Questions::of_fit(&fit, &loaded.machine, &loaded.catalogue, &view)?
+        let subject =
+            Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+        let found = diagnose(subject, &diagnose::Options::default())?;
+        match found.candidates.first().filter(|_| matches!(found.verdict, Verdict::MissingEffect)) {
+            Some(first) => left_open(&loaded, first),
+            None => Questions::of_plan(&View::new(&setting.task, &setting.runs, &[], setting.noise)?),
+        }
     } else {
         Questions::named(&args.effects)
     };
@@ -130,6 +139,25 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         ));
     };
     write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
+}
+
+/// The questions of a diagnosis: its first candidate against those that cannot be told from it.
+fn left_open(loaded: &Loaded, first: &Candidate) -> Questions {
+    let known = |id: &String| loaded.catalogue.get(id, &loaded.machine).is_some();
+    let rivals: Vec<String> = first.same_as.iter().filter(|id| known(id)).cloned().collect();
+    let mut sizes = BTreeMap::new();
+    if let Some(effect) = loaded.catalogue.get(&first.effect, &loaded.machine) {
+        let scales = effect.parameters.iter().filter(|p| p.shape.is_none());
+        let size: Option<Vec<f64>> = scales
+            .map(|p| {
+                first.parameters.iter().find(|q| q.name == p.name && q.unit == p.unit).map(|q| q.value / p.typical)
+            })
+            .collect();
+        if let Some(size) = size {
+            sizes.insert(effect.id.clone(), DVector::from_vec(size));
+        }
+    }
+    Questions::left_open(&first.effect, &rivals, sizes)
 }
 
 /// A program that was chosen and proven.
