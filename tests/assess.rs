@@ -82,8 +82,22 @@ fn seven_combinations_of_22_leave_no_trace() {
     let machine = common::machine("swivel-head");
     let catalogue = Catalogue::built_in().unwrap();
     let effects = [
-        "location-b", "location-c", "pretravel", "zero-b", "zero-c", "squareness-xy", "squareness-yz", "squareness-zx",
-        "scale-x", "scale-y", "scale-z", "backlash-x", "backlash-y", "backlash-z", "tip-eccentricity", "block-setup",
+        "location-b",
+        "location-c",
+        "pretravel",
+        "zero-b",
+        "zero-c",
+        "squareness-xy",
+        "squareness-yz",
+        "squareness-zx",
+        "scale-x",
+        "scale-y",
+        "scale-z",
+        "backlash-x",
+        "backlash-y",
+        "backlash-z",
+        "tip-eccentricity",
+        "block-setup",
     ];
     let runs = vec![plan(&machine, "head"), plan(&machine, "table")];
     let view = View::of_model(&task(&machine, &catalogue, &effects), &runs, &[], NOISE).unwrap();
@@ -115,8 +129,18 @@ fn the_papers_plan_says_what_it_cannot_see() {
     assert_eq!(a.score, Score::Enough, "{}", a.says);
     let blind = invisible(&a);
     for id in [
-        "zero-b", "zero-c", "axial-b-1", "axial-b-2", "tilt-b-1", "tilt-b-2", "backlash-z", "lobing-3",
-        "tip-eccentricity", "latency", "table-load", "tool-length",
+        "zero-b",
+        "zero-c",
+        "axial-b-1",
+        "axial-b-2",
+        "tilt-b-1",
+        "tilt-b-2",
+        "backlash-z",
+        "lobing-3",
+        "tip-eccentricity",
+        "latency",
+        "table-load",
+        "tool-length",
     ] {
         assert!(blind.contains(id), "{id}: {blind:?}");
     }
@@ -124,7 +148,8 @@ fn the_papers_plan_says_what_it_cannot_see() {
         assert!(!blind.contains(id), "{id}: {blind:?}");
     }
     // what would show them is computed from varied touches
-    let helps = |id: &str, habit: &str| assert!(of(&a, id).habits.iter().any(|h| h == habit), "{id}: {:?}", of(&a, id).habits);
+    let helps =
+        |id: &str, habit: &str| assert!(of(&a, id).habits.iter().any(|h| h == habit), "{id}: {:?}", of(&a, id).habits);
     helps("tip-eccentricity", "spindle-180");
     helps("zero-b", "other-stylus");
     // the program comes to B = -30 from below and to the other poses from above: with two senses B's backlash leaves a
@@ -152,8 +177,17 @@ fn the_papers_plan_says_what_it_cannot_see() {
 fn alias_sets_of_the_papers_plan() {
     let a = assessed(&["head", "table"]);
     let xz = [
-        "squareness-zx", "scale-z", "positioning-z-2", "angular-bz", "radial-b-1", "positioning-b-1",
-        "positioning-b-linear", "pretravel-axial", "stylus-sag", "head-sag", "head-tilt",
+        "squareness-zx",
+        "scale-z",
+        "positioning-z-2",
+        "angular-bz",
+        "radial-b-1",
+        "positioning-b-1",
+        "positioning-b-linear",
+        "pretravel-axial",
+        "stylus-sag",
+        "head-sag",
+        "head-tilt",
     ];
     let group = a.alias_groups.iter().find(|g| g.iter().any(|e| e == "head-sag")).expect("the XZ set");
     for id in xz {
@@ -166,7 +200,7 @@ fn alias_sets_of_the_papers_plan() {
     assert!(same("angular-ax", "squareness-xy") && same("angular-ay", "scale-y"), "{:?}", of(&a, "angular-ax"));
     assert!(same("radial-c-1", "tilt-c-1") && same("axial-c-1", "axial-c-3"));
     let inside = |x: &str, y: &str| of(&a, x).contained_in.iter().any(|e| e == y) || same(x, y);
-    assert!(inside("spindle-growth", "warm-up"));
+    assert!(inside("table-sag", "straightness-zx"));
     assert!(inside("backlash-x", "lobing-2") && inside("backlash-y", "lobing-2"));
     assert!(a.alias_pairs > 150, "{}", a.alias_pairs);
 }
@@ -175,8 +209,16 @@ fn alias_sets_of_the_papers_plan() {
 fn minimal_sizes_are_those_of_the_design_study() {
     let a = assessed(&["head", "table"]);
     for (id, um) in [
-        ("squareness-xy", 1.7), ("scale-y", 1.7), ("radial-c-1", 1.3), ("axial-c-1", 6.4), ("tilt-c-1", 1.4),
-        ("backlash-x", 0.8), ("lobing-2", 0.4), ("block-size", 0.7), ("head-sag", 7.8), ("scale-x", 7.0),
+        ("squareness-xy", 1.7),
+        ("scale-y", 1.7),
+        ("radial-c-1", 1.3),
+        ("axial-c-1", 6.4),
+        ("tilt-c-1", 1.4),
+        ("backlash-x", 0.8),
+        ("lobing-2", 0.4),
+        ("block-size", 0.7),
+        ("head-sag", 7.8),
+        ("scale-x", 7.0),
     ] {
         let found = of(&a, id).minimal_detectable_um.unwrap();
         println!("{id}: {found} against {um}");
@@ -256,7 +298,10 @@ fn a_plan_file_and_an_effect_of_ones_own() {
     let out = Command::cargo_bin("axiscal")
         .unwrap()
         .args(["assess", "--machine", "swivel-head", "--json", "--effects", "location-b,block-setup,pretravel"])
-        .arg("--plan").arg(&path).arg("--effects-file").arg(&own)
+        .arg("--plan")
+        .arg(&path)
+        .arg("--effects-file")
+        .arg(&own)
         .output()
         .unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));

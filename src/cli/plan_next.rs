@@ -8,6 +8,8 @@ use crate::design::next::{Design, Separation};
 use crate::design::questions::Questions;
 use crate::design::{Noise, Planned, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::answer::Candidate;
+use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::files;
 use crate::fit::{self, Fit, effects_of};
 use crate::machine::{Machine, Mounting};
@@ -18,7 +20,9 @@ use crate::program::{self, Generated, Options};
 use crate::report::fit::significant;
 use crate::search::power::SEEN;
 use crate::study;
+use nalgebra::DVector;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Rounds of choosing, generating and leaving out what cannot be reached.
@@ -78,8 +82,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let setting = Setting::new(&loaded, &settings.effects, &fit)?;
     let questions = if named.is_empty() {
-        let view = View::new(&setting.task, &setting.runs, &[], setting.noise)?;
-        Questions::of_fit(&fit, &loaded.machine, &loaded.catalogue, &view)?
+        let subject =
+            Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+        let found = diagnose(subject, &diagnose::Options::default())?;
+        match found.candidates.first().filter(|_| matches!(found.verdict, Verdict::MissingEffect)) {
+            Some(first) => left_open(&loaded, first),
+            None => Questions::of_plan(&View::new(&setting.task, &setting.runs, &[], setting.noise)?),
+        }
     } else {
         Questions::named(&args.effects)
     };
@@ -114,17 +123,41 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             } else {
                 io.report(&[Finding::info(
                     "next::other_blocks",
-                    format!("with mounting {:?} put up anew the least separation would be {}", other.generated.plan.mounting, significant(other.least())),
+                    format!(
+                        "with mounting {:?} put up anew the least separation would be {}",
+                        other.generated.plan.mounting,
+                        significant(other.least())
+                    ),
                 )
                 .help("add --moved for that program")]);
             }
         }
     }
     let Some(chosen) = best else {
-        return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time")
-            .help("give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)"));
+        return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time").help(
+            "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
+        ));
     };
     write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
+}
+
+/// The questions of a diagnosis: its first candidate against those that cannot be told from it.
+fn left_open(loaded: &Loaded, first: &Candidate) -> Questions {
+    let known = |id: &String| loaded.catalogue.get(id, &loaded.machine).is_some();
+    let rivals: Vec<String> = first.same_as.iter().filter(|id| known(id)).cloned().collect();
+    let mut sizes = BTreeMap::new();
+    if let Some(effect) = loaded.catalogue.get(&first.effect, &loaded.machine) {
+        let scales = effect.parameters.iter().filter(|p| p.shape.is_none());
+        let size: Option<Vec<f64>> = scales
+            .map(|p| {
+                first.parameters.iter().find(|q| q.name == p.name && q.unit == p.unit).map(|q| q.value / p.typical)
+            })
+            .collect();
+        if let Some(size) = size {
+            sizes.insert(effect.id.clone(), DVector::from_vec(size));
+        }
+    }
+    Questions::left_open(&first.effect, &rivals, sizes)
 }
 
 /// A program that was chosen and proven.
@@ -166,7 +199,13 @@ impl<'a> Setting<'a> {
             machine: &loaded.machine,
             catalogue: &loaded.catalogue,
             effects: effects_of(effects, &loaded.catalogue, &loaded.machine)?,
-            held: loaded.study.knowledge.iter().filter(|(_, k)| matches!(k, fit::Knowledge::Fixed(_))).map(|(n, _)| n.clone()).collect(),
+            held: loaded
+                .study
+                .knowledge
+                .iter()
+                .filter(|(_, k)| matches!(k, fit::Knowledge::Fixed(_)))
+                .map(|(n, _)| n.clone())
+                .collect(),
             reference: loaded.machine.reference.pivot,
             temperature: fit.data.observations.iter().any(|o| o.has_temperature),
         };
@@ -197,7 +236,14 @@ impl<'a> Setting<'a> {
         runs
     }
 
-    fn design(&self, plan: &Plan, label: Option<&str>, effects: &[&Effect], pool: &[Bundle], q: &Questions) -> Result<Design> {
+    fn design(
+        &self,
+        plan: &Plan,
+        label: Option<&str>,
+        effects: &[&Effect],
+        pool: &[Bundle],
+        q: &Questions,
+    ) -> Result<Design> {
         let view = View::with_effects(&self.task, &self.with(plan.clone(), label), self.noise, effects)?;
         let n_given = self.runs.iter().map(|r| r.plan.touches.len()).sum();
         Ok(Design::new(&view, n_given, pool, q))
@@ -260,7 +306,13 @@ impl<'a> Setting<'a> {
     }
 
     /// What the proven program will be able to tell.
-    fn told(&self, plan: &Plan, label: Option<&str>, effects: &[&Effect], questions: &Questions) -> Result<Vec<Separation>> {
+    fn told(
+        &self,
+        plan: &Plan,
+        label: Option<&str>,
+        effects: &[&Effect],
+        questions: &Questions,
+    ) -> Result<Vec<Separation>> {
         let touches = plan.touches.clone();
         let Some(first) = touches.first() else { return Ok(Vec::new()) };
         let manner = crate::design::bundle::Manner {
@@ -304,7 +356,12 @@ fn write(
     files::write_whole(&program_file, nc.text.as_bytes())?;
     let seconds = chosen.generated.path.seconds;
     io.say(&questions.says);
-    io.say(format!("{} touches on mounting {:?}, about {}", plan.touches.len(), plan.mounting, program::duration(seconds)));
+    io.say(format!(
+        "{} touches on mounting {:?}, about {}",
+        plan.touches.len(),
+        plan.mounting,
+        program::duration(seconds)
+    ));
     match &chosen.label {
         Some(_) => io.say("leave the blocks as the last run left them"),
         None => io.say("put the blocks up first; the time for it is not counted"),
@@ -316,13 +373,25 @@ fn write(
             s.other.clone().unwrap_or_else(|| "nothing".into()),
             significant(s.before),
             significant(s.after),
-            (if s.after >= SEEN { "yes" } else if s.after >= 9.0 { "likely" } else { "no" }).into(),
+            (if s.after >= SEEN {
+                "yes"
+            } else if s.after >= 9.0 {
+                "likely"
+            } else {
+                "no"
+            })
+            .into(),
         ]);
     }
     io.say(format!("{t}\n(25 and more tells them apart nearly always)"));
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let log = args.out.join(format!("{}.log", plan.program));
-    io.say(format!("written: {}\n         {}\n         {}", program_file.display(), plan_file.display(), form_file.display()));
+    io.say(format!(
+        "written: {}\n         {}\n         {}",
+        program_file.display(),
+        plan_file.display(),
+        form_file.display()
+    ));
     io.say(format!(
         "when it has run: axiscal plan-next {} --out {} --controller {} {}--join {}\nor by hand:\n\n{}",
         args.study.display(),
@@ -382,6 +451,8 @@ fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> 
     let text = study::join(&files::read_text(&args.study)?, &joined)?;
     files::write_whole(&args.study, text.as_bytes())?;
     io.say(format!("{}: run {} with {} touches", args.study.display(), loaded.runs.len() + 1, touches.len()));
-    io.answer(&json!({ "study": args.study.display().to_string(), "runs": loaded.runs.len() + 1, "touches": touches.len() }));
+    io.answer(
+        &json!({ "study": args.study.display().to_string(), "runs": loaded.runs.len() + 1, "touches": touches.len() }),
+    );
     Ok(Answer::Done)
 }

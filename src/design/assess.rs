@@ -60,8 +60,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let parameters = parameters(task, &alone, &view);
     let observability = observe(&alone.jacobian);
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
-    let undetermined =
-        observability.unseen.iter().map(|v| statement::undetermined(&free, &task.effects, v)).collect();
+    let undetermined = observability.unseen.iter().map(|v| statement::undetermined(&free, &task.effects, v)).collect();
     let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();
@@ -86,11 +85,8 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         let of = |both: bool| pairs.iter().filter(move |x| x.explained == c && x.both_ways == both).map(|x| id(x.by));
         let (same_as, contained_in): (Vec<String>, Vec<String>) = (of(true).collect(), of(false).collect());
         let absorbed_by = if visible { Vec::new() } else { absorbed.of(&view, c) };
-        let (tell_apart, helps) = if !visible {
-            to_show(c, &tried, &view, &absorbed_by)
-        } else {
-            to_part(c, &pairs, &tried, &view)
-        };
+        let (tell_apart, helps) =
+            if !visible { to_show(c, &tried, &view, &absorbed_by) } else { to_part(c, &pairs, &tried, &view) };
         effects.push(Seen {
             effect: candidate.id.clone(),
             name,
@@ -108,8 +104,9 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     }
     let mut parameters = parameters;
     for p in &mut parameters {
-        let equal =
-            effects.iter().filter(|e| !e.visible && e.habits.is_empty() && held_by(&e.absorbed_by) == Some(p.name.as_str()));
+        let equal = effects
+            .iter()
+            .filter(|e| !e.visible && e.habits.is_empty() && held_by(&e.absorbed_by) == Some(p.name.as_str()));
         p.holds = equal.map(|e| e.effect.clone()).collect();
     }
     let groups = groups(&effects);
@@ -209,9 +206,11 @@ impl Absorbed {
             return Vec::new();
         };
         // in units of what it does to the touches, so that unlike units compare
-        let weight: DVector<f64> = DVector::from_fn(x.nrows(), |r, _| if self.norms[r] > 0.0 { x.row(r).norm() } else { 0.0 });
+        let weight: DVector<f64> =
+            DVector::from_fn(x.nrows(), |r, _| if self.norms[r] > 0.0 { x.row(r).norm() } else { 0.0 });
         let top = weight.amax();
-        let mut order: Vec<usize> = (0..weight.len()).filter(|&r| weight[r] > WORTH_NAMING * top && top > 0.0).collect();
+        let mut order: Vec<usize> =
+            (0..weight.len()).filter(|&r| weight[r] > WORTH_NAMING * top && top > 0.0).collect();
         order.sort_by(|a, b| weight[*b].total_cmp(&weight[*a]));
         let mut out: Vec<String> = Vec::new();
         for r in order {
@@ -254,17 +253,29 @@ fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String]) -> (S
     };
     match found.first() {
         Some(first) => {
-            let more = found.get(1).map_or_else(String::new, |t| format!("; or {} (+{})", t.habit.says, minutes(t.habit.seconds)));
-            let says = format!("not observable with this plan: {why}; {} (+{}){more}", first.habit.says, minutes(first.habit.seconds));
+            let more = found
+                .get(1)
+                .map_or_else(String::new, |t| format!("; or {} (+{})", t.habit.says, minutes(t.habit.seconds)));
+            let says = format!(
+                "not observable with this plan: {why}; {} (+{}){more}",
+                first.habit.says,
+                minutes(first.habit.seconds)
+            );
             (says, found.iter().map(|t| t.habit.id.clone()).collect())
         }
-        None if held_by(absorbed_by).is_some() => {
-            (format!("not observable with these or any varied touches: it is one number with {}", absorbed_by.join(" and ")), Vec::new())
-        }
+        None if held_by(absorbed_by).is_some() => (
+            format!(
+                "not observable with these or any varied touches: it is one number with {}",
+                absorbed_by.join(" and ")
+            ),
+            Vec::new(),
+        ),
         None if view.library.columns(c, 0).norm() == 0.0 => {
             ("these touches cannot be disturbed by it: nothing that it acts on is touched".into(), Vec::new())
         }
-        None => (format!("not observable with this plan: {why}; no single variation of the touches shows it"), Vec::new()),
+        None => {
+            (format!("not observable with this plan: {why}; no single variation of the touches shows it"), Vec::new())
+        }
     }
 }
 
@@ -276,7 +287,8 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (Stri
     }
     let parted = |t: &Tried| -> Vec<usize> {
         let still = |o: &usize| {
-            let explained = |a: usize, b: usize| t.pairs.iter().any(|p| p.explained == a && p.by == b && p.share >= ALIGNED);
+            let explained =
+                |a: usize, b: usize| t.pairs.iter().any(|p| p.explained == a && p.by == b && p.share >= ALIGNED);
             let both = pairs.iter().any(|p| p.explained == c && p.by == *o && p.both_ways);
             explained(c, *o) && (!both || explained(*o, c))
         };
@@ -291,7 +303,11 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (Stri
     found.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.habit.seconds.total_cmp(&b.1.habit.seconds)));
     let (count, best, from) = &found[0];
     let whom = if *count == others.len() {
-        if others.len() == 1 { format!("from {}", view.library.candidates()[from[0]].id) } else { format!("from all {}", others.len()) }
+        if others.len() == 1 {
+            format!("from {}", view.library.candidates()[from[0]].id)
+        } else {
+            format!("from all {}", others.len())
+        }
     } else {
         format!("from {count} of {}", others.len())
     };
@@ -301,7 +317,8 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (Stri
 
 /// Effects that are the same both ways, largest group first.
 fn groups(effects: &[Seen]) -> Vec<Vec<String>> {
-    let mut left: BTreeSet<&str> = effects.iter().filter(|e| !e.same_as.is_empty()).map(|e| e.effect.as_str()).collect();
+    let mut left: BTreeSet<&str> =
+        effects.iter().filter(|e| !e.same_as.is_empty()).map(|e| e.effect.as_str()).collect();
     let mut out: Vec<Vec<String>> = Vec::new();
     while let Some(first) = left.pop_first() {
         let (mut group, mut open) = (vec![first.to_owned()], vec![first.to_owned()]);
@@ -329,7 +346,8 @@ fn advice(view: &View, seen: &[Power], pairs: &[AliasPair], nullity: usize, trie
                 .filter(|&c| seen[c].q == 0 && t.power.get(c).is_some_and(|p| p.q > 0 && p.at_typical >= SHOWN))
                 .map(|c| view.library.candidates()[c].id.clone())
                 .collect();
-            let parts = pairs.iter().filter(|p| !t.pairs.iter().any(|q| q.explained == p.explained && q.by == p.by)).count();
+            let parts =
+                pairs.iter().filter(|p| !t.pairs.iter().any(|q| q.explained == p.explained && q.by == p.by)).count();
             let determines = nullity - t.nullity;
             let worth = (5 * shows.len() + parts + 5 * determines) as f64;
             (worth > 0.0).then(|| {

@@ -90,7 +90,8 @@ fn manners(machine: &Machine) -> Vec<Manner> {
     }
     let come = |sense: f64| rotary.iter().fold(AxisMap::default(), |m, (name, _)| m.with(*name, sense));
     let feed = machine.probe.slow_feed;
-    let plain = |pose: &AxisMap| Manner { pose: *pose, from: come(1.0), spindle_deg: 0.0, feed_mm_min: feed, stylus: None };
+    let plain =
+        |pose: &AxisMap| Manner { pose: *pose, from: come(1.0), spindle_deg: 0.0, feed_mm_min: feed, stylus: None };
     let mut out: Vec<Manner> = poses.iter().map(plain).collect();
     // one axis at a time away from 0: what the probe does differently is seen there already
     let away = |p: &AxisMap| p.iter().filter(|(_, x)| *x != 0.0).count();
@@ -117,7 +118,8 @@ fn bundle(machine: &Machine, manner: &Manner, block: &Block) -> Bundle {
         if !faces_the_spindle(machine, block.carrier, &at, &face.normal()) {
             continue;
         }
-        let all: Option<Vec<PlanTouch>> = points(face, block).into_iter().map(|p| touch(machine, manner, block, face, &p, &at)).collect();
+        let all: Option<Vec<PlanTouch>> =
+            points(face, block).into_iter().map(|p| touch(machine, manner, block, face, &p, &at)).collect();
         if let Some(all) = all {
             faces.push(word.to_owned());
             touches.extend(all);
@@ -131,11 +133,22 @@ fn points(face: Face, block: &Block) -> Vec<Vector3<f64>> {
     let (n, (u, v)) = (face.normal(), face.tangents());
     let edge = |d: &Vector3<f64>| block.size.dot(&d.abs());
     let centre = block.centre + n * (edge(&n) / 2.0);
-    let across: Vec<f64> = if face.axis == 2 { vec![-SHARE * edge(&v), SHARE * edge(&v)] } else { vec![edge(&v) / 2.0 - DEPTH_MM] };
-    [-SHARE, SHARE].iter().flat_map(|s| across.iter().map(|w| centre + u * (s * edge(&u)) + v * *w).collect::<Vec<_>>()).collect()
+    let across: Vec<f64> =
+        if face.axis == 2 { vec![-SHARE * edge(&v), SHARE * edge(&v)] } else { vec![edge(&v) / 2.0 - DEPTH_MM] };
+    [-SHARE, SHARE]
+        .iter()
+        .flat_map(|s| across.iter().map(|w| centre + u * (s * edge(&u)) + v * *w).collect::<Vec<_>>())
+        .collect()
 }
 
-fn touch(machine: &Machine, manner: &Manner, block: &Block, face: Face, point: &Vector3<f64>, at: &Position) -> Option<PlanTouch> {
+fn touch(
+    machine: &Machine,
+    manner: &Manner,
+    block: &Block,
+    face: Face,
+    point: &Vector3<f64>,
+    at: &Position,
+) -> Option<PlanTouch> {
     let (probe, length_mm) = (&machine.probe, machine.tool.length_mm);
     let place = |off_face: f64| -> Option<AxisMap> {
         let ball = point + face.normal() * (probe.ball_radius + off_face);
@@ -234,7 +247,14 @@ pub fn cost_s(pool: &[Bundle], chosen: &[usize]) -> f64 {
 /// The program file of a choice: a stage for each stylus, the probe's own first; poses next to each other follow one
 /// another.
 #[must_use]
-pub fn program_text(machine: &Machine, mounting: &Mounting, name: &str, says: &str, pool: &[Bundle], chosen: &[usize]) -> String {
+pub fn program_text(
+    machine: &Machine,
+    mounting: &Mounting,
+    name: &str,
+    says: &str,
+    pool: &[Bundle],
+    chosen: &[usize],
+) -> String {
     let mut text = format!(
         "# chosen by `axiscal plan-next`\nformat = \"{FORMAT}\"\nname = \"{name}\"\nmachine = \"{}\"\nsays = {}\nmounting = \"{}\"\nfaces_in = \"block\"\n",
         machine.name,
@@ -244,7 +264,8 @@ pub fn program_text(machine: &Machine, mounting: &Mounting, name: &str, says: &s
     let mut order: Vec<usize> = chosen.to_vec();
     let angle = |i: usize, name: AxisName| pool[i].manner.pose.get(name).unwrap_or(0.0);
     order.sort_by(|&a, &b| {
-        let key = |i: usize| (pool[i].manner.stylus.clone(), machine.rotary().map(|x| angle(i, x.name)).collect::<Vec<_>>());
+        let key =
+            |i: usize| (pool[i].manner.stylus.clone(), machine.rotary().map(|x| angle(i, x.name)).collect::<Vec<_>>());
         let ((sa, pa), (sb, pb)) = (key(a), key(b));
         let by_pose = pa.iter().zip(&pb).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne());
         sa.cmp(&sb).then(by_pose.unwrap_or(std::cmp::Ordering::Equal)).then(a.cmp(&b))
@@ -267,7 +288,11 @@ pub fn program_text(machine: &Machine, mounting: &Mounting, name: &str, says: &s
         let together: Vec<usize> = order
             .iter()
             .copied()
-            .filter(|&k| pool[k].manner == *manner && pool[k].faces == pool[i].faces && same_size(mounting, &pool[k].block, &pool[i].block))
+            .filter(|&k| {
+                pool[k].manner == *manner
+                    && pool[k].faces == pool[i].faces
+                    && same_size(mounting, &pool[k].block, &pool[i].block)
+            })
             .collect();
         let pose: Vec<String> = manner.pose.iter().map(|(a, x)| format!("{a} = {}", decimal(x))).collect();
         let from: Vec<String> = manner.from.iter().map(|(a, x)| format!("{a} = {x:.0}")).collect();
@@ -275,7 +300,11 @@ pub fn program_text(machine: &Machine, mounting: &Mounting, name: &str, says: &s
         let grid = |side: bool, grids: &mut Vec<String>| -> String {
             let size = mounting.blocks.iter().find(|b| b.name == pool[i].block).map_or_else(Vector3::zeros, |b| b.size);
             let [x, y] = [size.x, size.y].map(|e| Plain((e * SHARE * 1e6).round() / 1e6).to_string());
-            let spelled = if side { format!("u = [-{x}, {x}]\ndepth = [{DEPTH_MM}]") } else { format!("u = [-{x}, {x}]\nv = [-{y}, {y}]") };
+            let spelled = if side {
+                format!("u = [-{x}, {x}]\ndepth = [{DEPTH_MM}]")
+            } else {
+                format!("u = [-{x}, {x}]\nv = [-{y}, {y}]")
+            };
             let n = grids.iter().position(|g| *g == spelled).unwrap_or_else(|| {
                 grids.push(spelled);
                 grids.len() - 1
@@ -328,7 +357,9 @@ fn decimal(x: f64) -> String {
 #[must_use]
 pub fn without(pool: &[Bundle], skipped: &[plan::Skipped]) -> Vec<Bundle> {
     let is_out = |b: &Bundle, face: &str| {
-        skipped.iter().any(|s| s.stage == stage_of(&b.manner) && s.block == b.block && s.face == face && s.pose == b.manner.pose)
+        skipped
+            .iter()
+            .any(|s| s.stage == stage_of(&b.manner) && s.block == b.block && s.face == face && s.pose == b.manner.pose)
     };
     pool.iter()
         .filter_map(|b| {

@@ -33,7 +33,10 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
         machine,
         catalogue,
         effects: effects_of(&fit.outcome.effects, catalogue, machine)?,
-        held: (0..fit.theta.len()).filter(|i| matches!(fit.knowledge[*i], Some(Knowledge::Fixed(_)))).map(name).collect(),
+        held: (0..fit.theta.len())
+            .filter(|i| matches!(fit.knowledge[*i], Some(Knowledge::Fixed(_))))
+            .map(name)
+            .collect(),
         reference: fit.model.reference,
         temperature: false,
     };

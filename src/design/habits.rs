@@ -58,7 +58,7 @@ pub fn habits(machine: &Machine, runs: &[Planned], model: &Model) -> Vec<Habit> 
     let all: Vec<Visit> = runs.iter().enumerate().flat_map(|(i, r)| visits(i, &r.plan)).collect();
     pool.at_the_best(&all);
     for axis in machine.rotary() {
-        pool.from_the_other_side(&all, axis);
+        pool.both_sides(&all, axis);
         pool.other_angles(&all, axis);
     }
     pool.other_stylus(&all);
@@ -113,7 +113,12 @@ impl Pool<'_> {
         let stands = best.touches.first().and_then(|t| t.spindle_deg).unwrap_or(0.0);
         let turned = |by: f64| Change { spindle_deg: Some(stands + by), ..Change::default() };
         let (half, quarter) = (self.once_more(best, &turned(180.0)), self.once_more(best, &turned(90.0)));
-        self.push("spindle-180", "turn the spindle by 180° (M19) and touch again".into(), vec![(best.run, vec![half.clone()])], 0.0);
+        self.push(
+            "spindle-180",
+            "turn the spindle by 180° (M19) and touch again".into(),
+            vec![(best.run, vec![half.clone()])],
+            0.0,
+        );
         self.push(
             "spindle-90-180",
             "turn the spindle by 90° and by 180° (M19) and touch again".into(),
@@ -125,12 +130,17 @@ impl Pool<'_> {
         self.push("feed", format!("touch again at {} times the feed", FASTER), vec![(best.run, vec![faster])], 0.0);
     }
 
-    fn from_the_other_side(&mut self, all: &[Visit], axis: &Axis) {
+    fn both_sides(&mut self, all: &[Visit], axis: &Axis) {
         let Some(best) = Self::best(all) else { return };
         let come = |sense: f64| Change { from: AxisMap::default().with(axis.name, sense), ..Change::default() };
         let both = vec![self.once_more(best, &come(1.0)), self.once_more(best, &come(-1.0))];
         let id = format!("other-side-{}", axis.name.letter().to_ascii_lowercase());
-        self.push(&id, format!("come to one pose with {} turning up and with it turning down", axis.name), vec![(best.run, both)], 0.0);
+        self.push(
+            &id,
+            format!("come to one pose with {} turning up and with it turning down", axis.name),
+            vec![(best.run, both)],
+            0.0,
+        );
     }
 
     fn other_angles(&mut self, all: &[Visit], axis: &Axis) {
@@ -194,7 +204,12 @@ impl Pool<'_> {
                 }
             }
         }
-        self.push("other-stylus", format!("change to a stylus of another length ({:+.0} mm) and touch again", length - own), added, STYLUS_S);
+        self.push(
+            "other-stylus",
+            format!("change to a stylus of another length ({:+.0} mm) and touch again", length - own),
+            added,
+            STYLUS_S,
+        );
     }
 
     fn all_faces(&mut self, all: &[Visit]) {
@@ -206,12 +221,23 @@ impl Pool<'_> {
             let here = |n: &[f64; 3], block: &str| v.touches.iter().any(|t| t.block == block && t.normal == *n);
             let mut light: Vec<PlanTouch> = Vec::new();
             for t in &plan.touches {
-                let of_visit = v.touches.iter().any(|o| o.block == t.block && o.carrier == t.carrier && o.mounting == t.mounting);
+                let of_visit =
+                    v.touches.iter().any(|o| o.block == t.block && o.carrier == t.carrier && o.mounting == t.mounting);
                 let of_face = |o: &&PlanTouch| o.block == t.block && o.normal == t.normal;
-                if !of_visit || here(&t.normal, &t.block) || light.iter().filter(of_face).count() >= 2 || light.iter().any(|o| o.point == t.point) {
+                if !of_visit
+                    || here(&t.normal, &t.block)
+                    || light.iter().filter(of_face).count() >= 2
+                    || light.iter().any(|o| o.point == t.point)
+                {
                     continue;
                 }
-                let change = Change { pose: like.pose, spindle_deg: like.spindle_deg, length_mm: like.tool_length_mm, from: like.from, ..Change::default() };
+                let change = Change {
+                    pose: like.pose,
+                    spindle_deg: like.spindle_deg,
+                    length_mm: like.tool_length_mm,
+                    from: like.from,
+                    ..Change::default()
+                };
                 light.extend(again(self.machine, plan, t, &change));
             }
             if !light.is_empty() {
@@ -228,7 +254,8 @@ impl Pool<'_> {
     }
 
     fn downward_face(&mut self, all: &[Visit]) {
-        let spindle = |v: &Visit| self.machine.tool_frame(&v.pose()).rotation * self.machine.tool.direction.into_inner();
+        let spindle =
+            |v: &Visit| self.machine.tool_frame(&v.pose()).rotation * self.machine.tool.direction.into_inner();
         let found = all.iter().find_map(|v| {
             let plan = self.plan(v.run);
             let top = v.touches.iter().find(|t| {
@@ -255,12 +282,24 @@ impl Pool<'_> {
             (!below.is_empty()).then(|| (v.run, vec![below]))
         });
         if let Some(added) = found {
-            self.push("downward-face", "touch a face that looks down, on a block that overhangs what bears it".into(), vec![added], MOUNTING_S);
+            self.push(
+                "downward-face",
+                "touch a face that looks down, on a block that overhangs what bears it".into(),
+                vec![added],
+                MOUNTING_S,
+            );
         }
     }
 
     /// A block once more, standing elsewhere: its place and tilt are unknown again.
-    fn moved_block(&mut self, id: &str, says: &str, all: &[Visit], of: &PlanTouch, run: usize, place: impl Fn(&Vector3<f64>) -> Vector3<f64>, most: usize) {
+    fn moved_block(
+        &mut self,
+        (id, says): (&str, &str),
+        all: &[Visit],
+        (run, of): (usize, &PlanTouch),
+        place: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+        most: usize,
+    ) {
         let plan = self.plan(run).clone();
         let Some(block) = plan.block_of(of).cloned() else { return };
         let name = format!("{} {id}", block.name);
@@ -275,7 +314,10 @@ impl Pool<'_> {
             if poses.contains(&first.pose) || poses.len() >= most {
                 continue;
             }
-            let own = Visit { run, touches: v.touches.iter().copied().filter(|t| t.block == of.block && t.carrier == of.carrier).collect() };
+            let own = Visit {
+                run,
+                touches: v.touches.iter().copied().filter(|t| t.block == of.block && t.carrier == of.carrier).collect(),
+            };
             let there: Vec<PlanTouch> = own
                 .light()
                 .into_iter()
@@ -297,9 +339,11 @@ impl Pool<'_> {
     }
 
     fn higher_block(&mut self, all: &[Visit]) {
-        let Some((run, first)) = Self::best(all).and_then(|v| Some((v.run, (*v.touches.first()?).clone()))) else { return };
+        let Some((run, first)) = Self::best(all).and_then(|v| Some((v.run, (*v.touches.first()?).clone()))) else {
+            return;
+        };
         let says = format!("put a block {HIGHER_MM} mm higher (a riser) and touch it in the same poses");
-        self.moved_block("riser", &says, all, &first, run, |c| c + Vector3::z() * HIGHER_MM, 4);
+        self.moved_block(("riser", &says), all, (run, &first), |c| c + Vector3::z() * HIGHER_MM, 4);
     }
 
     /// A block on the other side of the axis that carries it, where it stands there alone.
@@ -307,14 +351,15 @@ impl Pool<'_> {
         for (run, planned) in self.runs.iter().enumerate() {
             for axis in self.machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()) {
                 let letter = axis.name.to_string();
-                let on_it: Vec<&str> = planned.plan.blocks.iter().filter(|b| b.carrier == letter).map(|b| b.name.as_str()).collect();
+                let on_it: Vec<&str> =
+                    planned.plan.blocks.iter().filter(|b| b.carrier == letter).map(|b| b.name.as_str()).collect();
                 let Some(first) = planned.plan.touches.iter().find(|t| t.carrier == letter).cloned() else { continue };
                 if on_it.len() != 1 {
                     continue;
                 }
                 let half = crate::geometry::rotation_about(&axis.point, &axis.direction, std::f64::consts::PI);
                 let says = format!("put a second block on the other side of {letter} and touch it in the same poses");
-                self.moved_block("second-block", &says, all, &first, run, |c| apply(&half, c), usize::MAX);
+                self.moved_block(("second-block", &says), all, (run, &first), |c| apply(&half, c), usize::MAX);
                 return;
             }
         }
@@ -325,7 +370,8 @@ impl Pool<'_> {
         for run in 0..self.runs.len() {
             let own: Vec<&Visit> = all.iter().filter(|v| v.run == run).collect();
             let picked = [0, own.len() / 2];
-            let again: Vec<Vec<PlanTouch>> = picked.iter().filter_map(|&i| own.get(i)).map(|v| self.once_more(v, &Change::default())).collect();
+            let again: Vec<Vec<PlanTouch>> =
+                picked.iter().filter_map(|&i| own.get(i)).map(|v| self.once_more(v, &Change::default())).collect();
             if run + 1 == self.runs.len() {
                 added.push((run, again));
             }
@@ -368,17 +414,31 @@ impl Pool<'_> {
                 .filter(|k| k.sum.iter().all(|(name, _)| named(name)))
                 .collect();
             if !rows.is_empty() {
-                let says = format!("indicate the edges of block {} along the linear axes at C = 0 (a calibrated direction)", s.label);
+                let says = format!(
+                    "indicate the edges of block {} along the linear axes at C = 0 (a calibrated direction)",
+                    s.label
+                );
                 let says = if self.machine.axis(AxisName::C).is_some() { says } else { says.replace(" at C = 0", "") };
                 known.push(("calibrated-direction", says, rows));
             }
         }
         if named("pretravel") {
             let row = Known { sum: vec![("pretravel".into(), 1.0)], sigma: CERTIFIED_MM };
-            known.push(("ring-gauge", "calibrate the ball in a ring gauge or on a sphere of known size".into(), vec![row]));
+            known.push((
+                "ring-gauge",
+                "calibrate the ball in a ring gauge or on a sphere of known size".into(),
+                vec![row],
+            ));
         }
         for (id, says, known) in known {
-            self.out.push(Habit { id: id.into(), says, runs: self.runs.to_vec(), known, touches: 0, seconds: CERTIFICATE_S });
+            self.out.push(Habit {
+                id: id.into(),
+                says,
+                runs: self.runs.to_vec(),
+                known,
+                touches: 0,
+                seconds: CERTIFICATE_S,
+            });
         }
     }
 }

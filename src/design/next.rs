@@ -224,7 +224,13 @@ impl Design {
         self.thinned(pool, best)
     }
 
-    fn greedy(&self, pool: &[Bundle], among: &[usize], budget_s: f64, value: impl Fn(&DMatrix<f64>) -> f64 + Sync) -> Vec<usize> {
+    fn greedy(
+        &self,
+        pool: &[Bundle],
+        among: &[usize],
+        budget_s: f64,
+        value: impl Fn(&DMatrix<f64>) -> f64 + Sync,
+    ) -> Vec<usize> {
         let mut chosen: Vec<usize> = Vec::new();
         loop {
             let now = self.information(&chosen);

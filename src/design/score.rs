@@ -19,9 +19,7 @@ const PAIRS_PER_EFFECT: f64 = 0.5;
 /// Score and reason.
 pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     // an axis that no touch sees is not what this plan is for
-    let unseen_effect = |effect: &str| {
-        a.parameters.iter().filter(|p| p.effect == effect).all(|p| p.sigma.is_none())
-    };
+    let unseen_effect = |effect: &str| a.parameters.iter().filter(|p| p.effect == effect).all(|p| p.sigma.is_none());
     let location: Vec<&Expected> = a.parameters.iter().filter(|p| is_location(&p.effect)).collect();
     let typical = |p: &Expected| {
         let effect = task.effects.iter().find(|e| e.id == p.effect);
@@ -47,7 +45,10 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     };
     let noisy = coarse(NOISE_SHARE, |p| p.sigma);
     if !noisy.is_empty() {
-        let says = format!("the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size", noisy.join(", "));
+        let says = format!(
+            "the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size",
+            noisy.join(", ")
+        );
         return (Score::NotEnough, format!("{says}{not_for}"));
     }
     let mut reasons = Vec::new();
@@ -58,7 +59,10 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         over.map(|p| p.name.as_str()).collect()
     };
     if !open.is_empty() {
-        reasons.push(format!("effects that are not in the model could shift {} by more than its usual size", open.join(", ")));
+        reasons.push(format!(
+            "effects that are not in the model could shift {} by more than its usual size",
+            open.join(", ")
+        ));
     }
     let equal = |id: &str| a.parameters.iter().any(|p| p.holds.iter().any(|h| h == id));
     let invisible = a.effects.iter().filter(|e| !e.visible && e.typical_um > 0.0 && !equal(&e.effect)).count();
@@ -72,7 +76,10 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         let says = "it tells the location errors also while other errors act, and can name nearly all of them";
         return (Score::Good, format!("{says}{not_for}"));
     }
-    (Score::Enough, format!("it tells the location errors of a machine without other errors, but {}{not_for}", reasons.join("; ")))
+    (
+        Score::Enough,
+        format!("it tells the location errors of a machine without other errors, but {}{not_for}", reasons.join("; ")),
+    )
 }
 
 fn is_location(effect: &str) -> bool {

@@ -177,8 +177,9 @@ impl View {
         let rows = self.jacobian.nrows();
         let mut raw = Vec::new();
         for effect in effects {
-            let own: Vec<usize> =
-                (0..all.unknowns.len()).filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape).collect();
+            let own: Vec<usize> = (0..all.unknowns.len())
+                .filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape)
+                .collect();
             let scaled = |values: &DMatrix<f64>, which: &[usize], unknowns: &[crate::model::predict::Unknown]| {
                 let mut out = values.select_columns(which).resize_vertically(rows, 0.0);
                 for (mut column, &i) in out.column_iter_mut().zip(which) {
@@ -195,7 +196,14 @@ impl View {
                 let step = scan.len().div_ceil(MOST_SHAPES).max(1);
                 let mut best = KEPT;
                 for &value in scan.iter().step_by(step) {
-                    let at = columns(task.machine, &[effect], &self.data, &self.data.nominal, task.reference, Some(&[value]));
+                    let at = columns(
+                        task.machine,
+                        &[effect],
+                        &self.data,
+                        &self.data.nominal,
+                        task.reference,
+                        Some(&[value]),
+                    );
                     let which: Vec<usize> = (0..at.unknowns.len()).filter(|&i| !at.unknowns[i].shape).collect();
                     let tried = scaled(&at.values, &which, &at.unknowns);
                     let seen = self.whitened(&tried);
@@ -305,7 +313,9 @@ pub fn times_s(touches: &[PlanTouch]) -> Vec<f64> {
     let mut out = Vec::with_capacity(touches.len());
     for t in touches {
         let turned = previous.is_none_or(|p| {
-            AxisName::ALL.into_iter().any(|a| p.pose.get(a) != t.pose.get(a)) || p.visit != t.visit || p.spindle_deg != t.spindle_deg
+            AxisName::ALL.into_iter().any(|a| p.pose.get(a) != t.pose.get(a))
+                || p.visit != t.visit
+                || p.spindle_deg != t.spindle_deg
         });
         clock_s += TOUCH_S + if turned { INDEX_S } else { 0.0 };
         if let Some(s) = t.time_s {

@@ -2,6 +2,7 @@
 
 use super::outcome::Undetermined;
 use crate::model::catalogue::{Effect, Place, Term};
+use crate::model::formula::VARIABLES;
 use crate::model::predict::Unknown;
 use nalgebra::DVector;
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,7 +43,9 @@ pub fn undetermined(unknowns: &[&Unknown], effects: &[&Effect], direction: &DVec
     }
     let says = match &members[..] {
         [] => "a combination of many parameters leaves no trace in these touches".to_owned(),
-        [one] => format!("{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"),
+        [one] => format!(
+            "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
+        ),
         several => format!(
             "{} are one number with these touches: only their sum is seen, and by convention the part that leaves no trace is 0, so that each value holds a share of that sum",
             join(several)
@@ -60,7 +63,18 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
     };
     let Some(effect) = effects.iter().find(|e| e.id == unknown.effect) else { return symbol };
     let own = |t: &&Term| effect.parameters.get(t.parameter).is_some_and(|p| p.name == unknown.name);
-    let Some(term) = effect.terms.iter().find(own) else { return format!("{} ({symbol})", the(&effect.name)) };
+    // a parameter that acts in several directions is called after the one in which it acts when everything stands at zero
+    let shapes: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
+    let at_zero = |t: &Term| {
+        let value = t.formula.eval(&[0.0; VARIABLES.len()], &shapes).abs();
+        if value.is_finite() { value } else { 0.0 }
+    };
+    let first = effect.terms.iter().find(own);
+    let strongest = effect.terms.iter().filter(own).fold(first, |best, t| match best {
+        Some(b) if at_zero(b) >= at_zero(t) => best,
+        _ => Some(t),
+    });
+    let Some(term) = strongest else { return format!("{} ({symbol})", the(&effect.name)) };
     let component = COMPONENTS.get(term.component).copied().unwrap_or("");
     let is_stand = effect.family == "location" || effect.paper;
     let what = match term.place {
@@ -78,7 +92,9 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
         }
         Place::Tool if effect.id == "tip-eccentricity" => format!("the tip's offset {component}"),
         // several components of one effect are told apart by where they point
-        _ if effect.parameters.iter().filter(|p| p.shape.is_none()).count() > 1 && !matches!(term.place, Place::Trigger | Place::Reading) => {
+        _ if effect.parameters.iter().filter(|p| p.shape.is_none()).count() > 1
+            && !matches!(term.place, Place::Trigger | Place::Reading) =>
+        {
             format!("{} {component}", the(&effect.name))
         }
         _ => the(&effect.name),

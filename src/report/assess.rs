@@ -1,7 +1,7 @@
 //! The answer of `assess` as text.
 
 use super::fit::{number, significant, table};
-use crate::design::record::{Assessment, Seen};
+use crate::design::record::{Advice, Assessment, Seen};
 use comfy_table::Cell;
 
 /// Effects that contain another one are listed up to so many.
@@ -38,9 +38,19 @@ fn one(a: &Assessment, out: &mut String) {
     for p in &a.parameters {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |alias| format!("{} ({alias})", p.name));
         let size = |s: Option<f64>| number(s.map_or_else(|| "not told".into(), significant));
-        t.add_row(vec![Cell::new(name), Cell::new(&p.unit), size(p.sigma), size(p.sigma_with_unmodelled), Cell::new(p.holds.join(", "))]);
+        t.add_row(vec![
+            Cell::new(name),
+            Cell::new(&p.unit),
+            size(p.sigma),
+            size(p.sigma_with_unmodelled),
+            Cell::new(p.holds.join(", ")),
+        ]);
     }
-    *out += &format!("expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second)\n{t}\n\n", significant(a.noise_um), significant(a.visit_um));
+    *out += &format!(
+        "expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second)\n{t}\n\n",
+        significant(a.noise_um),
+        significant(a.visit_um)
+    );
     for u in &a.undetermined {
         *out += &format!("cannot be told: {}\n", u.says);
     }
@@ -64,7 +74,10 @@ fn one(a: &Assessment, out: &mut String) {
         }
     }
     if !a.alias_groups.is_empty() {
-        *out += &format!("\nnot to be told apart ({} pairs in all, those included that explain each other one way):\n", a.alias_pairs);
+        *out += &format!(
+            "\nnot to be told apart ({} pairs in all, those included that explain each other one way):\n",
+            a.alias_pairs
+        );
         for (g, number) in a.alias_groups.iter().zip(1..) {
             *out += &format!("  group {number}: {}\n", g.join(" = "));
             if let Some(how) = group_parted(g, a) {
@@ -105,11 +118,15 @@ fn side_by_side(first: &Assessment, out: &mut String) {
     row("touches", &|a| a.touches.to_string());
     row("time", &|a| time(a.time_s));
     row("combinations not told", &|a| a.undetermined.len().to_string());
-    row("effects with a trace", &|a| format!("{} of {}", a.effects.iter().filter(|e| e.visible).count(), a.effects.len()));
+    row("effects with a trace", &|a| {
+        format!("{} of {}", a.effects.iter().filter(|e| e.visible).count(), a.effects.len())
+    });
     row("pairs not told apart", &|a| a.alias_pairs.to_string());
     for p in &first.parameters {
         let of = |a: &Assessment| a.parameters.iter().find(|q| q.name == p.name).cloned();
-        row(&format!("{} ({})", p.name, p.unit), &|a| of(a).and_then(|q| q.sigma).map_or_else(|| "not told".into(), significant));
+        row(&format!("{} ({})", p.name, p.unit), &|a| {
+            of(a).and_then(|q| q.sigma).map_or_else(|| "not told".into(), significant)
+        });
         row("  with unmodelled", &|a| {
             of(a).and_then(|q| q.sigma_with_unmodelled).map_or_else(|| "not told".into(), significant)
         });
@@ -148,9 +165,13 @@ fn short(e: &Seen, a: &Assessment) -> String {
 fn group_parted(group: &[String], a: &Assessment) -> Option<String> {
     let members: Vec<&Seen> = a.effects.iter().filter(|e| group.contains(&e.effect)).collect();
     let helps = |habit: &str| members.iter().filter(|e| e.habits.iter().any(|h| h == habit)).count();
-    let best = a.advice.iter().max_by_key(|x| helps(&x.habit)).filter(|x| helps(&x.habit) > 0);
+    // the most members, then the least time: the advice has the quickest gain first, which is not the same
+    let order = |x: &&Advice, y: &&Advice| helps(&x.habit).cmp(&helps(&y.habit)).then(y.time_s.total_cmp(&x.time_s));
+    let best = a.advice.iter().max_by(order).filter(|x| helps(&x.habit) > 0);
     match best {
-        Some(x) => Some(format!("{} (+{}) parts {} of {}", x.says, time(x.time_s), helps(&x.habit), members.len())),
+        Some(x) => {
+            Some(format!("{} (+{}) helps with {} of {}", x.says, time(x.time_s), helps(&x.habit), members.len()))
+        }
         None => members.iter().map(|e| &e.tell_apart).find(|t| !t.is_empty()).cloned(),
     }
 }

@@ -22,14 +22,13 @@ pub struct Joined {
 /// # Errors
 /// When the text is no study.
 pub fn join(text: &str, run: &Joined) -> Result<String> {
-    let mut doc: DocumentMut = text
-        .parse()
-        .map_err(|e| Failure::new("study::not_toml", format!("the study is no TOML: {e}")).help("mend it by hand first"))?;
-    let runs = doc
-        .entry("data")
-        .or_insert(Item::ArrayOfTables(ArrayOfTables::new()))
-        .as_array_of_tables_mut()
-        .ok_or_else(|| Failure::new("study::data", "data is no list of tables").help("write [[data]] for each run"))?;
+    let mut doc: DocumentMut = text.parse().map_err(|e| {
+        Failure::new("study::not_toml", format!("the study is no TOML: {e}")).help("mend it by hand first")
+    })?;
+    let runs =
+        doc.entry("data").or_insert(Item::ArrayOfTables(ArrayOfTables::new())).as_array_of_tables_mut().ok_or_else(
+            || Failure::new("study::data", "data is no list of tables").help("write [[data]] for each run"),
+        )?;
     let count = runs.len();
     if let (Some((before, _)), Some(last)) = (&run.stood, count.checked_sub(1).and_then(|i| runs.get_mut(i)))
         && !last.contains_key("mounting")
