@@ -258,19 +258,11 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
 fn tell(s: &Solution, outcome: &Outcome, study: &Path, io: &Io) {
     io.say(format!("\n--- the end: {}", s.stopped));
     let sizes = |id: &str| -> String {
-        let of = |p: &&Parameter| p.effect == id && p.sigma.is_some();
-        let words: Vec<String> = outcome
-            .parameters
-            .iter()
-            .filter(of)
-            .map(|p| {
-                format!(
-                    "{} {} ± {} {}",
-                    p.name,
-                    digits(p.value, p.sigma),
-                    p.sigma.map_or_else(String::new, significant),
-                    p.unit
-                )
+        let of = outcome.parameters.iter().filter(|p: &&Parameter| p.effect == id);
+        let words: Vec<String> = of
+            .map(|p| match p.sigma {
+                Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, p.sigma), significant(sigma), p.unit),
+                None => format!("{} not told alone", p.name),
             })
             .collect();
         words.join(", ")

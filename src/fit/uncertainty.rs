@@ -18,6 +18,10 @@ const WORTH_NAMING: f64 = 0.8;
 /// With more touches the columns of the whole catalogue would need gigabytes.
 pub(super) const MOST_UNMODELLED: usize = 20_000;
 
+/// Singular values of the combinations of results below this share of the largest are zero: projecting the set-ups out
+/// of a Gram matrix leaves some 1e-5, and what leaves no trace is said elsewhere.
+const NO_TRACE: f64 = 1e-4;
+
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
 
@@ -243,7 +247,7 @@ pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
     let mut out = Vec::new();
     for (k, value) in eigen.eigenvalues.iter().enumerate() {
         let s = value.max(0.0).sqrt();
-        if s >= 1.0 || s <= 1e-6 * top {
+        if s >= 1.0 || s <= NO_TRACE * top {
             continue;
         }
         let direction = eigen.eigenvectors.column(k);

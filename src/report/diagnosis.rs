@@ -51,6 +51,9 @@ pub fn diagnosis(d: &Diagnosis) -> String {
 
 fn candidates(d: &Diagnosis) -> String {
     let mut t = table(&["candidate", "cannot be told from", "p (Holm)", "error after um", "held out um", "size"]);
+    if !t.is_tty() {
+        t.set_width(80);
+    }
     for c in &d.candidates {
         let held = match (c.held_out_before_um, c.held_out_after_um) {
             (Some(before), Some(after)) => format!("{} > {}", significant(before), significant(after)),
