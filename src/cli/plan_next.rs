@@ -18,6 +18,7 @@ use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
 use crate::report::fit::significant;
+use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::power::SEEN;
 use crate::study;
 use nalgebra::DVector;
@@ -86,7 +87,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
         let found = diagnose(subject, &diagnose::Options::default())?;
         match found.candidates.first().filter(|_| matches!(found.verdict, Verdict::MissingEffect)) {
-            Some(first) => left_open(&loaded, first),
+            Some(first) => left_open(&loaded, first, &found.candidates),
             None => Questions::of_plan(&View::new(&setting.task, &setting.runs, &[], setting.noise)?),
         }
     } else {
@@ -141,10 +142,18 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
 }
 
-/// The questions of a diagnosis: its first candidate against those that cannot be told from it.
-fn left_open(loaded: &Loaded, first: &Candidate) -> Questions {
+/// The questions of a diagnosis: its first candidate against those that cannot be told from it, and against the further
+/// ones that pass the test as well: one of them may be what the first one imitates.
+fn left_open(loaded: &Loaded, first: &Candidate, all: &[Candidate]) -> Questions {
     let known = |id: &String| loaded.catalogue.get(id, &loaded.machine).is_some();
-    let rivals: Vec<String> = first.same_as.iter().filter(|id| known(id)).cloned().collect();
+    let others = all.iter().filter(|c| c.effect != first.effect && c.p_adjusted < FAMILY_LEVEL);
+    let others = others.flat_map(|c| std::iter::once(&c.effect).chain(&c.same_as));
+    let mut rivals: Vec<String> = Vec::new();
+    for id in first.same_as.iter().chain(others).filter(|id| known(id)) {
+        if !rivals.contains(id) {
+            rivals.push(id.clone());
+        }
+    }
     let mut sizes = BTreeMap::new();
     if let Some(effect) = loaded.catalogue.get(&first.effect, &loaded.machine) {
         let scales = effect.parameters.iter().filter(|p| p.shape.is_none());

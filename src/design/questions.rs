@@ -62,7 +62,13 @@ impl Questions {
         Self {
             pairs: rivals.iter().take(MOST_PAIRS).map(pair).collect(),
             sizes,
-            says: format!("{leader} explains what the model leaves over, and so does {}", rivals.join(", ")),
+            says: match rivals.get(MOST_PAIRS..).map_or(0, <[String]>::len) {
+                0 => format!("{leader} explains what the model leaves over; it may as well be {}", rivals.join(", ")),
+                more => format!(
+                    "{leader} explains what the model leaves over; it may as well be {} (and {more} more)",
+                    rivals[..MOST_PAIRS].join(", ")
+                ),
+            },
         }
     }
 
