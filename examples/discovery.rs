@@ -10,6 +10,7 @@ mod discovery;
 
 use discovery::measure::{Clean, Outcome, both_named, clean, planted, two};
 use discovery::plant::Bench;
+use discovery::strange::{self, Seen};
 use axiscal::diagnose::Verdict;
 use std::collections::BTreeMap;
 
@@ -78,6 +79,24 @@ fn report_clean(name: &str, verdicts: &[Clean]) {
     }
 }
 
+fn report_strange(name: &str, seen: &[Seen]) {
+    let of = |what: &dyn Fn(&Seen) -> bool| percent(seen.iter().filter(|s| what(s)).count(), seen.len());
+    println!(
+        "in no catalogue, {name}: {} runs, adequate {}, right variable first {}, touches rejected {}",
+        seen.len(),
+        of(&|s| s.verdict == Verdict::Adequate),
+        of(&|s| s.right()),
+        of(&|s| s.rejected > 0)
+    );
+    let sketched: Vec<f64> = seen.iter().filter_map(|s| s.sketched).collect();
+    if !sketched.is_empty() {
+        println!("  with the sketch: {} within 20 % of the noise, worst {:.2} um", percent(sketched.iter().filter(|r| **r < 1.2).count(), sketched.len()), sketched.iter().copied().fold(0.0, f64::max));
+    }
+    for s in seen.iter().filter(|s| !s.right() || s.verdict == Verdict::Adequate).take(12) {
+        println!("  - {:?} first {:?} then {:?}, proposed {:?}, {} rejected", s.verdict, s.first, s.depends, s.proposed, s.rejected);
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let part = arguments.first().map_or("all", String::as_str);
@@ -99,6 +118,13 @@ fn main() {
         report_clean("paper's plan, 0.7 um per visit as declared", &clean(&Bench::paper().with_visits(0.5f64.hypot(0.5)), n, None, 5));
         report_clean("full", &clean(&Bench::full(), n, None, 4));
         report_clean("full, 0.5 um per visit", &clean(&Bench::full().with_visits(0.5), n, None, 6));
+        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+    }
+    if wanted("strange") {
+        let bench = Bench::full();
+        for (kind, (name, _, _)) in strange::KINDS.iter().enumerate() {
+            report_strange(name, &strange::run(&bench, kind, count(100) as u64, 100 * kind as u64 + 8));
+        }
         println!("  [{:.0} s]", began.elapsed().as_secs_f64());
     }
     if wanted("two") {

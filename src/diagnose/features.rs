@@ -19,7 +19,9 @@ pub fn features(fit: &Fit, machine: &Machine) -> Features {
     let mut variables = Vec::new();
     for axis in &machine.axes {
         let kind = if axis.name.is_rotary() { Kind::Rotary } else { Kind::Linear };
-        variables.push(Variable::new(axis.name.to_string(), kind, column(slot::AXES + axis.name.index())));
+        // where the plan has them: a step between two readings of one point would split them by their own noise
+        let places = fit.data.nominal.iter().map(|o| o.position.mm_or_rad(axis.name)).collect();
+        variables.push(Variable::new(axis.name.to_string(), kind, places));
     }
     variables.push(Variable::new("t", Kind::Time, column(slot::HOURS)));
     if observations.iter().any(|o| o.has_temperature) {

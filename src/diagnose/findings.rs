@@ -15,6 +15,9 @@ use nalgebra::DMatrix;
 /// A parameter is flagged when an added effect makes it this many times less certain.
 const WEAKENED: f64 = 3.0;
 
+/// A shape that does not pass among all shapes is named when its own p-value is below this.
+const WORTH_A_WORD: f64 = 1e-3;
+
 /// Most variables that are named.
 const MOST_WHERE: usize = 5;
 
@@ -62,7 +65,14 @@ pub(super) fn put_together(
     } else {
         Vec::new()
     };
-    let significant = || seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL);
+    // where a named effect passes, the best shape is worth a word even if it would not pass among all shapes
+    let significant = || {
+        let mut best: Vec<_> = seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL).collect();
+        if best.is_empty() {
+            best.extend(seen.dependences.first().filter(|d| d.p < WORTH_A_WORD));
+        }
+        best.into_iter()
+    };
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
     let depends: Vec<Where> = if verdict == Verdict::Adequate {

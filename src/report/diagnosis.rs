@@ -10,26 +10,50 @@ const PLOT: (usize, usize) = (11, 64);
 /// Effects named with their smallest detectable size.
 const MOST_POWER: usize = 4;
 
+/// Prose is wrapped to this: it is read on 80 columns and looks no worse on 160.
+const WIDTH: usize = 80;
+
+/// Words in lines of [`WIDTH`]; the lines after the first begin with so many blanks.
+fn wrapped(text: &str, indent: usize) -> String {
+    let mut out = String::new();
+    let mut length = 0;
+    for word in text.split(' ') {
+        let n = word.chars().count();
+        if length > 0 && length + 1 + n > WIDTH {
+            out.push('\n');
+            out += &" ".repeat(indent);
+            length = indent;
+        } else if length > 0 {
+            out.push(' ');
+            length += 1;
+        }
+        out += word;
+        length += n;
+    }
+    out.push('\n');
+    out
+}
+
 /// The whole answer.
 #[must_use]
 pub fn diagnosis(d: &Diagnosis) -> String {
-    let mut out = format!("{}\n", d.says);
+    let mut out = wrapped(&d.says, 0);
     if !d.candidates.is_empty() {
         out += &candidates(d);
     }
     for w in &d.depends {
-        out += &format!("depends: {}\n", w.says);
+        out += &wrapped(&format!("depends: {}", w.says), 2);
     }
     if let Some(shape) = &d.shape {
         out += &plot(shape);
-        out += &format!("such a misfit comes from {}\n", shape.kind);
+        out += &wrapped(&format!("such a misfit comes from {}", shape.kind), 2);
     }
     for g in d.gross.iter().take(3) {
-        out += &format!("tried: {}: {} um RMS would be left\n", g.says, significant(g.rms_um));
+        out += &wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2);
     }
     for o in &d.outliers {
         let back = if o.comes_back { "; it belongs to the rest once the first candidate is in the model" } else { "" };
-        out += &format!("not used: touch {} of run {}: {}{back}\n", o.id, o.run, o.reason);
+        out += &wrapped(&format!("not used: touch {} of run {}: {}{back}", o.id, o.run, o.reason), 2);
     }
     let large: Vec<String> = d
         .power
@@ -38,22 +62,19 @@ pub fn diagnosis(d: &Diagnosis) -> String {
         .map(|p| format!("{} below {} um", p.effect, significant(p.minimal_detectable_um)))
         .collect();
     if !large.is_empty() {
-        out += &format!("these touches could not have seen: {}\n", large.join(", "));
+        out += &wrapped(&format!("these touches could not have seen: {}", large.join(", ")), 2);
     }
     if !d.not_seen.is_empty() {
-        out += &format!("no trace in these touches at any size: {}\n", d.not_seen.join(", "));
+        out += &wrapped(&format!("no trace in these touches at any size: {}", d.not_seen.join(", ")), 2);
     }
     for w in &d.warnings {
-        out += &format!("warning: {w}\n");
+        out += &wrapped(&format!("warning: {w}"), 2);
     }
     out
 }
 
 fn candidates(d: &Diagnosis) -> String {
-    let mut t = table(&["candidate", "cannot be told from", "p (Holm)", "error after um", "held out um", "size"]);
-    if !t.is_tty() {
-        t.set_width(80);
-    }
+    let mut t = table(&["candidate", "p (Holm)", "error um", "held out um", "share"]);
     for c in &d.candidates {
         let held = match (c.held_out_before_um, c.held_out_after_um) {
             (Some(before), Some(after)) => format!("{} > {}", significant(before), significant(after)),
@@ -61,32 +82,41 @@ fn candidates(d: &Diagnosis) -> String {
         };
         t.add_row(vec![
             Cell::new(if c.proposed { format!("* {}", c.effect) } else { c.effect.clone() }),
-            Cell::new(if c.same_as.is_empty() { "-".to_owned() } else { c.same_as.join(", ") }),
             number(probability(c.p_adjusted)),
             number(significant(c.rms_after_um)),
             number(held),
-            Cell::new(sizes(c)),
+            number(format!("{:.0} %", 100.0 * c.share)),
         ]);
     }
     let mut out = format!("{t}\n");
     if d.candidates.iter().any(|c| c.proposed) {
-        out += "* passes the test with all candidates counted in, and predicts touches that had no part in choosing it\n";
+        out += &wrapped("* passes the test with all candidates counted in, and predicts touches that had no part in choosing it", 2);
+    }
+    for c in d.candidates.iter().filter(|c| c.p_adjusted < 1.0) {
+        out += &wrapped(&format!("{}: {}", c.effect, sizes(c)), 2);
+        if !c.same_as.is_empty() {
+            out += &wrapped(&format!("  cannot be told from {}", c.same_as.join(", ")), 4);
+        }
     }
     if let Some(first) = d.candidates.first() {
-        out += &format!("{}: {}\n  look: {}\n", first.name, first.says, first.look);
+        out += &wrapped(&format!("{}: {}", first.name, first.says), 2);
+        out += &wrapped(&format!("  look: {}", first.look), 4);
         if !first.tell_apart.is_empty() {
-            out += &format!("  to tell apart: {}\n", first.tell_apart);
+            out += &wrapped(&format!("  to tell apart: {}", first.tell_apart), 4);
         }
         if !first.plausible {
             out += "  its size would be unusual: look at the others of its group first\n";
         }
         for w in &first.weakens {
-            out += &format!(
-                "  with it {} is known to {} {} only, instead of {}: a smaller error left over, and a less certain result\n",
-                w.name,
-                significant(w.sigma_after),
-                w.unit,
-                significant(w.sigma_before)
+            out += &wrapped(
+                &format!(
+                    "  with it {} is known to {} {} only, instead of {}: a smaller error left over, and a less certain result",
+                    w.name,
+                    significant(w.sigma_after),
+                    w.unit,
+                    significant(w.sigma_before)
+                ),
+                4,
             );
         }
         if first.remains == Some(true) {

@@ -30,9 +30,15 @@ pub fn sized(bench: &Bench, base: &str, hidden: Hidden, peak_um: f64) -> Sized {
     };
     let (without, fit) = gaps(base, "");
     let (with, _) = gaps(&format!("{base}{}", hidden.written(1.0)), hidden.own());
+    let at_rest = without.clone();
     let difference = (with - without) * 1000.0;
     let size = peak_um / difference.amax();
     let difference_um = difference * size;
+    // of a mixture, what these touches see of the catalogue's own part must be the larger part: else it is another effect
+    let own = hidden.without_harmonics().map(|own| {
+        let (with, _) = gaps(&format!("{base}{}", own.written(1.0)), own.own());
+        (with - &at_rest) * 1000.0 * size
+    });
     let evidence = Evidence::of(&fit);
     // the base at σ = 1 um and no scatter of visits
     let jacobian = fit.linear(0.0).jacobian;
@@ -40,6 +46,10 @@ pub fn sized(bench: &Bench, base: &str, hidden: Hidden, peak_um: f64) -> Sized {
     let touches = axiscal::search::Basis::new(&jacobian.rows(0, n).into_owned());
     debug_assert!(evidence.base.rank() <= jacobian.ncols());
     let lambda = touches.project(&difference_um).norm_squared();
+    let lambda = match own {
+        Some(own) if touches.project(&own).norm_squared() < 0.8 * lambda => 0.0,
+        _ => lambda,
+    };
     Sized { hidden, size, lambda, difference_um }
 }
 

@@ -4,3 +4,4 @@
 pub mod find;
 pub mod measure;
 pub mod plant;
+pub mod strange;

@@ -164,6 +164,11 @@ impl Hidden {
         out
     }
 
+    /// The catalogue's part of a mixture; `None` where it is none.
+    pub fn without_harmonics(&self) -> Option<Self> {
+        (!self.harmonics.is_empty()).then(|| Self { harmonics: Vec::new(), ..self.clone() })
+    }
+
     pub fn own(&self) -> &str {
         &self.own
     }
