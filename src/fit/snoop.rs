@@ -111,7 +111,7 @@ impl Rows<'_, '_> {
             .collect();
         let n = self.gap.len();
         let mut d = vec![0.0; n];
-        let visits = if tau > 0.0 { self.touches.visits_in(0..n) } else { vec![0..n] };
+        let visits = if tau > 0.0 { self.touches.visits_in(0..n) } else { Vec::from([0..n]) };
         for visit in visits {
             let (mut m, mut shared, mut square) = (Matrix3::zeros(), DMatrix::zeros(0, 0), Matrix3::zeros());
             if tau > 0.0 {
@@ -242,9 +242,9 @@ impl Snoop {
             let amount = self.a[i] / root;
             self.chi2 -= amount * amount;
             self.dof -= 1.0;
-            for k in 0..n {
-                self.a[k] -= column[k] * amount;
-                self.d[k] = (self.d[k] - column[k] * column[k]).max(0.0);
+            for ((a, d), c) in self.a.iter_mut().zip(&mut self.d).zip(&column) {
+                *a -= c * amount;
+                *d = (*d - c * c).max(0.0);
             }
             self.d[i] = 0.0;
             self.a[i] = 0.0;
@@ -279,11 +279,14 @@ pub fn belongs(standardised: f64) -> bool {
     standardised.abs() < LIMIT
 }
 
+/// A face as it was touched: visit, block, rounded normal.
+pub type Face = (usize, usize, [i8; 3]);
+
 /// Clusters among rejected touches: where three or more of one face in one visit go together and make half of it, they
-/// are no chips but say something in common. Keys: visit, block, rounded normal.
+/// are no chips but say something in common.
 #[must_use]
-pub fn clusters(rejected: &[usize], face_of: impl Fn(usize) -> (usize, usize, [i8; 3]), n: usize) -> Vec<Vec<usize>> {
-    let mut faces: BTreeMap<(usize, usize, [i8; 3]), (usize, Vec<usize>)> = BTreeMap::new();
+pub fn clusters(rejected: &[usize], face_of: impl Fn(usize) -> Face, n: usize) -> Vec<Vec<usize>> {
+    let mut faces: BTreeMap<Face, (usize, Vec<usize>)> = BTreeMap::new();
     for i in 0..n {
         faces.entry(face_of(i)).or_default().0 += 1;
     }

@@ -345,7 +345,7 @@ pub fn observe_gram(gram: &DMatrix<f64>) -> Option<Observability> {
     let p = gram.ncols();
     let scale = DVector::from_fn(p, |i, _| gram[(i, i)].sqrt());
     let largest = scale.max();
-    if p == 0 || scale.iter().any(|s| !(*s > 1e-12 * largest)) {
+    if p == 0 || scale.iter().any(|s| s.is_nan() || *s <= 1e-12 * largest) {
         return None;
     }
     let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (scale[i] * scale[j]));

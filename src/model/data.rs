@@ -194,8 +194,8 @@ impl Visits {
     fn of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
         let at = Indexed {
             mounting,
-            pose: touch.pose.clone(),
-            from: touch.from.clone(),
+            pose: touch.pose,
+            from: touch.from,
             spindle_deg: touch.spindle_deg,
             tool_length_mm: touch.tool_length_mm,
         };
