@@ -16,11 +16,8 @@ pub(super) fn words(subject: Subject, seen: &Examination, group: &Group) -> Stri
         &seen.named.raw_um.columns(span.start, span.len()) * &score.estimate
     };
     let difference = trace(chosen) - trace(rival);
-    let Some(&most) =
-        seen.evidence.used.iter().max_by(|&&a, &&b| difference[a].abs().total_cmp(&difference[b].abs()))
-    else {
-        return String::new();
-    };
+    let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
+    let Some(most) = seen.evidence.used.iter().copied().max_by(further) else { return String::new() };
     let o = &subject.fit.data.observations[most];
     let pose: Vec<String> = subject
         .machine

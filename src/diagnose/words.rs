@@ -35,6 +35,13 @@ pub fn by(on: &str, is_rotary: &dyn Fn(&str) -> bool) -> String {
     }
 }
 
+/// A variable of formulas that stands for something that a person can look at: an axis, time, temperature, feed.
+#[must_use]
+pub fn is_plain(variable: &str) -> bool {
+    ["X", "Y", "Z", "A", "B", "C", "t", "T", "feed", "S", "L"].contains(&variable)
+        || (variable.len() == 2 && variable.starts_with('s'))
+}
+
 /// The form of a shape, from its id: `order`, `step`, …, or nothing for the smooth ones.
 fn form(d: &Dependence) -> &str {
     let middle = d.id.split(':').nth(1).unwrap_or_default();
