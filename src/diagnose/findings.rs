@@ -45,8 +45,7 @@ pub(super) fn put_together(
         );
     }
     candidates.truncate(options.at_most);
-    let found: Vec<&Group> =
-        seen
+    let found: Vec<&Group> = seen
         .groups
         .iter()
         .filter(|g| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL))
@@ -75,7 +74,7 @@ pub(super) fn put_together(
     };
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
-    let depends: Vec<Where> = if verdict == Verdict::Adequate {
+    let mut depends: Vec<Where> = if verdict == Verdict::Adequate {
         Vec::new()
     } else {
         significant()
@@ -89,6 +88,24 @@ pub(super) fn put_together(
             })
             .collect()
     };
+    // no shape passes by itself: the effect that was found says on what its own formulas depend
+    if !seen.dependences.iter().any(|d| d.p_adjusted < FAMILY_LEVEL)
+        && let Some(first) = candidates.first().filter(|c| c.proposed)
+        && let Some(effect) = subject.catalogue.get(&first.effect, subject.machine)
+        && let Some(on) =
+            effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))
+    {
+        depends.insert(
+            0,
+            Where {
+                by: by(on),
+                share: first.share,
+                p_adjusted: first.p_adjusted,
+                says: format!("{:.0} % of what is left goes the way of {}", 100.0 * first.share, effect.id),
+                id: effect.id.clone(),
+            },
+        );
+    }
     let shape = significant().next().filter(|_| !depends.is_empty()).and_then(|d| {
         let kind = features.variables.iter().find(|v| v.name == d.on).map(|v| v.kind);
         let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };

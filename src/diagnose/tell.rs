@@ -13,14 +13,11 @@ pub(super) fn words(subject: Subject, seen: &Examination, group: &Group) -> Stri
     let trace = |c: usize| -> DVector<f64> {
         let score = &seen.order.scores[c];
         let span = seen.named.library.candidates()[c].variants[score.variant].columns.clone();
-        &seen.named.raw_um.columns(span.start, span.len()) * &score.estimate
+        seen.named.raw_um.columns(span.start, span.len()) * &score.estimate
     };
     let difference = trace(chosen) - trace(rival);
-    let Some(&most) =
-        seen.evidence.used.iter().max_by(|&&a, &&b| difference[a].abs().total_cmp(&difference[b].abs()))
-    else {
-        return String::new();
-    };
+    let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
+    let Some(most) = seen.evidence.used.iter().copied().max_by(further) else { return String::new() };
     let o = &subject.fit.data.observations[most];
     let pose: Vec<String> = subject
         .machine

@@ -23,10 +23,10 @@ pub(super) fn outcome(
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
     let type_b = uncertainty::type_b(fit, machine, catalogue, &settings.type_b)?;
-    let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED).then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
+    let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
+        .then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
-    let b_variance =
-        DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
+    let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
     let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
     let parameters: Vec<Parameter> = (0..fit.theta.len())
         .map(|i| {
@@ -68,8 +68,11 @@ pub(super) fn outcome(
     let free_unknowns: Vec<&Unknown> = fit.free.iter().map(|&i| &fit.model.unknowns[i]).collect();
     let squares: f64 = fit.residual_mm.iter().zip(&fit.weight).map(|(r, w)| w * r * r).sum();
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
-    let unusable =
-        fit.data.unusable.iter().map(|u| Rejected { id: u.id, run: u.run + 1, reason: format!("{} (line {})", u.reason, u.line) });
+    let unusable = fit.data.unusable.iter().map(|u| Rejected {
+        id: u.id,
+        run: u.run + 1,
+        reason: format!("{} (line {})", u.reason, u.line),
+    });
     let strangers = fit.rejected.iter().map(|(&i, reason)| {
         let o = &fit.data.observations[i];
         Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
@@ -95,12 +98,20 @@ pub(super) fn outcome(
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
-        undetermined: fit.observability.unseen.iter().map(|v| statement::undetermined(&free_unknowns, effects, v)).collect(),
+        undetermined: fit
+            .observability
+            .unseen
+            .iter()
+            .map(|v| statement::undetermined(&free_unknowns, effects, v))
+            .collect(),
         weak: if settings.quick || n > uncertainty::MOST_UNMODELLED { Vec::new() } else { uncertainty::weak(fit) },
         parameters,
         correlations: uncertainty::correlations(fit),
         priors: uncertainty::priors(fit),
-        type_b: type_b.iter().map(|b| TypeBRow { name: b.name.clone(), sigma: b.sigma, unit: b.unit.clone() }).collect(),
+        type_b: type_b
+            .iter()
+            .map(|b| TypeBRow { name: b.name.clone(), sigma: b.sigma, unit: b.unit.clone() })
+            .collect(),
         reference_mm: fit.model.reference.into(),
         covariance: None,
         residuals: Some(residuals(fit)),

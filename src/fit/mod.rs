@@ -139,8 +139,7 @@ impl Fit {
     pub fn with_touches<T>(&self, tau_mm: f64, f: impl FnOnce(&Touches) -> T) -> T {
         let batch = self.model.prepare(&self.data.observations);
         let noise = (self.noise.sigma_mm, tau_mm);
-        let mut touches =
-            Touches::new(&batch, &self.data.visits, self.theta.clone(), &self.free, &self.priors, noise);
+        let mut touches = Touches::new(&batch, &self.data.visits, self.theta.clone(), &self.free, &self.priors, noise);
         touches.set_weights(self.weight.clone());
         f(&touches)
     }
@@ -551,8 +550,7 @@ fn observe_nominal(
     let touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, noise);
     let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
     let gram = solve::Problem::normal(&touches, &at, true).gram;
-    let seen =
-        solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+    let seen = solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
     (seen, gram)
 }
 

@@ -325,9 +325,9 @@ impl<'a> Touches<'a> {
             if self.tau_mm > 0.0 {
                 let m = self.visit_inverse(&seen.normals);
                 let weighted = m * &seen.rows;
-                let (gram, gradient) = part
-                    .visits
-                    .get_or_insert_with(|| (DMatrix::zeros(if with_gram { p } else { 0 }, if with_gram { p } else { 0 }), DVector::zeros(p)));
+                let (gram, gradient) = part.visits.get_or_insert_with(|| {
+                    (DMatrix::zeros(if with_gram { p } else { 0 }, if with_gram { p } else { 0 }), DVector::zeros(p))
+                });
                 if with_gram {
                     gram.gemm_tr(1.0, &seen.rows, &weighted, 1.0);
                 }
@@ -424,8 +424,7 @@ impl Problem for Touches<'_> {
     fn normal(&self, free: &DVector<f64>, with_gram: bool) -> Normal {
         let theta = self.full(free);
         let at = self.batch.at(&theta);
-        let parts: Vec<Partial> =
-            self.chunks.par_iter().map(|range| self.accumulate(&at, range, with_gram)).collect();
+        let parts: Vec<Partial> = self.chunks.par_iter().map(|range| self.accumulate(&at, range, with_gram)).collect();
         let p = free.len();
         let column_of = self.columns();
         let layout = self.batch.model().layout();

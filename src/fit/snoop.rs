@@ -104,14 +104,11 @@ impl Rows<'_, '_> {
     fn diagonal(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
         let (sigma, tau) = self.touches.noise_mm();
         let (w, s2) = (self.touches.weights(), sigma * sigma);
-        let own: Vec<DMatrix<f64>> = self
-            .columns
-            .iter()
-            .map(|c| DMatrix::from_fn(c.len(), c.len(), |a, b| covariance[(c[a], c[b])]))
-            .collect();
+        let own: Vec<DMatrix<f64>> =
+            self.columns.iter().map(|c| DMatrix::from_fn(c.len(), c.len(), |a, b| covariance[(c[a], c[b])])).collect();
         let n = self.gap.len();
         let mut d = vec![0.0; n];
-        let visits = if tau > 0.0 { self.touches.visits_in(0..n) } else { Vec::from([0..n]) };
+        let visits = if tau > 0.0 { self.touches.visits_in(0..n) } else { std::iter::once(0..n).collect() };
         for visit in visits {
             let (mut m, mut shared, mut square) = (Matrix3::zeros(), DMatrix::zeros(0, 0), Matrix3::zeros());
             if tau > 0.0 {
@@ -224,9 +221,7 @@ impl Snoop {
         // a touch whose residual the fit takes away nearly whole cannot be judged
         let least = 1e-6 / (sigma * sigma);
         while self.u.len() < most {
-            let worst = (0..n)
-                .map(|i| (i, self.standardised(i, least)))
-                .max_by(|x, y| x.1.abs().total_cmp(&y.1.abs()));
+            let worst = (0..n).map(|i| (i, self.standardised(i, least))).max_by(|x, y| x.1.abs().total_cmp(&y.1.abs()));
             let Some((i, w)) = worst else { break };
             if w.abs() <= LIMIT {
                 break;

@@ -319,8 +319,7 @@ pub fn minimise_from(
             factor = Factor::new(problem, &theta, &normal, seen);
         }
     }
-    let covariance =
-        factor.and_then(|f| f.covariance(seen)).unwrap_or_else(|| DMatrix::from_element(p, p, f64::NAN));
+    let covariance = factor.and_then(|f| f.covariance(seen)).unwrap_or_else(|| DMatrix::from_element(p, p, f64::NAN));
     Solution { theta, chi2: normal.sum, converged, iterations, stopped, covariance }
 }
 

@@ -82,8 +82,11 @@ pub(super) fn type_b(
     for (word, &sigma) in stated {
         if fit.model.unknowns.iter().any(|u| crate::symbols::same(&u.name, word)) {
             findings.push(
-                Finding::error("model::type_b_in_model", format!("{word} is in the model: it cannot be a type B row too"))
-                    .help("give it a prior under [model.parameters], or take its effect out of the model"),
+                Finding::error(
+                    "model::type_b_in_model",
+                    format!("{word} is in the model: it cannot be a type B row too"),
+                )
+                .help("give it a prior under [model.parameters], or take its effect out of the model"),
             );
             continue;
         }
@@ -99,7 +102,10 @@ pub(super) fn type_b(
             continue;
         };
         if !(sigma.is_finite() && sigma > 0.0) {
-            findings.push(Finding::error("model::type_b", format!("uncertainty of {word} is {sigma}")).help("write a positive number in the parameter's unit"));
+            findings.push(
+                Finding::error("model::type_b", format!("uncertainty of {word} is {sigma}"))
+                    .help("write a positive number in the parameter's unit"),
+            );
             continue;
         }
         let column = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, None)
@@ -282,7 +288,12 @@ pub(super) fn priors(fit: &Fit) -> Vec<super::outcome::PriorRow> {
     for (i, known) in fit.knowledge.iter().enumerate() {
         if let Some(Knowledge::Prior { value, sigma }) = known {
             let u = &fit.model.unknowns[i];
-            out.push(super::outcome::PriorRow { name: u.name.clone(), value: *value, sigma: *sigma, unit: u.unit.clone() });
+            out.push(super::outcome::PriorRow {
+                name: u.name.clone(),
+                value: *value,
+                sigma: *sigma,
+                unit: u.unit.clone(),
+            });
         }
     }
     out

@@ -223,7 +223,19 @@ impl Model {
             reading: self.find(Place::Reading),
         };
         let moving = (0..self.slots.len()).filter(|&i| self.slots[i].changes == Changes::WithTouch).collect();
-        Batch { model: self, observations, pose, poses, varying, coefficients, shaped, moving, entries, n_rotary_workpiece, roles }
+        Batch {
+            model: self,
+            observations,
+            pose,
+            poses,
+            varying,
+            coefficients,
+            shaped,
+            moving,
+            entries,
+            n_rotary_workpiece,
+            roles,
+        }
     }
 }
 
@@ -379,7 +391,8 @@ impl At<'_> {
         let Scratch { placed, displacement, gradient, moved, met, turned, .. } = scratch;
         let changes = |i: usize| model.slots[i].changes == Changes::WithTouch;
         let at_slot = |i: usize| -> &Placed { if changes(i) { &placed[i] } else { &self.placed[base + i] } };
-        let by_slot = |i: usize| -> &Displacement { if changes(i) { &displacement[i] } else { &self.displacement[base + i] } };
+        let by_slot =
+            |i: usize| -> &Displacement { if changes(i) { &displacement[i] } else { &self.displacement[base + i] } };
 
         // what the control shows, corrected by the reading's own error
         let mut shown = o.position;

@@ -143,7 +143,13 @@ pub fn statements(machines: &[Machine]) -> Result<Vec<Statement>> {
     say(head, "a b g dx dy dz, L", &[&six[..], &["dL"]].concat(), poses, &three)?;
     say(head, "a b g dx dy dz, datum", &[&six[..], &datum[..]].concat(), poses, &three)?;
     say(head, "a b g, L, datum", &[&five[..3], &["dL"], &datum[..]].concat(), poses, &three)?;
-    say(head, "a b g dx dy dz, L, datum, tip", &[&six[..], &["dL"], &datum[..], &["tx", "ty"]].concat(), poses, &three)?;
+    say(
+        head,
+        "a b g dx dy dz, L, datum, tip",
+        &[&six[..], &["dL"], &datum[..], &["tx", "ty"]].concat(),
+        poses,
+        &three,
+    )?;
     say(head, "a b g dx dy", &five, "B = 0, -90", &xyz(&[(0.0, 0.0), (-90.0, 0.0)]))?;
 
     let double = find("double-head")?;

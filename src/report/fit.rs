@@ -98,7 +98,12 @@ pub fn outcome(o: &Outcome) -> String {
         out += &format!("prior: {} = {} ± {} {}, counted once\n", p.name, p.value, significant(p.sigma), p.unit);
     }
     for b in &o.type_b {
-        out += &format!("type B: {} uncertain by {} {}, in the standard uncertainties\n", b.name, significant(b.sigma), b.unit);
+        out += &format!(
+            "type B: {} uncertain by {} {}, in the standard uncertainties\n",
+            b.name,
+            significant(b.sigma),
+            b.unit
+        );
     }
     if !o.correlations.is_empty() {
         let pairs: Vec<String> = o.correlations.iter().map(|c| format!("{} ~ {} {:+.2}", c.a, c.b, c.r)).collect();

@@ -18,6 +18,9 @@ pub const ADDS_NOTHING: f64 = 0.05;
 /// Expected sizes above this many typical sizes are implausible.
 pub const PLAUSIBLE: f64 = 5.0;
 
+/// Logarithms of p-values closer than this make no difference (a factor of 20).
+const AS_LIKELY: f64 = 3.0;
+
 /// A candidate in a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Member {
@@ -40,7 +43,8 @@ pub struct Member {
 pub struct Group {
     /// The most significant candidate.
     pub leader: usize,
-    /// All of it, leader included: possible ones first, then fewest parameters, plausible size, user's own, p-value.
+    /// All of it, leader included: possible ones first, then as likely as the leader, fewest parameters, plausible size,
+    /// user's own, p-value.
     pub members: Vec<Member>,
 }
 
@@ -109,15 +113,19 @@ impl Search<'_> {
                 })
             })
             .collect();
-        members.sort_by(|a, b| self.rank_of(a).partial_cmp(&self.rank_of(b)).unwrap_or(std::cmp::Ordering::Equal));
+        let best = self.scores[leader].ln_p;
+        let rank = |m: &Member| self.rank_of(m, best);
+        members.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(std::cmp::Ordering::Equal));
         Group { leader, members }
     }
 
-    /// Sorts members: what comes first is named first.
-    fn rank_of(&self, m: &Member) -> (bool, usize, bool, bool, f64) {
+    /// Sorts members: what comes first is named first. Those that are as likely as the leader go by simplicity; those
+    /// that are clearly less likely come after them, however simple they are.
+    fn rank_of(&self, m: &Member, best: f64) -> (bool, f64, usize, bool, bool, f64) {
         let score = &self.scores[m.candidate];
+        let behind = if best.is_finite() { ((score.ln_p - best) / AS_LIKELY).floor().max(0.0) } else { 0.0 };
         let origin = self.library.candidates()[m.candidate].origin;
-        (!m.stays, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
+        (!m.stays, behind, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
     }
 
     fn span(&self, candidate: usize) -> (usize, usize) {

@@ -242,7 +242,13 @@ pub fn check(case: &Case, summary: &Summary, k: f64) -> Vec<String> {
     }
     // where the scatter of visits is estimated it cannot come out below 0, and takes a part of the noise with it
     let estimated = case.programs.contains(&"full");
-    let spread = if case.tau_mm > 0.0 { 0.05 } else if estimated { 0.02 } else { 0.01 };
+    let spread = if case.tau_mm > 0.0 {
+        0.05
+    } else if estimated {
+        0.02
+    } else {
+        0.01
+    };
     let slack = spread + k * (2.0 / summary.dof as f64 / n).sqrt();
     if (summary.chi2_per_dof - 1.0).abs() > slack {
         wrong.push(format!("{case:?}: chi2/dof {:.4}", summary.chi2_per_dof));

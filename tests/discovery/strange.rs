@@ -107,8 +107,9 @@ fn touches(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> (Vec<Vec<Touch>>
     let wrong = match kind {
         0 => {
             let (cos, sin) = (25.0 * size, 15.0 * size * sign(rng));
-            let wrong =
-                format!("{base}[[harmonic]]\naxis = \"C\"\ndof = \"rz\"\nk = 7\ncos_urad = {cos:?}\nsin_urad = {sin:?}\n");
+            let wrong = format!(
+                "{base}[[harmonic]]\naxis = \"C\"\ndof = \"rz\"\nk = 7\ncos_urad = {cos:?}\nsin_urad = {sin:?}\n"
+            );
             bench.measure(&wrong, "", 1.0, seed)
         }
         1 => {
@@ -117,7 +118,8 @@ fn touches(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> (Vec<Vec<Touch>>
             let block = loop {
                 let b = &plan.blocks[rng.random_range(0..plan.blocks.len())];
                 let begins = bench.plans.iter().find(|(p, _)| std::ptr::eq(p, plan)).unwrap().1;
-                let times = plan.touches.iter().filter(|t| t.block == b.name).map(|t| (begins + t.time_s.unwrap()) / 3600.0);
+                let times =
+                    plan.touches.iter().filter(|t| t.block == b.name).map(|t| (begins + t.time_s.unwrap()) / 3600.0);
                 let times: Vec<f64> = times.collect();
                 if times.iter().any(|t| *t < hour - 0.1) && times.iter().any(|t| *t > hour + 0.1) {
                     break b;
@@ -127,12 +129,16 @@ fn touches(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> (Vec<Vec<Touch>>
             let [x, y, z] = block.centre;
             let [sx, sy, sz] = block.size.map(|s| 0.5 * s);
             let here = format!("step(t - {hour:?})*{}*{}*{}", near("px", x, sx), near("py", y, sy), near("pz", z, sz));
-            let (file, planted) = own("block", &[("dx", format!("{size:?}*{here}")), ("dy", format!("{:?}*{here}", size * sign(rng)))]);
+            let (file, planted) =
+                own("block", &[("dx", format!("{size:?}*{here}")), ("dy", format!("{:?}*{here}", size * sign(rng)))]);
             bench.measure(&format!("{base}{planted}"), &file, 1.0, seed)
         }
         2 => {
             let z = size * sign(rng);
-            let (file, planted) = own("base", &[("dx", format!("{size:?}*step(t - {hour:?})")), ("dz", format!("{z:?}*step(t - {hour:?})"))]);
+            let (file, planted) = own(
+                "base",
+                &[("dx", format!("{size:?}*step(t - {hour:?})")), ("dz", format!("{z:?}*step(t - {hour:?})"))],
+            );
             bench.measure(&format!("{base}{planted}"), &file, 1.0, seed)
         }
         3 => {
