@@ -142,7 +142,7 @@ fn touches(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> (Vec<Vec<Touch>>
             bench.measure(&format!("{base}{planted}"), &file, 1.0, seed)
         }
         3 => {
-            let phase = rng.random_range(0.0..6.28);
+            let phase = rng.random_range(0.0..std::f64::consts::TAU);
             let (file, planted) = own("base", &[("dz", format!("{:?}*sin(2*pi*t/0.15 + {phase:?})", 0.6 * size))]);
             bench.measure(&format!("{base}{planted}"), &file, 1.0, seed)
         }
