@@ -213,3 +213,36 @@ fn weak_combinations_are_named() {
     assert!(pair, "{:?}", o.correlations);
     assert!(o.parameters.iter().all(|p| p.status == Status::Identified || p.sigma.is_none()));
 }
+
+#[test]
+fn noise_does_not_make_a_null_direction_look_seen() {
+    // a uniform scale of the machine is the head's length and the ball's radius (effects.md, B.1)
+    let machine = machine("swivel-head");
+    let runs = measured(&machine, 14);
+    let effects = [&MODEL[..], &["scale-x", "scale-y", "scale-z"]].concat();
+    let o = fit(&machine, &runs, &effects, Settings::default()).outcome;
+    assert_eq!((o.unknowns, o.rank), (42, 41));
+    assert!(o.undetermined.iter().any(|u| u.combination.contains_key("EXX") && u.combination.contains_key("EZ0B")));
+    assert!(o.chi2_per_dof > 0.8, "{}", o.chi2_per_dof);
+    let known = |p: &&axiscal::fit::outcome::Parameter| p.status == Status::Identified;
+    assert!(
+        o.parameters.iter().filter(known).all(|p| p.sigma.is_some_and(|s| s.is_finite() && s < 1.0 || p.unit != "mm"))
+    );
+}
+
+#[test]
+fn touches_that_are_all_taken_out_tell_nothing() {
+    let machine = machine("swivel-head");
+    let runs = measured(&machine, 15);
+    let mask = |run: usize, t: &Touch| Mask { run, id: t.id, reason: "all".into() };
+    let all: Vec<Mask> = runs.iter().enumerate().flat_map(|(r, run)| run.1.iter().map(move |t| mask(r, t))).collect();
+    for masked in [all.clone(), all[10..].to_vec()] {
+        let o = fit(&machine, &runs, &MODEL, Settings { masked, ..Settings::default() }).outcome;
+        assert!(o.rank <= 10, "{}", o.rank);
+        assert!(o.parameters.iter().all(|p| p.sigma.is_none_or(f64::is_finite)));
+        assert!(o.parameters.iter().any(|p| p.status == Status::Undetermined));
+    }
+    let masked = vec![Mask { run: 0, id: 99_999, reason: "typo".into() }];
+    let o = fit(&machine, &runs, &MODEL, Settings { masked, ..Settings::default() }).outcome;
+    assert!(o.warnings.iter().any(|w| w.contains("99999")), "{:?}", o.warnings);
+}

@@ -36,7 +36,10 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     if !lost.is_empty() {
         return (Score::NotEnough, format!("it cannot tell {}{not_for}", lost.join(", ")));
     }
-    if judged.is_empty() && !location.is_empty() {
+    if location.is_empty() {
+        return (Score::Enough, "the model holds no location error: there is nothing to score it by".into());
+    }
+    if judged.is_empty() {
         return (Score::NotEnough, "it sees no location error at all".into());
     }
     let coarse = |share: f64, of: fn(&Expected) -> Option<f64>| -> Vec<&str> {
@@ -73,7 +76,13 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         reasons.push(format!("{} pairs of effects cannot be told apart", a.alias_pairs));
     }
     if reasons.is_empty() {
-        let says = "it tells the location errors also while other errors act, and can name nearly all of them";
+        // a trace is not enough: at its usual size an effect must be larger than what would just be found
+        let of_usual_size = |e: &&super::record::Seen| e.noncentrality >= 25.0;
+        let found = a.effects.iter().filter(of_usual_size).count();
+        let says = format!(
+            "it tells the location errors also while other errors act, and would find {found} of {} effects at their usual size",
+            a.effects.len()
+        );
         return (Score::Good, format!("{says}{not_for}"));
     }
     (

@@ -10,6 +10,9 @@ use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use nalgebra::DVector;
 
+/// A result further off than so many typical sizes is worth a warning by itself.
+const NOT_CREDIBLE: f64 = 300.0;
+
 pub(super) fn outcome(
     fit: &Fit,
     machine: &Machine,
@@ -34,7 +37,7 @@ pub(super) fn outcome(
             let column = fit.free.binary_search(&i).ok();
             let status = match (column, &fit.knowledge[i]) {
                 (None, _) => Status::Fixed,
-                (Some(c), _) if unseen(c) > 1e-6 => Status::Undetermined,
+                (Some(c), _) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
                 // the data halve the prior's variance at least, or the value is the prior's rather than theirs
                 (Some(c), Some(Knowledge::Prior { sigma, .. })) if noise_variance(c) > 0.5 * sigma * sigma => {
                     Status::PriorDominated
@@ -136,6 +139,16 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
         for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
             out.push(format!("effect {} goes with the temperature T, and no touch carries one", effect.id));
         }
+    }
+    let far = |i: &usize| {
+        let u = &fit.model.unknowns[*i];
+        !u.shape && !u.nuisance && fit.theta[*i].abs() > NOT_CREDIBLE * u.typical
+    };
+    for &i in fit.free.iter().filter(|i| far(i)) {
+        out.push(format!(
+            "{} is more than {NOT_CREDIBLE} times its usual size: no machine is like that; is the plan, a unit or a sign wrong, or does a combination of the model leave hardly a trace?",
+            fit.model.unknowns[i].name
+        ));
     }
     if !solution.converged {
         out.push(format!("the search did not converge: {}", solution.stopped));

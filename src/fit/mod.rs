@@ -267,7 +267,7 @@ fn identify_from(
         touches.set_weights(masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
     }
     let first = solve::Problem::normal(&touches, &start, true);
-    let (observability, condition) = observe(&first.gram, &model, &data, &theta, &free, &priors, first_noise);
+    let (observability, condition) = observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
     let mut search = Search { data: &data, observability: &observability, touches, masked };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
@@ -300,10 +300,18 @@ fn identify_from(
     }
     let residual_mm = search.touches.gaps(&solution.theta);
     let mut rejected = search.reasons(&solution);
+    let mut unknown_masks = Vec::new();
     for mask in &settings.masked {
         let is = |o: &Observation| o.run == mask.run && o.id == mask.id;
-        if let Some(i) = data.observations.iter().position(is) {
-            rejected.insert(i, format!("taken out: {}", mask.reason));
+        match data.observations.iter().position(is) {
+            Some(i) => {
+                rejected.insert(i, format!("taken out: {}", mask.reason));
+            }
+            None => unknown_masks.push(format!(
+                "there is no touch {} in run {}: its mask does nothing",
+                mask.id,
+                mask.run + 1
+            )),
         }
     }
     let weight = search.touches.weights().to_vec();
@@ -336,6 +344,7 @@ fn identify_from(
         outcome: Outcome::default(),
     };
     fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition)?;
+    fit.outcome.warnings.extend(unknown_masks);
     Ok(fit)
 }
 
@@ -517,13 +526,13 @@ fn observe(
     theta: &[f64],
     free: &[usize],
     priors: &[Prior],
-    noise: (f64, f64),
+    weights: &[f64],
 ) -> (solve::Observability, f64) {
     let clear = solve::observe_gram(gram).filter(|seen| seen.condition < CLEARLY_SEEN);
     let (seen, nominal) = match clear {
         Some(seen) => (seen, None),
         None => {
-            let (seen, gram) = observe_nominal(model, data, theta, free, priors, noise);
+            let (seen, gram) = observe_nominal(model, data, theta, free, priors, Some(weights));
             (seen, Some(gram))
         }
     };
@@ -544,10 +553,13 @@ fn observe_nominal(
     theta: &[f64],
     free: &[usize],
     priors: &[Prior],
-    noise: (f64, f64),
+    weights: Option<&[f64]>,
 ) -> (solve::Observability, DMatrix<f64>) {
     let nominal = model.prepare(&data.nominal);
-    let touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, noise);
+    let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (1e-3, 0.0));
+    if let Some(weights) = weights {
+        touches.set_weights(weights.to_vec());
+    }
     let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
     let gram = solve::Problem::normal(&touches, &at, true).gram;
     let seen = solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
@@ -568,6 +580,6 @@ pub fn observe_plan(
     let model = Model::new(machine, &effects, &data.set_ups, machine.reference.pivot);
     let theta = model.start();
     let free: Vec<usize> = (0..theta.len()).collect();
-    let seen = observe_nominal(&model, data, &theta, &free, &[], (1.0, 0.0)).0;
+    let seen = observe_nominal(&model, data, &theta, &free, &[], None).0;
     Ok((model, seen))
 }

@@ -128,8 +128,11 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let normal = Vector3::from(planned.normal).normalize();
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
             let ball_radius = planned.ball_radius_mm.unwrap_or(run.plan.ball_radius_mm);
+            let ideal = machine
+                .linear_for_ball(carrier, &planned.pose.position(), &(point + normal * ball_radius), length_mm)
+                .unwrap_or(touch.position);
             // the rotary axes stand where the control says they stand; a log without them means the plan's pose
-            let observation = Observation {
+            let at = |position: Position| Observation {
                 run: index,
                 id: touch.id,
                 set_up,
@@ -137,14 +140,14 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 normal,
                 ball_radius,
                 ball_at_zero: machine.tool.ball_at_zero(length_mm),
-                position: touch.position,
+                position,
                 has_temperature: touch.temperature_deg_c.is_some(),
                 state: Circumstances {
                     machine,
                     carrier,
                     block,
                     planned,
-                    at: &touch.position,
+                    at: &position,
                     hours: t,
                     temperature_deg_c: touch.temperature_deg_c,
                     senses: &last_sense,
@@ -152,16 +155,15 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 }
                 .state(),
             };
-            let ideal = machine
-                .linear_for_ball(carrier, &planned.pose.position(), &(point + normal * ball_radius), length_mm)
-                .unwrap_or(touch.position);
+            let observation = at(touch.position);
             data.origins.push(Origin {
                 line: touch.line,
                 stage: planned.stage.clone(),
                 block: data.set_ups[set_up].label.clone(),
                 face: planned.face.clone(),
             });
-            data.nominal.push(Observation { position: ideal, ..observation.clone() });
+            // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
+            data.nominal.push(at(ideal));
             data.repeats.push(repeat_group(&data, run.plan, planned, index));
             let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));
             data.visits.push(visit);
