@@ -8,10 +8,10 @@ mod common;
 #[path = "../tests/discovery/mod.rs"]
 mod discovery;
 
+use axiscal::diagnose::Verdict;
 use discovery::measure::{Clean, Outcome, both_named, clean, planted, two};
 use discovery::plant::Bench;
 use discovery::strange::{self, Seen};
-use axiscal::diagnose::Verdict;
 use std::collections::BTreeMap;
 
 fn percent(part: usize, of: usize) -> String {
@@ -25,7 +25,11 @@ fn share(outcomes: &[Outcome], what: impl Fn(&Outcome) -> bool) -> String {
 fn report_planted(name: &str, outcomes: &[Outcome]) {
     let n = outcomes.len();
     println!("planted, {name}: {n} cases, {} with another shape", share(outcomes, |o| o.other_shape));
-    println!("  proposed {}  missing-effect {}", share(outcomes, |o| o.proposed), share(outcomes, |o| o.verdict == Verdict::MissingEffect));
+    println!(
+        "  proposed {}  missing-effect {}",
+        share(outcomes, |o| o.proposed),
+        share(outcomes, |o| o.verdict == Verdict::MissingEffect)
+    );
     println!(
         "  by name {}  first group {} (mean size {:.1})  first three {}",
         share(outcomes, |o| o.by_name),
@@ -90,10 +94,17 @@ fn report_strange(name: &str, seen: &[Seen]) {
     );
     let sketched: Vec<f64> = seen.iter().filter_map(|s| s.sketched).collect();
     if !sketched.is_empty() {
-        println!("  with the sketch: {} within 20 % of the noise, worst {:.2} um", percent(sketched.iter().filter(|r| **r < 1.2).count(), sketched.len()), sketched.iter().copied().fold(0.0, f64::max));
+        println!(
+            "  with the sketch: {} within 20 % of the noise, worst {:.2} um",
+            percent(sketched.iter().filter(|r| **r < 1.2).count(), sketched.len()),
+            sketched.iter().copied().fold(0.0, f64::max)
+        );
     }
     for s in seen.iter().filter(|s| !s.right() || s.verdict == Verdict::Adequate).take(12) {
-        println!("  - {:?} first {:?} then {:?}, proposed {:?}, {} rejected", s.verdict, s.first, s.depends, s.proposed, s.rejected);
+        println!(
+            "  - {:?} first {:?} then {:?}, proposed {:?}, {} rejected",
+            s.verdict, s.first, s.depends, s.proposed, s.rejected
+        );
     }
 }
 
@@ -115,7 +126,10 @@ fn main() {
         let n = count(2000) as u64;
         report_clean("paper's plan", &clean(&Bench::paper(), n, None, 3));
         // two axes with 0.5 um each, as the machine file declares
-        report_clean("paper's plan, 0.7 um per visit as declared", &clean(&Bench::paper().with_visits(0.5f64.hypot(0.5)), n, None, 5));
+        report_clean(
+            "paper's plan, 0.7 um per visit as declared",
+            &clean(&Bench::paper().with_visits(0.5f64.hypot(0.5)), n, None, 5),
+        );
         report_clean("full", &clean(&Bench::full(), n, None, 4));
         report_clean("full, 0.5 um per visit", &clean(&Bench::full().with_visits(0.5), n, None, 6));
         println!("  [{:.0} s]", began.elapsed().as_secs_f64());
@@ -131,7 +145,12 @@ fn main() {
         let found = two(&Bench::full(), count(400), 7);
         let both = found.iter().filter(|(t, s)| both_named(t, s)).count();
         let more = found.iter().filter(|(_, s)| s.len() > 2).count();
-        println!("two hidden, full: {} cases, both named {}, more than two {}", found.len(), percent(both, found.len()), percent(more, found.len()));
+        println!(
+            "two hidden, full: {} cases, both named {}, more than two {}",
+            found.len(),
+            percent(both, found.len()),
+            percent(more, found.len())
+        );
         for (truths, steps) in found.iter().filter(|(t, s)| !both_named(t, s)) {
             println!("  - {truths:?}: {steps:?}");
         }

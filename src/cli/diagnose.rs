@@ -26,8 +26,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut settings = loaded.settings();
     settings.quick = true;
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
-    let subject =
-        Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+    let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
     let options = Options { at_most: args.at_most.max(1), ..Options::default() };
     let found = diagnose(subject, &options)?;
     io.say(crate::report::diagnosis::diagnosis(&found).trim_end());

@@ -37,8 +37,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         own.add_file(&source(&name, before.clone()))?;
     }
     let taken = |id: &str| loaded.catalogue.knows(id) || own.knows(id);
-    let subject =
-        Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+    let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
     let made = sketch(subject, &taken)?;
     let gap = match before.trim_end() {
         "" => "",
@@ -48,8 +47,17 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let text = format!("{before}{gap}{}", made.toml);
     Catalogue::built_in()?.add_file(&source(&name, text.clone()))?;
     files::write_whole(&args.out, text.as_bytes())?;
-    io.say(format!("{}\n{} = {}\nwritten to {name}: change its id and name to what it is,", made.says, made.id, made.formula));
-    io.say(format!("put effects_file = [\"{name}\"] into the study, then: axiscal add {} {}", args.study.display(), made.id));
-    io.answer(&json!({ "effect": made.id, "says": made.says, "formula": made.formula, "file": name, "toml": made.toml }));
+    io.say(format!(
+        "{}\n{} = {}\nwritten to {name}: change its id and name to what it is,",
+        made.says, made.id, made.formula
+    ));
+    io.say(format!(
+        "put effects_file = [\"{name}\"] into the study, then: axiscal add {} {}",
+        args.study.display(),
+        made.id
+    ));
+    io.answer(
+        &json!({ "effect": made.id, "says": made.says, "formula": made.formula, "file": name, "toml": made.toml }),
+    );
     Ok(Answer::Done)
 }

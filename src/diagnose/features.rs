@@ -28,11 +28,7 @@ pub fn features(fit: &Fit, machine: &Machine) -> Features {
         variables.push(Variable::new("T", Kind::Temperature, column(slot::TEMPERATURE)));
     }
     for axis in &machine.axes {
-        variables.push(Variable::new(
-            format!("s{}", axis.name),
-            Kind::Plain,
-            column(slot::SENSES + axis.name.index()),
-        ));
+        variables.push(Variable::new(format!("s{}", axis.name), Kind::Plain, column(slot::SENSES + axis.name.index())));
     }
     for axis in machine.rotary() {
         variables.push(before(fit, axis.name));

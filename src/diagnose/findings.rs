@@ -45,8 +45,7 @@ pub(super) fn put_together(
         );
     }
     candidates.truncate(options.at_most);
-    let found: Vec<&Group> =
-        seen
+    let found: Vec<&Group> = seen
         .groups
         .iter()
         .filter(|g| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL))
@@ -93,7 +92,8 @@ pub(super) fn put_together(
     if !seen.dependences.iter().any(|d| d.p_adjusted < FAMILY_LEVEL)
         && let Some(first) = candidates.first().filter(|c| c.proposed)
         && let Some(effect) = subject.catalogue.get(&first.effect, subject.machine)
-        && let Some(on) = effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))
+        && let Some(on) =
+            effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))
     {
         depends.insert(
             0,

@@ -51,8 +51,7 @@ fn plain(x: f64) -> String {
 }
 
 fn write(subject: Subject, d: &Dependence, taken: &dyn Fn(&str) -> bool) -> Sketch {
-    let stem: String =
-        d.on.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let stem: String = d.on.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let free = |n: usize| if n == 1 { format!("sketch-{stem}") } else { format!("sketch-{stem}-{n}") };
     let id = (1..).map(free).find(|id| !taken(id)).unwrap_or_else(|| format!("sketch-{stem}"));
     let prefix: String = id.replace('-', "_");

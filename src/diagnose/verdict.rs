@@ -56,14 +56,16 @@ pub fn of(seen: &Examination) -> Decision {
 pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
     let against = format!("{:.2} um RMS against {:.2} um noise", out.rms_um, out.noise_um);
     out.says = match out.verdict {
-        Verdict::Adequate => match out.power.iter().max_by(|a, b| a.minimal_detectable_um.total_cmp(&b.minimal_detectable_um)) {
-            Some(_) => format!(
-                "Nothing is missing that these touches can show ({against}; {} effects tested, {} leave no trace in this plan).",
-                out.tested,
-                out.not_seen.len()
-            ),
-            None => format!("Nothing is missing that these touches can show ({against})."),
-        },
+        Verdict::Adequate => {
+            match out.power.iter().max_by(|a, b| a.minimal_detectable_um.total_cmp(&b.minimal_detectable_um)) {
+                Some(_) => format!(
+                    "Nothing is missing that these touches can show ({against}; {} effects tested, {} leave no trace in this plan).",
+                    out.tested,
+                    out.not_seen.len()
+                ),
+                None => format!("Nothing is missing that these touches can show ({against})."),
+            }
+        }
         Verdict::TooLittleData => format!(
             "Too few touches to judge: {} touches against {} unknowns. Use a program with more touches, or take effects out of the model.",
             fit.n_used(),

@@ -75,12 +75,15 @@ pub fn says(d: &Dependence, fit: &Fit, machine: &Machine) -> String {
     let rotary = machine.rotary().any(|a| a.name.to_string() == d.on) || d.on == "S";
     let direction = direction_words(&d.direction, machine);
     let (on, how) = match d.on.as_str() {
-        "t" => ("time".to_owned(), match form(d) {
-            "step" => format!("a jump {}", place(d, false)),
-            "period" => format!("a cycle of {}", duration(d.scanned)),
-            "exponential" => format!("settling with a time constant of {}", duration(d.scanned)),
-            _ => "slowly".to_owned(),
-        }),
+        "t" => (
+            "time".to_owned(),
+            match form(d) {
+                "step" => format!("a jump {}", place(d, false)),
+                "period" => format!("a cycle of {}", duration(d.scanned)),
+                "exponential" => format!("settling with a time constant of {}", duration(d.scanned)),
+                _ => "slowly".to_owned(),
+            },
+        ),
         "t*block" => {
             let number: Option<usize> = d.id.split("block-").nth(1).and_then(|w| w.split(':').next()?.parse().ok());
             let block = number.and_then(|n| fit.data.set_ups.get(n)).map_or("one block", |s| s.label.as_str());
@@ -97,13 +100,18 @@ pub fn says(d: &Dependence, fit: &Fit, machine: &Machine) -> String {
         on if on.contains('*') => (on.replace('*', " and "), "both together".to_owned()),
         on => match (on.strip_suffix(" before"), on.strip_prefix('s')) {
             (Some(axis), _) => (format!("where {axis} stood before"), "the way it came from".to_owned()),
-            (_, Some(axis)) if axis.len() == 1 => (format!("the sense of {axis}'s last motion"), "up against down".to_owned()),
-            _ => (on.to_owned(), match form(d) {
-                "step" => format!("a jump at {}", place(d, rotary)),
-                "kink" => format!("a corner at {}", place(d, rotary)),
-                _ if rotary => harmonic(d),
-                _ => "smoothly".to_owned(),
-            }),
+            (_, Some(axis)) if axis.len() == 1 => {
+                (format!("the sense of {axis}'s last motion"), "up against down".to_owned())
+            }
+            _ => (
+                on.to_owned(),
+                match form(d) {
+                    "step" => format!("a jump at {}", place(d, rotary)),
+                    "kink" => format!("a corner at {}", place(d, rotary)),
+                    _ if rotary => harmonic(d),
+                    _ => "smoothly".to_owned(),
+                },
+            ),
         },
     };
     format!("{percent} % of what is left goes with {on} ({how}), {direction}")
@@ -117,7 +125,9 @@ fn harmonic(d: &Dependence) -> String {
 #[must_use]
 pub fn kind(d: &Dependence) -> String {
     let text = match (d.on.as_str(), form(d)) {
-        ("t", "step") => "something moved at one moment: a knocked fixture, a clamp or probe that gave way, a collision",
+        ("t", "step") => {
+            "something moved at one moment: a knocked fixture, a clamp or probe that gave way, a collision"
+        }
         ("t", "period") => "something that cycles: a cooling unit, a lubrication pump, doors and draughts",
         ("t", "exponential") => "warming up: it moves fast at first and comes to rest",
         ("t", _) => "slow change: temperature, creep of a clamp",
@@ -129,10 +139,17 @@ pub fn kind(d: &Dependence) -> String {
         ("S" | "approach", _) => "the probe: stylus run-out, or a trigger that depends on the direction",
         ("L", _) => "the stylus: its length or bending",
         ("feed", _) => "a delay between trigger and recorded position",
-        (on, _) if on.ends_with(" before") => "hysteresis: friction or wind-up that depends on where the axis came from",
+        (on, _) if on.ends_with(" before") => {
+            "hysteresis: friction or wind-up that depends on where the axis came from"
+        }
         (on, _) if on.len() == 2 && on.starts_with('s') => "looseness: backlash or a reversal error",
         (on, _) if on.contains('*') => "two axes together: sag or squareness that changes with the pose",
-        (_, "order") if d.scanned >= 3.5 => return format!("a tooth or bolt pattern with {} periods per turn: gear, worm wheel, coupling, clamping ring", d.scanned.round()),
+        (_, "order") if d.scanned >= 3.5 => {
+            return format!(
+                "a tooth or bolt pattern with {} periods per turn: gear, worm wheel, coupling, clamping ring",
+                d.scanned.round()
+            );
+        }
         (_, "order") => "an eccentric or wobbling bearing, or an encoder ring mounted off its centre",
         (_, "step") => "looseness that lets go at one place: a stop, a clamp, a worn spot",
         (_, "kink") => "contact that changes at one place: a counterweight, a guideway joint, slack that is taken up",

@@ -42,7 +42,9 @@ pub(super) fn starts(
         let which = shapes.iter().position(|p| p.scan.len() > 1).unwrap_or(0);
         let of_effect = |i: &usize| model.unknowns[*i].effect == effect.id;
         let name = &shapes[which].name;
-        let Some(unknown) = (0..theta.len()).filter(of_effect).find(|&i| &model.unknowns[i].name == name) else { continue };
+        let Some(unknown) = (0..theta.len()).filter(of_effect).find(|&i| &model.unknowns[i].name == name) else {
+            continue;
+        };
         if known(unknown) {
             continue;
         }
@@ -103,7 +105,10 @@ fn is_smooth(effect: &Effect, which: usize, value: f64, starts: &[f64], data: &D
     values.extend_from_slice(starts);
     values[n_factors + which] = value;
     let moves = |o: &crate::model::predict::Observation| {
-        effect.terms.iter().any(|t| t.formula.partials(&o.state, &values).any(|(k, d)| k == n_factors + which && d != 0.0))
+        effect
+            .terms
+            .iter()
+            .any(|t| t.formula.partials(&o.state, &values).any(|(k, d)| k == n_factors + which && d != 0.0))
     };
     data.observations.iter().filter(|o| moves(o)).count() > data.observations.len() / 20
 }

@@ -90,7 +90,10 @@ fn candidates(d: &Diagnosis) -> String {
     }
     let mut out = format!("{t}\n");
     if d.candidates.iter().any(|c| c.proposed) {
-        out += &wrapped("* passes the test with all candidates counted in, and predicts touches that had no part in choosing it", 2);
+        out += &wrapped(
+            "* passes the test with all candidates counted in, and predicts touches that had no part in choosing it",
+            2,
+        );
     }
     for c in d.candidates.iter().filter(|c| c.p_adjusted < 1.0) {
         out += &wrapped(&format!("{}: {}", c.effect, sizes(c)), 2);
@@ -151,7 +154,8 @@ fn plot(s: &Shape) -> String {
     if limit <= 0.0 || to <= from {
         return String::new();
     }
-    let row = |y: f64| (((limit - y) / (2.0 * limit)) * (rows - 1) as f64).round().clamp(0.0, (rows - 1) as f64) as usize;
+    let row =
+        |y: f64| (((limit - y) / (2.0 * limit)) * (rows - 1) as f64).round().clamp(0.0, (rows - 1) as f64) as usize;
     let mut grid = vec![vec![' '; columns]; rows];
     grid[rows / 2].fill('·');
     for c in 0..columns {
@@ -169,7 +173,11 @@ fn plot(s: &Shape) -> String {
             _ if r == rows / 2 => format!("{:8.1}", 0.0),
             _ => " ".repeat(8),
         };
-        out += &format!("{label} {} {}\n", line.iter().collect::<String>().trim_end(), if r == 0 { s.y_unit.as_str() } else { "" });
+        out += &format!(
+            "{label} {} {}\n",
+            line.iter().collect::<String>().trim_end(),
+            if r == 0 { s.y_unit.as_str() } else { "" }
+        );
     }
     let gap = columns.saturating_sub(significant(from).len() + significant(to).len());
     out += &format!("{} {}{}{}\n", " ".repeat(8), significant(from), " ".repeat(gap), significant(to));

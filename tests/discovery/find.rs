@@ -21,7 +21,13 @@ pub fn data(machine: &Machine, plans: &[(Plan, f64)], touches: &[Vec<Touch>]) ->
     assemble(machine, &runs)
 }
 
-pub fn fit(machine: &Machine, catalogue: &Catalogue, data: Data, more: &[String], visit_um: Option<f64>) -> (Fit, Settings) {
+pub fn fit(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    data: Data,
+    more: &[String],
+    visit_um: Option<f64>,
+) -> (Fit, Settings) {
     let settings = Settings {
         effects: BASE.iter().map(|e| (*e).to_owned()).chain(more.iter().cloned()).collect(),
         // what a plan without revisits must be told
@@ -65,7 +71,8 @@ pub fn ladder(machine: &Machine, catalogue: &Catalogue, data: &Data, at_most: us
 
 /// RMS over noise with the sketched effect in the model; `None` where nothing can be sketched.
 pub fn sketched(machine: &Machine, built_in: &Catalogue, first: &Fit, settings: &Settings) -> Option<f64> {
-    let made = sketch::sketch(Subject { machine, catalogue: built_in, settings, fit: first }, &|id| built_in.knows(id)).ok()?;
+    let made = sketch::sketch(Subject { machine, catalogue: built_in, settings, fit: first }, &|id| built_in.knows(id))
+        .ok()?;
     let mut own = Catalogue::built_in().unwrap();
     own.add_file(&source("my-effects.toml", made.toml)).unwrap();
     let mut more = settings.effects[BASE.len()..].to_vec();

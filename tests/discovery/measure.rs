@@ -213,5 +213,6 @@ pub fn two(bench: &Bench, count: usize, seed: u64) -> Vec<(Vec<String>, Vec<Vec<
 /// Are both truths in the group of a step, each in its own?
 pub fn both_named(truths: &[String], steps: &[Vec<String>]) -> bool {
     let holds = |step: &Vec<String>, truth: &String| step.contains(truth);
-    (0..steps.len()).any(|i| (0..steps.len()).any(|j| i != j && holds(&steps[i], &truths[0]) && holds(&steps[j], &truths[1])))
+    (0..steps.len())
+        .any(|i| (0..steps.len()).any(|j| i != j && holds(&steps[i], &truths[0]) && holds(&steps[j], &truths[1])))
 }

@@ -206,18 +206,41 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
         let (value, is_shape) = match id {
             _ if p.shape.is_none() => (p.typical * normal(rng), false),
             "block-slip" => (rng.random_range(0.15..0.85) * bench.hours(), true),
-            _ if p.name.starts_with("pitch") => (*[5.0, 8.0, 10.0, 12.0, 16.0].get(rng.random_range(0..5)).unwrap(), true),
+            _ if p.name.starts_with("pitch") => {
+                (*[5.0, 8.0, 10.0, 12.0, 16.0].get(rng.random_range(0..5)).unwrap(), true)
+            }
             _ => (p.scan[rng.random_range(0..p.scan.len())], true),
         };
         values.push((p.name.clone(), value, p.unit.clone(), is_shape));
     }
-    Hidden { truth: id.to_owned(), other_shape: false, values, harmonics: Vec::new(), own: String::new(), own_parameters: Vec::new() }
+    Hidden {
+        truth: id.to_owned(),
+        other_shape: false,
+        values,
+        harmonics: Vec::new(),
+        own: String::new(),
+        own_parameters: Vec::new(),
+    }
 }
 
 /// Ids of which [`bent`] knows another shape.
 pub fn bendable(machine: &Machine) -> Vec<String> {
-    let families = ["radial-", "axial-", "tilt-", "positioning-b", "positioning-c", "warm-up", "spindle-growth", "pitch-", "head-sag", "drift-linear"];
-    ids(machine).into_iter().filter(|id| families.iter().any(|f| id.starts_with(f)) && !id.ends_with("-linear") || id == "drift-linear").collect()
+    let families = [
+        "radial-",
+        "axial-",
+        "tilt-",
+        "positioning-b",
+        "positioning-c",
+        "warm-up",
+        "spindle-growth",
+        "pitch-",
+        "head-sag",
+        "drift-linear",
+    ];
+    ids(machine)
+        .into_iter()
+        .filter(|id| families.iter().any(|f| id.starts_with(f)) && !id.ends_with("-linear") || id == "drift-linear")
+        .collect()
 }
 
 /// The same with a shape that is not exactly the catalogue's: a time constant between the scanned ones, another
@@ -231,7 +254,9 @@ pub fn bent(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
             let tau = f64::exp(rng.random_range(f64::ln(0.13)..f64::ln(2.0)));
             out.values.iter_mut().filter(|v| v.0 == "tau").for_each(|v| v.1 = tau);
         }
-        ("pitch", _) => out.values.iter_mut().filter(|v| v.0 == "pitch").for_each(|v| v.1 = rng.random_range(5.0..18.0)),
+        ("pitch", _) => {
+            out.values.iter_mut().filter(|v| v.0 == "pitch").for_each(|v| v.1 = rng.random_range(5.0..18.0))
+        }
         ("head", _) => {
             out.values.clear();
             out.own = "[[effect]]\nid = \"planted\"\nat = \"Z\"\nterms = [{ parameter = \"p\", unit = \"um\", dof = \"dz\", formula = \"0 - abs(sin(B))^1.5\" }]\n".into();
