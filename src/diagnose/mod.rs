@@ -17,10 +17,11 @@ mod verdict;
 mod words;
 
 use crate::diag::Result;
-use crate::fit::{Fit, Settings, identify_data};
+use crate::fit::{Fit, Settings, declared_tau_mm, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
+use crate::search::forward::forward;
 use crate::search::generic::{Features, Generics};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, HeldOut, held_out};
@@ -151,15 +152,33 @@ pub fn examine<'a>(
     }
 }
 
+/// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
+/// explain all of it: what drifts or jumps between two visits of one pose looks like scatter of the visits, and would
+/// widen the tests until they are blind to it. Scatter that nothing explains stays scatter.
+fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Features) -> Option<Evidence> {
+    const AT_MOST: usize = 4;
+    let declared_mm = declared_tau_mm(machine, &fit.data.observations);
+    if fit.noise.visit_source != "revisits" || declared_mm == 0.0 || fit.noise.tau_test_mm <= declared_mm {
+        return None;
+    }
+    let evidence = Evidence::with_visits(fit, declared_mm);
+    let mut library = Named::of(fit, &evidence, machine, catalogue).library;
+    library.append(features::shapes(fit, &evidence, features).library);
+    let question = evidence.question();
+    let end = forward(question, &library, AT_MOST, None);
+    let rest = lack_of_fit(&Question { residual: &end.residual, base: &end.basis, ..question });
+    (!end.steps.is_empty() && rest.p > 0.05).then_some(evidence)
+}
+
 /// The diagnosis of a fit.
 ///
 /// # Errors
 /// When a refit is impossible.
 pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let Subject { machine, catalogue, fit, .. } = subject;
-    let evidence = Evidence::of(fit);
-    let named = Named::of(fit, &evidence, machine, catalogue);
     let features = features::features(fit, machine);
+    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
+    let named = Named::of(fit, &evidence, machine, catalogue);
     let generics = features::shapes(fit, &evidence, &features);
     let ordering = Ordering::of(fit, machine, catalogue);
     let seen = examine(&evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);

@@ -5,6 +5,8 @@ use crate::fit::Fit;
 use crate::fit::candidates::columns;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::formula::slot;
+use crate::model::predict::Observation;
 use crate::search::{Library, Origin};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
@@ -62,6 +64,22 @@ fn scan_of(effect: &Effect) -> Option<(usize, &[f64])> {
     shapes.enumerate().find(|(_, p)| p.scan.len() > 1).map(|(i, p)| (i, &p.scan[..]))
 }
 
+/// The touches where the model expects them instead of where they were read: along its normal a reading carries the very
+/// noise that is to be explained, and a formula that is steep in a coordinate (a pitch error whose period the plan's
+/// coordinates keep) would explain the noise by itself.
+fn without_noise(fit: &Fit) -> Vec<Observation> {
+    let each = fit.data.observations.iter().zip(&fit.residual_mm).map(|(o, residual)| {
+        let mut o = o.clone();
+        for k in 0..3 {
+            let by = o.state[slot::NORMAL_IN_R + k] * residual;
+            o.position.0[k] -= by;
+            o.state[slot::AXES + k] -= by;
+        }
+        o
+    });
+    each.collect()
+}
+
 impl<'c> Named<'c> {
     /// All candidates of a fit.
     #[must_use]
@@ -72,8 +90,9 @@ impl<'c> Named<'c> {
     /// Given effects as candidates.
     #[must_use]
     pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
+        let places = without_noise(fit);
         let make = |effects: &[&Effect], shapes: Option<&[f64]>| {
-            columns(machine, effects, &fit.data, &fit.data.observations, fit.model.reference, shapes)
+            columns(machine, effects, &fit.data, &places, fit.model.reference, shapes)
         };
         let fixed: Vec<&Effect> = effects.iter().copied().filter(|e| scan_of(e).is_none()).collect();
         let together = make(&fixed, None);
