@@ -198,6 +198,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         findings::outliers_again(&mut out, fit, &again);
     }
     verdict::says(&mut out, fit);
+    verdict::not_when_touches_are_missing(&mut out, fit);
     Ok(out)
 }
 

@@ -17,6 +17,9 @@ const LEAST_DOF: usize = 8;
 /// folds says little: the error may then rise by less than its standard error.
 const FEW_VISITS: usize = 15;
 
+/// More touches than this share may not be missing.
+const MOST_MISSED: f64 = 0.2;
+
 /// What was decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decision {
@@ -78,6 +81,21 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
             format!("Something is missing ({against}), and no known effect explains it.{}", gross.unwrap_or(first))
         }
     };
+}
+
+/// Where many touches found nothing the rest is no sample of the machine: that is the finding, and it is said alone.
+pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, fit: &Fit) {
+    let (missed, made) = (fit.data.unusable.len(), fit.data.observations.len() + fit.data.unusable.len());
+    if missed as f64 <= MOST_MISSED * made as f64 {
+        return;
+    }
+    out.verdict = Verdict::TooLittleData;
+    out.candidates.iter_mut().for_each(|c| c.proposed = false);
+    out.says = format!(
+        "{missed} of {made} touches cannot be used, most of them because the search found nothing: nothing can be said about small \
+         effects. Does an axis count the other way round, are two exchanged, do the blocks stand where the plan says, does the \
+         log belong to this plan?"
+    );
 }
 
 fn missing(c: &Candidate, against: &str) -> String {

@@ -1,0 +1,73 @@
+//! What `diagnose` must never say: a name where nothing is missing, and anything small where touches are missing.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
+
+mod common;
+use axiscal::diagnose::answer::Diagnosis;
+use axiscal::diagnose::{Options, Subject, Verdict, diagnose};
+use axiscal::fit::{self, Settings};
+use axiscal::log::Touch;
+use axiscal::machine::Machine;
+use axiscal::model::catalogue::Catalogue;
+use axiscal::model::data::Run;
+use axiscal::program::plan::Plan;
+use axiscal::simulate::{self, Scenario};
+use common::*;
+
+fn diagnosis(machine: &Machine, plans: &[Plan], scenario: &Scenario) -> Diagnosis {
+    let catalogue = Catalogue::built_in().unwrap();
+    let touches: Vec<Vec<Touch>> = plans
+        .iter()
+        .map(|p| {
+            let (raw, _) = simulate::run(machine, p, scenario, None).unwrap();
+            let read = raw.iter().map(|r| Touch {
+                id: r.id.unwrap(),
+                position: r.position,
+                status: r.status,
+                time_s: r.time_s,
+                temperature_deg_c: r.temperature_deg_c,
+                line: r.line,
+            });
+            read.collect()
+        })
+        .collect();
+    let runs: Vec<Run> = plans
+        .iter()
+        .zip(&touches)
+        .map(|(plan, touches)| Run { plan, touches, mounting: None, started_s: None })
+        .collect();
+    let effects = ["location-b", "location-c", "block-setup", "pretravel"].map(str::to_owned).to_vec();
+    let settings = Settings { effects, quick: true, ..Settings::default() };
+    let fit = fit::identify(machine, &catalogue, &runs, &settings).unwrap();
+    let subject = Subject { machine, catalogue: &catalogue, settings: &settings, fit: &fit };
+    diagnose(subject, &Options { refit: false, power: false, ..Options::default() }).unwrap()
+}
+
+/// The plan's coordinates keep the pitch of the screws when the blocks stand exactly where they should: a formula of the
+/// coordinate must not explain the noise that the reading itself carries.
+#[test]
+fn blocks_at_their_nominal_places_hide_nothing() {
+    let machine = machine("swivel-head");
+    let plans = [plan(&machine, "head"), plan(&machine, "table")];
+    let verdicts: Vec<Verdict> = (0..12)
+        .map(|seed| {
+            let scenario = Scenario::flawless()
+                .with(&machine, "location-b", &[("EX0B", 0.02), ("EA0B", 0.003)])
+                .unwrap()
+                .with_noise(1e-3, 0.0, 300 + seed);
+            diagnosis(&machine, &plans, &scenario).verdict
+        })
+        .collect();
+    let wrong = verdicts.iter().filter(|v| **v != Verdict::Adequate).count();
+    assert!(wrong <= 2, "{verdicts:?}");
+}
+
+#[test]
+fn missing_touches_are_the_finding() {
+    let machine = machine("swivel-head");
+    let scenario =
+        Scenario::flawless().with(&machine, "sign-or-axis-swap", &[("flip_Y", 1.0)]).unwrap().with_noise(1e-3, 0.0, 9);
+    let found = diagnosis(&machine, &[plan(&machine, "full")], &scenario);
+    assert_eq!(found.verdict, Verdict::TooLittleData);
+    assert!(found.says.contains("cannot be used") && found.says.contains("other way round"), "{}", found.says);
+    assert!(found.candidates.iter().all(|c| !c.proposed));
+}
