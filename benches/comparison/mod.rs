@@ -216,7 +216,8 @@ pub fn identify_both(peers: &Peers, folder: &Path, repeats: usize) -> [Option<Ti
             identified.map(|p| (p["name"].as_str().unwrap().to_owned(), p["value"].as_f64().unwrap())).collect();
         (Times { median_s: times_s[times_s.len() / 2], least_s: times_s[0] }, values)
     };
-    let (ours, our_values) = run(Command::new(env!("CARGO_BIN_EXE_axiscal")).args(["identify", "--quick", "--json"]).arg(&study));
+    let (ours, our_values) =
+        run(Command::new(env!("CARGO_BIN_EXE_axiscal")).args(["identify", "--quick", "--json"]).arg(&study));
     let theirs = peers.0.get("python").map(|python| {
         let script = self::folder().join("identify.py");
         let (times, values) = run(Command::new(python).arg(script).arg(&study));
