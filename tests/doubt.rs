@@ -39,8 +39,8 @@ fn chip(run: &mut (Plan, Vec<Touch>), index: usize, by_mm: f64) {
     let (start, end) = (planned.start_position(), planned.end_position());
     let way: Vec<f64> = (0..3).map(|k| start.0[k] - end.0[k]).collect();
     let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
-    for k in 0..3 {
-        run.1[index].position.0[k] += by_mm * way[k] / length;
+    for (at, w) in run.1[index].position.0.iter_mut().zip(&way) {
+        *at += by_mm * w / length;
     }
 }
 
