@@ -15,15 +15,15 @@ const WIDTH: usize = 80;
 
 /// Words in lines of [`WIDTH`]; the lines after the first begin with so many blanks.
 fn wrapped(text: &str, indent: usize) -> String {
-    let mut out = String::new();
-    let mut length = 0;
-    for word in text.split(' ') {
+    let mut length = text.len() - text.trim_start().len();
+    let mut out = " ".repeat(length);
+    for (i, word) in text.split_whitespace().enumerate() {
         let n = word.chars().count();
-        if length > 0 && length + 1 + n > WIDTH {
+        if i > 0 && length + 1 + n > WIDTH {
             out.push('\n');
             out += &" ".repeat(indent);
             length = indent;
-        } else if length > 0 {
+        } else if i > 0 {
             out.push(' ');
             length += 1;
         }
