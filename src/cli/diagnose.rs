@@ -27,7 +27,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let options = Options { at_most: args.at_most.max(1), ..Options::default() };
+    let planned = loaded.planned(&fit);
+    let options = Options { at_most: args.at_most.max(1), planned: Some(&planned), ..Options::default() };
     let found = diagnose(subject, &options)?;
     io.say(crate::report::diagnosis::diagnosis(&found).trim_end());
     if matches!(found.verdict, Verdict::MissingEffect) && !io.json {

@@ -90,7 +90,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         settings.quick = true;
         let subject =
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-        let found = diagnose(subject, &Options::default())?;
+        let planned = loaded.planned(&fit);
+        let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
         io.say(&found.says);
         let stopped = match (&found.verdict, found.candidates.first()) {
             (Verdict::MissingEffect, Some(first)) if first.proposed => {

@@ -56,6 +56,9 @@ pub struct Diagnosis {
     pub power: Vec<Power>,
     /// Effects that leave no trace in these touches.
     pub not_seen: Vec<String>,
+    /// What is left open, for a further program.
+    #[serde(skip)]
+    pub open: super::open::Open,
     /// Remarks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,

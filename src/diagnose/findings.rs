@@ -31,6 +31,7 @@ pub(super) fn put_together(
 ) -> Diagnosis {
     let fit = subject.fit;
     let mut verdict = decision.verdict;
+    let open = if verdict == Verdict::MissingEffect { super::open::open(seen) } else { super::open::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
     let gross_found = gross.first().is_some_and(|g| g.rms_um < 0.1 * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
@@ -40,9 +41,11 @@ pub(super) fn put_together(
         candidates.push(candidate);
     }
     if verdict != Verdict::TooLittleData {
-        candidates.extend(
-            seen.groups.iter().enumerate().map(|(i, g)| candidate(subject, seen, g, i == 0, decision.borne_out)),
-        );
+        let tell_apart = tell::words(subject, seen, options);
+        candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, tell_apart))| Candidate {
+            tell_apart,
+            ..candidate(subject, seen, group, i == 0, decision.borne_out)
+        }));
     }
     candidates.truncate(options.at_most);
     let found: Vec<&Group> = seen
@@ -154,6 +157,7 @@ pub(super) fn put_together(
             .map(|s| seen.named.effects[s.candidate].id.clone())
             .collect(),
         warnings: Vec::new(),
+        open,
     }
 }
 
@@ -219,7 +223,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
             .filter(|m| m.candidate != chosen)
             .map(|m| seen.named.effects[m.candidate].id.clone())
             .collect(),
-        tell_apart: tell::words(subject, seen, group),
+        tell_apart: String::new(),
         says: effect.says.clone(),
         look: effect.look.clone(),
         share: score.delta_ss / total,

@@ -11,11 +11,13 @@ pub mod features;
 mod findings;
 pub mod gross;
 pub mod named;
+pub mod open;
 pub mod sketch;
 mod tell;
 mod verdict;
 mod words;
 
+use crate::design::Planned;
 use crate::diag::Result;
 use crate::fit::{Fit, Settings, declared_tau_mm, identify_data};
 use crate::machine::Machine;
@@ -47,18 +49,21 @@ pub struct Subject<'a> {
 
 /// How much is worked out.
 #[derive(Debug, Clone, Copy)]
-pub struct Options {
+pub struct Options<'a> {
     /// Most candidates that are listed.
     pub at_most: usize,
     /// Refit with the first candidate: what remains, and which outliers come back.
     pub refit: bool,
     /// What would have been found.
     pub power: bool,
+    /// The runs as they were planned, with the touches that were made: which further touches would tell effects apart is
+    /// tried on them.
+    pub planned: Option<&'a [Planned]>,
 }
 
-impl Default for Options {
+impl Default for Options<'_> {
     fn default() -> Self {
-        Self { at_most: 5, refit: true, power: true }
+        Self { at_most: 5, refit: true, power: true, planned: None }
     }
 }
 
