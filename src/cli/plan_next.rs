@@ -378,7 +378,7 @@ fn write(
         ]);
     }
     t.set_width(io.paper(false).width.min(120) as u16);
-    io.say(t.to_string());
+    io.say(io.paper(false).plain(t.to_string()));
     let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
     io.say(format!(
         "{} of {} pairs will be told apart by `diagnose` (with 95 % or more, whichever of the two acts); 25 and more of \

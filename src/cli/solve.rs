@@ -162,7 +162,7 @@ fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
 
 /// The proposal and its reason.
 fn propose(first: &Candidate, io: &Io) {
-    let sizes: Vec<String> = first
+    let mut sizes: Vec<String> = first
         .parameters
         .iter()
         .map(|p| match p.sigma {
@@ -170,6 +170,7 @@ fn propose(first: &Candidate, io: &Io) {
             None => format!("{} {} {}", p.name, significant(p.value), p.unit),
         })
         .collect();
+    sizes.extend(first.not_told.iter().map(|name| format!("{name} ? (cannot be told by this plan)")));
     io.say(format!("proposed: {} ({}): {}", first.effect, first.name, sizes.join(", ")));
     io.say(format!("  {}", first.says));
     io.say(format!("  to confirm it: {}", first.look));

@@ -119,8 +119,11 @@ pub struct Candidate {
     pub held_out_before_um: Option<f64>,
     /// The same with it.
     pub held_out_after_um: Option<f64>,
-    /// Expected sizes.
+    /// Expected sizes of what these touches can tell.
     pub parameters: Vec<Parameter>,
+    /// Parameters that these touches cannot tell: they have no size here.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_told: Vec<String>,
     /// Effects that these touches cannot tell from it.
     pub same_as: Vec<String>,
     /// Which touches would tell them apart.

@@ -122,6 +122,7 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         held_out_before_um: None,
         held_out_after_um: None,
         parameters: vec![Parameter { name: gross.hypothesis.clone(), value: 1.0, unit: "1".into(), sigma: None }],
+        not_told: Vec::new(),
         same_as: Vec::new(),
         tell_apart: String::new(),
         says: effect.says.clone(),

@@ -12,10 +12,11 @@ mod findings;
 pub mod gross;
 pub mod named;
 pub mod open;
+pub mod places;
 pub mod sketch;
 mod tell;
 mod verdict;
-mod words;
+pub mod words;
 
 use crate::design::Planned;
 use crate::diag::Result;

@@ -1,5 +1,6 @@
 //! The answer of `identify` as a table with its remarks.
 
+use super::plot::Paper;
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
@@ -36,7 +37,7 @@ pub fn digits(value: f64, sigma: Option<f64>) -> String {
 
 /// The whole answer.
 #[must_use]
-pub fn outcome(o: &Outcome) -> String {
+pub fn outcome(o: &Outcome, paper: Paper) -> String {
     let mut out = String::new();
     out += &format!(
         "{}: {} touches, {} unknowns of rank {} ({} degrees of freedom), condition {:.1}\n",
@@ -77,6 +78,7 @@ pub fn outcome(o: &Outcome) -> String {
         cells.push(Cell::new(status(p.status)));
         t.add_row(cells);
     }
+    t.set_width(paper.width.min(120) as u16);
     out += &t.to_string();
     out.push('\n');
     if unmodelled {
@@ -121,7 +123,7 @@ pub fn outcome(o: &Outcome) -> String {
     for w in &o.warnings {
         out += &format!("warning: {w}\n");
     }
-    out
+    paper.plain(out)
 }
 
 /// Three significant digits, plainly written where that is readable.
