@@ -30,7 +30,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let planned = loaded.planned(&fit);
+    let planned = loaded.planned();
     let options = Options { at_most: args.at_most.max(1), planned: Some(&planned), ..Options::default() };
     let found = diagnose(subject, &options)?;
     io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii)).trim_end());

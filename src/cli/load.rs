@@ -66,16 +66,26 @@ impl Loaded {
             .collect()
     }
 
-    /// The runs as they were planned, with the touches that a fit could use: only what was measured tells anything.
+    /// The runs as they were planned.
     #[must_use]
-    pub fn planned(&self, fit: &Fit) -> Vec<Planned> {
-        let each = self.runs.iter().enumerate().map(|(i, r)| {
-            let made: HashSet<u64> = fit.data.observations.iter().filter(|o| o.run == i).map(|o| o.id).collect();
-            let mut plan = r.plan.clone();
-            plan.touches.retain(|t| made.contains(&t.id));
-            Planned { plan, mounting: r.mounting.clone(), started_s: r.started_s }
+    pub fn planned(&self) -> Vec<Planned> {
+        let each = self.runs.iter().map(|r| Planned {
+            plan: r.plan.clone(),
+            mounting: r.mounting.clone(),
+            started_s: r.started_s,
         });
         each.collect()
+    }
+
+    /// The same with the touches that a fit could use: only what was measured tells anything.
+    #[must_use]
+    pub fn measured(&self, fit: &Fit) -> Vec<Planned> {
+        let made: HashSet<(usize, u64)> = fit.data.observations.iter().map(|o| (o.run, o.id)).collect();
+        let mut out = self.planned();
+        for (run, p) in out.iter_mut().enumerate() {
+            p.plan.touches.retain(|t| made.contains(&(run, t.id)));
+        }
+        out
     }
 
     /// What the study asks of the fit.

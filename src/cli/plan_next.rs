@@ -184,7 +184,7 @@ struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     fn new(loaded: &'a Loaded, effects: &[String], fit: &Fit) -> Result<Self> {
-        let runs = loaded.planned(fit);
+        let runs = loaded.measured(fit);
         let name = |i: usize| fit.model.unknowns[i].name.clone();
         let known =
             fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
@@ -430,11 +430,7 @@ fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> 
     let plan = super::load::load_plan(plan_file, &loaded.machine, io)?;
     let touches = read_log(&files::read_bytes(log)?, log, &args.controller, &loaded.machine, &plan, io)?;
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
-    let runs: Vec<Planned> = loaded
-        .runs
-        .iter()
-        .map(|r| Planned { plan: r.plan.clone(), mounting: r.mounting.clone(), started_s: r.started_s })
-        .collect();
+    let runs = loaded.planned();
     let stood = runs.last().and_then(|last| {
         let own = last.plan.touches.last()?.mounting.clone();
         let same = own.as_deref().unwrap_or(&last.plan.mounting).split('#').next() == Some(plan.mounting.as_str());

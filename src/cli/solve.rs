@@ -90,7 +90,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         settings.quick = true;
         let subject =
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-        let planned = loaded.planned(&fit);
+        let planned = loaded.planned();
         let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
         io.say(&found.says);
         let stopped = match (&found.verdict, found.candidates.first()) {

@@ -179,6 +179,9 @@ pub struct Gross {
     pub says: String,
     /// RMS if it is true, µm.
     pub rms_um: f64,
+    /// Where most touches are missing: share of the hits and misses that are as it would make them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agrees: Option<f64>,
 }
 
 /// A touch that was not used.

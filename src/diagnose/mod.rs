@@ -10,6 +10,7 @@ pub mod evidence;
 pub mod features;
 mod findings;
 pub mod gross;
+mod missed;
 pub mod named;
 pub mod open;
 pub mod places;
@@ -57,8 +58,8 @@ pub struct Options<'a> {
     pub refit: bool,
     /// What would have been found.
     pub power: bool,
-    /// The runs as they were planned, with the touches that were made: which further touches would tell effects apart is
-    /// tried on them.
+    /// The runs as they were planned: which further touches would tell effects apart is tried on them, and where touches are
+    /// missing, which mistake would have made them miss.
     pub planned: Option<&'a [Planned]>,
 }
 
@@ -189,7 +190,12 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let ordering = Ordering::of(fit, machine, catalogue);
     let seen = examine(&evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
     let verdict = verdict::of(&seen);
-    let gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
+    let mut gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
+    if let Some(planned) = options.planned.filter(|_| missed::mostly(&fit.data)) {
+        let missed = missed::hypotheses(subject, planned);
+        gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
+        gross.splice(0..0, missed);
+    }
     let mut out = findings::put_together(subject, &seen, &features, verdict, gross, options);
     if options.refit
         && let Some(first) = out.candidates.first_mut()

@@ -12,6 +12,7 @@ use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::units::deg_from_rad;
 use nalgebra::DVector;
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// A variation tells two effects apart when the diagnosis of its touches does so with this probability.
 const SAFELY: f64 = 0.95;
@@ -70,6 +71,12 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
     let priors: Vec<Known> =
         fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
     let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: seen.evidence.tau_mm };
+    let made: HashSet<(usize, u64)> = fit.data.observations.iter().map(|o| (o.run, o.id)).collect();
+    let mut planned = planned.to_vec();
+    for (run, p) in planned.iter_mut().enumerate() {
+        // only what was measured tells anything
+        p.plan.touches.retain(|t| made.contains(&(run, t.id)));
+    }
     let mut candidates: Vec<usize> = Vec::new();
     for group in seen.groups.iter().zip(asked).filter(|g| *g.1).map(|g| g.0) {
         candidates.extend(group.members.iter().map(|m| m.candidate));
@@ -82,7 +89,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
             (seen.named.effects[c], seen.named.scanned[c].as_ref().map(|_| shape))
         })
         .collect();
-    habits(machine, planned, &fit.model)
+    habits(machine, &planned, &fit.model)
         .into_par_iter()
         .map(|habit| {
             let known: Vec<Known> = priors.iter().chain(&habit.known).cloned().collect();
