@@ -52,7 +52,7 @@ fn keys(value: &Value, wanted: &[&str]) {
 #[test]
 fn a_missing_effect_is_no_and_a_clean_machine_is_done() {
     let wrong = "seed = 4\n[effects.radial-c-2]\nEXC2c = 6.0\nEYC2s = -5.0\n[noise]\ntouch_um = 0.5\n";
-    let folder = folder(&["head", "table"], wrong, None);
+    let folder = folder(&["full"], wrong, None);
     let at = folder.path();
     let (d, code) = json(at, &["diagnose", "study.toml"]);
     assert_eq!((d["format"].as_str(), code), (Some("axiscal-diagnosis/1"), 1));
@@ -171,12 +171,12 @@ fn a_sketch_finds_its_place_and_takes_the_error_away() {
     assert_eq!(json(at, &["diagnose", "study.toml"]).1, 0);
 }
 
-/// A notch that only the user knows, so large that its touches look like chips.
-const NOTCH: &str = "[[effect]]\nid = \"my-notch\"\nname = \"Notch of the turntable\"\nsays = \"The ring is worn at one place\"\nlook = \"Indicate it there\"\nat = \"C\"\nterms = [ { parameter = \"notch\", unit = \"um\", dof = \"dx\", formula = \"step(C - 4.6)*step(4.8 - C)\", typical = 20.0 } ]\n";
+/// A worn place that only the user knows, so deep that the touches at its bottom look like chips.
+const NOTCH: &str = "[[effect]]\nid = \"my-notch\"\nname = \"Notch of the turntable\"\nsays = \"The ring is worn at one place\"\nlook = \"Indicate it there\"\nat = \"C\"\nterms = [ { parameter = \"notch\", unit = \"urad\", dof = \"rz\", formula = \"exp(0 - ((C - 4.712)/0.25)^2)\", typical = 100.0 } ]\n";
 
 #[test]
 fn a_users_effect_is_a_candidate_and_its_touches_come_back() {
-    let wrong = "effects_file = \"own.toml\"\nseed = 3\n[effects.my-notch]\nnotch = 40.0\n[noise]\ntouch_um = 1.0\n";
+    let wrong = "effects_file = \"own.toml\"\nseed = 3\n[effects.my-notch]\nnotch = 600.0\n[noise]\ntouch_um = 1.0\n";
     let folder = folder(&["full"], wrong, Some(NOTCH));
     let at = folder.path();
     let before = json(at, &["diagnose", "study.toml"]).0;
@@ -188,10 +188,10 @@ fn a_users_effect_is_a_candidate_and_its_touches_come_back() {
     assert_eq!((d["verdict"].as_str(), code), (Some("missing-effect"), 1), "{d}");
     assert_eq!(d["candidates"][0]["effect"], "my-notch", "{}", d["candidates"][0]);
     let size = d["candidates"][0]["parameters"][0]["value"].as_f64().unwrap();
-    assert!((size - 40.0).abs() < 12.0, "{size}");
+    assert!((size - 600.0).abs() < 60.0, "{size}");
     let outliers = d["outliers"].as_array().expect("touches that look like chips");
     let back = outliers.iter().filter(|o| o["comes_back"] == true).count();
-    assert!(!outliers.is_empty() && 10 * back >= 9 * outliers.len(), "{back} of {} come back", outliers.len());
+    assert!(outliers.len() > 3 && 10 * back >= 9 * outliers.len(), "{back} of {} come back", outliers.len());
 }
 
 #[test]

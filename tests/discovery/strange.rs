@@ -17,7 +17,7 @@ pub const KINDS: [(&str, &[&str], bool); 6] = [
     ("one block bumped", &["time*block", "block"], false),
     ("step in time", &["time"], false),
     ("cycle of 9 minutes", &["time"], true),
-    ("hysteresis of B", &["before.B"], false),
+    ("hysteresis of B", &["before.B"], true),
     ("chips on three faces", &["face"], false),
 ];
 
