@@ -18,7 +18,10 @@ fn ok(folder: &Path, args: &[&str]) {
 fn json(folder: &Path, args: &[&str]) -> (Value, i32) {
     let out = axiscal(folder, &[args, &["--json"]].concat());
     let read = serde_json::from_slice(&out.stdout);
-    (read.unwrap_or_else(|e| panic!("{args:?}: {e}: {}", String::from_utf8_lossy(&out.stderr))), out.status.code().unwrap())
+    (
+        read.unwrap_or_else(|e| panic!("{args:?}: {e}: {}", String::from_utf8_lossy(&out.stderr))),
+        out.status.code().unwrap(),
+    )
 }
 
 const COMMON: [&str; 5] = ["--machine", "swivel-head", "--controller", "linuxcnc", "--out"];
@@ -61,7 +64,16 @@ fn a_missing_effect_is_no_and_a_clean_machine_is_done() {
     let first = &d["candidates"][0];
     keys(
         first,
-        &["effect", "p", "p_adjusted", "rms_after_um", "held_out_before_um", "held_out_after_um", "parameters", "same_as"],
+        &[
+            "effect",
+            "p",
+            "p_adjusted",
+            "rms_after_um",
+            "held_out_before_um",
+            "held_out_after_um",
+            "parameters",
+            "same_as",
+        ],
     );
     keys(first, &["tell_apart", "says", "look"]);
     let group: Vec<&str> = std::iter::once(first["effect"].as_str().unwrap())
@@ -156,7 +168,10 @@ fn a_sketch_finds_its_place_and_takes_the_error_away() {
     assert!(text.starts_with("# effects of mine\n"), "{text}");
     // it is the turntable that turns by it; the other places stand beside it with what they would leave
     assert!(text.contains("at = \"C\"") && text.contains("dof = \"rz\"") && text.contains("7*C"), "{text}");
-    assert!(text.contains("# places that were tried") && text.contains("base (") && text.contains(" leaves "), "{text}");
+    assert!(
+        text.contains("# places that were tried") && text.contains("base (") && text.contains(" leaves "),
+        "{text}"
+    );
     let left: Vec<f64> = made["places"].as_array().unwrap().iter().map(|p| p["left_um"].as_f64().unwrap()).collect();
     assert!(left.len() > 5 && left[0] < 1.2 && left.iter().any(|l| *l > 1.2 * left[0]), "{left:?}");
     // added to the model it leaves the noise
@@ -196,7 +211,9 @@ fn a_users_effect_is_a_candidate_and_its_touches_come_back() {
 
 #[test]
 fn a_mistake_is_named_where_most_touches_miss() {
-    for (parameter, says) in [("flip_Y", "axis Y is counted the wrong way round"), ("flip_B", "axis B is counted the wrong way round")] {
+    for (parameter, says) in
+        [("flip_Y", "axis Y is counted the wrong way round"), ("flip_B", "axis B is counted the wrong way round")]
+    {
         let wrong = format!("seed = 2\n[effects.sign-or-axis-swap]\n{parameter} = 1.0\n[noise]\ntouch_um = 1.0\n");
         let folder = folder(&["head", "table"], &wrong, None);
         let out = axiscal(folder.path(), &["diagnose", "study.toml", "--json"]);

@@ -75,7 +75,18 @@ const READING: [&[&str]; 8] = [
 ];
 
 const WRITING: [&[&str]; 3] = [
-    &["plan-next", "study.toml", "--out", "n", "--controller", "linuxcnc", "--minutes", "4", "--effects", "radial-c-1,radial-c-3"],
+    &[
+        "plan-next",
+        "study.toml",
+        "--out",
+        "n",
+        "--controller",
+        "linuxcnc",
+        "--minutes",
+        "4",
+        "--effects",
+        "radial-c-1,radial-c-3",
+    ],
     &["solve", "study.toml", "--yes"],
     &["sketch-effect", "study.toml", "--out", "mine.toml"],
 ];
@@ -87,7 +98,9 @@ fn width(line: &str) -> usize {
 /// What a person copies stays on its line, however long it is.
 fn is_copied(line: &str) -> bool {
     let line = line.trim_start();
-    ["next: axiscal", "when it has run: axiscal", "written:", "plan = ", "log = ", "mounting = "].iter().any(|w| line.starts_with(w))
+    ["next: axiscal", "when it has run: axiscal", "written:", "plan = ", "log = ", "mounting = "]
+        .iter()
+        .any(|w| line.starts_with(w))
 }
 
 fn looks_good(args: &[&str], text: &str, columns: usize) {

@@ -35,11 +35,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
     let found = diagnose(subject, &Options { at_most: 1, refit: false, power: false, planned: None })?;
-    let leads: Vec<Lead> = found
-        .depends
-        .iter()
-        .map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() })
-        .collect();
+    let leads: Vec<Lead> =
+        found.depends.iter().map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() }).collect();
     let comparison = compare::compare(&fit).led_by(&leads);
     if let Some(path) = &args.csv {
         files::write_whole(path, report::compare::csv(&comparison).as_bytes())?;

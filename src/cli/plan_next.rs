@@ -17,9 +17,9 @@ use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
 use crate::report::fit::{number, significant};
-use comfy_table::Cell;
 use crate::search::apart::SEEN;
 use crate::study;
+use comfy_table::Cell;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -246,6 +246,8 @@ impl Comparison {
     #[must_use]
     pub fn led_by(mut self, leads: &[Lead]) -> Self {
         let Some(first) = leads.first() else { return self };
+        // the further ones explain much of the same: their own splits say how much
+        let leads = &leads[..1];
         let mut front: Vec<Split> = Vec::new();
         for lead in leads {
             let by = match lead.by.as_str() {

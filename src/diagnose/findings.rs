@@ -95,7 +95,8 @@ pub(super) fn put_together(
             .collect()
     };
     // an effect that explains more than any shape without a name says on what its own formulas depend
-    let best_shape = seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL).map(|d| d.share).fold(0.0, f64::max);
+    let best_shape =
+        seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL).map(|d| d.share).fold(0.0, f64::max);
     if let Some(first) = candidates.first().filter(|c| c.proposed && c.share >= best_shape)
         && let Some(effect) = subject.catalogue.get(&first.effect, subject.machine)
         && let Some(on) =

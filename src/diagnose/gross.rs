@@ -79,7 +79,12 @@ fn units(subject: Subject) -> Vec<Gross> {
     .filter_map(|(hypothesis, factor, says)| {
         let data = scaled(&subject.fit.data, factor);
         let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
-        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um: fit.outcome.rms_um, agrees: None })
+        Some(Gross {
+            hypothesis: hypothesis.to_owned(),
+            says: says.to_owned(),
+            rms_um: fit.outcome.rms_um,
+            agrees: None,
+        })
     })
     .collect()
 }

@@ -193,9 +193,10 @@ fn forward(subject: Subject, evidence: &Evidence, at: &str, ways: &[(String, DMa
     let total = question.base.project(question.residual).norm_squared();
     let left = (total - score.delta_ss).max(f64::MIN_POSITIVE);
     let n = evidence.used.len().max(1) as f64;
-    let sized = terms.into_iter().enumerate().map(|(k, (dof, which))| {
-        (dof, which, score.estimate[k], score.covariance[(k, k)].max(0.0).sqrt())
-    });
+    let sized = terms
+        .into_iter()
+        .enumerate()
+        .map(|(k, (dof, which))| (dof, which, score.estimate[k], score.covariance[(k, k)].max(0.0).sqrt()));
     Some(Tried {
         at: at.to_owned(),
         terms: sized.collect(),
@@ -208,9 +209,15 @@ fn forward(subject: Subject, evidence: &Evidence, at: &str, ways: &[(String, DMa
 #[must_use]
 pub fn comment(tried: &[Tried]) -> String {
     let Some(first) = tried.first() else { return String::new() };
-    let mut out = format!("# places that were tried with this formula: {} ({}) leaves {:.2} um\n", first.at, first.dofs().join(" "), first.left_um);
+    let mut out = format!(
+        "# places that were tried with this formula: {} ({}) leaves {:.2} um\n",
+        first.at,
+        first.dofs().join(" "),
+        first.left_um
+    );
     for t in tried.iter().skip(1).take(MOST_LISTED) {
-        let same = if t.criterion - first.criterion < AS_GOOD { ": these touches cannot tell it from the first" } else { "" };
+        let same =
+            if t.criterion - first.criterion < AS_GOOD { ": these touches cannot tell it from the first" } else { "" };
         let _ = writeln!(out, "#   {} ({}) leaves {:.2} um{same}", t.at, t.dofs().join(" "), t.left_um);
     }
     out

@@ -29,7 +29,11 @@ pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> 
         _ => Vec::new(),
     };
     let each = seen.groups.iter().zip(&asked).map(|(group, asked)| {
-        if *asked && !tried.is_empty() { by_variation(seen, group, &tried) } else { by_difference(subject, seen, group) }
+        if *asked && !tried.is_empty() {
+            by_variation(seen, group, &tried)
+        } else {
+            by_difference(subject, seen, group)
+        }
     });
     each.collect()
 }

@@ -10,8 +10,8 @@ use std::sync::{Arc, OnceLock};
 /// The variables of a touch that a formula may use, in the order of [`State`].
 pub const VARIABLES: [&str; 40] = [
     "X", "Y", "Z", "A", "B", "C", "t", "T", "nx", "ny", "nz", "mx", "my", "mz", "sX", "sY", "sZ", "sA", "sB", "sC",
-    "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge",
-    "wA", "wB", "wC",
+    "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge", "wA", "wB",
+    "wC",
 ];
 
 /// Where groups of variables begin in a [`State`].

@@ -4,6 +4,7 @@ use super::fit::{digits, number, significant, table};
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
 use crate::diagnose::answer::{Candidate, Diagnosis, Shape, Verdict};
+use crate::diagnose::words::plain;
 use comfy_table::Cell;
 
 /// Rows of the small plot.
@@ -29,8 +30,14 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
     if !d.candidates.is_empty() {
         out += &candidates(d, paper);
     }
-    for w in &d.depends {
-        out += &wrapped(&format!("depends: {}", w.says), 2);
+    if let Some(first) = d.depends.first() {
+        out += &wrapped(&format!("depends: {}", first.says), 2);
+        // they share much of it with the first, and with each other
+        let others: Vec<String> =
+            d.depends[1..].iter().map(|w| format!("{} ({:.0} %)", plain(&w.by), 100.0 * w.share)).collect();
+        if !others.is_empty() {
+            out += &wrapped(&format!("  taken alone, also {}", others.join(", ")), 4);
+        }
     }
     if let Some(shape) = &d.shape {
         out += &plot(shape, paper);
@@ -171,7 +178,7 @@ fn plot(s: &Shape, paper: Paper) -> String {
         }
         grid[row(s.y[i])][c] = curve;
     }
-    let mut out = wrapped(&format!("what is left against {} ({}), {}", crate::diagnose::words::plain(&s.by), s.x_unit, s.direction), 2, paper);
+    let mut out = wrapped(&format!("what is left against {} ({}), {}", plain(&s.by), s.x_unit, s.direction), 2, paper);
     for (r, line) in grid.iter().enumerate() {
         let label = match r {
             0 => format!("{limit:+8.1}"),

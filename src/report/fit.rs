@@ -75,9 +75,10 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         if unmodelled {
             cells.push(number(p.sigma_with_unmodelled.map_or_else(|| "-".into(), significant)));
         }
-        cells.push(Cell::new(status(p.status)));
+        cells.push(Cell::new(status(p.status, paper.width < ROOMY)));
         t.add_row(cells);
     }
+    // numbers are never broken: a name is, where it must
     t.set_width(paper.width.min(120) as u16);
     out += &t.to_string();
     out.push('\n');
@@ -136,8 +137,15 @@ pub fn significant(x: f64) -> String {
     if (-7..6).contains(&magnitude) { format!("{x:.*}", (2 - magnitude).max(0) as usize) } else { format!("{x:.2e}") }
 }
 
-fn status(status: Status) -> &'static str {
+/// From this width on the last column has its whole words.
+const ROOMY: usize = 96;
+
+fn status(status: Status, short: bool) -> &'static str {
     match status {
+        // the rule needs no word where there is little room
+        Status::Identified if short => "",
+        Status::PriorDominated if short => "prior",
+        Status::Undetermined if short => "not told",
         Status::Identified => "identified",
         Status::Fixed => "fixed",
         Status::PriorDominated => "prior-dominated",

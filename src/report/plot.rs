@@ -53,7 +53,13 @@ impl Paper {
         let round = |x: f64, up: bool| {
             let n = x / step;
             // what is round already stays, whatever the last bit says
-            let n = if (n - n.round()).abs() < 1e-9 { n.round() } else if up { n.ceil() } else { n.floor() };
+            let n = if (n - n.round()).abs() < 1e-9 {
+                n.round()
+            } else if up {
+                n.ceil()
+            } else {
+                n.floor()
+            };
             // twelve decimals: no trace of the binary form of the step
             (n * step * 1e12).round() / 1e12
         };
@@ -88,7 +94,8 @@ fn plain(c: char) -> char {
 /// A number at an axis that spans so much: no more digits than the eye can use.
 #[must_use]
 pub fn axis_label(value: f64, span: f64) -> String {
-    let decimals = if span > 0.0 && span.is_finite() { (2.0 - span.log10()).ceil().clamp(0.0, 6.0) as usize } else { 3 };
+    let decimals =
+        if span > 0.0 && span.is_finite() { (2.0 - span.log10()).ceil().clamp(0.0, 6.0) as usize } else { 3 };
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

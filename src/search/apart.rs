@@ -100,8 +100,7 @@ impl Products {
     }
 
     fn part<'m>(m: &'m DMatrix<f64>, rows: &Range<usize>, columns: &Range<usize>) -> DMatrix<f64> {
-        let view: nalgebra::DMatrixView<'m, f64> =
-            m.view((rows.start, columns.start), (rows.len(), columns.len()));
+        let view: nalgebra::DMatrixView<'m, f64> = m.view((rows.start, columns.start), (rows.len(), columns.len()));
         view.into_owned()
     }
 

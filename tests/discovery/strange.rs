@@ -60,7 +60,7 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
     };
     let data = find::data(&bench.machine, &bench.plans, &touches);
     let (fit, settings) = find::fit(&bench.machine, &catalogue, data, &[], None);
-    let options = Options { at_most: 3, refit: false, power: false };
+    let options = Options { at_most: 3, refit: false, power: false, planned: None };
     let d = find::look(&bench.machine, &catalogue, &fit, &settings, &options);
     Seen {
         kind,
