@@ -137,3 +137,56 @@ fn what_cannot_be_asked_is_said() {
     let answer = json(dir, &["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--json"]);
     assert!(answer["pairs"].as_array().is_some_and(|p| !p.is_empty()), "{answer}");
 }
+
+/// What `plan-next` promises of a pair with the leader is what `diagnose` does with the log of its program.
+#[test]
+fn what_is_promised_is_what_diagnose_then_does() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    study(dir, "[effects.radial-c-1]\nEXC1c = 6.0\nEYC1s = -6.0");
+    let diagnosis = |dir: &Path| -> serde_json::Value {
+        let out = axiscal(dir, &["diagnose", "study.toml", "--json"]);
+        serde_json::from_slice(&out.stdout).unwrap()
+    };
+    let group = |d: &serde_json::Value| -> Vec<String> {
+        let first = &d["candidates"][0];
+        let same = first["same_as"].as_array().unwrap().iter().map(|s| s.as_str().unwrap().to_owned());
+        std::iter::once(first["effect"].as_str().unwrap().to_owned()).chain(same).collect()
+    };
+    let before = diagnosis(dir);
+    let open = group(&before);
+    assert!(open.len() > 1 && open.iter().any(|e| e == "radial-c-1"), "{open:?}");
+    let next = ["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc"];
+    let promise = json(dir, &[&next[..], &["--minutes", "12", "--json"]].concat());
+    let pairs: Vec<(String, String, f64)> = promise["pairs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| {
+            let word = |k: &str| p[k].as_str().unwrap().to_owned();
+            (word("one"), word("other"), p["told"].as_f64().unwrap())
+        })
+        .collect();
+    // every pair of the group is asked for, not the leader's alone
+    let n = open.len();
+    let asked = |a: &str, b: &str| pairs.iter().any(|(x, y, _)| (x == a && y == b) || (x == b && y == a));
+    for (i, a) in open.iter().enumerate() {
+        for b in &open[i + 1..] {
+            assert!(asked(a, b), "{a} and {b} of {n} are not asked for: {pairs:?}");
+        }
+    }
+    let promised: Vec<&str> = pairs
+        .iter()
+        .filter(|p| p.2 >= 0.95 && (p.0 == "radial-c-1" || p.1 == "radial-c-1"))
+        .map(|p| if p.0 == "radial-c-1" { p.1.as_str() } else { p.0.as_str() })
+        .collect();
+    assert!(!promised.is_empty(), "{pairs:?}");
+    simulate(dir, "next-3");
+    ok(dir, &[&next[..], &["--join", "next-3.log"]].concat());
+    let after = diagnosis(dir);
+    let left = group(&after);
+    assert!(left.iter().any(|e| e == "radial-c-1"), "{left:?}");
+    for rival in &promised {
+        assert!(!left.iter().any(|e| e == rival), "{rival} was to be told apart and was not: {left:?} of {promised:?}");
+    }
+}

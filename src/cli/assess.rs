@@ -91,7 +91,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut answers = answers.into_iter();
     let Some(mut first) = answers.next() else { return Ok(Answer::Done) };
     first.compared = answers.collect();
-    io.say(crate::report::assess::assessment(&first));
+    io.say(crate::report::assess::assessment(&first, io.paper(false)));
     io.answer(&first);
     Ok(Answer::Done)
 }

@@ -30,6 +30,14 @@ pub fn print(text: &str) {
     }
 }
 
+/// Columns of the terminal, or as `COLUMNS` states them; `None` in a pipe of no stated width.
+fn columns() -> Option<usize> {
+    let stated = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok()).filter(|c| *c > 0);
+    let terminal = std::io::IsTerminal::is_terminal(&std::io::stdout());
+    let measured = || console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    stated.or_else(|| measured().filter(|_| terminal)).map(|c| c.clamp(40, 400))
+}
+
 /// How to print.
 #[derive(Debug, Clone, Copy)]
 pub struct Io {
@@ -56,15 +64,24 @@ impl Io {
     #[must_use]
     pub fn paper(&self, ascii: bool) -> Paper {
         let terminal = std::io::IsTerminal::is_terminal(&std::io::stdout());
-        let stated = std::env::var("COLUMNS").ok().and_then(|c| c.parse().ok());
-        let measured = console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-        let width = stated.or(measured.filter(|_| terminal)).unwrap_or(80);
-        let colour = terminal && !ascii && std::env::var_os("NO_COLOR").is_none();
-        Paper { width: width.clamp(40, 400), ascii: ascii || !terminal, colour }
+        let width = columns().unwrap_or(80);
+        let colour = terminal && !ascii && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+        Paper { width, ascii: ascii || !terminal, colour }
     }
 
-    /// A line for the person: stdout, or nothing when JSON was asked for.
+    /// A line for the person: stdout, or nothing when JSON was asked for. Prose is wrapped to the terminal; in a pipe of
+    /// no stated width a sentence stays on its line, where `grep` finds it.
     pub fn say(&self, text: impl AsRef<str>) {
+        if !self.json && !self.within {
+            match columns() {
+                Some(width) => print(&crate::report::prose::wrapped(text.as_ref(), width)),
+                None => print(text.as_ref()),
+            }
+        }
+    }
+
+    /// A line that must stay as it is: what a person copies into a shell or a file.
+    pub fn say_as_it_is(&self, text: impl AsRef<str>) {
         if !self.json && !self.within {
             print(text.as_ref());
         }

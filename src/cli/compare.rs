@@ -2,7 +2,9 @@
 
 use super::load::load_study;
 use super::{Answer, Io};
+use crate::compare::Lead;
 use crate::diag::Result;
+use crate::diagnose::{Options, Subject, diagnose};
 use crate::{compare, files, fit, report};
 use std::path::PathBuf;
 
@@ -29,7 +31,13 @@ pub struct Args {
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
-    let comparison = compare::compare(&fit);
+    let mut settings = loaded.settings();
+    settings.quick = true;
+    let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
+    let found = diagnose(subject, &Options { at_most: 1, refit: false, power: false, planned: None })?;
+    let leads: Vec<Lead> =
+        found.depends.iter().map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() }).collect();
+    let comparison = compare::compare(&fit).led_by(&leads);
     if let Some(path) = &args.csv {
         files::write_whole(path, report::compare::csv(&comparison).as_bytes())?;
     }
@@ -37,8 +45,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for u in &fit.outcome.undetermined {
         io.say(format!("not told by this data: {}", u.says));
     }
-    if !comparison.explained_by_noise {
-        io.say(format!("next: axiscal diagnose {}", args.study.display()));
+    if !comparison.explained_by_noise || !leads.is_empty() {
+        io.say_as_it_is(format!("next: axiscal diagnose {}", args.study.display()));
     }
     io.answer(&comparison);
     Ok(Answer::Done)

@@ -15,6 +15,9 @@ pub struct Args {
     /// Most candidates that are listed
     #[arg(long, value_name = "N", default_value_t = Options::default().at_most)]
     pub at_most: usize,
+    /// Plots of plain ASCII signs (as in a pipe)
+    #[arg(long)]
+    pub ascii: bool,
 }
 
 /// Runs `diagnose`. The answer is "no" when the model does not fit.
@@ -27,15 +30,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let options = Options { at_most: args.at_most.max(1), ..Options::default() };
+    let planned = loaded.planned();
+    let options = Options { at_most: args.at_most.max(1), planned: Some(&planned), ..Options::default() };
     let found = diagnose(subject, &options)?;
-    io.say(crate::report::diagnosis::diagnosis(&found).trim_end());
+    io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii)).trim_end());
     if matches!(found.verdict, Verdict::MissingEffect) && !io.json {
         if let Some(first) = found.candidates.first() {
-            io.say(format!("next: axiscal add {} {}", args.study.display(), first.effect));
+            io.say_as_it_is(format!("next: axiscal add {} {}", args.study.display(), first.effect));
         }
     } else if matches!(found.verdict, Verdict::Unexplained) {
-        io.say(format!("next: axiscal sketch-effect {} --out my-effects.toml", args.study.display()));
+        io.say_as_it_is(format!("next: axiscal sketch-effect {} --out my-effects.toml", args.study.display()));
     }
     io.answer(&found);
     Ok(if matches!(found.verdict, Verdict::MissingEffect | Verdict::Unexplained) { Answer::No } else { Answer::Done })

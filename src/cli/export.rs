@@ -81,6 +81,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     remove_stale(&args.out, &export)?;
     say(&export, args, io);
+    // what has no value of its own is in no table: "nothing is left" speaks of the rest
+    for u in &fit.outcome.undetermined {
+        io.say(format!("not corrected, because this data cannot tell it: {}", u.says));
+    }
     io.answer(&json!({
         "controller": args.controller,
         "out": args.out.display().to_string(),
@@ -88,6 +92,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         "terms": export.component.compensation.terms,
         "left": export.component.left,
         "stock_left": export.stock.left,
+        "not_told": fit.outcome.undetermined,
         "radius_mm": args.radius,
     }));
     Ok(Answer::Done)

@@ -53,7 +53,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if !args.residuals {
         outcome.residuals = None;
     }
-    io.say(crate::report::fit::outcome(&outcome));
+    io.say(crate::report::fit::outcome(&outcome, io.paper(false)));
     if let (Some(residuals), false) = (&outcome.residuals, io.json) {
         let mut t = crate::report::fit::table(&["run", "touch", "residual um", "standardised"]);
         for r in residuals {
@@ -64,7 +64,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 format!("{:.2}", r.standardised),
             ]);
         }
-        io.say(t.to_string());
+        io.say(io.paper(false).plain(t.to_string()));
     }
     io.answer(&outcome);
     Ok(Answer::Done)

@@ -1,9 +1,10 @@
 //! From a study's path to machine, effects and touches: opens what the study names.
 
 use super::common::{Io, load_machine};
+use crate::design::Planned;
 use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::files;
-use crate::fit::{self, Settings};
+use crate::fit::{self, Fit, Settings};
 use crate::log::{self, Touch};
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
@@ -13,6 +14,7 @@ use crate::program::plan::Plan;
 use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use sha2::{Digest, Sha256};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// A study with everything that it names.
@@ -62,6 +64,28 @@ impl Loaded {
                 started_s: r.started_s,
             })
             .collect()
+    }
+
+    /// The runs as they were planned.
+    #[must_use]
+    pub fn planned(&self) -> Vec<Planned> {
+        let each = self.runs.iter().map(|r| Planned {
+            plan: r.plan.clone(),
+            mounting: r.mounting.clone(),
+            started_s: r.started_s,
+        });
+        each.collect()
+    }
+
+    /// The same with the touches that a fit could use: only what was measured tells anything.
+    #[must_use]
+    pub fn measured(&self, fit: &Fit) -> Vec<Planned> {
+        let made: HashSet<(usize, u64)> = fit.data.observations.iter().map(|o| (o.run, o.id)).collect();
+        let mut out = self.planned();
+        for (run, p) in out.iter_mut().enumerate() {
+            p.plan.touches.retain(|t| made.contains(&(run, t.id)));
+        }
+        out
     }
 
     /// What the study asks of the fit.

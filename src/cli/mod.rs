@@ -7,6 +7,7 @@ mod add;
 mod assess;
 mod common;
 mod compare;
+mod completions;
 mod controllers;
 mod demo;
 mod diagnose;
@@ -91,6 +92,10 @@ enum Verb {
     Export(export::Args),
     /// Print the JSON schema of a file, for editors
     Schema(schema::Args),
+    /// Print the completions of verbs and options for a shell
+    Completions(completions::CompletionArgs),
+    /// Write the manual pages
+    Man(completions::ManArgs),
 }
 
 /// Runs the program with the arguments of the process.
@@ -139,5 +144,7 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::Verify(args) => verify::run(&args, io),
         Verb::Export(args) => export::run(&args, io),
         Verb::Schema(args) => schema::run(&args, io),
+        Verb::Completions(args) => completions::completions(&args, io),
+        Verb::Man(args) => completions::man(&args, io),
     }
 }

@@ -6,9 +6,8 @@ use super::{Answer, Io};
 use crate::design::bundle::{Bundle, as_plan, bundles, program_text, without};
 use crate::design::next::{Design, Separation};
 use crate::design::questions::Questions;
-use crate::design::{Noise, Planned, Task, View};
+use crate::design::{Known, Noise, Planned, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
-use crate::diagnose::answer::Candidate;
 use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::files;
 use crate::fit::{self, Fit, effects_of};
@@ -17,13 +16,11 @@ use crate::model::catalogue::Effect;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
-use crate::report::fit::significant;
-use crate::search::multiplicity::FAMILY_LEVEL;
-use crate::search::power::SEEN;
+use crate::report::fit::{number, significant};
+use crate::search::apart::SEEN;
 use crate::study;
-use nalgebra::DVector;
+use comfy_table::Cell;
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Rounds of choosing, generating and leaving out what cannot be reached.
@@ -31,6 +28,15 @@ const MOST_ROUNDS: usize = 5;
 
 /// A program may take this much longer than the time that was given.
 const OVER: f64 = 1.02;
+
+/// A pair is promised to be told apart from this probability on.
+const SAFELY: f64 = 0.95;
+
+/// Pairs that the program's own head names.
+const MOST_SAID: usize = 6;
+
+/// Pairs that are listed: those that matter most for the person who waits.
+const MOST_LISTED: usize = 20;
 
 /// Other blocks are worth the trouble when they part effects so many times better.
 const WORTH_MOVING: f64 = 1.5;
@@ -81,14 +87,17 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let named = effects_of(&args.effects, &loaded.catalogue, &loaded.machine)?;
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
-    let setting = Setting::new(&loaded, &settings.effects, &fit)?;
+    let mut setting = Setting::new(&loaded, &settings.effects, &fit)?;
     let questions = if named.is_empty() {
         let subject =
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-        let found = diagnose(subject, &diagnose::Options::default())?;
-        match found.candidates.first().filter(|_| matches!(found.verdict, Verdict::MissingEffect)) {
-            Some(first) => left_open(&loaded, first, &found.candidates),
-            None => Questions::of_plan(&View::new(&setting.task, &setting.runs, &[], setting.noise)?),
+        let found = diagnose(subject, &diagnose::Options { power: false, refit: false, ..Default::default() })?;
+        if found.verdict == Verdict::MissingEffect && !found.open.suspects.is_empty() {
+            // as its tests allow for it
+            setting.noise.tau_mm = found.open.tau_mm;
+            Questions::left_open(found.open.suspects, &found.open.pairs)
+        } else {
+            Questions::of_plan(&View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?)
         }
     } else {
         Questions::named(&args.effects)
@@ -100,11 +109,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let asked: Vec<String> =
         questions.pairs.iter().flat_map(|p| std::iter::once(p.one.clone()).chain(p.other.clone())).collect();
-    let mut effects: Vec<&Effect> = Vec::new();
+    let mut effects: Vec<(&Effect, Option<f64>)> = Vec::new();
     for id in &asked {
-        if let Some(e) = loaded.catalogue.get(id, &loaded.machine).filter(|e| effects.iter().all(|o| o.id != e.id)) {
-            effects.push(e);
-        }
+        let shape = questions.suspects.iter().find(|s| s.id == *id).and_then(|s| s.shape);
+        let known = effects.iter().any(|(e, _)| e.id == *id);
+        effects.extend(loaded.catalogue.get(id, &loaded.machine).filter(|_| !known).map(|e| (e, shape)));
     }
     let budget_s = 60.0 * args.minutes;
     let stands = setting.stands(&loaded.machine, args.moved);
@@ -113,11 +122,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         best = setting.choose(mounting, label.as_deref(), &effects, &questions, budget_s, &name).ok();
     }
     // other blocks only where those that stand there cannot settle it, and only if they may be put up
-    if !best.as_ref().is_some_and(|b| b.least() >= SEEN) {
+    if !best.as_ref().is_some_and(|b| b.settles(SEEN)) {
         let others = loaded.machine.mountings.iter();
         let others = others.filter_map(|m| setting.choose(m, None, &effects, &questions, budget_s, &name).ok());
-        let better = others.filter(|o| best.as_ref().is_none_or(|b| o.least() > WORTH_MOVING * b.least()));
-        let most = better.max_by(|a, b| a.least().total_cmp(&b.least()));
+        let better = others.filter(|o| best.as_ref().is_none_or(|b| o.worth() > WORTH_MOVING * b.worth()));
+        let most = better.max_by(|a, b| a.worth().total_cmp(&b.worth()));
         if let Some(other) = most {
             if args.moved || stands.is_none() {
                 best = Some(other);
@@ -125,9 +134,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 io.report(&[Finding::info(
                     "next::other_blocks",
                     format!(
-                        "with mounting {:?} put up anew the least separation would be {}",
+                        "with mounting {:?} put up anew {} of {} pairs would be told apart",
                         other.generated.plan.mounting,
-                        significant(other.least())
+                        other.separations.iter().filter(|s| s.told >= SAFELY).count(),
+                        other.separations.len()
                     ),
                 )
                 .help("add --moved for that program")]);
@@ -142,33 +152,6 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
 }
 
-/// The questions of a diagnosis: its first candidate against those that cannot be told from it, and against the further
-/// ones that pass the test as well: one of them may be what the first one imitates.
-fn left_open(loaded: &Loaded, first: &Candidate, all: &[Candidate]) -> Questions {
-    let known = |id: &String| loaded.catalogue.get(id, &loaded.machine).is_some();
-    let others = all.iter().filter(|c| c.effect != first.effect && c.p_adjusted < FAMILY_LEVEL);
-    let others = others.flat_map(|c| std::iter::once(&c.effect).chain(&c.same_as));
-    let mut rivals: Vec<String> = Vec::new();
-    for id in first.same_as.iter().chain(others).filter(|id| known(id)) {
-        if !rivals.contains(id) {
-            rivals.push(id.clone());
-        }
-    }
-    let mut sizes = BTreeMap::new();
-    if let Some(effect) = loaded.catalogue.get(&first.effect, &loaded.machine) {
-        let scales = effect.parameters.iter().filter(|p| p.shape.is_none());
-        let size: Option<Vec<f64>> = scales
-            .map(|p| {
-                first.parameters.iter().find(|q| q.name == p.name && q.unit == p.unit).map(|q| q.value / p.typical)
-            })
-            .collect();
-        if let Some(size) = size {
-            sizes.insert(effect.id.clone(), DVector::from_vec(size));
-        }
-    }
-    Questions::left_open(&first.effect, &rivals, sizes)
-}
-
 /// A program that was chosen and proven.
 struct Chosen {
     text: String,
@@ -179,8 +162,14 @@ struct Chosen {
 }
 
 impl Chosen {
-    fn least(&self) -> f64 {
-        self.separations.iter().map(|s| s.after).fold(f64::INFINITY, f64::min)
+    /// Does every pair come that far apart?
+    fn settles(&self, lambda: f64) -> bool {
+        self.separations.iter().all(|s| s.after >= lambda)
+    }
+
+    /// Separations as far as they are worth anything: a pair that nothing parts must not hide the others.
+    fn worth(&self) -> f64 {
+        self.separations.iter().map(|s| s.after.min(2.0 * SEEN)).sum()
     }
 }
 
@@ -188,22 +177,17 @@ impl Chosen {
 struct Setting<'a> {
     task: Task<'a>,
     runs: Vec<Planned>,
+    /// What the study knows beside the touches.
+    known: Vec<Known>,
     noise: Noise,
 }
 
 impl<'a> Setting<'a> {
     fn new(loaded: &'a Loaded, effects: &[String], fit: &Fit) -> Result<Self> {
-        let runs = loaded
-            .runs
-            .iter()
-            .enumerate()
-            .map(|(i, r)| {
-                let mut plan = r.plan.clone();
-                // only what was measured tells anything
-                plan.touches.retain(|t| fit.data.observations.iter().any(|o| o.run == i && o.id == t.id));
-                Planned { plan, mounting: r.mounting.clone(), started_s: r.started_s }
-            })
-            .collect();
+        let runs = loaded.measured(fit);
+        let name = |i: usize| fit.model.unknowns[i].name.clone();
+        let known =
+            fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
         let task = Task {
             machine: &loaded.machine,
             catalogue: &loaded.catalogue,
@@ -218,7 +202,7 @@ impl<'a> Setting<'a> {
             reference: loaded.machine.reference.pivot,
             temperature: fit.data.observations.iter().any(|o| o.has_temperature),
         };
-        Ok(Self { task, runs, noise: Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: fit.noise.tau_test_mm } })
+        Ok(Self { task, runs, known, noise: Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: fit.noise.tau_test_mm } })
     }
 
     /// The mounting that stands there since the last run, with the study's name for it (`None` where it is put up anew).
@@ -249,11 +233,11 @@ impl<'a> Setting<'a> {
         &self,
         plan: &Plan,
         label: Option<&str>,
-        effects: &[&Effect],
+        effects: &[(&Effect, Option<f64>)],
         pool: &[Bundle],
         q: &Questions,
     ) -> Result<Design> {
-        let view = View::with_effects(&self.task, &self.with(plan.clone(), label), self.noise, effects)?;
+        let view = View::with_effects(&self.task, &self.with(plan.clone(), label), &self.known, self.noise, effects)?;
         let n_given = self.runs.iter().map(|r| r.plan.touches.len()).sum();
         Ok(Design::new(&view, n_given, pool, q))
     }
@@ -263,7 +247,7 @@ impl<'a> Setting<'a> {
         &self,
         mounting: &Mounting,
         label: Option<&str>,
-        effects: &[&Effect],
+        effects: &[(&Effect, Option<f64>)],
         questions: &Questions,
         budget_s: f64,
         name: &str,
@@ -298,11 +282,11 @@ impl<'a> Setting<'a> {
             if over <= OVER {
                 let separations = self.told(&generated.plan, label, effects, questions)?;
                 let now = Chosen { text, generated: generated.clone(), separations, label: label.map(str::to_owned) };
-                if found.as_ref().is_none_or(|f| now.least() > f.least()) {
+                if found.as_ref().is_none_or(|f| now.worth() > f.worth()) {
                     found = Some(now);
                 }
             }
-            let settled = found.as_ref().is_some_and(|f| f.least() >= 2.0 * SEEN);
+            let settled = found.as_ref().is_some_and(|f| f.settles(2.0 * SEEN));
             if !lost && (settled || (0.85..=OVER).contains(&over)) {
                 break;
             }
@@ -319,7 +303,7 @@ impl<'a> Setting<'a> {
         &self,
         plan: &Plan,
         label: Option<&str>,
-        effects: &[&Effect],
+        effects: &[(&Effect, Option<f64>)],
         questions: &Questions,
     ) -> Result<Vec<Separation>> {
         let touches = plan.touches.clone();
@@ -342,7 +326,11 @@ fn says(questions: &Questions) -> String {
         Some(other) => format!("{} from {other}", p.one),
         None => p.one.clone(),
     };
-    format!("tells {}", questions.pairs.iter().map(pair).collect::<Vec<_>>().join(", "))
+    let named = questions.pairs.iter().take(MOST_SAID).map(pair).collect::<Vec<_>>().join(", ");
+    match questions.pairs.len().saturating_sub(MOST_SAID) {
+        0 => format!("tells {named}"),
+        more => format!("tells {named} and {more} more pairs"),
+    }
 }
 
 /// Writes program, plan and program file, and says what they will tell.
@@ -376,23 +364,28 @@ fn write(
         None => io.say("put the blocks up first; the time for it is not counted"),
     }
     let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "told apart"]);
-    for s in &chosen.separations {
+    for s in chosen.separations.iter().take(MOST_LISTED) {
         t.add_row(vec![
-            s.one.clone(),
-            s.other.clone().unwrap_or_else(|| "nothing".into()),
-            significant(s.before),
-            significant(s.after),
-            (if s.after >= SEEN {
-                "yes"
-            } else if s.after >= 9.0 {
-                "likely"
-            } else {
-                "no"
-            })
-            .into(),
+            Cell::new(&s.one),
+            Cell::new(s.other.as_deref().unwrap_or("nothing")),
+            number(significant(s.before)),
+            number(significant(s.after)),
+            number(match s.told {
+                p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
+                p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
+                p => format!("no ({:.0} %)", 100.0 * p),
+            }),
         ]);
     }
-    io.say(format!("{t}\n(25 and more tells them apart nearly always)"));
+    t.set_width(io.paper(false).width.min(120) as u16);
+    io.say(io.paper(false).plain(t.to_string()));
+    let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
+    io.say(format!(
+        "{} of {} pairs will be told apart by `diagnose` (with 95 % or more, whichever of the two acts); 25 and more of \
+         separation tells a pair apart nearly always",
+        told(SAFELY),
+        chosen.separations.len()
+    ));
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let log = args.out.join(format!("{}.log", plan.program));
     io.say(format!(
@@ -437,10 +430,7 @@ fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> 
     let plan = super::load::load_plan(plan_file, &loaded.machine, io)?;
     let touches = read_log(&files::read_bytes(log)?, log, &args.controller, &loaded.machine, &plan, io)?;
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
-    let mut runs: Vec<Planned> = Vec::new();
-    for r in &loaded.runs {
-        runs.push(Planned { plan: r.plan.clone(), mounting: r.mounting.clone(), started_s: r.started_s });
-    }
+    let runs = loaded.planned();
     let stood = runs.last().and_then(|last| {
         let own = last.plan.touches.last()?.mounting.clone();
         let same = own.as_deref().unwrap_or(&last.plan.mounting).split('#').next() == Some(plan.mounting.as_str());

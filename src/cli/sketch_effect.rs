@@ -56,8 +56,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         args.study.display(),
         made.id
     ));
+    let others = made.tried.iter().skip(1).take(5);
+    for t in others {
+        io.say(format!("  at {} ({}) it would leave {:.2} um", t.at, t.dofs().join(", "), t.left_um));
+    }
     io.answer(
-        &json!({ "effect": made.id, "says": made.says, "formula": made.formula, "file": name, "toml": made.toml }),
+        &json!({ "effect": made.id, "places": made.tried, "says": made.says, "formula": made.formula, "file": name, "toml": made.toml }),
     );
     Ok(Answer::Done)
 }

@@ -90,7 +90,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         settings.quick = true;
         let subject =
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-        let found = diagnose(subject, &Options::default())?;
+        let planned = loaded.planned();
+        let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
         io.say(&found.says);
         let stopped = match (&found.verdict, found.candidates.first()) {
             (Verdict::MissingEffect, Some(first)) if first.proposed => {
@@ -161,7 +162,7 @@ fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
 
 /// The proposal and its reason.
 fn propose(first: &Candidate, io: &Io) {
-    let sizes: Vec<String> = first
+    let mut sizes: Vec<String> = first
         .parameters
         .iter()
         .map(|p| match p.sigma {
@@ -169,6 +170,7 @@ fn propose(first: &Candidate, io: &Io) {
             None => format!("{} {} {}", p.name, significant(p.value), p.unit),
         })
         .collect();
+    sizes.extend(first.not_told.iter().map(|name| format!("{name} ? (cannot be told by this plan)")));
     io.say(format!("proposed: {} ({}): {}", first.effect, first.name, sizes.join(", ")));
     io.say(format!("  {}", first.says));
     io.say(format!("  to confirm it: {}", first.look));

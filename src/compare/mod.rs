@@ -229,6 +229,61 @@ pub fn compare(fit: &Fit) -> Comparison {
     }
 }
 
+/// What a diagnosis found the misfit to depend on: named first, and in the same words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lead {
+    /// `pose.C`, `axis.X`, `time`, `before.B`, …
+    pub by: String,
+    /// Share of the misfit beyond the noise.
+    pub share: f64,
+    /// In a sentence.
+    pub says: String,
+}
+
+impl Comparison {
+    /// The same comparison with what a diagnosis found in front, best first. Its tests try many more forms than groups of
+    /// equal values (orders, periods, places of a step) and pay for them: where they speak, they say it better.
+    #[must_use]
+    pub fn led_by(mut self, leads: &[Lead]) -> Self {
+        let Some(first) = leads.first() else { return self };
+        // the further ones explain much of the same: their own splits say how much
+        let leads = &leads[..1];
+        let mut front: Vec<Split> = Vec::new();
+        for lead in leads {
+            let by = match lead.by.as_str() {
+                "length" => "stylus",
+                other => other.strip_prefix("axis.").unwrap_or(other),
+            };
+            let split = match self.splits.iter().position(|s| s.by == by) {
+                Some(i) => self.splits.remove(i),
+                None if front.iter().any(|s| s.by == by) => continue,
+                None => Split {
+                    by: by.to_owned(),
+                    share: lead.share,
+                    p: 0.0,
+                    columns: 0,
+                    evidence: 0.0,
+                    harmonics: Vec::new(),
+                    groups: Vec::new(),
+                    says: String::new(),
+                },
+            };
+            front.push(Split { share: lead.share, says: lead.says.clone(), ..split });
+        }
+        front.append(&mut self.splits);
+        self.splits = front;
+        self.says = if self.explained_by_noise {
+            format!(
+                "as a whole what is left, {:.2} um, could be noise of {:.2} um, but not the way it is spread: {}",
+                self.rms_um, self.noise_um, first.says
+            )
+        } else {
+            format!("the model misses the touches by {:.1} times their noise; {}", self.chi2_per_dof.sqrt(), first.says)
+        };
+        self
+    }
+}
+
 fn points(fit: &Fit) -> Vec<Point> {
     let axes: Vec<crate::axes::AxisName> = fit.model.axes();
     let each = fit.data.observations.iter().zip(&fit.data.origins).enumerate().map(|(i, (o, origin))| {

@@ -7,6 +7,7 @@
 use super::bundle::{Bundle, cost_s};
 use super::questions::{Pair, Questions};
 use super::view::View;
+use crate::search::apart::{Left, Products, chance};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -32,19 +33,14 @@ pub struct Design {
     n_base: usize,
     /// Columns of each effect, behind those of the base.
     spans: Vec<(String, Range<usize>)>,
+    /// Size of each effect in typical sizes; `None`: the mean over random signs of typical ones.
+    sizes: Vec<Option<DVector<f64>>>,
     /// What there is already, with the prior of the base.
     given: DMatrix<f64>,
     /// What each bundle adds.
     adds: Vec<DMatrix<f64>>,
-    /// The pairs with the sizes of their effects.
-    asked: Vec<Asked>,
-}
-
-#[derive(Debug, Clone)]
-struct Asked {
-    one: usize,
-    other: Option<usize>,
-    size: [Option<DVector<f64>>; 2],
+    /// The pairs, by their effects.
+    asked: Vec<(usize, Option<usize>)>,
 }
 
 /// How well a pair is told apart.
@@ -58,6 +54,8 @@ pub struct Separation {
     pub before: f64,
     /// The same with the further touches.
     pub after: f64,
+    /// Probability that `diagnose` tells them apart by all touches.
+    pub told: f64,
 }
 
 impl Design {
@@ -101,7 +99,6 @@ impl Design {
             .collect();
         let adds = ranges.into_par_iter().map(gram).collect();
         let find = |id: &str| spans.iter().position(|(s, _)| s == id);
-        let size = |id: &str| questions.sizes.get(id).cloned();
         let asked = questions
             .pairs
             .iter()
@@ -110,10 +107,14 @@ impl Design {
                     Some(id) => Some(find(id)?),
                     None => None,
                 };
-                Some(Asked { one: find(&p.one)?, other, size: [size(&p.one), p.other.as_deref().and_then(size)] })
+                Some((find(&p.one)?, other))
             })
             .collect();
-        Self { n_base, spans, given, adds, asked }
+        let size = |(id, span): &(String, Range<usize>)| {
+            questions.suspects.iter().find(|s| s.id == *id).map(|s| s.size.clone()).filter(|t| t.len() == span.len())
+        };
+        let sizes = spans.iter().map(size).collect();
+        Self { n_base, spans, sizes, given, adds, asked }
     }
 
     /// Information about the effects, what the base takes projected out.
@@ -124,44 +125,55 @@ impl Design {
         Some(information.view((p, p), (q, q)) - cross.tr_mul(&base.solve(&cross)))
     }
 
-    /// Noncentrality of effect `a` at its size when `b` is taken for it.
-    fn left(&self, s: &DMatrix<f64>, a: usize, b: Option<usize>, size: Option<&DVector<f64>>) -> f64 {
-        let local = |k: usize| {
-            let r = &self.spans[k].1;
-            (r.start - self.n_base, r.len())
-        };
-        let (i, n) = local(a);
-        let mut own = s.view((i, i), (n, n)).into_owned();
-        if let Some(b) = b {
-            let (j, m) = local(b);
-            let mut other = s.view((j, j), (m, m)).into_owned();
-            let floor = 1e-9 * other.trace().max(1e-12);
-            for k in 0..m {
-                other[(k, k)] += floor;
-            }
-            let cross = s.view((j, i), (m, n)).into_owned();
-            if let Some(c) = other.cholesky() {
-                own -= cross.tr_mul(&c.solve(&cross));
-            }
-        }
-        match size.filter(|t| t.len() == n) {
-            Some(theta) => theta.dot(&(&own * theta)).max(0.0),
-            // the mean over random signs of typical sizes
-            None => own.trace().max(0.0),
-        }
+    fn span(&self, effect: usize) -> Range<usize> {
+        let r = &self.spans[effect].1;
+        r.start - self.n_base..r.end - self.n_base
     }
 
+    /// Noncentralities of the pairs, the worse way of each, for the search: without the ranks that the statement has.
     fn separations(&self, information: &DMatrix<f64>) -> Option<Vec<f64>> {
         let s = self.effects(information)?;
-        Some(
-            self.asked
-                .iter()
-                .map(|p| {
-                    let forth = self.left(&s, p.one, p.other, p.size[0].as_ref());
-                    p.other.map_or(forth, |b| forth.min(self.left(&s, b, Some(p.one), p.size[1].as_ref())))
-                })
-                .collect(),
-        )
+        let part = |rows: &Range<usize>, columns: &Range<usize>| {
+            s.view((rows.start, columns.start), (rows.len(), columns.len()))
+        };
+        // each effect at its size, as seen by all; one column for each parameter where there is no size
+        let seen: Vec<DMatrix<f64>> = (0..self.spans.len())
+            .map(|k| {
+                let columns = s.columns(self.span(k).start, self.span(k).len());
+                match &self.sizes[k] {
+                    Some(theta) => DMatrix::from_column_slice(s.nrows(), 1, (columns * theta).as_slice()),
+                    None => columns.into_owned(),
+                }
+            })
+            .collect();
+        let own: Vec<f64> = (0..self.spans.len())
+            .map(|k| {
+                let mine = seen[k].rows(self.span(k).start, self.span(k).len());
+                match &self.sizes[k] {
+                    Some(theta) => theta.dot(&mine.column(0)),
+                    None => mine.trace(),
+                }
+            })
+            .collect();
+        let factors: Vec<Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>> = (0..self.spans.len())
+            .map(|k| {
+                let span = self.span(k);
+                let mut block = part(&span, &span).into_owned();
+                let floor = 1e-9 * block.trace().max(1e-12);
+                for i in 0..block.nrows() {
+                    block[(i, i)] += floor;
+                }
+                block.cholesky()
+            })
+            .collect();
+        let left = |a: usize, b: usize| {
+            let span = self.span(b);
+            let cross = seen[a].rows(span.start, span.len()).into_owned();
+            let taken = factors[b].as_ref().map_or(0.0, |c| cross.dot(&c.solve(&cross)));
+            (own[a] - taken).max(0.0)
+        };
+        let each = self.asked.iter().map(|&(a, b)| b.map_or(own[a].max(0.0), |b| left(a, b).min(left(b, a))));
+        Some(each.collect())
     }
 
     /// What the exchange maximises: separations, as far as they are worth anything.
@@ -183,21 +195,29 @@ impl Design {
         chosen.iter().fold(self.given.clone(), |sum, &i| sum + &self.adds[i])
     }
 
-    /// Separations of the pairs by the touches so far and with a choice.
+    /// Separations of the pairs by the touches so far and with a choice, by the criterion of the diagnosis.
     #[must_use]
     pub fn separated(&self, chosen: &[usize]) -> Vec<Separation> {
-        let before = self.separations(&self.given).unwrap_or_default();
-        let after = self.separations(&self.information(chosen)).unwrap_or_default();
-        self.asked
-            .iter()
-            .zip(before.iter().zip(&after))
-            .map(|(p, (before, after))| Separation {
-                one: self.spans[p.one].0.clone(),
-                other: p.other.map(|b| self.spans[b].0.clone()),
-                before: *before,
-                after: *after,
-            })
-            .collect()
+        let before = Products::of_information(&self.given, self.n_base);
+        let after = Products::of_information(&self.information(chosen), self.n_base);
+        let each = self.asked.iter().map(|&(a, b)| {
+            let of = |products: &Option<Products>| {
+                let size = |k: usize| self.sizes[k].as_ref();
+                let other = b.map(|b| (self.span(b), size(b)));
+                products.as_ref().map_or(Left { lambda: 0.0, q: 0 }, |p| {
+                    p.apart((&self.span(a), size(a)), other.as_ref().map(|(span, size)| (span, *size)))
+                })
+            };
+            let (before, after) = (of(&before), of(&after));
+            Separation {
+                one: self.spans[a].0.clone(),
+                other: b.map(|b| self.spans[b].0.clone()),
+                before: before.lambda,
+                after: after.lambda,
+                told: chance(after.lambda, after.q),
+            }
+        });
+        each.collect()
     }
 
     /// Chooses bundles within a time, s.

@@ -4,10 +4,15 @@ use super::view::View;
 use crate::search::groups::{PLAUSIBLE, alias_pairs};
 use crate::search::power::power;
 use nalgebra::DVector;
-use std::collections::BTreeMap;
 
-/// Pairs that one program is to settle at most.
+/// Pairs of a plan alone (nothing is known to be missing) that one program is to settle at most.
 const MOST_PAIRS: usize = 6;
+
+/// Pairs of a diagnosis that one program is to settle at most: all of a group of fifteen.
+const MOST_OPEN: usize = 105;
+
+/// Pairs that are named in a sentence.
+const MOST_NAMED: usize = 6;
 
 /// Is it the one, or the other (or nothing)?
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,13 +23,24 @@ pub struct Pair {
     pub other: Option<String>,
 }
 
-/// The pairs, and the sizes that the data expect, in units of typical sizes.
+/// An effect as the data would have it, if it is the one that acts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suspect {
+    /// Its id.
+    pub id: String,
+    /// Expected size of each parameter, in typical sizes.
+    pub size: DVector<f64>,
+    /// Value of its scanned shape.
+    pub shape: Option<f64>,
+}
+
+/// The pairs, and the sizes that the data expect.
 #[derive(Debug, Clone, Default)]
 pub struct Questions {
     /// The pairs, most pressing first.
     pub pairs: Vec<Pair>,
-    /// Expected size of each parameter of an effect, by its id; effects without stand at their typical size.
-    pub sizes: BTreeMap<String, DVector<f64>>,
+    /// Effects with a size of their own; those without stand at their typical one.
+    pub suspects: Vec<Suspect>,
     /// Where the pairs come from, in a sentence.
     pub says: String,
 }
@@ -42,34 +58,38 @@ impl Questions {
         if let [only] = ids {
             pairs.push(Pair { one: only.clone(), other: None });
         }
-        Self { pairs, sizes: BTreeMap::new(), says: "effects named in the call".into() }
+        Self { pairs, suspects: Vec::new(), says: "effects named in the call, each at its usual size".into() }
     }
 
-    /// What a diagnosis leaves open: the leading effect against everything that explains the misfit as well. `sizes`: the
-    /// expected size of each parameter in units of its typical size, where there is one.
+    /// What a diagnosis leaves open: every pair of suspects that its data do not tell apart. The first suspect leads.
     #[must_use]
-    pub fn left_open(leader: &str, rivals: &[String], sizes: BTreeMap<String, DVector<f64>>) -> Self {
-        // a size beyond belief is that of a trace which hardly differs from the model's: not to be counted on
-        let sizes = sizes.into_iter().filter(|(_, x)| x.amax() <= PLAUSIBLE).collect();
-        if rivals.is_empty() {
-            return Self {
-                pairs: vec![Pair { one: leader.to_owned(), other: None }],
-                sizes,
-                says: format!("the data name {leader} alone: further touches confirm it"),
-            };
+    pub fn left_open(mut suspects: Vec<Suspect>, pairs: &[(usize, usize)]) -> Self {
+        for s in &mut suspects {
+            // a size beyond belief is that of a trace which hardly differs from the model's: not to be counted on
+            let most = s.size.amax();
+            if most > PLAUSIBLE {
+                s.size *= PLAUSIBLE / most;
+            }
         }
-        let pair = |rival: &String| Pair { one: leader.to_owned(), other: Some(rival.clone()) };
-        Self {
-            pairs: rivals.iter().take(MOST_PAIRS).map(pair).collect(),
-            sizes,
-            says: match rivals.get(MOST_PAIRS..).map_or(0, <[String]>::len) {
-                0 => format!("{leader} explains what the model leaves over; it may as well be {}", rivals.join(", ")),
-                more => format!(
-                    "{leader} explains what the model leaves over; it may as well be {} (and {more} more)",
-                    rivals[..MOST_PAIRS].join(", ")
-                ),
-            },
+        let id = |i: usize| suspects.get(i).map(|s| s.id.clone());
+        let Some(leader) = id(0) else { return Self::default() };
+        let asked: Vec<Pair> = pairs
+            .iter()
+            .take(MOST_OPEN)
+            .filter_map(|&(a, b)| Some(Pair { one: id(a)?, other: Some(id(b)?) }))
+            .collect();
+        if asked.is_empty() {
+            let says = format!("the data name {leader} alone: further touches confirm it");
+            return Self { pairs: vec![Pair { one: leader, other: None }], suspects, says };
         }
+        let rivals: Vec<String> = suspects[1..].iter().map(|s| s.id.clone()).collect();
+        let named = rivals[..rivals.len().min(MOST_NAMED)].join(", ");
+        let more = match rivals.len().saturating_sub(MOST_NAMED) {
+            0 => String::new(),
+            more => format!(" (and {more} more)"),
+        };
+        let says = format!("{leader} explains what the model leaves over; it may as well be {named}{more}");
+        Self { pairs: asked, suspects, says }
     }
 
     /// The pairs that a plan confounds both ways, those first that would be seen best at typical size.
@@ -88,7 +108,7 @@ impl Questions {
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
         Self {
             pairs: pairs.into_iter().take(MOST_PAIRS).map(|(_, p)| p).collect(),
-            sizes: BTreeMap::new(),
+            suspects: Vec::new(),
             says: "nothing is missing that the data can show; these effects would be confounded if one of them acted"
                 .into(),
         }

@@ -123,16 +123,23 @@ impl View {
     pub fn new(task: &Task, runs: &[Planned], known: &[Known], noise: Noise) -> Result<Self> {
         let mut view = Self::of_model(task, runs, known, noise)?;
         let candidates = unmodelled_by(&view.model.unknowns, task.machine, task.catalogue);
-        view.add(task, &candidates);
+        let usual: Vec<(&Effect, Option<f64>)> = candidates.into_iter().map(|e| (e, None)).collect();
+        view.add(task, &usual);
         Ok(view)
     }
 
-    /// Looks at planned runs, with the named effects only.
+    /// Looks at planned runs, with the named effects only, each with its scanned shape at a value (`None`: as usual).
     ///
     /// # Errors
     /// When no touch can be used.
-    pub fn with_effects(task: &Task, runs: &[Planned], noise: Noise, effects: &[&Effect]) -> Result<Self> {
-        let mut view = Self::of_model(task, runs, &[], noise)?;
+    pub fn with_effects(
+        task: &Task,
+        runs: &[Planned],
+        known: &[Known],
+        noise: Noise,
+        effects: &[(&Effect, Option<f64>)],
+    ) -> Result<Self> {
+        let mut view = Self::of_model(task, runs, known, noise)?;
         view.add(task, effects);
         Ok(view)
     }
@@ -171,12 +178,14 @@ impl View {
         Ok(Self { data, model, free, jacobian, base, library, raw_um, shapes: Vec::new(), noise, end_s })
     }
 
-    /// Puts effects into the library, each at its usual shape, or where that leaves no trace at the one that leaves most.
-    fn add(&mut self, task: &Task, effects: &[&Effect]) {
-        let all = columns(task.machine, effects, &self.data, &self.data.nominal, task.reference, None);
+    /// Puts effects into the library, each at the given shape; else at its usual one, or where that leaves no trace at the
+    /// one that leaves most.
+    fn add(&mut self, task: &Task, effects: &[(&Effect, Option<f64>)]) {
+        let plain: Vec<&Effect> = effects.iter().map(|e| e.0).collect();
+        let all = columns(task.machine, &plain, &self.data, &self.data.nominal, task.reference, None);
         let rows = self.jacobian.nrows();
         let mut raw = Vec::new();
-        for effect in effects {
+        for (effect, given) in effects {
             let own: Vec<usize> = (0..all.unknowns.len())
                 .filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape)
                 .collect();
@@ -192,7 +201,14 @@ impl View {
             let start = effect.parameters.iter().find_map(|p| p.shape.map(|s| s.0));
             let scan: &[f64] = effect.parameters.iter().find(|p| !p.scan.is_empty()).map_or(&[], |p| &p.scan);
             let mut shape = start;
-            if self.kept(&whitened) < KEPT {
+            if let Some(shapes) = given.and_then(|value| shapes_at(effect, value)) {
+                let (data, places) = (&self.data, &self.data.nominal);
+                let at = columns(task.machine, &[effect], data, places, task.reference, Some(&shapes));
+                let which: Vec<usize> = (0..at.unknowns.len()).filter(|&i| !at.unknowns[i].shape).collect();
+                plain = scaled(&at.values, &which, &at.unknowns);
+                whitened = self.whitened(&plain);
+                shape = *given;
+            } else if self.kept(&whitened) < KEPT {
                 let step = scan.len().div_ceil(MOST_SHAPES).max(1);
                 let mut best = KEPT;
                 for &value in scan.iter().step_by(step) {
@@ -252,6 +268,14 @@ impl View {
     pub fn left_out(&self) -> DMatrix<f64> {
         self.library.matrix().rows(0, self.n_touches()).into_owned()
     }
+}
+
+/// The shape parameters of an effect with its scanned one at a value; `None` where none is scanned.
+fn shapes_at(effect: &Effect, value: f64) -> Option<Vec<f64>> {
+    let shaped = || effect.parameters.iter().filter(|p| p.shape.is_some());
+    let which = shaped().position(|p| p.scan.len() > 1)?;
+    let starts = shaped().filter_map(|p| p.shape.map(|s| s.0));
+    Some(starts.enumerate().map(|(k, start)| if k == which { value } else { start }).collect())
 }
 
 /// Calls `f` with the nominal touches as a problem.

@@ -56,6 +56,9 @@ pub struct Diagnosis {
     pub power: Vec<Power>,
     /// Effects that leave no trace in these touches.
     pub not_seen: Vec<String>,
+    /// What is left open, for a further program.
+    #[serde(skip)]
+    pub open: super::open::Open,
     /// Remarks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -116,8 +119,11 @@ pub struct Candidate {
     pub held_out_before_um: Option<f64>,
     /// The same with it.
     pub held_out_after_um: Option<f64>,
-    /// Expected sizes.
+    /// Expected sizes of what these touches can tell.
     pub parameters: Vec<Parameter>,
+    /// Parameters that these touches cannot tell: they have no size here.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_told: Vec<String>,
     /// Effects that these touches cannot tell from it.
     pub same_as: Vec<String>,
     /// Which touches would tell them apart.
@@ -173,6 +179,9 @@ pub struct Gross {
     pub says: String,
     /// RMS if it is true, µm.
     pub rms_um: f64,
+    /// Where most touches are missing: share of the hits and misses that are as it would make them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agrees: Option<f64>,
 }
 
 /// A touch that was not used.

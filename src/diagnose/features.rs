@@ -53,20 +53,11 @@ pub fn features(fit: &Fit, machine: &Machine) -> Features {
     }
 }
 
-/// Where a rotary axis stood at the index visit before: hysteresis. Formulas have no word for it.
+/// Where a rotary axis stood before it came to its pose: hysteresis.
 fn before(fit: &Fit, axis: AxisName) -> Variable {
-    let (mut now, mut earlier) = (None, 0.0);
-    let values = fit.data.observations.iter().map(|o| {
-        let at = o.state[slot::AXES + axis.index()];
-        if let Some(last) = now
-            && f64::abs(at - last) > 1e-6
-        {
-            earlier = last;
-        }
-        now = Some(at);
-        earlier
-    });
-    Variable { word: None, ..Variable::new(format!("{axis} before"), Kind::Plain, values.collect()) }
+    let place = slot::BEFORE + axis.index() - AxisName::A.index();
+    let values = fit.data.observations.iter().map(|o| o.state[place]).collect();
+    Variable { word: Some(format!("w{axis}")), ..Variable::new(format!("{axis} before"), Kind::Plain, values) }
 }
 
 /// Angle of the approach in the probe's frame.

@@ -31,6 +31,7 @@ pub(super) fn put_together(
 ) -> Diagnosis {
     let fit = subject.fit;
     let mut verdict = decision.verdict;
+    let open = if verdict == Verdict::MissingEffect { super::open::open(seen) } else { super::open::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
     let gross_found = gross.first().is_some_and(|g| g.rms_um < 0.1 * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
@@ -40,9 +41,11 @@ pub(super) fn put_together(
         candidates.push(candidate);
     }
     if verdict != Verdict::TooLittleData {
-        candidates.extend(
-            seen.groups.iter().enumerate().map(|(i, g)| candidate(subject, seen, g, i == 0, decision.borne_out)),
-        );
+        let tell_apart = tell::words(subject, seen, options);
+        candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, tell_apart))| Candidate {
+            tell_apart,
+            ..candidate(subject, seen, group, i == 0, decision.borne_out)
+        }));
     }
     candidates.truncate(options.at_most);
     let found: Vec<&Group> = seen
@@ -79,34 +82,48 @@ pub(super) fn put_together(
     } else {
         significant()
             .take(MOST_WHERE)
-            .map(|d| Where {
-                by: by(&d.on),
-                share: d.share,
-                p_adjusted: d.p_adjusted,
-                says: words::says(d, fit, subject.machine),
-                id: d.id.clone(),
+            .map(|d| {
+                let share = beyond_the_noise(seen, d.share, d.terms.len());
+                Where {
+                    by: by(&d.on),
+                    share,
+                    p_adjusted: d.p_adjusted,
+                    says: words::says(d, share, fit, subject.machine),
+                    id: d.id.clone(),
+                }
             })
             .collect()
     };
-    // no shape passes by itself: the effect that was found says on what its own formulas depend
-    if !seen.dependences.iter().any(|d| d.p_adjusted < FAMILY_LEVEL)
-        && let Some(first) = candidates.first().filter(|c| c.proposed)
+    // an effect that explains more than any shape without a name says on what its own formulas depend
+    let best_shape =
+        seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL).map(|d| d.share).fold(0.0, f64::max);
+    if let Some(first) = candidates.first().filter(|c| c.proposed && c.share >= best_shape)
         && let Some(effect) = subject.catalogue.get(&first.effect, subject.machine)
         && let Some(on) =
             effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))
     {
+        let share = beyond_the_noise(seen, first.share, first.parameters.len() + first.not_told.len());
+        depends.retain(|w| w.by != by(on));
         depends.insert(
             0,
             Where {
                 by: by(on),
-                share: first.share,
+                share,
                 p_adjusted: first.p_adjusted,
-                says: format!("{:.0} % of what is left goes the way of {}", 100.0 * first.share, effect.id),
+                says: format!(
+                    "{:.0} % of what is left changes with {} as {} would make it ({})",
+                    100.0 * share,
+                    words::plain(&by(on)),
+                    effect.id,
+                    effect.name
+                ),
                 id: effect.id.clone(),
             },
         );
     }
-    let shape = significant().next().filter(|_| !depends.is_empty()).and_then(|d| {
+    // the curve is of what is named first
+    let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
+    let shape = drawn.and_then(|d| {
         let kind = features.variables.iter().find(|v| v.name == d.on).map(|v| v.kind);
         let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };
         (!d.curve.is_empty()).then(|| Shape {
@@ -154,7 +171,19 @@ pub(super) fn put_together(
             .map(|s| seen.named.effects[s.candidate].id.clone())
             .collect(),
         warnings: Vec::new(),
+        open,
     }
+}
+
+/// A share of the misfit as one of what the noise does not explain: what functions of no meaning would take away is taken off
+/// on both sides. As `compare` counts its shares.
+fn beyond_the_noise(seen: &Examination, share: f64, n_parameters: usize) -> f64 {
+    let question = seen.evidence.question();
+    let total = question.base.project(question.residual).norm_squared();
+    let (dof, q) = (seen.evidence.dof() as f64, n_parameters as f64);
+    let taken = share * total;
+    let per_dof = ((total - taken) / (dof - q).max(1.0)).max(1.0);
+    ((taken - q * per_dof) / (total - dof).max(4.0 * (2.0 * dof).sqrt())).clamp(0.0, 1.0)
 }
 
 /// Columns in µm at the rows of the regression; rows of priors are zero.
@@ -181,9 +210,13 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
     } else {
         held_out(seen.evidence.question(), &seen.named.library, &seen.evidence.visits, Choice::Given(chosen))
     };
+    let told = told(&score.covariance);
+    let names = seen.named.columns[chosen].iter().zip(&told);
+    let not_told: Vec<String> = names.filter(|(_, told)| !**told).map(|(c, _)| c.name.clone()).collect();
     let mut parameters: Vec<Parameter> = seen.named.columns[chosen]
         .iter()
         .enumerate()
+        .filter(|(i, _)| told[*i])
         .map(|(i, c)| Parameter {
             name: c.name.clone(),
             value: score.estimate[i] * c.typical,
@@ -191,6 +224,10 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
             sigma: Some(score.covariance[(i, i)].max(0.0).sqrt() * c.typical),
         })
         .collect();
+    let says = match &not_told[..] {
+        [] => effect.says.clone(),
+        some => format!("{} Its {} cannot be told by this plan.", effect.says, words::list(some)),
+    };
     if let Some(scanned) = &seen.named.scanned[chosen] {
         parameters.push(Parameter {
             name: scanned.name.clone(),
@@ -213,20 +250,40 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         held_out_before_um: Some(um * held.before).filter(|x| x.is_finite()),
         held_out_after_um: Some(um * held.after).filter(|x| x.is_finite()),
         parameters,
+        not_told,
         same_as: group
             .members
             .iter()
             .filter(|m| m.candidate != chosen)
             .map(|m| seen.named.effects[m.candidate].id.clone())
             .collect(),
-        tell_apart: tell::words(subject, seen, group),
-        says: effect.says.clone(),
+        tell_apart: String::new(),
+        says,
         look: effect.look.clone(),
         share: score.delta_ss / total,
         plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,
         weakens: weakened(fit, seen, chosen),
         remains: None,
     }
+}
+
+/// Which parameters of an effect have a size: those whose direction lies within what the plan sees of it. The covariance
+/// has the rank of that.
+fn told(covariance: &DMatrix<f64>) -> Vec<bool> {
+    let n = covariance.nrows();
+    let scale = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let by = scale(i) * scale(j);
+        if by > 0.0 { covariance[(i, j)] / by } else { 0.0 }
+    });
+    let eigen = scaled.symmetric_eigen();
+    (0..n)
+        .map(|i| {
+            let seen: f64 =
+                (0..n).filter(|&k| eigen.eigenvalues[k] > 1e-9).map(|k| eigen.eigenvectors[(i, k)].powi(2)).sum();
+            scale(i) > 0.0 && seen > 1.0 - 1e-6
+        })
+        .collect()
 }
 
 /// Results that an added effect makes less certain, from the one fit: C′ = C + G·C_c·Gᵀ with G how they move with it.

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 pub const GROSS_UM: f64 = 50.0;
 
 /// Effect of the catalogue whose parameters are the suppositions.
-const EFFECT: &str = "sign-or-axis-swap";
+pub(super) const EFFECT: &str = "sign-or-axis-swap";
 
 /// All suppositions with the error that they leave, best first.
 #[must_use]
@@ -47,17 +47,26 @@ fn signs_and_swaps(subject: Subject) -> Vec<Gross> {
                 settings.knowledge.insert(p.name.clone(), Knowledge::Fixed(value));
             }
             let fit = identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings).ok()?;
-            let says = match supposed.name.split_once('_') {
-                Some(("flip", axis)) => format!("axis {axis} is counted the wrong way round"),
-                Some((_, axes)) => {
-                    let (a, b) = axes.split_at(1.min(axes.len()));
-                    format!("axes {a} and {b} are taken for each other")
-                }
-                None => supposed.name.clone(),
-            };
-            Some(Gross { hypothesis: supposed.name.clone(), says, rms_um: fit.outcome.rms_um })
+            Some(Gross {
+                hypothesis: supposed.name.clone(),
+                says: in_words(&supposed.name),
+                rms_um: fit.outcome.rms_um,
+                agrees: None,
+            })
         })
         .collect()
+}
+
+/// A supposition of the catalogue: `flip_B`, `swap_XY`.
+pub(super) fn in_words(name: &str) -> String {
+    match name.split_once('_') {
+        Some(("flip", axis)) => format!("axis {axis} is counted the wrong way round"),
+        Some((_, axes)) => {
+            let (a, b) = axes.split_at(1.min(axes.len()));
+            format!("axes {a} and {b} are taken for each other")
+        }
+        None => name.to_owned(),
+    }
 }
 
 /// Lengths in the other unit.
@@ -70,7 +79,12 @@ fn units(subject: Subject) -> Vec<Gross> {
     .filter_map(|(hypothesis, factor, says)| {
         let data = scaled(&subject.fit.data, factor);
         let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
-        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um: fit.outcome.rms_um })
+        Some(Gross {
+            hypothesis: hypothesis.to_owned(),
+            says: says.to_owned(),
+            rms_um: fit.outcome.rms_um,
+            agrees: None,
+        })
     })
     .collect()
 }
@@ -105,6 +119,7 @@ fn elsewhere(subject: Subject) -> Option<Gross> {
             "half of the touches lie more than {median:.0} mm off where the plan has them: a log of another program or machine, or another origin"
         ),
         rms_um: subject.fit.outcome.rms_um,
+        agrees: None,
     })
 }
 
@@ -122,6 +137,7 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         held_out_before_um: None,
         held_out_after_um: None,
         parameters: vec![Parameter { name: gross.hypothesis.clone(), value: 1.0, unit: "1".into(), sigma: None }],
+        not_told: Vec::new(),
         same_as: Vec::new(),
         tell_apart: String::new(),
         says: effect.says.clone(),

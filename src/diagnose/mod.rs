@@ -10,12 +10,16 @@ pub mod evidence;
 pub mod features;
 mod findings;
 pub mod gross;
+mod missed;
 pub mod named;
+pub mod open;
+pub mod places;
 pub mod sketch;
 mod tell;
 mod verdict;
-mod words;
+pub mod words;
 
+use crate::design::Planned;
 use crate::diag::Result;
 use crate::fit::{Fit, Settings, declared_tau_mm, identify_data};
 use crate::machine::Machine;
@@ -47,18 +51,21 @@ pub struct Subject<'a> {
 
 /// How much is worked out.
 #[derive(Debug, Clone, Copy)]
-pub struct Options {
+pub struct Options<'a> {
     /// Most candidates that are listed.
     pub at_most: usize,
     /// Refit with the first candidate: what remains, and which outliers come back.
     pub refit: bool,
     /// What would have been found.
     pub power: bool,
+    /// The runs as they were planned: which further touches would tell effects apart is tried on them, and where touches are
+    /// missing, which mistake would have made them miss.
+    pub planned: Option<&'a [Planned]>,
 }
 
-impl Default for Options {
+impl Default for Options<'_> {
     fn default() -> Self {
-        Self { at_most: 5, refit: true, power: true }
+        Self { at_most: 5, refit: true, power: true, planned: None }
     }
 }
 
@@ -183,7 +190,12 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let ordering = Ordering::of(fit, machine, catalogue);
     let seen = examine(&evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
     let verdict = verdict::of(&seen);
-    let gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
+    let mut gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
+    if let Some(planned) = options.planned.filter(|_| missed::mostly(&fit.data)) {
+        let missed = missed::hypotheses(subject, planned);
+        gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
+        gross.splice(0..0, missed);
+    }
     let mut out = findings::put_together(subject, &seen, &features, verdict, gross, options);
     if options.refit
         && let Some(first) = out.candidates.first_mut()

@@ -12,6 +12,9 @@ use crate::units::um_from_mm;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+/// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
+const LEAST_TRACE: f64 = 1e-6;
+
 /// A parameter of a candidate: one column.
 #[derive(Debug, Clone)]
 pub struct Column {
@@ -170,7 +173,14 @@ impl<'c> Named<'c> {
             let mut variants = Vec::new();
             while part < parts.len() && parts[part].0 == i {
                 let width = parts[part].2.ncols();
-                variants.push((parts[part].1, white.columns(at, width).into_owned()));
+                let mut columns = white.columns(at, width).into_owned();
+                for mut column in columns.column_iter_mut() {
+                    // what is left of an effect of which no used touch has a part is rounding, and no trace
+                    if column.norm() < LEAST_TRACE {
+                        column.fill(0.0);
+                    }
+                }
+                variants.push((parts[part].1, columns));
                 at += width;
                 part += 1;
             }

@@ -2,7 +2,8 @@
 
 use super::Subject;
 use super::evidence::Evidence;
-use super::features::{direction_words, features, shapes};
+use super::features::{features, shapes};
+use super::places;
 use super::words;
 use crate::diag::{Failure, Result};
 use crate::search::dependence::{Dependence, dependences};
@@ -19,6 +20,8 @@ pub struct Sketch {
     pub formula: String,
     /// The row of the effects file.
     pub toml: String,
+    /// Places where it may act, the one that leaves least first.
+    pub tried: Vec<places::Tried>,
 }
 
 /// The best starting formula for what is left over. `taken` are ids that exist.
@@ -26,8 +29,9 @@ pub struct Sketch {
 /// # Errors
 /// When nothing significant is left, or what is left has no formula.
 pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> {
-    let evidence = Evidence::of(subject.fit);
     let features = features(subject.fit, subject.machine);
+    let evidence = super::calm(subject.fit, subject.machine, subject.catalogue, &features)
+        .unwrap_or_else(|| Evidence::of(subject.fit));
     let generics = shapes(subject.fit, &evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let level = crate::search::multiplicity::FAMILY_LEVEL;
@@ -41,7 +45,8 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
         return Err(Failure::new("sketch::no_formula", format!("formulas have no word for {}: {}", first.on, words::kind(first)))
             .help("a block that moved, a dirty face or a pose that does not come back is put right on the machine, not by a formula"));
     };
-    Ok(write(subject, best, taken))
+    let tried = places::tried(subject, &evidence, best);
+    Ok(write(subject, best, &tried, taken))
 }
 
 /// Six digits without an exponent.
@@ -50,40 +55,39 @@ fn plain(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-fn write(subject: Subject, d: &Dependence, taken: &dyn Fn(&str) -> bool) -> Sketch {
+fn write(subject: Subject, d: &Dependence, tried: &[places::Tried], taken: &dyn Fn(&str) -> bool) -> Sketch {
     let stem: String = d.on.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let free = |n: usize| if n == 1 { format!("sketch-{stem}") } else { format!("sketch-{stem}-{n}") };
     let id = (1..).map(free).find(|id| !taken(id)).unwrap_or_else(|| format!("sketch-{stem}"));
     let prefix: String = id.replace('-', "_");
-    let says = words::says(d, subject.fit, subject.machine);
+    let says = words::says(d, d.share, subject.fit, subject.machine);
     let shape_name = d.shape.as_ref().map(|s| format!("{prefix}_{}", s.name));
+    let own = places::Tried::of(d);
+    let place = tried.first().unwrap_or(&own);
     let mut terms = String::new();
     let mut formula = Vec::new();
-    for (i, term) in d.terms.iter().enumerate() {
-        let text = term.formula.clone().unwrap_or_default();
+    for (i, (dof, which, size, sigma)) in place.terms.iter().enumerate() {
+        let text = d.terms.get(*which).and_then(|t| t.formula.clone()).unwrap_or_default();
         let text = match (&d.shape, &shape_name) {
             (Some(shape), Some(name)) => replace_word(&text, &shape.name, name),
             _ => text,
         };
-        let typical = term.size.abs().max(term.sigma).max(0.1);
+        let (unit, typical) = (places::unit_of(dof), size.abs().max(*sigma).max(0.1));
         let _ = writeln!(
             terms,
-            "  {{ parameter = \"{prefix}_{}\", unit = \"{}\", dof = \"{}\", formula = \"{text}\", typical = {} }},",
+            "  {{ parameter = \"{prefix}_{}\", unit = \"{unit}\", dof = \"{dof}\", formula = \"{text}\", typical = {} }},",
             i + 1,
-            d.unit,
-            d.dof,
             plain(typical)
         );
-        formula.push(format!("{:+.2} {} * {text}", term.size, d.unit));
+        formula.push(format!("{size:+.2} {unit} * {text} [{} {dof}]", place.at));
     }
     let mut toml = format!(
-        "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: {}\"\nsays = \"{}\"\nlook = \"{}\"\nat = \"{}\"                   # {} {}\nterms = [\n{terms}]\n",
+        "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: {}\"\nsays = \"{}\"\nlook = \"{}\"\n{}at = \"{}\"\nterms = [\n{terms}]\n",
         d.on,
         says.replace('"', "'"),
         words::kind(d).replace('"', "'"),
-        d.at,
-        d.dof,
-        direction_words(&d.direction, subject.machine)
+        places::comment(tried),
+        place.at,
     );
     if let (Some(shape), Some(name)) = (&d.shape, &shape_name) {
         let _ = writeln!(
@@ -95,7 +99,7 @@ fn write(subject: Subject, d: &Dependence, taken: &dyn Fn(&str) -> bool) -> Sket
             plain(shape.max)
         );
     }
-    Sketch { id, says, formula: formula.join(" "), toml }
+    Sketch { id, says, formula: formula.join(" "), toml, tried: tried.to_vec() }
 }
 
 /// Replaces a whole word.

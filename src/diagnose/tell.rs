@@ -1,13 +1,138 @@
-//! Which touches would tell the members of a group apart.
+//! Which touches would tell the members of a group apart: variations of these very touches that this machine can make.
 
-use super::{Examination, Subject};
+use super::{Examination, Options, Subject};
+use crate::design::{Known, Noise, Planned, Task, View, habits};
+use crate::diag::Result;
+use crate::fit::{Knowledge, effects_of};
+use crate::model::catalogue::Effect;
 use crate::model::formula::slot;
+use crate::search::apart::{Products, chance};
 use crate::search::groups::Group;
+use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::units::deg_from_rad;
 use nalgebra::DVector;
+use rayon::prelude::*;
+use std::collections::HashSet;
 
-/// In words; empty where the group has one member.
-pub(super) fn words(subject: Subject, seen: &Examination, group: &Group) -> String {
+/// A variation tells two effects apart when the diagnosis of its touches does so with this probability.
+const SAFELY: f64 = 0.95;
+
+/// Rivals that are named at most.
+const MOST_NAMED: usize = 4;
+
+/// In words, one for each group; empty where a group has one member.
+pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<String> {
+    let found = |g: &Group| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL);
+    let asked: Vec<bool> = seen.groups.iter().map(|g| g.members.len() > 1 && found(g)).collect();
+    let tried = match options.planned {
+        Some(planned) if asked.contains(&true) => tried(subject, seen, planned, &asked).unwrap_or_default(),
+        _ => Vec::new(),
+    };
+    let each = seen.groups.iter().zip(&asked).map(|(group, asked)| {
+        if *asked && !tried.is_empty() {
+            by_variation(seen, group, &tried)
+        } else {
+            by_difference(subject, seen, group)
+        }
+    });
+    each.collect()
+}
+
+/// A variation with what it makes of the effects in question.
+struct Tried {
+    says: String,
+    seconds: f64,
+    /// Candidate, columns, expected size.
+    effects: Vec<(usize, std::ops::Range<usize>, DVector<f64>)>,
+    products: Products,
+}
+
+impl Tried {
+    /// Would the two be told apart, whichever of them acts?
+    fn tells(&self, one: usize, other: usize) -> bool {
+        let find = |c: usize| self.effects.iter().find(|e| e.0 == c);
+        let (Some(a), Some(b)) = (find(one), find(other)) else { return false };
+        let left = self.products.apart((&a.1, Some(&a.2)), Some((&b.1, Some(&b.2))));
+        chance(left.lambda, left.q) >= SAFELY
+    }
+}
+
+/// All variations, cheapest first.
+fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[bool]) -> Result<Vec<Tried>> {
+    let Subject { machine, catalogue, fit, .. } = subject;
+    let name = |i: usize| fit.model.unknowns[i].name.clone();
+    let task = Task {
+        machine,
+        catalogue,
+        effects: effects_of(&fit.outcome.effects, catalogue, machine)?,
+        held: (0..fit.theta.len())
+            .filter(|i| matches!(fit.knowledge[*i], Some(Knowledge::Fixed(_))))
+            .map(name)
+            .collect(),
+        reference: fit.model.reference,
+        temperature: fit.data.observations.iter().any(|o| o.has_temperature),
+    };
+    let priors: Vec<Known> =
+        fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
+    let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: seen.evidence.tau_mm };
+    let made: HashSet<(usize, u64)> = fit.data.observations.iter().map(|o| (o.run, o.id)).collect();
+    let mut planned = planned.to_vec();
+    for (run, p) in planned.iter_mut().enumerate() {
+        // only what was measured tells anything
+        p.plan.touches.retain(|t| made.contains(&(run, t.id)));
+    }
+    let mut candidates: Vec<usize> = Vec::new();
+    for group in seen.groups.iter().zip(asked).filter(|g| *g.1).map(|g| g.0) {
+        candidates.extend(group.members.iter().map(|m| m.candidate));
+    }
+    let effects: Vec<(&Effect, Option<f64>)> = candidates
+        .iter()
+        .map(|&c| {
+            let variant = seen.order.scores[c].variant;
+            let shape = seen.named.library.candidates()[c].variants[variant].shape;
+            (seen.named.effects[c], seen.named.scanned[c].as_ref().map(|_| shape))
+        })
+        .collect();
+    habits(machine, &planned, &fit.model)
+        .into_par_iter()
+        .map(|habit| {
+            let known: Vec<Known> = priors.iter().chain(&habit.known).cloned().collect();
+            let view = View::with_effects(&task, &habit.runs, &known, noise, &effects)?;
+            let spans = view.library.candidates().iter().map(|c| c.variants[0].columns.clone());
+            let effects = candidates
+                .iter()
+                .zip(spans)
+                .map(|(&c, span)| (c, span, seen.order.scores[c].estimate.clone()))
+                .collect();
+            let products = Products::new(&view.base, &view.library.matrix().into_owned());
+            Ok(Tried { says: habit.says, seconds: habit.seconds, effects, products })
+        })
+        .collect()
+}
+
+/// The cheapest variation that tells the first of a group from most of the others.
+fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> String {
+    let chosen = group.first();
+    let rivals: Vec<usize> = group.members.iter().map(|m| m.candidate).filter(|&c| c != chosen).collect();
+    let told = |t: &Tried| rivals.iter().filter(|&&r| t.tells(chosen, r)).count();
+    // ties go to the earlier, which is the cheaper
+    let best = tried.iter().map(|t| (told(t), t)).rev().max_by_key(|t| t.0);
+    let id = |c: usize| seen.named.effects[c].id.as_str();
+    let Some((count, best)) = best.filter(|b| b.0 > 0) else {
+        return "no single change of these touches does: `axiscal plan-next` looks for a program that does".into();
+    };
+    let from: Vec<&str> = rivals.iter().filter(|&&r| best.tells(chosen, r)).map(|&r| id(r)).collect();
+    let whom = match (count == rivals.len(), count) {
+        (true, 1) => format!("from {}", from[0]),
+        (true, _) => "from all of them".to_owned(),
+        (false, n) if n <= MOST_NAMED => format!("from {}, and leaves the others", from.join(", ")),
+        (false, n) => format!("from {n} of the {}", rivals.len()),
+    };
+    format!("{} (+{:.0} min): that tells {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen))
+}
+
+/// Where the two that lead a group differ most: for who has no plan at hand.
+fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String {
     let chosen = group.first();
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
     let trace = |c: usize| -> DVector<f64> {

@@ -17,9 +17,6 @@ const LEAST_DOF: usize = 8;
 /// folds says little: the error may then rise by less than its standard error.
 const FEW_VISITS: usize = 15;
 
-/// More touches than this share may not be missing.
-const MOST_MISSED: f64 = 0.2;
-
 /// What was decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decision {
@@ -86,11 +83,24 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
 /// Where many touches found nothing the rest is no sample of the machine: that is the finding, and it is said alone.
 pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, fit: &Fit) {
     let (missed, made) = (fit.data.unusable.len(), fit.data.observations.len() + fit.data.unusable.len());
-    if missed as f64 <= MOST_MISSED * made as f64 {
+    if !super::missed::mostly(&fit.data) {
         return;
     }
     out.verdict = Verdict::TooLittleData;
     out.candidates.iter_mut().for_each(|c| c.proposed = false);
+    let named: Vec<&super::answer::Gross> = out.gross.iter().filter(|g| g.agrees.is_some()).collect();
+    if let Some(first) = named.first() {
+        let as_good = named.iter().skip(1).filter(|g| g.agrees == first.agrees).map(|g| g.says.as_str());
+        let supposed: Vec<&str> = std::iter::once(first.says.as_str()).chain(as_good).collect();
+        out.says = format!(
+            "{missed} of {made} touches cannot be used, most of them because the search found nothing. It looks as if {}: that \
+             would make {:.0} % of the touches hit or miss as they did. Correct it in the machine file or the log and measure \
+             again; nothing can be said about small effects before.",
+            supposed.join(", or "),
+            100.0 * first.agrees.unwrap_or(0.0)
+        );
+        return;
+    }
     out.says = format!(
         "{missed} of {made} touches cannot be used, most of them because the search found nothing: nothing can be said about small \
          effects. Does an axis count the other way round, are two exchanged, do the blocks stand where the plan says, does the \

@@ -35,6 +35,26 @@ pub fn by(on: &str, is_rotary: &dyn Fn(&str) -> bool) -> String {
     }
 }
 
+/// What `where` calls a variable, as a machinist says it.
+#[must_use]
+pub fn plain(by: &str) -> String {
+    let of = |word: &str, axis: &str| format!("{word} {axis}");
+    match by.split_once('.') {
+        Some(("pose", axis)) => axis.to_owned(),
+        Some(("axis", axis)) => of("the position of", axis),
+        Some(("before", axis)) => format!("where {axis} stood before"),
+        Some(("sense", axis)) => format!("the sense of {axis}'s last motion"),
+        _ => match by {
+            "time*block" => "time and block".to_owned(),
+            "length" => "the length of the stylus".to_owned(),
+            "spindle" => "the orientation of the spindle".to_owned(),
+            "approach" => "the direction of approach".to_owned(),
+            "X" | "Y" | "Z" => of("the position of", by),
+            other => format!("the {other}"),
+        },
+    }
+}
+
 /// A variable of formulas that stands for something that a person can look at: an axis, time, temperature, feed.
 #[must_use]
 pub fn is_plain(variable: &str) -> bool {
@@ -70,8 +90,8 @@ fn duration(hours: f64) -> String {
 
 /// On what the misfit depends, in a sentence.
 #[must_use]
-pub fn says(d: &Dependence, fit: &Fit, machine: &Machine) -> String {
-    let percent = (100.0 * d.share).round();
+pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String {
+    let percent = (100.0 * share).round();
     let rotary = machine.rotary().any(|a| a.name.to_string() == d.on) || d.on == "S";
     let direction = direction_words(&d.direction, machine);
     let (on, how) = match d.on.as_str() {

@@ -82,6 +82,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let started = run.started_s.unwrap_or(clock_s);
         let mut previous: Option<&PlanTouch> = None;
         let mut last_sense = [0.0; 6];
+        let mut before = Before::default();
         visits.last = None;
         for touch in run.touches {
             let Some(planned) = run.plan.touch(touch.id) else {
@@ -97,6 +98,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             clock_s = f64::max(clock_s, time_s);
             let t = hours_from_s(time_s - *first_touch_s.get_or_insert(time_s));
             senses(&mut last_sense, planned, previous);
+            before.next(planned);
             previous = Some(planned);
             let reason = match touch.status {
                 Status::Miss => Some("the search ended without a trigger"),
@@ -151,6 +153,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     hours: t,
                     temperature_deg_c: touch.temperature_deg_c,
                     senses: &last_sense,
+                    before: &before.earlier,
                     length_mm,
                 }
                 .state(),
@@ -248,6 +251,27 @@ fn senses(last: &mut [f64; 6], touch: &PlanTouch, previous: Option<&PlanTouch>) 
     }
 }
 
+/// Where each rotary axis stood before it came to its pose, in one run.
+#[derive(Debug, Default)]
+struct Before {
+    now: [Option<f64>; 3],
+    /// rad; 0 until the axis has moved.
+    earlier: [f64; 3],
+}
+
+impl Before {
+    fn next(&mut self, touch: &PlanTouch) {
+        let pose = touch.pose.position();
+        for (i, name) in [AxisName::A, AxisName::B, AxisName::C].into_iter().enumerate() {
+            let at = rad_from_deg(pose.get(name));
+            if let Some(last) = self.now[i].filter(|last| (at - last).abs() > 1e-6) {
+                self.earlier[i] = last;
+            }
+            self.now[i] = Some(at);
+        }
+    }
+}
+
 /// What the state of a touch is made of.
 struct Circumstances<'a> {
     machine: &'a Machine,
@@ -259,6 +283,8 @@ struct Circumstances<'a> {
     hours: f64,
     temperature_deg_c: Option<f64>,
     senses: &'a [f64; 6],
+    /// Where the rotary axes stood before, rad.
+    before: &'a [f64; 3],
     /// Pivot to ball, mm.
     length_mm: f64,
 }
@@ -271,6 +297,7 @@ impl Circumstances<'_> {
             state[slot::AXES + name.index()] = c.at.mm_or_rad(name);
         }
         state[slot::SENSES..slot::SENSES + 6].copy_from_slice(c.senses);
+        state[slot::BEFORE..slot::BEFORE + 3].copy_from_slice(c.before);
         state[slot::HOURS] = c.hours;
         state[slot::TEMPERATURE] = c.temperature_deg_c.unwrap_or(20.0);
         state[slot::FEED] = c.planned.feed_mm_min.unwrap_or(c.machine.probe.slow_feed);

@@ -8,9 +8,10 @@ use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
 use std::sync::{Arc, OnceLock};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
-pub const VARIABLES: [&str; 37] = [
+pub const VARIABLES: [&str; 40] = [
     "X", "Y", "Z", "A", "B", "C", "t", "T", "nx", "ny", "nz", "mx", "my", "mz", "sX", "sY", "sZ", "sA", "sB", "sC",
-    "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge",
+    "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge", "wA", "wB",
+    "wC",
 ];
 
 /// Where groups of variables begin in a [`State`].
@@ -43,10 +44,13 @@ pub mod slot {
     pub const OUTWARD: usize = 33;
     /// `edge`.
     pub const EDGE: usize = 36;
+    /// `wA wB wC`.
+    pub const BEFORE: usize = 37;
 }
 
 /// Values of [`VARIABLES`] at one touch: X Y Z mm; A B C rad; t h; T °C; normals; senses ±1; feed mm/min; spindle rad;
-/// gravity in the tool's frame; lengths, point and edge mm; outward from the carrier's centre line.
+/// gravity in the tool's frame; lengths, point and edge mm; outward from the carrier's centre line; where the rotary axes
+/// stood before they came to their pose, rad (0 until they have moved).
 pub type State = [f64; VARIABLES.len()];
 
 /// Functions that a formula may use.

@@ -1,6 +1,7 @@
 //! The answer of `assess` as text.
 
 use super::fit::{number, significant, table};
+use super::plot::Paper;
 use crate::design::record::{Advice, Assessment, Seen};
 use comfy_table::Cell;
 
@@ -12,17 +13,17 @@ const MOST_SHOWN: usize = 6;
 
 /// The whole answer.
 #[must_use]
-pub fn assessment(a: &Assessment) -> String {
+pub fn assessment(a: &Assessment, paper: Paper) -> String {
     let mut out = String::new();
     if a.compared.is_empty() {
-        one(a, &mut out);
+        one(a, paper, &mut out);
     } else {
-        side_by_side(a, &mut out);
+        side_by_side(a, paper, &mut out);
     }
-    out
+    paper.plain(out)
 }
 
-fn one(a: &Assessment, out: &mut String) {
+fn one(a: &Assessment, paper: Paper, out: &mut String) {
     *out += &format!(
         "{} with {}: {} touches in {}; {} unknowns of rank {}\n",
         a.machine,
@@ -46,6 +47,7 @@ fn one(a: &Assessment, out: &mut String) {
             Cell::new(p.holds.join(", ")),
         ]);
     }
+    t.set_width(paper.width.min(120) as u16);
     *out += &format!(
         "expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second)\n{t}\n\n",
         significant(a.noise_um),
@@ -65,6 +67,7 @@ fn one(a: &Assessment, out: &mut String) {
             Cell::new(short(e, a)),
         ]);
     }
+    t.set_width(paper.width.min(120) as u16);
     *out += &format!("{t}\n");
     let invisible: Vec<&Seen> = a.effects.iter().filter(|e| !e.visible).collect();
     if !invisible.is_empty() {
@@ -103,7 +106,7 @@ fn one(a: &Assessment, out: &mut String) {
     }
 }
 
-fn side_by_side(first: &Assessment, out: &mut String) {
+fn side_by_side(first: &Assessment, paper: Paper, out: &mut String) {
     let all: Vec<&Assessment> = std::iter::once(first).chain(&first.compared).collect();
     let names: Vec<String> = all.iter().map(|a| a.plan.join("+")).collect();
     let mut head = vec![first.machine.as_str()];
@@ -131,6 +134,7 @@ fn side_by_side(first: &Assessment, out: &mut String) {
             of(a).and_then(|q| q.sigma_with_unmodelled).map_or_else(|| "not told".into(), significant)
         });
     }
+    t.set_width(paper.width.min(160) as u16);
     *out += &format!("{t}\n");
     for (a, name) in all.iter().zip(&names) {
         *out += &format!("{name} is {}: {}\n", a.score.word(), a.says);

@@ -29,13 +29,13 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
         t.add_row(vec![
             Cell::new(&s.by),
             number(format!("{:.0} %", 100.0 * s.share)),
-            number(s.groups.len()),
+            number(if s.groups.is_empty() { "-".to_owned() } else { s.groups.len().to_string() }),
             Cell::new(&s.says),
         ]);
     }
     t.set_width(paper.width.min(160) as u16);
     out += &format!("{t}\nshares are of the misfit beyond the noise, each split taken alone: they overlap\n");
-    let shown = |s: &&Split| all || s.share >= WORTH_SHOWING;
+    let shown = |s: &&Split| !s.groups.is_empty() && (all || s.share >= WORTH_SHOWING);
     for s in c.splits.iter().filter(shown).take(if all { usize::MAX } else { LISTED }) {
         out += &format!("\n{}\n{}\n", s.by, groups(s, paper));
     }
@@ -45,7 +45,7 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
             c.points.iter().filter(|p| p.used).filter_map(|p| Some((p.value(&variable)?, p.residual_um))).collect();
         out += &format!("\n{}", scatter(&format!("residual, um, against {}", named(&variable)), &points, paper));
     }
-    if paper.ascii { out.replace('─', "-").replace('…', "..") } else { out }
+    paper.plain(out)
 }
 
 fn groups(s: &Split, paper: Paper) -> String {

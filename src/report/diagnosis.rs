@@ -1,52 +1,47 @@
 //! The answer of `diagnose`: the verdict first, then what may be missing, then on what the misfit depends.
 
 use super::fit::{digits, number, significant, table};
-use crate::diagnose::answer::{Candidate, Diagnosis, Shape};
+use super::plot::{Paper, axis_label};
+use super::prose::sentence;
+use crate::diagnose::answer::{Candidate, Diagnosis, Shape, Verdict};
+use crate::diagnose::words::plain;
 use comfy_table::Cell;
 
-/// Rows and columns of the small plot.
-const PLOT: (usize, usize) = (11, 64);
+/// Rows of the small plot.
+const ROWS: usize = 11;
 
 /// Effects named with their smallest detectable size.
 const MOST_POWER: usize = 4;
 
-/// Prose is wrapped to this: it is read on 80 columns and looks no worse on 160.
-const WIDTH: usize = 80;
+/// Columns of the small plot at least and at most.
+const COLUMNS: (usize, usize) = (30, 100);
 
-/// Words in lines of [`WIDTH`]; the lines after the first begin with so many blanks.
-fn wrapped(text: &str, indent: usize) -> String {
-    let mut length = text.len() - text.trim_start().len();
-    let mut out = " ".repeat(length);
-    for (i, word) in text.split_whitespace().enumerate() {
-        let n = word.chars().count();
-        if i > 0 && length + 1 + n > WIDTH {
-            out.push('\n');
-            out += &" ".repeat(indent);
-            length = indent;
-        } else if i > 0 {
-            out.push(' ');
-            length += 1;
-        }
-        out += word;
-        length += n;
-    }
-    out.push('\n');
-    out
+/// Words in lines of the paper; the lines after the first begin with so many blanks.
+fn wrapped(text: &str, indent: usize, paper: Paper) -> String {
+    let own = text.len() - text.trim_start().len();
+    sentence(text.trim_start(), paper.width, own, indent) + "\n"
 }
 
 /// The whole answer.
 #[must_use]
-pub fn diagnosis(d: &Diagnosis) -> String {
+pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
+    let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
     let mut out = wrapped(&d.says, 0);
     if !d.candidates.is_empty() {
-        out += &candidates(d);
+        out += &candidates(d, paper);
     }
-    for w in &d.depends {
-        out += &wrapped(&format!("depends: {}", w.says), 2);
+    if let Some(first) = d.depends.first() {
+        out += &wrapped(&format!("depends: {}", first.says), 2);
+        // they share much of it with the first, and with each other
+        let others: Vec<String> =
+            d.depends[1..].iter().map(|w| format!("{} ({:.0} %)", plain(&w.by), 100.0 * w.share)).collect();
+        if !others.is_empty() {
+            out += &wrapped(&format!("  taken alone, also {}", others.join(", ")), 4);
+        }
     }
     if let Some(shape) = &d.shape {
-        out += &plot(shape);
-        out += &wrapped(&format!("such a misfit comes from {}", shape.kind), 2);
+        out += &plot(shape, paper);
+        out += &wrapped(&format!("what does that: {}", shape.kind), 2);
     }
     for g in d.gross.iter().take(3) {
         out += &wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2);
@@ -70,10 +65,13 @@ pub fn diagnosis(d: &Diagnosis) -> String {
     for w in &d.warnings {
         out += &wrapped(&format!("warning: {w}"), 2);
     }
-    out
+    paper.plain(out)
 }
 
-fn candidates(d: &Diagnosis) -> String {
+fn candidates(d: &Diagnosis, paper: Paper) -> String {
+    let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
+    // where nothing is missing the list says what was tried; a place to look at would send a person after noise
+    let missing = d.verdict != Verdict::Adequate;
     let mut t = table(&["candidate", "p (Holm)", "error um", "held out um", "share"]);
     for c in &d.candidates {
         let held = match (c.held_out_before_um, c.held_out_after_um) {
@@ -88,20 +86,22 @@ fn candidates(d: &Diagnosis) -> String {
             number(format!("{:.0} %", 100.0 * c.share)),
         ]);
     }
-    let mut out = format!("{t}\n");
+    t.set_width(paper.width.min(100) as u16);
+    let mut out = if missing { String::new() } else { "tried, and none of them needed:\n".to_owned() };
+    out += &format!("{t}\n");
     if d.candidates.iter().any(|c| c.proposed) {
         out += &wrapped(
             "* passes the test with all candidates counted in, and predicts touches that had no part in choosing it",
             2,
         );
     }
-    for c in d.candidates.iter().filter(|c| c.p_adjusted < 1.0) {
+    for c in d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0) {
         out += &wrapped(&format!("{}: {}", c.effect, sizes(c)), 2);
         if !c.same_as.is_empty() {
             out += &wrapped(&format!("  cannot be told from {}", c.same_as.join(", ")), 4);
         }
     }
-    if let Some(first) = d.candidates.first() {
+    if let Some(first) = d.candidates.first().filter(|_| missing) {
         out += &wrapped(&format!("{}: {}", first.name, first.says), 2);
         out += &wrapped(&format!("  look: {}", first.look), 4);
         if !first.tell_apart.is_empty() {
@@ -135,20 +135,33 @@ fn probability(p: f64) -> String {
 
 fn sizes(c: &Candidate) -> String {
     const MOST: usize = 4;
-    let each = c.parameters.iter().take(MOST).map(|p| match p.sigma {
-        Some(s) => format!("{} {} ± {} {}", p.name, digits(p.value, Some(s)), significant(s), p.unit),
-        None => format!("{} {} {}", p.name, significant(p.value), p.unit),
-    });
-    let mut text = each.collect::<Vec<_>>().join(", ");
-    if c.parameters.len() > MOST {
+    let mut each: Vec<String> = c
+        .parameters
+        .iter()
+        .map(|p| match p.sigma {
+            Some(s) => format!("{} {} ± {} {}", p.name, digits(p.value, Some(s)), significant(s), p.unit),
+            None => format!("{} {} {}", p.name, significant(p.value), p.unit),
+        })
+        .collect();
+    let more = each.len() > MOST;
+    each.truncate(MOST);
+    let mut text = each.join(", ");
+    if more {
         text += ", …";
+    }
+    if !c.not_told.is_empty() {
+        let unknown: Vec<String> = c.not_told.iter().take(MOST).map(|name| format!("{name} ?")).collect();
+        let gap = if text.is_empty() { "" } else { ", " };
+        let more = if c.not_told.len() > MOST { ", …" } else { "" };
+        text += &format!("{gap}{}{more} (cannot be told by this plan)", unknown.join(", "));
     }
     text
 }
 
 /// The misfit against its variable, in characters.
-fn plot(s: &Shape) -> String {
-    let (rows, columns) = PLOT;
+fn plot(s: &Shape, paper: Paper) -> String {
+    let (rows, columns) = (ROWS, paper.width.saturating_sub(16).clamp(COLUMNS.0, COLUMNS.1));
+    let [zero, band, curve] = ['·', '░', '█'];
     let (Some(&from), Some(&to)) = (s.x.first(), s.x.last()) else { return String::new() };
     let limit = s.y.iter().zip(&s.band).map(|(y, b)| y.abs() + b).fold(0.0, f64::max);
     if limit <= 0.0 || to <= from {
@@ -157,15 +170,15 @@ fn plot(s: &Shape) -> String {
     let row =
         |y: f64| (((limit - y) / (2.0 * limit)) * (rows - 1) as f64).round().clamp(0.0, (rows - 1) as f64) as usize;
     let mut grid = vec![vec![' '; columns]; rows];
-    grid[rows / 2].fill('·');
+    grid[rows / 2].fill(zero);
     for c in 0..columns {
         let i = c * (s.x.len() - 1) / (columns - 1);
         for line in grid.iter_mut().take(row(s.y[i] - s.band[i]) + 1).skip(row(s.y[i] + s.band[i])) {
-            line[c] = '░';
+            line[c] = band;
         }
-        grid[row(s.y[i])][c] = '█';
+        grid[row(s.y[i])][c] = curve;
     }
-    let mut out = format!("misfit against {} ({}), {}\n", s.by, s.x_unit, s.direction);
+    let mut out = wrapped(&format!("what is left against {} ({}), {}", plain(&s.by), s.x_unit, s.direction), 2, paper);
     for (r, line) in grid.iter().enumerate() {
         let label = match r {
             0 => format!("{limit:+8.1}"),
@@ -179,7 +192,8 @@ fn plot(s: &Shape) -> String {
             if r == 0 { s.y_unit.as_str() } else { "" }
         );
     }
-    let gap = columns.saturating_sub(significant(from).len() + significant(to).len());
-    out += &format!("{} {}{}{}\n", " ".repeat(8), significant(from), " ".repeat(gap), significant(to));
+    let (from, to) = (axis_label(from, to - from), axis_label(to, to - from));
+    let gap = columns.saturating_sub(from.len() + to.len());
+    out += &format!("{} {from}{}{to}\n", " ".repeat(8), " ".repeat(gap));
     out
 }

@@ -1,5 +1,6 @@
 //! The answer of `identify` as a table with its remarks.
 
+use super::plot::Paper;
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
@@ -36,7 +37,7 @@ pub fn digits(value: f64, sigma: Option<f64>) -> String {
 
 /// The whole answer.
 #[must_use]
-pub fn outcome(o: &Outcome) -> String {
+pub fn outcome(o: &Outcome, paper: Paper) -> String {
     let mut out = String::new();
     out += &format!(
         "{}: {} touches, {} unknowns of rank {} ({} degrees of freedom), condition {:.1}\n",
@@ -74,9 +75,11 @@ pub fn outcome(o: &Outcome) -> String {
         if unmodelled {
             cells.push(number(p.sigma_with_unmodelled.map_or_else(|| "-".into(), significant)));
         }
-        cells.push(Cell::new(status(p.status)));
+        cells.push(Cell::new(status(p.status, paper.width < ROOMY)));
         t.add_row(cells);
     }
+    // numbers are never broken: a name is, where it must
+    t.set_width(paper.width.min(120) as u16);
     out += &t.to_string();
     out.push('\n');
     if unmodelled {
@@ -121,7 +124,7 @@ pub fn outcome(o: &Outcome) -> String {
     for w in &o.warnings {
         out += &format!("warning: {w}\n");
     }
-    out
+    paper.plain(out)
 }
 
 /// Three significant digits, plainly written where that is readable.
@@ -134,8 +137,15 @@ pub fn significant(x: f64) -> String {
     if (-7..6).contains(&magnitude) { format!("{x:.*}", (2 - magnitude).max(0) as usize) } else { format!("{x:.2e}") }
 }
 
-fn status(status: Status) -> &'static str {
+/// From this width on the last column has its whole words.
+const ROOMY: usize = 96;
+
+fn status(status: Status, short: bool) -> &'static str {
     match status {
+        // the rule needs no word where there is little room
+        Status::Identified if short => "",
+        Status::PriorDominated if short => "prior",
+        Status::Undetermined if short => "not told",
         Status::Identified => "identified",
         Status::Fixed => "fixed",
         Status::PriorDominated => "prior-dominated",

@@ -58,7 +58,7 @@ pub fn change(
     for r in &c.remarks {
         out += &format!("note: {r}\n");
     }
-    out
+    paper.plain(out)
 }
 
 /// The ladder as a table and a chart.
@@ -94,7 +94,7 @@ pub fn history(h: &History, paper: Paper) -> String {
             out += &format!("\n{drawn}");
         }
     }
-    out
+    paper.plain(out)
 }
 
 /// Two studies side by side.
@@ -108,6 +108,7 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
     row("readings, blocks placed, um RMS", v.before.readings_rms_um, v.after.readings_rms_um);
     row("left by the model, um RMS", v.before.fit_rms_um, v.after.fit_rms_um);
     row("noise of a touch, um", v.before.noise_um, v.after.noise_um);
+    t.set_width(paper.width.min(100) as u16);
     out += &format!("{t}\n\n");
     let mut t = table(&["error", "unit", "before", "after", "difference", "95 %", ""]);
     for r in &v.parameters {
@@ -126,5 +127,5 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
     for r in &v.remarks {
         out += &format!("note: {r}\n");
     }
-    out
+    paper.plain(out)
 }

@@ -6,3 +6,4 @@ pub mod diagnosis;
 pub mod fit;
 pub mod ladder;
 pub mod plot;
+pub mod prose;

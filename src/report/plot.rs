@@ -21,6 +21,16 @@ impl Paper {
         self.width.saturating_sub(16).clamp(20, 120)
     }
 
+    /// Text as this paper can show it: in a pipe rules and signs become ASCII. `±` stays: no number is without it.
+    #[must_use]
+    pub fn plain(&self, text: String) -> String {
+        if self.ascii {
+            text.replace(['─', '━'], "-").replace('…', "..").replace('·', ".").replace('█', "#").replace('░', ":")
+        } else {
+            text
+        }
+    }
+
     fn options(&self, title: &str, height: usize) -> LineplotOptions {
         let mut options = LineplotOptions::default();
         options.title = Some(title.to_owned());
@@ -31,6 +41,29 @@ impl Paper {
         options.border = if self.ascii { BorderType::Corners } else { BorderType::Solid };
         options.grid = true;
         options
+    }
+
+    /// Limits that a person can read: outwards to a round number, so that the axis is labelled with few digits.
+    fn rounded(low: f64, high: f64) -> (f64, f64) {
+        let span = high - low;
+        if span <= 0.0 || !span.is_finite() {
+            return (low, high);
+        }
+        let step = 10f64.powf((span / 10.0).log10().floor());
+        let round = |x: f64, up: bool| {
+            let n = x / step;
+            // what is round already stays, whatever the last bit says
+            let n = if (n - n.round()).abs() < 1e-9 {
+                n.round()
+            } else if up {
+                n.ceil()
+            } else {
+                n.floor()
+            };
+            // twelve decimals: no trace of the binary form of the step
+            (n * step * 1e12).round() / 1e12
+        };
+        (round(low, false), round(high, true))
     }
 
     fn text(&self, plot: Plot<unicode_plot::GridCanvas>) -> String {
@@ -58,12 +91,30 @@ fn plain(c: char) -> char {
     }
 }
 
+/// A number at an axis that spans so much: no more digits than the eye can use.
+#[must_use]
+pub fn axis_label(value: f64, span: f64) -> String {
+    let decimals =
+        if span > 0.0 && span.is_finite() { (2.0 - span.log10()).ceil().clamp(0.0, 6.0) as usize } else { 3 };
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
 /// Points; empty where none is finite.
 #[must_use]
 pub fn scatter(title: &str, points: &[(f64, f64)], paper: Paper) -> String {
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     let (x, y): (Vec<f64>, Vec<f64>) = finite.into_iter().unzip();
-    scatterplot(&x, &y, paper.options(title, 10)).map_or_else(|_| String::new(), |plot| paper.text(plot))
+    let limits = |v: &[f64]| {
+        let (low, high) = v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+        Paper::rounded(low, high)
+    };
+    let mut options = paper.options(title, 10);
+    if x.len() > 1 {
+        (options.xlim, options.ylim) = (limits(&x), limits(&y));
+    }
+    scatterplot(&x, &y, options).map_or_else(|_| String::new(), |plot| paper.text(plot))
 }
 
 /// A line through points in their order; empty where fewer than two are finite.
@@ -76,7 +127,7 @@ pub fn line(title: &str, points: &[(f64, f64)], paper: Paper) -> String {
     let top = finite.iter().map(|p| p.1).fold(0.0, f64::max);
     let (x, y): (Vec<f64>, Vec<f64>) = finite.into_iter().unzip();
     let mut options = paper.options(title, 8);
-    options.ylim = (0.0, if top > 0.0 { 1.05 * top } else { 1.0 });
+    options.ylim = (0.0, if top > 0.0 { Paper::rounded(0.0, 1.05 * top).1 } else { 1.0 });
     lineplot(&x, &y, options).map_or_else(|_| String::new(), |plot| paper.text(plot))
 }
 
@@ -96,6 +147,14 @@ mod tests {
                 assert!(!text.contains('\u{1b}'));
             }
         }
+        // limits are round numbers: no 310.00000000000006 at an axis
+        let odd = [(0.1 + 0.2, -6.953), (1.0, 7.01), (310.123_456, 0.0)];
+        let text = scatter("odd", &odd, Paper { width: 80, ascii: true, colour: false });
+        let digits = |w: &str| w.chars().filter(char::is_ascii_digit).count();
+        assert!(text.split_whitespace().all(|w| digits(w) <= 3), "{text}");
+        assert_eq!(axis_label(-0.000_1, 10.0), "0");
+        assert_eq!(axis_label(0.123_456, 0.5), "0.123");
+        assert_eq!(axis_label(359.999, 360.0), "360");
         assert!(scatter("none", &[], Paper { width: 80, ascii: true, colour: false }).is_empty());
         assert!(line("one", &[(1.0, 1.0)], Paper { width: 80, ascii: true, colour: false }).is_empty());
     }

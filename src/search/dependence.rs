@@ -94,7 +94,7 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
         let key = |m: &Member| {
             (generics.shapes[m.candidate].depends_on.matches('*').count(), search.scores[m.candidate].ln_p)
         };
-        let simplest = group.members.iter().filter(|m| m.stays).min_by(|a, b| {
+        let simplest = group.members.iter().min_by(|a, b| {
             let ((n, p), (k, q)) = (key(a), key(b));
             n.cmp(&k).then(p.total_cmp(&q))
         });

@@ -3,12 +3,15 @@
 
 use super::basis::Basis;
 use super::distributions::ln_p_of_f;
-use super::groups::{ADDS_NOTHING, Group};
+use super::groups::Group;
 use super::held_out::{Choice, HeldOut, held_out};
 use super::library::Library;
 use super::moments::KEPT;
 use super::score::{PureError, Question, Search};
 use nalgebra::{DMatrix, DVector};
+
+/// An earlier effect goes again when its p-value next to the others is above this.
+const ADDS_NOTHING: f64 = 0.05;
 
 /// One effect added.
 #[derive(Debug, Clone)]

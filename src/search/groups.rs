@@ -1,25 +1,21 @@
 //! Findings as groups: candidates whose traces these touches cannot tell apart stand together under one leader.
 
+pub use super::apart::ALIGNED;
+use super::apart::adds_nothing;
 use super::distributions::ln_p_of_f;
 use super::library::Origin;
 use super::moments::{Block, Moments};
 use super::score::Search;
 use nalgebra::{DMatrix, DVector};
 
-/// A candidate that explains this share of the leader's trace is aliased with it.
-pub const ALIGNED: f64 = 0.9;
-
-/// One that explains this share may still be the cause where the leader adds nothing to it.
+/// A rival explains at least this share of the leader's trace: a leader that is hardly there adds nothing after anything.
 const RIVAL: f64 = 0.5;
-
-/// The leader adds nothing after a candidate when its p-value is above this.
-pub const ADDS_NOTHING: f64 = 0.05;
 
 /// Expected sizes above this many typical sizes are implausible.
 pub const PLAUSIBLE: f64 = 5.0;
 
 /// Logarithms of p-values closer than this make no difference (a factor of 3).
-const AS_LIKELY: f64 = 1.0;
+pub const AS_LIKELY: f64 = 1.0;
 
 /// A candidate in a group.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,8 +28,6 @@ pub struct Member {
     pub separation: f64,
     /// p-value of adding the leader after it.
     pub leader_after_p: f64,
-    /// Do these data leave it possible? The leader always; others while the leader adds nothing to them.
-    pub stays: bool,
     /// Is its expected size at most [`PLAUSIBLE`] typical sizes?
     pub plausible: bool,
 }
@@ -43,8 +37,8 @@ pub struct Member {
 pub struct Group {
     /// The most significant candidate.
     pub leader: usize,
-    /// All of it, leader included: possible ones first, then as likely as the leader, fewest parameters, plausible size,
-    /// user's own, p-value.
+    /// The leader and every candidate after which it adds nothing ([`super::apart`]): as likely as the leader first, then
+    /// fewest parameters, plausible size, user's own, p-value.
     pub members: Vec<Member>,
 }
 
@@ -101,14 +95,12 @@ impl Search<'_> {
                     return None;
                 }
                 let leader_after_p = if j == leader { 1.0 } else { self.leader_after(&trace, j, &block, &cross) };
-                let stays = leader_after_p > ADDS_NOTHING;
                 let alignment = if j == leader { 1.0 } else { alignment };
-                (alignment >= ALIGNED || stays).then(|| Member {
+                adds_nothing(leader_after_p).then(|| Member {
                     candidate: j,
                     alignment,
                     separation: self.scores[leader].noncentrality * (1.0 - alignment),
                     leader_after_p,
-                    stays,
                     plausible: self.scores[j].relative_size() <= PLAUSIBLE,
                 })
             })
@@ -121,11 +113,11 @@ impl Search<'_> {
 
     /// Sorts members: what comes first is named first. Those that are as likely as the leader go by simplicity; those
     /// that are clearly less likely come after them, however simple they are.
-    fn rank_of(&self, m: &Member, best: f64) -> (bool, f64, usize, bool, bool, f64) {
+    fn rank_of(&self, m: &Member, best: f64) -> (f64, usize, bool, bool, f64) {
         let score = &self.scores[m.candidate];
         let behind = if best.is_finite() { ((score.ln_p - best) / AS_LIKELY).floor().max(0.0) } else { 0.0 };
         let origin = self.library.candidates()[m.candidate].origin;
-        (!m.stays, behind, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
+        (behind, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
     }
 
     fn span(&self, candidate: usize) -> (usize, usize) {
@@ -188,7 +180,7 @@ pub struct AliasPair {
 }
 
 /// Alias pairs of a plan, from no measurement: candidate `a` is explained by `b` when ‖U_bᵀU_a‖²_F/q_a is at least
-/// [`ALIGNED`]. Each candidate stands with its first variant.
+/// [`ALIGNED`]: even at a size that is clearly seen `b` leaves too little of it. Each candidate stands with its first variant.
 #[must_use]
 pub fn alias_pairs(base: &super::Basis, library: &super::Library) -> Vec<AliasPair> {
     let shares = super::power::shares(base, library);

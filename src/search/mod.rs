@@ -2,9 +2,10 @@
 //!
 //! A [`Question`] is one linearised regression, a [`Library`] the candidates with their columns. [`Search`] tests all
 //! of them at once, [`groups`] says which of them these data cannot tell apart, [`held_out`] redoes the choice without
-//! the touches that judge it, [`forward`] goes on until nothing is left to find, [`power`] says before any measurement
+//! the touches that judge it, [`apart`] is the criterion by which two are told apart, [`forward`] goes on until nothing is left to find, [`power`] says before any measurement
 //! what a plan can see, and [`generic`] and [`dependence`] say on what the misfit depends where no candidate explains it.
 
+pub mod apart;
 pub mod basis;
 pub mod dependence;
 pub mod distributions;

@@ -10,8 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-/// Noncentrality from which on an effect is found nearly always.
-pub const SEEN: f64 = 25.0;
+pub use super::apart::SEEN;
 
 /// Directions over which the median is taken.
 const DIRECTIONS: usize = 401;

@@ -93,6 +93,7 @@ pub fn bench<'a>(
         present[axis.name.index()] = true;
     }
     let mut senses = Senses::default();
+    let mut came_from = CameFrom::default();
     let mut visits = Visits::default();
     let mut touches = Vec::with_capacity(plan.touches.len());
     let mut no_value: Vec<u64> = Vec::new();
@@ -107,6 +108,7 @@ pub fn bench<'a>(
                     ready.state.temperature_deg_c = degrees;
                 }
                 ready.state.sense = senses.next(touch, &ready);
+                ready.state.stood_before_rad = came_from.next(touch);
                 ready.visit = visits.next(touch, plan, &ready);
                 if !terms.finite(&ready.state, &ready.start) {
                     no_value.push(touch.id);
@@ -264,6 +266,7 @@ fn state(
     let feed = touch.feed_mm_min.filter(|f| f.is_finite()).unwrap_or(machine.probe.slow_feed);
     TouchState {
         sense: [0.0; 6],
+        stood_before_rad: [0.0; 3],
         feed_mm_min: feed,
         hours: 0.0,
         stylus_ratio: stylus.length_mm / machine.tool.length_mm,
@@ -315,6 +318,27 @@ impl Senses {
         }
         self.stood = Some(ready.start);
         self.last
+    }
+}
+
+/// The pose that each rotary axis left for the one where it is.
+#[derive(Default)]
+struct CameFrom {
+    /// Last pose and the one before, deg.
+    poses: BTreeMap<char, (f64, f64)>,
+}
+
+impl CameFrom {
+    fn next(&mut self, touch: &PlanTouch) -> [f64; 3] {
+        ['A', 'B', 'C'].map(|letter| {
+            let here = AxisName::from_letter(letter).and_then(|name| touch.pose.get(name)).unwrap_or(0.0);
+            let (pose, left) = self.poses.entry(letter).or_insert((here, 0.0));
+            // a ten-thousandth of a degree is no other pose
+            if (here - *pose).abs() > 1e-4 {
+                (*left, *pose) = (*pose, here);
+            }
+            crate::units::rad_from_deg(*left)
+        })
     }
 }
 

@@ -11,6 +11,8 @@ use std::sync::Arc;
 pub struct TouchState {
     /// Sense (+1, -1, 0 when nothing is known) of each axis's last motion.
     pub sense: [f64; 6],
+    /// Where A, B and C stood before they came to their pose, rad; 0 while an axis has not moved.
+    pub stood_before_rad: [f64; 3],
     /// Feed of the search, mm/min.
     pub feed_mm_min: f64,
     /// Hours since the first touch.
@@ -55,6 +57,7 @@ impl Default for TouchState {
     fn default() -> Self {
         Self {
             sense: [0.0; 6],
+            stood_before_rad: [0.0; 3],
             feed_mm_min: 0.0,
             hours: 0.0,
             temperature_deg_c: 20.0,

@@ -44,7 +44,7 @@ pub fn look(machine: &Machine, catalogue: &Catalogue, fit: &Fit, settings: &Sett
 }
 
 /// Without the refit and the figures that only a reader needs.
-pub const LEAN: Options = Options { at_most: 3, refit: false, power: false };
+pub const LEAN: Options = Options { at_most: 3, refit: false, power: false, planned: None };
 
 /// A group as a reader sees it.
 pub fn groups(d: &Diagnosis) -> Vec<Vec<String>> {

@@ -17,7 +17,7 @@ pub const KINDS: [(&str, &[&str], bool); 6] = [
     ("one block bumped", &["time*block", "block"], false),
     ("step in time", &["time"], false),
     ("cycle of 9 minutes", &["time"], true),
-    ("hysteresis of B", &["before.B"], false),
+    ("hysteresis of B", &["before.B"], true),
     ("chips on three faces", &["face"], false),
 ];
 
@@ -59,7 +59,7 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
     };
     let data = find::data(&bench.machine, &bench.plans, &touches);
     let (fit, settings) = find::fit(&bench.machine, &catalogue, data, &[], None);
-    let options = Options { at_most: 3, refit: false, power: false };
+    let options = Options { at_most: 3, refit: false, power: false, planned: None };
     let d = find::look(&bench.machine, &catalogue, &fit, &settings, &options);
     Seen {
         kind,

@@ -8,7 +8,7 @@ use exmex::{BinOp, MakeOperators, MatchLiteral, Operator};
 
 /// Words for the state of a touch, as messages list them.
 pub const STATE_WORDS: &str = "X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB sC feed S gx gy gz L L0 bx by bz px py pz \
-    ox oy oz edge";
+    ox oy oz edge wA wB wC";
 
 /// Functions, as messages list them.
 pub const FUNCTION_WORDS: &str = "sin cos tan asin acos atan atan2 exp ln sqrt abs sign floor mod step";
@@ -20,6 +20,8 @@ enum Word {
     Axis(AxisName),
     /// Sense of its last motion.
     Sense(AxisName),
+    /// Where a rotary axis stood before, rad.
+    Before(usize),
     Hours,
     Temperature,
     NormalInMachine(usize),
@@ -58,6 +60,9 @@ impl Word {
             "edge" => Self::Edge,
             _ if axis(text).is_some() => Self::Axis(axis(text)?),
             _ if text.starts_with('s') && axis(&text[1..]).is_some() => Self::Sense(axis(&text[1..])?),
+            "wA" => Self::Before(0),
+            "wB" => Self::Before(1),
+            "wC" => Self::Before(2),
             _ if text.len() == 2 && text.is_ascii() => {
                 let i = along(text.chars().nth(1))?;
                 match text.as_bytes()[0] {
@@ -78,6 +83,7 @@ impl Word {
         match self {
             Self::Axis(name) => joints.mm_or_rad(name),
             Self::Sense(name) => touch.sense[name.index()],
+            Self::Before(i) => touch.stood_before_rad[i],
             Self::Hours => touch.hours,
             Self::Temperature => touch.temperature_deg_c,
             Self::NormalInMachine(i) => touch.normal_machine[i],

@@ -1,0 +1,229 @@
+//! `diagnose`, `compare` and `sketch-effect` from outside: exit codes, the contract's JSON, rubbish.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+fn axiscal(folder: &Path, args: &[&str]) -> std::process::Output {
+    Command::cargo_bin("axiscal").unwrap().current_dir(folder).env_remove("COLUMNS").args(args).output().unwrap()
+}
+
+fn ok(folder: &Path, args: &[&str]) {
+    let out = axiscal(folder, args);
+    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
+}
+
+/// One JSON object on stdout and the exit code.
+fn json(folder: &Path, args: &[&str]) -> (Value, i32) {
+    let out = axiscal(folder, &[args, &["--json"]].concat());
+    let read = serde_json::from_slice(&out.stdout);
+    (
+        read.unwrap_or_else(|e| panic!("{args:?}: {e}: {}", String::from_utf8_lossy(&out.stderr))),
+        out.status.code().unwrap(),
+    )
+}
+
+const COMMON: [&str; 5] = ["--machine", "swivel-head", "--controller", "linuxcnc", "--out"];
+
+/// Programs touched under a scenario, and their study.
+fn folder(programs: &[&str], scenario: &str, effects: Option<&str>) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("wrong.toml"), scenario).unwrap();
+    if let Some(text) = effects {
+        std::fs::write(at.join("own.toml"), text).unwrap();
+    }
+    let mut new = vec!["new".to_owned()];
+    for p in programs {
+        let (plan, log) = (format!("{p}.plan.json"), format!("{p}.log"));
+        ok(at, &[&["generate", "--program", p][..], &COMMON, &["."]].concat());
+        ok(at, &[&["simulate", "--plan", &plan, "--scenario", "wrong.toml"][..], &COMMON, &[&log]].concat());
+        new.extend(["--plan".to_owned(), plan, "--log".to_owned(), log]);
+    }
+    let words: Vec<&str> = new.iter().map(String::as_str).collect();
+    ok(at, &[&words[..], &COMMON, &["study.toml"]].concat());
+    folder
+}
+
+fn keys(value: &Value, wanted: &[&str]) {
+    for key in wanted {
+        assert!(value.get(key).is_some(), "no {key:?} in {value}");
+    }
+}
+
+#[test]
+fn a_missing_effect_is_no_and_a_clean_machine_is_done() {
+    let wrong = "seed = 4\n[effects.radial-c-2]\nEXC2c = 6.0\nEYC2s = -5.0\n[noise]\ntouch_um = 0.5\n";
+    let folder = folder(&["full"], wrong, None);
+    let at = folder.path();
+    let (d, code) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!((d["format"].as_str(), code), (Some("axiscal-diagnosis/1"), 1));
+    keys(&d, &["verdict", "rms_um", "noise_um", "lack_of_fit_p", "where", "candidates"]);
+    assert_eq!(d["verdict"], "missing-effect");
+    let first = &d["candidates"][0];
+    keys(
+        first,
+        &[
+            "effect",
+            "p",
+            "p_adjusted",
+            "rms_after_um",
+            "held_out_before_um",
+            "held_out_after_um",
+            "parameters",
+            "same_as",
+        ],
+    );
+    keys(first, &["tell_apart", "says", "look"]);
+    let group: Vec<&str> = std::iter::once(first["effect"].as_str().unwrap())
+        .chain(first["same_as"].as_array().unwrap().iter().map(|s| s.as_str().unwrap()))
+        .collect();
+    assert!(group.contains(&"radial-c-2"), "{group:?}");
+    // every size has a number and a unit; what has no size is named and said
+    for c in d["candidates"].as_array().unwrap() {
+        for p in c["parameters"].as_array().unwrap() {
+            assert!(p["value"].as_f64().is_some_and(|v| v.is_finite() && v.abs() < 1e5), "{c}");
+            keys(p, &["name", "unit", "sigma"]);
+        }
+        if let Some(names) = c.get("not_told").and_then(Value::as_array) {
+            let says = c["says"].as_str().unwrap();
+            assert!(names.iter().all(|n| says.contains(n.as_str().unwrap())), "{c}");
+            assert!(says.contains("cannot be told by this plan"), "{says}");
+        }
+    }
+    if group.len() > 1 {
+        // touches that this machine can make, with their time, or the verb that looks for them
+        let how = first["tell_apart"].as_str().unwrap();
+        assert!(how.contains(" min)") || how.contains("plan-next"), "{how}");
+    }
+    // compare names the same first, with the same share
+    let (c, code) = json(at, &["compare", "study.toml"]);
+    assert_eq!((c["format"].as_str(), code), (Some("axiscal-comparison/1"), 0));
+    let named = |by: &str| by.trim_start_matches("axis.").replace("length", "stylus");
+    assert_eq!(c["splits"][0]["by"].as_str().unwrap(), named(d["where"][0]["by"].as_str().unwrap()));
+    assert_eq!(c["splits"][0]["says"], d["where"][0]["says"]);
+    assert!(c["says"].as_str().unwrap().contains(d["where"][0]["says"].as_str().unwrap()), "{}", c["says"]);
+    assert_eq!(d["where"][0]["by"], "pose.C");
+    // with it in the model nothing is missing, and nobody is sent to look for anything
+    ok(at, &["add", "study.toml", "radial-c-2"]);
+    let out = axiscal(at, &["diagnose", "study.toml"]);
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert_eq!(out.status.code(), Some(0), "{text}");
+    assert!(text.contains("Nothing is missing") && !text.contains("look:") && !text.contains("next:"), "{text}");
+    let (c, code) = json(at, &["compare", "study.toml"]);
+    assert!(code == 0 && c["explained_by_noise"] == true, "{c}");
+}
+
+#[test]
+fn rubbish_is_two_with_a_remedy() {
+    let folder = folder(&["head"], "seed = 1\n[noise]\ntouch_um = 1.0\n", None);
+    let at = folder.path();
+    std::fs::write(at.join("broken.toml"), "machine = \"swivel-head\n").unwrap();
+    std::fs::write(at.join("binary.toml"), [0u8, 159, 146, 150]).unwrap();
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    std::fs::write(at.join("no-log.toml"), study.replace("head.log", "none.log")).unwrap();
+    std::fs::write(at.join("no-effect.toml"), study.replace("pretravel", "no-such-effect")).unwrap();
+    std::fs::write(at.join("mine-broken.toml"), "[[effect]]\nid = 3\n").unwrap();
+    let sketch: &[&str] = &["sketch-effect"];
+    for verb in [&["diagnose"][..], &["compare"], sketch] {
+        let more: &[&str] = if verb == sketch { &["--out", "mine.toml"] } else { &[] };
+        for file in ["missing.toml", "broken.toml", "binary.toml", "no-log.toml", "no-effect.toml", "."] {
+            let out = axiscal(at, &[verb, &[file], more].concat());
+            let said = String::from_utf8_lossy(&out.stderr).into_owned();
+            assert_eq!(out.status.code(), Some(2), "{verb:?} {file}: {said}");
+            assert!(said.contains("error:") && !said.contains("panicked"), "{verb:?} {file}: {said}");
+            // with --json nothing that is no answer stands on stdout
+            let out = axiscal(at, &[verb, &[file], more, &["--json"]].concat());
+            assert!(out.status.code() == Some(2) && out.stdout.is_empty(), "{verb:?} {file}");
+        }
+        assert_eq!(axiscal(at, &[verb, &["study.toml", "--no-such-option"]].concat()).status.code(), Some(2));
+    }
+    assert_eq!(axiscal(at, &["sketch-effect", "study.toml"]).status.code(), Some(2), "--out is needed");
+    let out = axiscal(at, &["sketch-effect", "study.toml", "--out", "mine-broken.toml"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(at.join("mine-broken.toml")).unwrap(), "[[effect]]\nid = 3\n", "left as it was");
+    // nothing is left over in the noise: nothing is written
+    let out = axiscal(at, &["sketch-effect", "study.toml", "--out", "mine.toml"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(!at.join("mine.toml").exists());
+}
+
+/// Seven teeth of the turntable's ring: nothing in the catalogue has seven periods.
+const TEETH: &str = "seed = 6\n[[harmonic]]\naxis = \"C\"\ndof = \"rz\"\nk = 7\ncos_urad = 160.0\nsin_urad = -90.0\n[noise]\ntouch_um = 1.0\n";
+
+#[test]
+fn a_sketch_finds_its_place_and_takes_the_error_away() {
+    let folder = folder(&["full"], TEETH, None);
+    let at = folder.path();
+    let (d, code) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!((d["verdict"].as_str(), code), (Some("unexplained"), 1), "{}", d["says"]);
+    assert_eq!(d["where"][0]["by"], "pose.C");
+    assert!(d["shape"]["x"].as_array().is_some_and(|x| x.len() > 10), "{d}");
+    std::fs::write(at.join("mine.toml"), "# effects of mine\n").unwrap();
+    let (made, code) = json(at, &["sketch-effect", "study.toml", "--out", "mine.toml"]);
+    assert_eq!(code, 0);
+    keys(&made, &["effect", "says", "formula", "file", "toml", "places"]);
+    let text = std::fs::read_to_string(at.join("mine.toml")).unwrap();
+    assert!(text.starts_with("# effects of mine\n"), "{text}");
+    // it is the turntable that turns by it; the other places stand beside it with what they would leave
+    assert!(text.contains("at = \"C\"") && text.contains("dof = \"rz\"") && text.contains("7*C"), "{text}");
+    assert!(
+        text.contains("# places that were tried") && text.contains("base (") && text.contains(" leaves "),
+        "{text}"
+    );
+    let left: Vec<f64> = made["places"].as_array().unwrap().iter().map(|p| p["left_um"].as_f64().unwrap()).collect();
+    assert!(left.len() > 5 && left[0] < 1.2 && left.iter().any(|l| *l > 1.2 * left[0]), "{left:?}");
+    // added to the model it leaves the noise
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    let study = study.replace("machine = \"swivel-head\"", "machine = \"swivel-head\"\neffects_file = [\"mine.toml\"]");
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    let (added, code) = json(at, &["add", "study.toml", made["effect"].as_str().unwrap()]);
+    assert_eq!(code, 0);
+    let after = &added["after"];
+    let (rms, noise) = (after["rms_um"].as_f64().unwrap(), after["noise_um"].as_f64().unwrap());
+    assert!(rms < 1.2 * noise, "{rms} um left of {noise} um noise");
+    assert_eq!(json(at, &["diagnose", "study.toml"]).1, 0);
+}
+
+/// A worn place that only the user knows, so deep that the touches at its bottom look like chips.
+const NOTCH: &str = "[[effect]]\nid = \"my-notch\"\nname = \"Notch of the turntable\"\nsays = \"The ring is worn at one place\"\nlook = \"Indicate it there\"\nat = \"C\"\nterms = [ { parameter = \"notch\", unit = \"urad\", dof = \"rz\", formula = \"exp(0 - ((C - 4.712)/0.25)^2)\", typical = 100.0 } ]\n";
+
+#[test]
+fn a_users_effect_is_a_candidate_and_its_touches_come_back() {
+    let wrong = "effects_file = \"own.toml\"\nseed = 3\n[effects.my-notch]\nnotch = 600.0\n[noise]\ntouch_um = 1.0\n";
+    let folder = folder(&["full"], wrong, Some(NOTCH));
+    let at = folder.path();
+    let before = json(at, &["diagnose", "study.toml"]).0;
+    assert!(before["candidates"].as_array().unwrap().iter().all(|c| c["effect"] != "my-notch"));
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    let study = study.replace("machine = \"swivel-head\"", "machine = \"swivel-head\"\neffects_file = [\"own.toml\"]");
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    let (d, code) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!((d["verdict"].as_str(), code), (Some("missing-effect"), 1), "{d}");
+    assert_eq!(d["candidates"][0]["effect"], "my-notch", "{}", d["candidates"][0]);
+    let size = d["candidates"][0]["parameters"][0]["value"].as_f64().unwrap();
+    assert!((size - 600.0).abs() < 60.0, "{size}");
+    let outliers = d["outliers"].as_array().expect("touches that look like chips");
+    let back = outliers.iter().filter(|o| o["comes_back"] == true).count();
+    assert!(outliers.len() > 3 && 10 * back >= 9 * outliers.len(), "{back} of {} come back", outliers.len());
+}
+
+#[test]
+fn a_mistake_is_named_where_most_touches_miss() {
+    for (parameter, says) in
+        [("flip_Y", "axis Y is counted the wrong way round"), ("flip_B", "axis B is counted the wrong way round")]
+    {
+        let wrong = format!("seed = 2\n[effects.sign-or-axis-swap]\n{parameter} = 1.0\n[noise]\ntouch_um = 1.0\n");
+        let folder = folder(&["head", "table"], &wrong, None);
+        let out = axiscal(folder.path(), &["diagnose", "study.toml", "--json"]);
+        // so few touches may be left that there is no fit at all: that is said, and is no crash
+        if out.status.code() == Some(2) {
+            assert!(String::from_utf8_lossy(&out.stderr).contains("error:"), "{parameter}");
+            continue;
+        }
+        let d: Value = serde_json::from_slice(&out.stdout).unwrap();
+        let text = format!("{} {}", d["says"], d["gross"]);
+        assert!(text.contains(says), "{parameter}: {text}");
+    }
+}
