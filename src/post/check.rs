@@ -280,7 +280,9 @@ impl Check<'_> {
                 self.error(&part.template.span(), "post::part", message, "give it another name");
             }
             self.origin(&format!("parts.{name}"), &part.source, &part.unverified, &part.template.span());
-            self.template(&mut env, name, &part.template);
+            // a part stands in lines of its own, whatever follows the tag that includes it; one line end is the engine's
+            let lines = format!("{}\n\n", part.template.get_ref().trim_end_matches('\n'));
+            self.template(&mut env, name, &Spanned::new(part.template.span(), lines));
         }
         for (index, companion) in file.companion.iter().enumerate() {
             let entry = format!("companion {}", companion.name.get_ref());
