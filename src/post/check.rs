@@ -254,6 +254,8 @@ impl Check<'_> {
 
     fn templates(&mut self, file: &w::File, comment: &CommentRule, number: &NumberRule) -> Environment<'static> {
         let mut env = environment(comment, number, *file.file.line_length.get_ref());
+        // globals reach into messages and macros too
+        env.add_global("settings", minijinja::Value::from(file.settings.clone()));
         let write = &file.write;
         let entries: [(&str, &Entry); 13] = [
             ("start", &write.start),

@@ -103,6 +103,8 @@ pub(super) struct Writer<'a> {
     last: Named,
     /// Approach of the touch made last, and the way back off it: what its retract may use.
     approach: Vec<Value>,
+    heading_back: Vec<Value>,
+    way: String,
     back_off: String,
     /// A move has been written.
     moving: bool,
@@ -144,6 +146,8 @@ impl<'a> Writer<'a> {
             open_setup: None,
             last: Named::default(),
             approach: Vec::new(),
+            heading_back: Vec::new(),
+            way: String::new(),
             back_off: String::new(),
             moving: false,
         };
@@ -210,7 +214,6 @@ impl<'a> Writer<'a> {
             next_says => next.says,
             last => self.last.id,
             last_says => self.last.says.clone(),
-            settings => map(self.post.settings.clone()),
             result => of_axes(&|a| self.result(a)),
             axes => names(&self.axes),
             rotary => names(&rotary),
@@ -340,16 +343,23 @@ impl<'a> Writer<'a> {
                 }
                 let named = self.linear_words(to)?;
                 let words = self.words(&named)?;
-                let (way, length) = self.straight(to, &named);
-                self.render("protected", context! { to => words, feed => self.feed(*feed)?, way, length })?;
+                let (heading, length) = self.straight(to, &named);
+                self.render("protected", context! { to => words, feed => self.feed(*feed)?, heading, length })?;
                 self.moved(to);
                 Ok(())
             }
             Step::Touch(touch) => self.touch(touch),
             Step::Retract { to, feed } => {
                 let words = self.words(&self.linear_words(to)?)?;
-                let (approach, back_off) = (self.approach.clone(), self.back_off.clone());
-                self.render("retract", context! { to => words, feed => self.feed(*feed)?, approach, back_off })?;
+                let context = context! {
+                    to => words,
+                    feed => self.feed(*feed)?,
+                    approach => self.approach.clone(),
+                    heading => self.heading_back.clone(),
+                    way => self.way.clone(),
+                    back_off => self.back_off.clone(),
+                };
+                self.render("retract", context)?;
                 self.moved(to);
                 Ok(())
             }
@@ -465,6 +475,12 @@ impl<'a> Writer<'a> {
         };
         self.render("touch", context)?;
         self.approach = approach;
+        let back = |axis: AxisName| {
+            let direction = self.number(-direction[axis.index()]);
+            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction }
+        };
+        self.heading_back = target.iter().map(|(axis, _)| back(axis)).collect();
+        self.way = self.length((nominal - start).norm());
         self.back_off = self.length(touch.back_off_mm);
         self.at = touch.end.or(&stands);
         self.loose = true;
@@ -556,7 +572,13 @@ impl Postprocessor {
 
     /// Renders one template; a failure names the template and its line.
     pub(super) fn render(&self, template: &str, context: Value) -> Result<String> {
-        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|e| {
+        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|outer| {
+            // an error in an included part stands behind the one that says which part
+            let mut e = &outer;
+            while let Some(inner) = std::error::Error::source(e).and_then(|s| s.downcast_ref::<minijinja::Error>()) {
+                e = inner;
+            }
+            let template = e.name().unwrap_or(template);
             let line = e.line().map(|l| format!(", line {l}")).unwrap_or_default();
             let mut detail = e.detail().map_or_else(|| e.kind().to_string(), str::to_owned);
             if e.kind() == minijinja::ErrorKind::UndefinedError {
