@@ -5,19 +5,23 @@
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
 pub mod csv;
+mod fast;
 mod lines;
 mod matching;
 mod parse;
 mod place;
 mod record;
 mod rows;
+mod runs;
+mod stretch;
 mod swaps;
 pub mod touch;
 mod words;
 
 pub use matching::match_to_plan;
-pub use parse::{Ending, ParsedLog, Rejected, parse};
+pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use record::LogHeader;
+pub use runs::RunFound;
 pub use touch::{RawTouch, Status, Touch};
 
 use crate::axes::{AxisMap, AxisName};
@@ -45,8 +49,8 @@ pub struct MatchedLog {
     pub complete: bool,
     /// How the log ends.
     pub ending: Ending,
-    /// How many runs the log holds.
-    pub runs: usize,
+    /// The runs that the log holds.
+    pub runs: Vec<RunFound>,
 }
 
 /// Reads a log and matches it to its plan.
@@ -60,16 +64,31 @@ pub fn read(
     machine: &Machine,
     plan: &Plan,
 ) -> Result<(MatchedLog, Findings)> {
+    read_run(bytes, name, writer, machine, plan, None)
+}
+
+/// The same for the run of this number, from 1, in a log that holds several.
+///
+/// # Errors
+/// As [`read`], and when there is no such run.
+pub fn read_run(
+    bytes: &[u8],
+    name: &str,
+    writer: Writer<'_>,
+    machine: &Machine,
+    plan: &Plan,
+    run: Option<usize>,
+) -> Result<(MatchedLog, Findings)> {
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
-        Writer::Controller(post) => parse(bytes, name, post)?,
+        Writer::Controller(post) => parse_run(bytes, name, post, run)?,
         Writer::Csv => {
             let (touches, findings) = csv::read(bytes, name)?;
             let per_touch = Vec::new();
             let unnamed = findings.0.iter().any(|f| f.code == "log::not_understood");
             let rejected = Rejected { ids: Vec::new(), unnamed };
             let ending = Ending::Unmarked;
-            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: 1 }, findings)
+            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: Vec::new() }, findings)
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());

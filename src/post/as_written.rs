@@ -240,6 +240,27 @@ pub struct Log {
     /// `.` or `,`
     #[schemars(with = "String")]
     pub decimal_mark: Spanned<String>,
+    /// The other decimal mark, where a setting of the control chooses between the two: a log that uses it is read too.
+    #[schemars(with = "Option<String>")]
+    pub other_decimal_mark: Option<Spanned<String>>,
+    /// What X, Y and Z are in; the head of the log says it too, and what it says counts.
+    #[serde(default)]
+    pub unit: LengthUnit,
+    /// Places before the mark that the control fills with blanks; 0: it pads nothing.
+    #[schemars(with = "Option<usize>")]
+    pub whole_places: Option<Spanned<usize>>,
+    /// Where the blanks stand.
+    #[serde(default)]
+    pub padding: Padding,
+    /// What the control puts before each line, e.g. `;` where the log is a program file; lines without it are read too.
+    #[serde(default)]
+    pub prefix: String,
+    /// Lines that begin like this are the control's own and no part of the log.
+    #[serde(default)]
+    pub skip: Vec<String>,
+    /// Letter of the word with the time of the touch, s since the program began, where the control can give it.
+    #[schemars(with = "Option<String>")]
+    pub time_word: Option<Spanned<String>>,
     /// Letter of the word with the sum of all other numbers of the line, where the control can write one.
     #[schemars(with = "Option<String>")]
     pub check_word: Option<Spanned<String>>,
@@ -249,6 +270,28 @@ pub struct Log {
     pub source: Option<String>,
     /// Why it is not verified.
     pub unverified: Option<String>,
+}
+
+/// What lengths are in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LengthUnit {
+    /// Millimetres.
+    #[default]
+    Mm,
+    /// Inches.
+    Inch,
+}
+
+/// Where a control pads a number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Padding {
+    /// `X  -1.500`: the sign is one of the places.
+    #[default]
+    BeforeSign,
+    /// `X-   1.500`, `X    1.500`: the sign has a place of its own.
+    AfterSign,
 }
 
 /// A log of nothing but columns.

@@ -180,12 +180,33 @@ impl Check<'_> {
             let help = "name at least one of \"lf\", \"crlf\", \"cr\"";
             self.error(&log.file.span(), "post::end_of_line", "[log] end_of_line is empty".into(), help);
         }
-        let check_word = log.check_word.as_ref().and_then(|word| {
-            let free =
-                |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
-            self.word("check_word", word, free, "one capital letter that is no axis and none of N S U H P E");
-            word.get_ref().bytes().next()
+        let free = |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
+        let mut letter = |what: &str, word: &Option<Spanned<String>>| {
+            word.as_ref().and_then(|word| {
+                self.word(what, word, free, "one capital letter that is no axis and none of N S U H P E");
+                word.get_ref().bytes().next()
+            })
+        };
+        let check_word = letter("check_word", &log.check_word);
+        let time_word = letter("time_word", &log.time_word);
+        if let Some(word) = log.time_word.as_ref().filter(|_| check_word == time_word) {
+            let help = "two words of a line need two letters";
+            self.error(&word.span(), "post::word", "time_word is check_word".into(), help);
+        }
+        let whole_places = log.whole_places.as_ref().map_or(0, |places| {
+            if *places.get_ref() > 12 {
+                let message = format!("whole_places is {}", places.get_ref());
+                self.error(&places.span(), "post::whole_places", message, "0 to 12");
+            }
+            (*places.get_ref()).min(12)
         });
+        let mark = if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' };
+        let other_mark =
+            log.other_decimal_mark.as_ref().map(|other| if self.mark(other) == ',' { b',' } else { b'.' });
+        if let Some(word) = log.other_decimal_mark.as_ref().filter(|_| other_mark == Some(mark)) {
+            let help = "leave it out, or name the mark that decimal_mark does not name";
+            self.error(&word.span(), "post::word", "other_decimal_mark is decimal_mark".into(), help);
+        }
         let columns = log.columns.as_ref().map(|columns| {
             self.origin("log.columns", &columns.source, &columns.unverified, &columns.axes.span());
             let axes: Vec<_> = columns.axes.get_ref().iter().map(|a| axis_of(a)).collect();
@@ -207,7 +228,14 @@ impl Check<'_> {
             end_of_line: log.end_of_line.clone(),
             decimals: self.decimals(&log.decimals),
             exact_decimals: log.exact_decimals,
-            mark: if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' },
+            mark,
+            other_mark,
+            unit: log.unit,
+            whole_places,
+            padding: log.padding,
+            prefix: log.prefix.clone(),
+            skip: log.skip.clone(),
+            time_word,
             check_word,
             columns,
         }

@@ -22,7 +22,7 @@ pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, source};
-use as_written::{EndOfLine, Role};
+use as_written::{EndOfLine, LengthUnit, Padding, Role};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -85,6 +85,20 @@ pub struct LogRule {
     pub exact_decimals: bool,
     /// `.` or `,`
     pub mark: u8,
+    /// The other one, where a setting of the control chooses.
+    pub other_mark: Option<u8>,
+    /// What X, Y and Z are in.
+    pub unit: LengthUnit,
+    /// Places before the mark that are filled with blanks.
+    pub whole_places: usize,
+    /// Where the blanks stand.
+    pub padding: Padding,
+    /// Before each line.
+    pub prefix: String,
+    /// Beginnings of lines that are the control's own.
+    pub skip: Vec<String>,
+    /// Letter of the word with the time, s since the program began.
+    pub time_word: Option<u8>,
     /// Letter of the word with the sum of all other numbers of the line: it shows a damaged digit.
     pub check_word: Option<u8>,
     /// A file of nothing but columns.
