@@ -137,11 +137,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
                 _ => return Err(Fault::at(line, word, width, "log::status", "status S is 1 (hit) or 0 (miss)")),
             });
         } else if Some(*letter) == rule.time_word {
-            if value.value < 0.0 {
-                return Err(Fault::at(line, word, width, "log::time", "a time before the beginning"));
-            }
             time_s = Some(value.value);
-            sum += value.value;
         } else {
             exact(line, word, width, value, rule)?;
             check = Some((value.value, word, width));

@@ -47,6 +47,9 @@ pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         extension: file.file.extension.get_ref().clone(),
         end_of_line: file.file.end_of_line,
         line_length: *file.file.line_length.get_ref(),
+        blank_lines: file.file.blank_lines,
+        block_numbers: file.file.block_numbers.clone(),
+        coordinates: file.number.coordinates,
         number,
         comment,
         settings: file.settings.clone(),
@@ -160,6 +163,7 @@ impl Check<'_> {
             open: comment.open.clone(),
             close: comment.close.clone(),
             width: width.max(20),
+            message_width: comment.message_width,
             replace,
             other: comment.other.clone(),
             capitals: comment.capitals,
@@ -235,8 +239,8 @@ impl Check<'_> {
             padding: log.padding,
             prefix: log.prefix.clone(),
             skip: log.skip.clone(),
-            time_word,
             check_word,
+            time_word,
             columns,
         }
     }
@@ -304,6 +308,9 @@ fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away
         let mut clean = rule.clean(&text);
+        if let Some(width) = rule.message_width {
+            clean = clean.chars().take(width).collect();
+        }
         let template = state.env().get_template("message")?;
         loop {
             let filled = match &value {

@@ -24,6 +24,8 @@ pub struct LogRecord {
     pub status: Status,
     /// Axis positions at the trigger (at the end of the search for a miss).
     pub position: Position,
+    /// When, on any clock, s; written where the control's program writes times.
+    pub time_s: Option<f64>,
 }
 
 /// Version of the log's form.
@@ -109,6 +111,9 @@ impl Postprocessor {
                 // ids are small: a double holds them
                 let sum = record.id as f64 + f64::from(status) + axes.iter().map(|a| shown.get(*a)).sum::<f64>();
                 let _ = write!(line, " {}{}", letter as char, self.log.number(sum));
+            }
+            if let (Some(letter), Some(time)) = (self.log.time_word, record.time_s) {
+                let _ = write!(line, " {}{}", letter as char, self.log.number(time));
             }
             lines.push(line);
         }
