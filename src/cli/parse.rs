@@ -5,7 +5,7 @@ use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::{Result, source};
 use crate::files;
-use crate::log::{self, Ending, MatchedLog, Status, Touch, Writer};
+use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch, Writer};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
@@ -27,6 +27,9 @@ pub struct Args {
     /// A machines.toml of your own (default: the one built in)
     #[arg(long, value_name = "FILE")]
     pub machines: Option<PathBuf>,
+    /// Which run, where the log holds several (default: the last complete one)
+    #[arg(long, value_name = "N")]
+    pub run: Option<usize>,
     /// Where to write the touches (CSV)
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -42,6 +45,8 @@ struct Parsed<'a> {
     complete: bool,
     end: String,
     runs: usize,
+    run: Option<usize>,
+    run_list: Vec<serde_json::Value>,
     planned: usize,
     hits: usize,
     misses: usize,
@@ -68,7 +73,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     let writer = post.as_ref().map_or(Writer::Csv, Writer::Controller);
     let bytes = files::read_bytes(&args.log)?;
-    let (read, findings) = log::read(&bytes, &args.log.display().to_string(), writer, &machine, &plan)?;
+    let (read, findings) = log::read_run(&bytes, &args.log.display().to_string(), writer, &machine, &plan, args.run)?;
     io.report(&findings.0);
     if let Some(out) = &args.out {
         files::write_whole(out, log::csv::write(&machine, &read.touches).as_bytes())?;
@@ -79,6 +84,15 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     io.answer(&answer(&machine, &plan, &read));
     Ok(Answer::Done)
+}
+
+/// A run as it is offered.
+fn run_record(run: &RunFound) -> serde_json::Value {
+    let RunFound { number, first_line, last_line, touches, complete, taken } = *run;
+    serde_json::json!({
+        "run": number, "first_line": first_line, "last_line": last_line, "touches": touches, "complete": complete,
+        "taken": taken,
+    })
 }
 
 fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a> {
@@ -103,7 +117,9 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
         program: &plan.program,
         complete: read.complete,
         end: end_says(read),
-        runs: read.runs,
+        runs: read.runs.len().max(1),
+        run: read.runs.iter().find(|r| r.taken).map(|r| r.number),
+        run_list: read.runs.iter().map(run_record).collect(),
         planned: plan.touches.len(),
         hits,
         misses: read.touches.len() - hits,

@@ -120,7 +120,6 @@ pub fn touch(bytes: &[u8], line_number: usize, table: &Table) -> Option<(RawTouc
             Word::Time => {
                 let (value, tail) = any_decimal(after, table.mark)?;
                 time_s = Some(value.0);
-                sum += value.0;
                 rest = tail;
             }
             Word::None => return None,

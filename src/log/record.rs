@@ -137,6 +137,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
                 _ => return Err(Fault::at(line, word, width, "log::status", "status S is 1 (hit) or 0 (miss)")),
             });
         } else if Some(*letter) == rule.time_word {
+            // any clock, any zero; the sum is that of what was measured
             time_s = Some(value.value);
         } else {
             exact(line, word, width, value, rule)?;
@@ -165,10 +166,9 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
 
 /// How far the sum that a line gives may be from the sum of its numbers.
 ///
-/// Every position, a time and the sum itself are rounded by at most half a digit; with a little room for the doubles.
+/// Every position and the sum itself are rounded by at most half a digit; with a little room for the doubles.
 pub fn sum_room(rule: &LogRule, n_axes: usize) -> f64 {
-    let rounded = n_axes as f64 + 1.0 + if rule.time_word.is_some() { 1.0 } else { 0.0 };
-    rounded * (0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0))) + 1e-9
+    (n_axes as f64 + 1.0) * (0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0))) + 1e-9
 }
 
 fn axis_of(letter: u8) -> Option<AxisName> {
