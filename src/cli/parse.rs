@@ -5,9 +5,8 @@ use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::{Result, source};
 use crate::files;
-use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch, Writer};
+use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch};
 use crate::machine::Machine;
-use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use comfy_table::CellAlignment;
 use serde::Serialize;
@@ -18,7 +17,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// The log that the probing program wrote
     pub log: PathBuf,
-    /// Controller that wrote it: a name (`axiscal controllers` lists them), a postprocessor FILE.toml, or `csv`
+    /// Controller that wrote it: a name (`axiscal controllers` lists them), a FILE.toml of your own, `msr` (inspection results), or `csv`
     #[arg(long, value_name = "NAME|FILE")]
     pub controller: String,
     /// The plan that `generate` wrote together with the program
@@ -63,17 +62,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let (plan, findings) = Plan::parse(&plan_source)?;
     io.report(&findings.0);
     let machine = load_machine(&plan.machine, args.machines.as_deref(), io)?;
-    let post = match args.controller.as_str() {
-        "csv" => None,
-        word => {
-            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
-            io.report(&findings);
-            Some(post)
-        }
-    };
-    let writer = post.as_ref().map_or(Writer::Csv, Writer::Controller);
+    let (reader, findings) = log::Reader::load(&args.controller, files::read_text)?;
+    io.report(&findings);
     let bytes = files::read_bytes(&args.log)?;
-    let (read, findings) = log::read_run(&bytes, &args.log.display().to_string(), writer, &machine, &plan, args.run)?;
+    let (read, findings) = log::read_run(&bytes, &args.log.display().to_string(), reader.writer(), &machine, &plan, args.run)?;
     io.report(&findings.0);
     if let Some(out) = &args.out {
         files::write_whole(out, log::csv::write(&machine, &read.touches).as_bytes())?;

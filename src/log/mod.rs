@@ -10,6 +10,8 @@ mod lines;
 mod matching;
 mod parse;
 mod place;
+pub mod points;
+mod reader;
 mod record;
 mod rows;
 mod runs;
@@ -20,6 +22,7 @@ mod words;
 
 pub use matching::match_to_plan;
 pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
+pub use reader::Reader;
 pub use record::LogHeader;
 pub use runs::RunFound;
 pub use touch::{RawTouch, Status, Touch};
@@ -36,6 +39,8 @@ use place::Places;
 pub enum Writer<'a> {
     /// A control, with its postprocessor.
     Controller(&'a Postprocessor),
+    /// Inspection results of another program.
+    Points(&'a points::PointsForm),
     /// The project's own form, `controller = "csv"`.
     Csv,
 }
@@ -82,6 +87,16 @@ pub fn read_run(
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
         Writer::Controller(post) => parse_run(bytes, name, post, run)?,
+        Writer::Points(form) => {
+            let (read, findings) = points::parse(bytes, name, form, run)?;
+            let (touches, unclear, more) = points::touches(machine, plan, &read, form, &places)
+                .map_err(|f| Failure([findings.0.clone(), f.0].concat()))?;
+            let ending = if read.ended { Ending::Line } else { Ending::CutOff };
+            let rejected = Rejected { ids: unclear, unnamed: false };
+            let findings = Findings([findings.0, more.0].concat());
+            let (per_touch, runs) = (Vec::new(), read.runs);
+            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs }, findings)
+        }
         Writer::Csv => {
             let (touches, findings) = csv::read(bytes, name)?;
             let per_touch = Vec::new();

@@ -247,6 +247,9 @@ fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault
     };
     let mut words = (word, word, word, word, word, word);
     let (tail, (mark, version, controller, machine, program, digest)) = words.parse(rest).map_err(|_| fault(form))?;
+    if digest.len() != 12 || !digest.iter().all(u8::is_ascii_hexdigit) {
+        return Err(fault(form));
+    }
     if mark != b"AXISCAL" || version != crate::post::LOG_VERSION.to_string().as_bytes() {
         return Err(fault("this is not the head of a log of this version of axiscal"));
     }

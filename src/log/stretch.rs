@@ -155,7 +155,7 @@ pub fn looks_like_columns(bytes: &[u8]) -> bool {
 }
 
 /// The first byte of a line that is no text says more than what the grammar makes of it.
-fn no_text(line: &[u8], start: usize) -> Option<Fault> {
+pub(super) fn no_text(line: &[u8], start: usize) -> Option<Fault> {
     let at = line.iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?;
     // what a punch writes may stand before the words
     let at = if line[..at].iter().all(|b| *b == b' ') && super::lines::is_tape(line[at]) {
