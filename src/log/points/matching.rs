@@ -34,8 +34,8 @@ pub fn touches(
     let mut findings = Findings::default();
     let (pairs, unclear) = pair(plan, &points.points, places, &mut findings);
     if pairs.is_empty() && unclear.is_empty() {
-        findings.push(none_fits(plan, &points.points, form, places));
-        return Err(Failure(findings.0));
+        // that says it all: not each point on its own
+        return Err(none_fits(plan, &points.points, form, places).into());
     }
     let mut out = Vec::with_capacity(pairs.len());
     let mut other_ball = Capped::few();
