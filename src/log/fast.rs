@@ -118,8 +118,9 @@ pub fn touch(bytes: &[u8], line_number: usize, table: &Table) -> Option<(RawTouc
                 rest = tail;
             }
             Word::Time => {
-                let (value, tail) = any_decimal(after, table.mark)?;
-                time_s = Some(value.0);
+                let (value, tail) = decimal(after, table)?;
+                time_s = Some(value);
+                sum += value;
                 rest = tail;
             }
             Word::None => return None,

@@ -97,7 +97,7 @@ fn show(bytes: &[u8]) -> String {
 
 fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Result<RawTouch, Fault> {
     let mut seen = [false; 256];
-    let (mut id, mut status, mut check, mut time_s) = (None, None, None, None);
+    let (mut id, mut status, mut check) = (None, None, None);
     let mut position = Position::default();
     let mut present = [false; 6];
     let mut sum = 0.0;
@@ -137,8 +137,10 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
                 _ => return Err(Fault::at(line, word, width, "log::status", "status S is 1 (hit) or 0 (miss)")),
             });
         } else if Some(*letter) == rule.time_word {
-            // any clock, any zero; the sum is that of what was measured
+            // any clock, any zero
+            exact(line, word, width, value, rule)?;
             time_s = Some(value.value);
+            sum += value.value;
         } else {
             exact(line, word, width, value, rule)?;
             check = Some((value.value, word, width));
@@ -166,9 +168,10 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
 
 /// How far the sum that a line gives may be from the sum of its numbers.
 ///
-/// Every position and the sum itself are rounded by at most half a digit; with a little room for the doubles.
+/// Every position, a time and the sum itself are rounded by at most half a digit; with a little room for the doubles.
 pub fn sum_room(rule: &LogRule, n_axes: usize) -> f64 {
-    (n_axes as f64 + 1.0) * (0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0))) + 1e-9
+    let rounded = n_axes as f64 + 1.0 + if rule.time_word.is_some() { 1.0 } else { 0.0 };
+    rounded * (0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0))) + 1e-9
 }
 
 fn axis_of(letter: u8) -> Option<AxisName> {

@@ -75,8 +75,6 @@ impl Reader<'_> {
             Ok(Record::Touch(_)) if !line.ended() && (self.columns.is_some() || self.rule.check_word.is_none()) => {
                 Err(Fault::at(bytes, &bytes[bytes.len()..], 1, "log::cut_line", "the last line has no end"))
             }
-            // its time, behind the sum, may be cut off
-            Ok(Record::Touch(touch)) if !line.ended() => Ok(Record::Touch(RawTouch { time_s: None, ..touch })),
             Err(fault) => Err(no_text(bytes, line.start).unwrap_or(fault)),
             record => record,
         }
