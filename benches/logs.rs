@@ -50,10 +50,8 @@ fn main() {
 fn row(controller: &str, problem: &Problem, peers: &Peers, folder: &Path, repeats: usize) -> String {
     let (post, _) = Postprocessor::load_built_in_or_file(controller).unwrap();
     let Problem { machine, plan, touches, .. } = problem;
-    let records: Vec<LogRecord> = touches
-        .iter()
-        .map(|t| LogRecord { id: t.id, status: t.status, position: t.position, time_s: None })
-        .collect();
+    let records: Vec<LogRecord> =
+        touches.iter().map(|t| LogRecord { id: t.id, status: t.status, position: t.position, time_s: None }).collect();
     let text = post.log_text(machine, plan, &records);
     let log_file = folder.join(format!("{controller}.log"));
     std::fs::write(&log_file, &text).unwrap();
@@ -105,8 +103,7 @@ fn as_csv(log: &str) -> String {
     for line in log.lines().filter(|l| l.starts_with('P')) {
         let words = line[1..].trim_start();
         if out.is_empty() {
-            let letters: Vec<String> =
-                words.chars().filter(char::is_ascii_uppercase).map(|c| c.to_string()).collect();
+            let letters: Vec<String> = words.chars().filter(char::is_ascii_uppercase).map(|c| c.to_string()).collect();
             out.push_str(&letters.join(","));
             out.push('\n');
         }

@@ -49,7 +49,10 @@ fn the_public_files_give_what_their_own_tests_expect() {
         ("Extra-Ordinate.msr", Refused("log::word_twice", "36:31", "the word Y stands twice")),
         ("G330-Detransformed.msr", Read(81)),
         ("G330-Untransformed.msr", Read(81)),
-        ("Line-Number-Error.msr", Refused("log::order", "9:1", "the centre is of point N3, the nominal point before it is N2")),
+        (
+            "Line-Number-Error.msr",
+            Refused("log::order", "9:1", "the centre is of point N3, the nominal point before it is N2"),
+        ),
         ("Missing-G800-Line.msr", Refused("log::order", "12:1", "the line G800 N4 is missing before this one")),
         ("Missing-G801-Line.msr", Refused("log::order", "19:1", "the line G801 N7 is missing")),
         ("No-Data.msr", Refused("log::nothing", "1:1", "the file holds no point")),
@@ -77,8 +80,12 @@ fn the_public_files_give_what_their_own_tests_expect() {
             _ => false,
         };
         if !right {
-            let found = found.map(|(p, f)| (p.points.len(), p.ended, f.iter().map(ToString::to_string).collect::<Vec<_>>()));
-            wrong.push(format!("{name}: {:?}", found.map_err(|f| f.iter().map(ToString::to_string).collect::<Vec<_>>())));
+            let found =
+                found.map(|(p, f)| (p.points.len(), p.ended, f.iter().map(ToString::to_string).collect::<Vec<_>>()));
+            wrong.push(format!(
+                "{name}: {:?}",
+                found.map_err(|f| f.iter().map(ToString::to_string).collect::<Vec<_>>())
+            ));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -65,7 +65,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let (reader, findings) = log::Reader::load(&args.controller, files::read_text)?;
     io.report(&findings);
     let bytes = files::read_bytes(&args.log)?;
-    let (read, findings) = log::read_run(&bytes, &args.log.display().to_string(), reader.writer(), &machine, &plan, args.run)?;
+    let (read, findings) =
+        log::read_run(&bytes, &args.log.display().to_string(), reader.writer(), &machine, &plan, args.run)?;
     io.report(&findings.0);
     if let Some(out) = &args.out {
         files::write_whole(out, log::csv::write(&machine, &read.touches).as_bytes())?;

@@ -103,7 +103,10 @@ pub fn read_run(
             let unnamed = findings.0.iter().any(|f| f.code == "log::not_understood");
             let rejected = Rejected { ids: Vec::new(), unnamed };
             let ending = Ending::Unmarked;
-            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: Vec::new() }, findings)
+            (
+                ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: Vec::new() },
+                findings,
+            )
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());

@@ -142,7 +142,8 @@ pub fn parse_run(
 /// The log was written by another controller than the one that is named.
 fn other_controller(header: &LogHeader, post: &Postprocessor, places: &Places<'_>, findings: &mut Findings) {
     if header.controller != log_word(&post.name) {
-        let message = format!("the head says that {} wrote this log, it is read as one of {}", header.controller, post.name);
+        let message =
+            format!("the head says that {} wrote this log, it is read as one of {}", header.controller, post.name);
         let finding = Finding::warning("log::other_controller", message)
             .help("positions mean the same on all of them; spelling and rounding may differ");
         findings.push(places.at_line(finding, header.line));
@@ -159,7 +160,10 @@ fn with_its_mark<'r>(
     let Some(other) = rule.other_mark else { return Cow::Borrowed(rule) };
     let has = |mark: u8| {
         let touch = |l: &Line<'_>| begin(l.bytes, rule).first() == Some(&b'P');
-        Lines::new(bytes, 0).filter(touch).take(16).find_map(|l| l.bytes.iter().position(|b| *b == mark).map(|i| l.start + i))
+        Lines::new(bytes, 0)
+            .filter(touch)
+            .take(16)
+            .find_map(|l| l.bytes.iter().position(|b| *b == mark).map(|i| l.start + i))
     };
     match (has(rule.mark), has(other)) {
         (None, Some(at)) => {
@@ -230,8 +234,7 @@ fn line_ends(
     let some = if ends.iter().filter(|e| **e).count() > 1 { "some" } else { "the" };
     let at = line.start + line.bytes.len();
     let message = format!("{some} lines end with {}; {} writes others", found.says(), post.name);
-    let finding = Finding::warning("log::line_ends", message).help(
-        "they are read all the same; was the log opened in an editor? prefer the file as the control wrote it",
-    );
+    let finding = Finding::warning("log::line_ends", message)
+        .help("they are read all the same; was the log opened in an editor? prefer the file as the control wrote it");
     findings.push(places.at(finding, at..at + 1));
 }

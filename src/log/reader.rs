@@ -24,7 +24,7 @@ impl Reader {
     ///
     /// # Errors
     /// When there is none of that name, or the file is unusable; the message lists what there is.
-    pub fn load(word: &str, read: impl FnOnce(&Path) -> Result<String>) -> Result<(Self, Vec<Finding>)> {
+    pub fn load(word: &str, read: impl Fn(&Path) -> Result<String>) -> Result<(Self, Vec<Finding>)> {
         if word == "csv" {
             return Ok((Self::Csv, Vec::new()));
         }
@@ -34,7 +34,7 @@ impl Reader {
             if PointsForm::is_one(file.inner()) {
                 return PointsForm::parse(&file).map(|(form, f)| (Self::Points(Box::new(form)), f.0));
             }
-            return crate::post::parse(&file).map(|(post, f)| (Self::Controller(Box::new(post)), f.0));
+            return Postprocessor::load(word, read).map(|(post, f)| (Self::Controller(Box::new(post)), f));
         }
         if let Some(form) = PointsForm::built_in()?.into_iter().find(|f| f.name == word) {
             return Ok((Self::Points(Box::new(form)), Vec::new()));

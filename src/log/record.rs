@@ -97,7 +97,7 @@ fn show(bytes: &[u8]) -> String {
 
 fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Result<RawTouch, Fault> {
     let mut seen = [false; 256];
-    let (mut id, mut status, mut check) = (None, None, None);
+    let (mut id, mut status, mut check, mut time_s) = (None, None, None, None);
     let mut position = Position::default();
     let mut present = [false; 6];
     let mut sum = 0.0;
@@ -245,9 +245,8 @@ fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault
     if !rest.is_ascii() {
         return Err(fault("the head of a run holds characters that are not ASCII"));
     }
-    let word = |input| -> IResult<&[u8], &[u8]> {
-        preceded(space1, take_till1(|b: u8| b == b' ' || b == b'\t')).parse(input)
-    };
+    let word =
+        |input| -> IResult<&[u8], &[u8]> { preceded(space1, take_till1(|b: u8| b == b' ' || b == b'\t')).parse(input) };
     let mut words = (word, word, word, word, word, word);
     let (tail, (mark, version, controller, machine, program, digest)) = words.parse(rest).map_err(|_| fault(form))?;
     if digest.len() != 12 || !digest.iter().all(u8::is_ascii_hexdigit) {
@@ -272,7 +271,13 @@ fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault
     });
     let text = |word: &[u8]| String::from_utf8_lossy(word).into_owned();
     let (touches, setup) = numbers.ok_or_else(|| {
-        Fault::at(line, tail, tail.len(), "log::head", "the head of a run ends with its unit MM or INCH, N and the count of touches, U and the first set-up")
+        Fault::at(
+            line,
+            tail,
+            tail.len(),
+            "log::head",
+            "the head of a run ends with its unit MM or INCH, N and the count of touches, U and the first set-up",
+        )
     })?;
     Ok(LogHeader {
         controller: text(controller),

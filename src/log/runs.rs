@@ -89,7 +89,9 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>]) -> Vec<Run> {
             What::Head(header) => {
                 let goes_on = header.setup > 1
                     && run.end.is_none()
-                    && run.header.as_ref().is_none_or(|h| h.digest == header.digest && h.program == header.program && h.unit == header.unit);
+                    && run.header.as_ref().is_none_or(|h| {
+                        h.digest == header.digest && h.program == header.program && h.unit == header.unit
+                    });
                 if goes_on && (run.header.is_some() || run.count() > 0) {
                     run.header.get_or_insert_with(|| (**header).clone());
                     run.last_line = number;

@@ -67,7 +67,9 @@ impl Reader<'_> {
     pub fn line(&self, line: &Line<'_>) -> Result<Record, Fault> {
         let bytes = without_trailer(line.bytes);
         let record = match self.columns {
-            Some(columns) => row(bytes, line.number, columns, self.rule).map(|r| r.map_or(Record::Blank, Record::Touch)),
+            Some(columns) => {
+                row(bytes, line.number, columns, self.rule).map(|r| r.map_or(Record::Blank, Record::Touch))
+            }
             None => record(bytes, line.number, self.rule),
         };
         match record {
@@ -82,8 +84,7 @@ impl Reader<'_> {
 
     /// Could a line that is not understood have been a touch?
     pub fn may_be_touch(&self, line: &Line<'_>) -> bool {
-        self.columns.is_some()
-            || begin(line.bytes, self.rule).first().is_some_and(|b| b.eq_ignore_ascii_case(&b'P'))
+        self.columns.is_some() || begin(line.bytes, self.rule).first().is_some_and(|b| b.eq_ignore_ascii_case(&b'P'))
     }
 
     /// Reads lines, the first of which begins at `start` of the log.

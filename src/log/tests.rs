@@ -14,7 +14,8 @@ fn post() -> Postprocessor {
 
 /// All that are built in.
 fn posts() -> &'static [Postprocessor] {
-    static ALL: std::sync::LazyLock<Vec<Postprocessor>> = std::sync::LazyLock::new(|| Postprocessor::built_in().unwrap());
+    static ALL: std::sync::LazyLock<Vec<Postprocessor>> =
+        std::sync::LazyLock::new(|| Postprocessor::built_in().unwrap());
     &ALL
 }
 
@@ -52,7 +53,10 @@ fn what_the_machine_would_write_is_read_back() {
                 assert_eq!(touch.id, record.id);
                 for (a, b) in touch.position.0.iter().zip(record.position.0) {
                     // half a digit; a turn of the frame may add a last digit
-                    assert!((a - b).abs() < 1.1 * 10f64.powi(-i32::try_from(post.log.decimals).unwrap()), "{name} {frame:?} {touch:?}");
+                    assert!(
+                        (a - b).abs() < 1.1 * 10f64.powi(-i32::try_from(post.log.decimals).unwrap()),
+                        "{name} {frame:?} {touch:?}"
+                    );
                 }
             }
         }

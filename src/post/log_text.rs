@@ -113,7 +113,10 @@ impl Postprocessor {
             }
             if let Some(letter) = self.log.check_word {
                 // ids are small: a double holds them
-                let sum = record.id as f64 + f64::from(status) + axes.iter().map(|a| shown.get(*a)).sum::<f64>() + time_s.unwrap_or(0.0);
+                let sum = record.id as f64
+                    + f64::from(status)
+                    + axes.iter().map(|a| shown.get(*a)).sum::<f64>()
+                    + time_s.unwrap_or(0.0);
                 let _ = write!(line, " {}{}", letter as char, self.log.number(sum));
             }
             lines.push(line);

@@ -89,7 +89,11 @@ impl PointsForm {
             findings.push(Finding::error("form::word", message).help(help).at(source, at.span()));
         };
         if w.format.get_ref() != FORMAT {
-            error(&w.format, format!("format is {:?}, expected {FORMAT:?}", w.format.get_ref()), "write the format line of this version");
+            error(
+                &w.format,
+                format!("format is {:?}, expected {FORMAT:?}", w.format.get_ref()),
+                "write the format line of this version",
+            );
         }
         if !matches!(w.decimal_mark.get_ref().as_str(), "." | ",") {
             error(&w.decimal_mark, format!("decimal_mark is {:?}", w.decimal_mark.get_ref()), "\".\" or \",\"");

@@ -45,7 +45,8 @@ pub fn touches(
             other_ball.push(|| {
                 let message = format!("the ball has the radius {:.3} mm, the plan says {radius:.3}", point.radius_mm);
                 places.at_line(
-                    Finding::warning("log::ball_radius", message).help("is it the plan's stylus? the unit the right one?"),
+                    Finding::warning("log::ball_radius", message)
+                        .help("is it the plan's stylus? the unit the right one?"),
                     point.line,
                 )
             });
@@ -148,7 +149,10 @@ fn none_fits(plan: &Plan, points: &[Point], form: &PointsForm, places: &Places<'
     });
     if inches.count() * 2 > points.len() {
         let message = "no point of the file is one of the plan; read as inches most would be".to_owned();
-        let help = format!("copy the form (`axiscal controllers show {}`), write unit = \"inch\" and name that file", form.name);
+        let help = format!(
+            "copy the form (`axiscal controllers show {}`), write unit = \"inch\" and name that file",
+            form.name
+        );
         return places.at_line(Finding::error("log::swapped", message).help(help), line);
     }
     let distance = |p: &Point, t: &PlanTouch| (p.in_part(&p.nominal) - Vector3::from(t.point)).norm();

@@ -97,7 +97,10 @@ pub fn parse(bytes: &[u8], name: &str, form: &PointsForm, asked: Option<usize>) 
             taken: i == index,
         })
         .collect();
-    let offer: Vec<String> = runs.iter().map(|r| format!("block {}: lines {} to {}, {} points", r.number, r.first_line, r.last_line, r.touches)).collect();
+    let offer: Vec<String> = runs
+        .iter()
+        .map(|r| format!("block {}: lines {} to {}, {} points", r.number, r.first_line, r.last_line, r.touches))
+        .collect();
     if asked.is_none() && blocks.len() > 1 {
         let message = format!("a second {} in the file: it holds {} blocks", form.begin, blocks.len());
         let help = format!("say with --run N which one is meant: {}", offer.join("; "));
@@ -132,7 +135,8 @@ pub fn parse(bytes: &[u8], name: &str, form: &PointsForm, asked: Option<usize>) 
     }
     if !block.ended {
         let message = format!("the file ends after {} points without the line {}", block.points.len(), form.end);
-        let finding = Finding::warning("log::truncated", message).help("it is cut off, or the program was stopped; what is there is used");
+        let finding = Finding::warning("log::truncated", message)
+            .help("it is cut off, or the program was stopped; what is there is used");
         findings.push(places.at_line(finding, block.last_line));
     }
     let mut points = block.points;
@@ -154,13 +158,18 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
     let mut orientation = [0.0; 3];
     let mut open: Option<(u64, Vector3<f64>, Vector3<f64>, usize)> = None;
     let lost = |number: u64, line: usize| {
-        let message = format!("the line {} N{number} is missing: a new record begins before the centre of the point", form.centre);
+        let message = format!(
+            "the line {} N{number} is missing: a new record begins before the centre of the point",
+            form.centre
+        );
         places.at_line(Finding::error("log::order", message).help(WHOLE), line)
     };
     for line in Lines::new(bytes, start) {
         let text = super::lines::without_trailer(line.bytes);
         let found = record(text, form);
-        if blocks.is_empty() && matches!(found, Ok(Record::Orientation(_) | Record::Nominal { .. } | Record::Centre { .. })) {
+        if blocks.is_empty()
+            && matches!(found, Ok(Record::Orientation(_) | Record::Nominal { .. } | Record::Centre { .. }))
+        {
             let message = format!("the file does not begin with {}: is its head lost?", form.begin);
             let finding = Finding::warning("log::no_head", message).help("what is there is used");
             let errors = vec![places.at_line(finding, line.number)];
@@ -202,7 +211,12 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
                 }
             }
             Ok(_) if !in_block => {
-                error(0, text.len(), "log::order", format!("a point or an orientation outside of {} and {}", form.begin, form.end));
+                error(
+                    0,
+                    text.len(),
+                    "log::order",
+                    format!("a point or an orientation outside of {} and {}", form.begin, form.end),
+                );
             }
             Ok(Record::Orientation(angles)) => {
                 if let Some((number, ..)) = open.take() {
@@ -216,9 +230,19 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
                 }
             }
             Ok(Record::Centre { number, point, radius }) => match open.take() {
-                None => error(0, text.len(), "log::order", format!("the line {} N{number} is missing before this one", form.nominal)),
+                None => error(
+                    0,
+                    text.len(),
+                    "log::order",
+                    format!("the line {} N{number} is missing before this one", form.nominal),
+                ),
                 Some((expected, ..)) if expected != number => {
-                    error(0, text.len(), "log::order", format!("the centre is of point N{number}, the nominal point before it is N{expected}"));
+                    error(
+                        0,
+                        text.len(),
+                        "log::order",
+                        format!("the centre is of point N{number}, the nominal point before it is N{expected}"),
+                    );
                 }
                 Some((_, nominal, normal, _)) => block.points.push(Point {
                     number,
@@ -241,7 +265,12 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
     // what is wrong somewhere makes the whole file doubtful, as for the programs that these files are made for
     match blocks.first_mut() {
         Some(block) => block.errors.splice(0..0, errors).for_each(drop),
-        None => blocks.extend((!errors.is_empty()).then_some(Block { errors, first_line: 1, last_line: 1, ..Block::default() })),
+        None => blocks.extend((!errors.is_empty()).then_some(Block {
+            errors,
+            first_line: 1,
+            last_line: 1,
+            ..Block::default()
+        })),
     }
     blocks
 }

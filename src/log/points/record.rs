@@ -64,12 +64,20 @@ pub fn record(line: &[u8], form: &PointsForm) -> Result<Record, Fault> {
             let message = format!("the normal I J K has the length {:.4}, expected 1", normal.norm());
             return Err(Fault::at(line, rest, rest.len(), "log::normal", message));
         }
-        return Ok(Record::Nominal { number: words.number(line)?, point: Vector3::from(words.all(line, b"XYZ")?), normal });
+        return Ok(Record::Nominal {
+            number: words.number(line)?,
+            point: Vector3::from(words.all(line, b"XYZ")?),
+            normal,
+        });
     }
     if is(&form.centre) {
         let words = words(line, rest, b"NXYZR", form)?;
         let [radius] = words.all(line, b"R")?;
-        return Ok(Record::Centre { number: words.number(line)?, point: Vector3::from(words.all(line, b"XYZ")?), radius });
+        return Ok(Record::Centre {
+            number: words.number(line)?,
+            point: Vector3::from(words.all(line, b"XYZ")?),
+            radius,
+        });
     }
     let message = format!(
         "not a line of this file: {}, {}, {}, {} or {} is expected",
@@ -96,7 +104,9 @@ impl Words {
     fn number(&self, line: &[u8]) -> Result<u64, Fault> {
         let [value] = self.all(line, b"N")?;
         let number = crate::log::words::Number { value, decimals: None };
-        whole(number).ok_or_else(|| Fault::at(line, line, line.len(), "log::id", "the number of a point is whole and not negative"))
+        whole(number).ok_or_else(|| {
+            Fault::at(line, line, line.len(), "log::id", "the number of a point is whole and not negative")
+        })
     }
 }
 
@@ -128,7 +138,8 @@ fn words(line: &[u8], mut rest: &[u8], known: &[u8], form: &PointsForm) -> Resul
 }
 
 fn shown(bytes: &[u8]) -> String {
-    let text: String = bytes.iter().take(20).map(|b| if (b' '..=b'~').contains(b) { *b as char } else { '?' }).collect();
+    let text: String =
+        bytes.iter().take(20).map(|b| if (b' '..=b'~').contains(b) { *b as char } else { '?' }).collect();
     format!("{text:?}")
 }
 
