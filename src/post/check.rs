@@ -282,7 +282,9 @@ impl Check<'_> {
             }
             self.origin(&format!("parts.{name}"), &part.source, &part.unverified, &part.template.span());
             // a part stands in lines of its own, whatever follows the tag that includes it; one line end is the engine's
-            let lines = format!("{}\n\n", part.template.get_ref().trim_end_matches('\n'));
+            let text = part.template.get_ref().trim_end_matches('\n');
+            // the engine takes the line end behind a tag
+            let lines = format!("{text}\n\n{}", if text.ends_with("%}") { "\n" } else { "" });
             self.template(&mut env, name, &Spanned::new(part.template.span(), lines));
         }
         for (index, companion) in file.companion.iter().enumerate() {
