@@ -139,7 +139,7 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
 fn mode_note(active: Mode) -> Finding {
     let other = match active {
         Mode::Component => "stock/",
-        Mode::Stock => "the component",
+        Mode::Stock | Mode::Table => "the component",
     };
     Finding::info(
         "tables::one_way",
