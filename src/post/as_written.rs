@@ -51,6 +51,11 @@ pub struct ProgramFile {
     /// The longest line that the control takes, characters.
     #[schemars(with = "usize")]
     pub line_length: Spanned<usize>,
+    /// Empty lines of the templates stay; false where each line is a block.
+    #[serde(default = "yes")]
+    pub blank_lines: bool,
+    /// A running number before each line, where the control wants one.
+    pub block_numbers: Option<BlockNumbers>,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -67,6 +72,33 @@ pub enum EndOfLine {
     Crlf,
     /// CR
     Cr,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A running number before each line of the program.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BlockNumbers {
+    /// Of the first line.
+    pub first: usize,
+    /// From line to line.
+    pub step: usize,
+    /// What stands before the line, from `{n}`: `"{n} "`, `"N{n} "`.
+    pub word: String,
+}
+
+/// Which coordinates a program's words are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Coordinates {
+    /// From the origin of R: the program sets an offset of its own.
+    #[default]
+    Origin,
+    /// What the control displays without any offset. Not under a transformation (`--tcp`): there they are the origin's.
+    Machine,
 }
 
 /// How numbers and axis words are written.
@@ -91,6 +123,9 @@ pub struct Number {
     /// An axis word, from `{axis}` and `{value}`.
     #[schemars(with = "String")]
     pub word: Spanned<String>,
+    /// Which coordinates the words are.
+    #[serde(default)]
+    pub coordinates: Coordinates,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -109,6 +144,8 @@ pub struct Comment {
     /// Longer remarks go on in the next line, characters.
     #[schemars(with = "usize")]
     pub width: Spanned<usize>,
+    /// The longest message to the operator that is shown whole, characters.
+    pub message_width: Option<usize>,
     /// Characters that must not stand in a remark, and what is written in their place.
     #[serde(default)]
     pub replace: BTreeMap<String, String>,
@@ -245,6 +282,9 @@ pub struct Log {
     /// Letter of the word with the sum of all other numbers of the line, where the control can write one.
     #[schemars(with = "Option<String>")]
     pub check_word: Option<Spanned<String>>,
+    /// Letter of the word with the seconds on a clock of the control, where it can give them; any zero.
+    #[schemars(with = "Option<String>")]
+    pub time_word: Option<Spanned<String>>,
     /// A file of nothing but columns, where the control has such a log of its own.
     pub columns: Option<Columns>,
     /// Document and page, public file, or observation.

@@ -50,6 +50,9 @@ pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         extension: file.file.extension.get_ref().clone(),
         end_of_line: file.file.end_of_line,
         line_length: *file.file.line_length.get_ref(),
+        blank_lines: file.file.blank_lines,
+        block_numbers: file.file.block_numbers.clone(),
+        coordinates: file.number.coordinates,
         number,
         comment,
         settings: file.settings.clone(),
@@ -164,6 +167,7 @@ impl Check<'_> {
             open: comment.open.clone(),
             close: comment.close.clone(),
             width: width.max(20),
+            message_width: comment.message_width,
             replace,
             other: comment.other.clone(),
             capitals: comment.capitals,
@@ -190,6 +194,14 @@ impl Check<'_> {
             self.word("check_word", word, free, "one capital letter that is no axis and none of N S U H P E");
             word.get_ref().bytes().next()
         });
+        let time_word = log.time_word.as_ref().and_then(|word| {
+            let free = |w: &str| {
+                let taken = |b: &u8| b"XYZABCNSUHPE".contains(b) || Some(*b) == check_word;
+                w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !taken(&b))
+            };
+            self.word("time_word", word, free, "one capital letter that is no axis, none of N S U H P E, not check_word");
+            word.get_ref().bytes().next()
+        });
         let columns = log.columns.as_ref().map(|columns| {
             self.origin("log.columns", &columns.source, &columns.unverified, &columns.axes.span());
             let axes: Vec<_> = columns.axes.get_ref().iter().map(|a| axis_of(a)).collect();
@@ -213,6 +225,7 @@ impl Check<'_> {
             exact_decimals: log.exact_decimals,
             mark: if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' },
             check_word,
+            time_word,
             columns,
         }
     }
@@ -280,6 +293,9 @@ fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away
         let mut clean = rule.clean(&text);
+        if let Some(width) = rule.message_width {
+            clean = clean.chars().take(width).collect();
+        }
         let template = state.env().get_template("message")?;
         loop {
             let filled = match &value {

@@ -169,9 +169,13 @@ impl<'a> Writer<'a> {
             stops => !self.path.mounted.is_empty(),
             program => self.plan.program.clone(),
             machine => self.machine.name.clone(),
+            origin => map(self.axes.iter().map(|a| (a.to_string(), self.number(self.machine.origin.get(*a).unwrap_or(0.0))))),
+            log_name => self.post.log_name(self.plan)?,
         };
         let rendered = self.post.render(template, context! { ..context, ..common })?;
-        self.label += LABELS_PER_STEP;
+        if self.post.uses_labels(template) {
+            self.label += LABELS_PER_STEP;
+        }
         let rendered = rendered.strip_suffix('\n').unwrap_or(&rendered);
         if !rendered.is_empty() {
             self.text.push_str(rendered);
@@ -206,11 +210,10 @@ impl<'a> Writer<'a> {
         for (entry, why) in &self.post.unverified {
             head.push(format!("NOT VERIFIED on a real control: {entry}: {why}"));
         }
-        let origin = self.axes.iter().map(|a| (a.to_string(), self.number(self.machine.origin.get(*a).unwrap_or(0.0))));
         let near = self.path.start_near.as_ref().map(|near| {
             let window = |a: &crate::machine::Axis| {
-                let [low, high] = near.window(a);
-                context! { axis => a.name.to_string(), low => self.number(low), high => self.number(high) }
+                let [low, high] = near.window(a).map(|v| self.number(self.shown(a.name, v)));
+                context! { axis => a.name.to_string(), low, high }
             };
             self.machine.rotary().map(window).collect::<Vec<_>>()
         });
@@ -218,9 +221,7 @@ impl<'a> Writer<'a> {
             head => head,
             start_near => near.unwrap_or_default(),
             setups => setups,
-            origin => map(origin),
             slow_feed => self.number(self.machine.probe.slow_feed),
-            log_name => self.post.log_name(self.plan)?,
             log_head => log_text::head(self.post, self.plan),
         };
         self.render("start", context)
@@ -354,8 +355,9 @@ impl<'a> Writer<'a> {
                 context! {
                     axis => axis.to_string(),
                     direction => self.number(direction[i]),
-                    start => self.number(start[i]),
-                    nominal => self.number(nominal[i]),
+                    start => self.number(self.shown(axis, start[i])),
+                    nominal => self.number(self.shown(axis, nominal[i])),
+                    end => self.number(self.shown(axis, end[i])),
                     back_off => self.number(direction[i] * touch.back_off_mm),
                 }
             })
@@ -365,6 +367,8 @@ impl<'a> Writer<'a> {
             says => touch.says.clone(),
             first => touch.first,
             end => self.words(&target)?,
+            all => self.words(&xyz(&end))?,
+            length => self.number(length),
             approach => approach,
             way => self.number((nominal - start).norm()),
             tolerance => self.number(touch.tolerance_mm),
@@ -380,7 +384,8 @@ impl<'a> Writer<'a> {
     }
 
     fn finish(self) -> Result<NcProgram> {
-        let longest = self.text.lines().enumerate().find(|(_, line)| line.chars().count() > self.post.line_length);
+        let text = self.post.lines(&self.text);
+        let longest = text.lines().enumerate().find(|(_, line)| line.chars().count() > self.post.line_length);
         if let Some((index, line)) = longest {
             return Err(Failure::new(
                 "post::line_length",
@@ -395,9 +400,9 @@ impl<'a> Writer<'a> {
             .help("shorten the template, or the names of machine, program and blocks"));
         }
         let text = match self.post.end_of_line {
-            EndOfLine::Lf => self.text,
-            EndOfLine::Crlf => self.text.replace('\n', "\r\n"),
-            EndOfLine::Cr => self.text.replace('\n', "\r"),
+            EndOfLine::Lf => text,
+            EndOfLine::Crlf => text.replace('\n', "\r\n"),
+            EndOfLine::Cr => text.replace('\n', "\r"),
         };
         Ok(NcProgram { text, extension: self.post.extension.clone(), findings: self.findings })
     }
@@ -412,6 +417,25 @@ fn xyz(v: &nalgebra::Vector3<f64>) -> AxisMap {
 }
 
 impl Postprocessor {
+    /// Whether a template names labels; numbers are scarce on some controls, so only those take any.
+    fn uses_labels(&self, template: &str) -> bool {
+        self.templates.get_template(template).is_ok_and(|t| t.source().contains("label"))
+    }
+
+    /// The text with or without its empty lines, numbered where the control wants it.
+    fn lines(&self, text: &str) -> String {
+        let kept = text.lines().filter(|line| self.blank_lines || !line.trim().is_empty());
+        let mut out = String::with_capacity(text.len());
+        for (index, line) in kept.enumerate() {
+            if let Some(rule) = &self.block_numbers {
+                out.push_str(&rule.word.replace("{n}", &(rule.first + index * rule.step).to_string()));
+            }
+            out.push_str(line);
+            out.push('\n');
+        }
+        out
+    }
+
     /// Renders one template; a failure names the template and its line.
     pub(super) fn render(&self, template: &str, context: Value) -> Result<String> {
         self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|e| {

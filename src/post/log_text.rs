@@ -1,6 +1,6 @@
 //! The log as the control would have written it: the counterpart of [`crate::log::parse`].
 //!
-//! `H AXISCAL 1 LINUXCNC SWIVEL-HEAD HEAD 0A1B2C3D4E5F N202 U1`, then `P N1 S1 X… K…` for each touch, then `E N202`.
+//! `H AXISCAL 1 LINUXCNC SWIVEL-HEAD HEAD 0A1B2C3D4E5F MM N202 U1`, then `P N1 S1 X… K…` for each touch, then `E N202`.
 //! Capitals, digits, signs, points and blanks only: every control can write that.
 
 use super::as_written::EndOfLine;
@@ -23,6 +23,8 @@ pub struct LogRecord {
     pub status: Status,
     /// Axis positions at the trigger (at the end of the search for a miss).
     pub position: Position,
+    /// When, on any clock, s; written where the control's program writes times.
+    pub time_s: Option<f64>,
 }
 
 /// Version of the log's form.
@@ -57,7 +59,7 @@ pub(crate) fn log_word(name: &str) -> String {
 /// The head line up to and with the `U` whose number is the first set-up of the run.
 pub(super) fn head(post: &Postprocessor, plan: &Plan) -> String {
     format!(
-        "H AXISCAL {VERSION} {} {} {} {} N{} U",
+        "H AXISCAL {VERSION} {} {} {} {} MM N{} U",
         log_word(&post.name),
         log_word(&plan.machine),
         log_word(&plan.program),
@@ -107,6 +109,9 @@ impl Postprocessor {
                 // ids are small: a double holds them
                 let sum = record.id as f64 + f64::from(status) + axes.iter().map(|a| shown.get(*a)).sum::<f64>();
                 let _ = write!(line, " {}{}", letter as char, number(sum));
+            }
+            if let (Some(letter), Some(time)) = (self.log.time_word, record.time_s) {
+                let _ = write!(line, " {}{}", letter as char, number(time));
             }
             lines.push(line);
         }

@@ -23,12 +23,18 @@ pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, source};
-use as_written::{EndOfLine, Role};
+use as_written::{BlockNumbers, Coordinates, EndOfLine, Role};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The postprocessors that are built in: file name, text.
-pub const BUILT_IN: [(&str, &str); 1] = [("linuxcnc.toml", include_str!("../../postprocessors/linuxcnc.toml"))];
+pub const BUILT_IN: [(&str, &str); 5] = [
+    ("linuxcnc.toml", include_str!("../../postprocessors/linuxcnc.toml")),
+    ("sinumerik.toml", include_str!("../../postprocessors/sinumerik.toml")),
+    ("fanuc.toml", include_str!("../../postprocessors/fanuc.toml")),
+    ("heidenhain.toml", include_str!("../../postprocessors/heidenhain.toml")),
+    ("haas.toml", include_str!("../../postprocessors/haas.toml")),
+];
 
 /// A checked postprocessor.
 #[derive(Debug, Clone)]
@@ -43,6 +49,12 @@ pub struct Postprocessor {
     pub end_of_line: EndOfLine,
     /// The longest line that the control takes, characters.
     pub line_length: usize,
+    /// Empty lines stay.
+    pub blank_lines: bool,
+    /// A running number before each line.
+    pub block_numbers: Option<BlockNumbers>,
+    /// Which coordinates the words of a program are (not under a transformation).
+    pub coordinates: Coordinates,
     /// Numbers and axis words.
     pub number: NumberRule,
     /// Remarks and messages.
@@ -90,6 +102,8 @@ pub struct LogRule {
     pub mark: u8,
     /// Letter of the word with the sum of all other numbers of the line: it shows a damaged digit.
     pub check_word: Option<u8>,
+    /// Letter of the word with the seconds on a clock of the control.
+    pub time_word: Option<u8>,
     /// A file of nothing but columns.
     pub columns: Option<ColumnRule>,
 }

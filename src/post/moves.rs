@@ -1,6 +1,7 @@
 //! Axis words of moves, in the control's own coordinates: what a move must name, and turns in steps under a
 //! transformation.
 
+use super::as_written::Coordinates;
 use super::emit::Writer;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
@@ -14,6 +15,14 @@ impl Writer<'_> {
         self.post.number.number(value)
     }
 
+    /// A place of an axis as the program's words name it: from the origin of R, or the control's own machine coordinate.
+    pub(super) fn shown(&self, axis: AxisName, value: f64) -> f64 {
+        match self.post.coordinates {
+            Coordinates::Machine if !self.frame.is_tcp() => value + self.machine.origin.get(axis).unwrap_or(0.0),
+            _ => value,
+        }
+    }
+
     /// Axis words of a template: `{ axis, value, word, rotary }`.
     pub(super) fn words(&self, to: &AxisMap) -> Result<Value> {
         let mut words = Vec::new();
@@ -24,6 +33,7 @@ impl Writer<'_> {
             if self.machine.axis(axis).is_none() {
                 return Err(self.broken(format!("axis {axis} is moved, which machine {} lacks", self.machine.name)));
             }
+            let value = self.shown(axis, value);
             words.push(context! {
                 axis => axis.to_string(),
                 value => self.number(value),

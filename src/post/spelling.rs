@@ -72,6 +72,8 @@ pub struct CommentRule {
     pub close: String,
     /// Longer remarks go on in the next line, characters.
     pub width: usize,
+    /// The longest message to the operator that is shown whole, characters.
+    pub message_width: Option<usize>,
     /// Replaced characters.
     pub replace: BTreeMap<char, String>,
     /// For a character outside printable ASCII.
@@ -190,6 +192,7 @@ mod tests {
             open: "(".into(),
             close: ")".into(),
             width: 20,
+            message_width: None,
             replace: BTreeMap::from([('(', "[".into()), (')', "]".into())]),
             other: "?".into(),
             capitals: false,
