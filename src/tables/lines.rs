@@ -17,6 +17,7 @@ use crate::axes::{AxisName, Position};
 use crate::geometry::{Transform, apply, rotation_about};
 use crate::machine::{Axis, Machine, Side};
 use nalgebra::{Unit, Vector3};
+use std::collections::BTreeMap;
 
 /// The line of a rotary axis at zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -153,14 +154,76 @@ impl Seen {
     }
 
     /// How far the ball stands off its place of the workpiece (in R at zero, mm) where this control drives a machine with
-    /// errors; what it stands off at zero too is a matter of where the workpiece is, and not counted.
+    /// errors; what it stands off at zero too is a matter of where the workpiece is, and not counted. `told_deg`: what the
+    /// control adds to the angles that a program names, deg.
     #[must_use]
-    pub fn ball_off(&self, (nominal, kins): (&Self, &Kins), place: &Vector3<f64>, pose: &Position, longer: f64) -> Vector3<f64> {
+    pub fn ball_off(
+        &self,
+        (nominal, kins): (&Self, &Kins),
+        place: &Vector3<f64>,
+        pose: &Position,
+        longer: f64,
+        told_deg: &BTreeMap<AxisName, f64>,
+    ) -> Vector3<f64> {
         let at = |pose: &Position| {
             let world = pose.with_xyz_mm(nominal.linear(place, pose, longer));
-            let joints = pose.with_xyz_mm(self.linear(place, pose, longer));
+            let mut joints = pose.with_xyz_mm(self.linear(place, pose, longer));
+            for (axis, deg) in told_deg {
+                joints.set(*axis, joints.get(*axis) + deg);
+            }
             kins.ball_error(&world, &joints)
         };
         at(pose) - at(&Position::default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diag::source;
+    use crate::tables::compensation::Term;
+    use crate::tables::place::{Dof, Place};
+
+    fn machine(name: &str) -> Machine {
+        let (machines, _) = crate::machine::load(&source("m", crate::machine::BUILT_IN)).unwrap();
+        machines.into_iter().find(|m| m.name == name).unwrap()
+    }
+
+    /// Every constant error at once: the ball stands where it should, but for one shift of the workpiece.
+    #[test]
+    fn lines_say_everything_but_where_the_workpiece_is() {
+        for name in ["swivel-head", "double-head", "trunnion", "swivel-table-b"] {
+            let machine = machine(name);
+            let mut terms = Vec::new();
+            let mut size = 0.03;
+            for axis in machine.rotary() {
+                for place in [Place::Before, Place::After] {
+                    for dof in Dof::ALL {
+                        size = -size * 1.03;
+                        let parameter = String::new();
+                        let (effect, unit) = (String::new(), dof.unit().to_owned());
+                        terms.push(Term {
+                            axis: axis.name, place, dof, value: size, unit, parameter, effect,
+                            active_before: 0.0, identified: size, sigma: None,
+                        });
+                    }
+                }
+            }
+            let errors = Errors::from_terms(&terms, [3.0, -4.0, -190.0]);
+            let length = machine.tool.length_mm;
+            let (nominal, seen) = (Seen::of(&machine, &Errors::from_terms(&[], [0.0; 3]), length), Seen::of(&machine, &errors, length));
+            let kins = Kins::new(&machine, errors, length);
+            let none = BTreeMap::new();
+            let mut pose = Position::default();
+            for (i, axis) in machine.rotary().enumerate() {
+                pose.set(axis.name, [37.0, -71.0][i]);
+            }
+            // a workpiece that stands off and is turned shows the same displacement at every pose
+            for place in [Vector3::new(30.0, -20.0, -202.684), Vector3::new(-80.0, 55.0, -150.0)] {
+                let off = |seen: &Seen| seen.ball_off((&nominal, &kins), &place, &pose, 0.0, &none).norm();
+                assert!(off(&nominal) > 1e-2, "{name}");
+                assert!(off(&seen) < 1e-11, "{name}: {:e}", off(&seen));
+            }
+        }
     }
 }
