@@ -352,6 +352,12 @@ pub(super) fn check(check: &mut Check, tables: &Tables) {
             if !turns.into_iter().flatten().all(here) {
                 wrong(of(&format!("vector {:?} names an axis that this kind has not", v.id)), "compare workpiece and tool");
             }
+            if let (Some(from), Some(to)) = (v.from, v.to) {
+                let of_head = |p: Point| matches!(p, Point::Tool1 | Point::Tool2 | Point::ToolAdapter);
+                if of_head(from) != of_head(to) || to.turn().is_none() {
+                    wrong(of(&format!("vector {:?} leads from {from} to {to}", v.id)), "head and table are two chains; a vector leads to an axis");
+                }
+            }
             for other in v.close.iter().flatten() {
                 let known = kind.vector.iter().any(|k| k.id == *other && k.from.is_some());
                 if !known {

@@ -91,6 +91,7 @@ pub(super) fn write(
             .collect();
         context! {
             head => head.clone(), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
+            axes => machine.rotary().map(|a| a.name.to_string()).collect::<Vec<_>>(),
             unit => unit.clone(), restore, known, doubts => doubts.clone(),
         }
     };
