@@ -15,6 +15,8 @@ use axiscal::tables::compensation::{self, Provenance};
 use axiscal::tables::control::backup::{self, Old};
 use axiscal::tables::control::{self, Export, Options};
 use axiscal::tables::correction::Correction;
+use axiscal::tables::kins::{Errors, Kins};
+use axiscal::tables::lines::Seen;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -44,7 +46,9 @@ pub fn correction(machine: &Machine, planted: &Planted, active: Option<&compensa
     let rows: Vec<_> =
         planted.iter().zip(&units).map(|((e, n, v), u)| (*n, *e, *v, u.as_str(), Status::Identified)).collect();
     let provenance = Provenance { study: "study.toml".into(), study_sha256: "0123abcd".into(), data_date: "2026-11-20".into() };
-    let outcome = crate::export::outcome(&machine.name, &rows);
+    let mut outcome = crate::export::outcome(&machine.name, &rows);
+    // where the virtual machine states its errors
+    outcome.reference_mm = machine.reference.pivot.into();
     Correction::collect(machine, &catalogue, &outcome, active, provenance).unwrap().0
 }
 
@@ -93,7 +97,7 @@ fn readings(machine: &Machine, plan: &Plan, scenario: &Scenario, c: Option<&Comp
 
 /// Largest reading that is left when the workpiece has been touched off again: one small displacement of all blocks,
 /// fitted by least squares here. mm.
-fn left(plan: &Plan, readings: &[f64], turned: bool) -> f64 {
+fn left(plan: &Plan, readings: &[f64]) -> f64 {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     let rows: Vec<(Vector6<f64>, f64)> = plan
         .touches
@@ -101,7 +105,7 @@ fn left(plan: &Plan, readings: &[f64], turned: bool) -> f64 {
         .zip(readings)
         .map(|(t, e)| {
             let (n, p) = (Vector3::from(t.normal), Vector3::from(t.point));
-            let m = if turned { p.cross(&n) / 100.0 } else { Vector3::zeros() };
+            let m = p.cross(&n) / 100.0;
             (Vector6::new(n.x, n.y, n.z, m.x, m.y, m.z), *e)
         })
         .collect();
@@ -124,58 +128,99 @@ fn parameters<'a>(catalogue: &'a Catalogue, machine: &Machine) -> Vec<(&'a str, 
     out
 }
 
-/// One parameter: what the control leaves (µm), with the whole way through its file.
+/// What the touches must read under this table, mm: where the ball stands when the machine with these errors is driven by
+/// a control that knows the written numbers.
+fn foretold(machine: &Machine, planted: &Planted, export: &Export, plan: &Plan) -> Vec<f64> {
+    let terms = correction(machine, planted, None).terms;
+    let errors = Errors::from_terms(&terms, machine.reference.pivot.into());
+    let length = machine.tool.length_mm;
+    let (kins, nominal) = (Kins::new(machine, errors, length), Seen::of(machine, &Errors::from_terms(&[], [0.0; 3]), length));
+    let zero = &export.compensation.tables.as_ref().unwrap().zero_deg;
+    let reading = |t: &axiscal::program::plan::PlanTouch| {
+        let n = Vector3::from(t.normal);
+        let ball = Vector3::from(t.point) + n * plan.ball_radius_mm;
+        let pose = t.pose.position();
+        let world = pose.with_xyz_mm(nominal.linear(&ball, &pose, 0.0));
+        let mut joints = pose.with_xyz_mm(export.seen.linear(&ball, &pose, 0.0));
+        for (axis, deg) in zero {
+            joints.set(*axis, joints.get(*axis) + deg);
+        }
+        -n.dot(&kins.ball_error(&world, &joints))
+    };
+    plan.touches.iter().map(reading).collect()
+}
+
+/// The whole way through the control's file: largest reading before and after, the workpiece touched off again, µm.
 fn way(machine: &Machine, control: &str, planted: &Planted, plan: &Plan) -> (f64, f64, Export) {
     let export = export(machine, control, planted, &accepting());
     let scenario = scenario(machine, planted);
-    let before = left(plan, &readings(machine, plan, &scenario, None), true);
-    let control = loaded(machine, &export, None);
-    let after = left(plan, &readings(machine, plan, &scenario, Some(&control)), true);
-    (before * 1e3, after * 1e3, export)
+    let before = left(plan, &readings(machine, plan, &scenario, None));
+    let applied = loaded(machine, &export, None);
+    let read = readings(machine, plan, &scenario, Some(&applied));
+    for (touch, (e, f)) in plan.touches.iter().zip(read.iter().zip(foretold(machine, planted, &export, plan))) {
+        // the commanded and the real search differ by the tilt: second order, some 0.1 um for 0.1 deg
+        assert!((e - f).abs() < 3e-4, "{control} {} {planted:?}: touch {} reads {e} mm, foretold {f} mm", machine.name, touch.id);
+    }
+    (before * 1e3, left(plan, &read) * 1e3, export)
 }
 
-/// For each control, machine, parameter and sign: what is carried is gone to the control's resolution, what is not is
-/// said, and stays as it was.
-#[test]
-fn every_parameter_with_both_signs_comes_back() {
-    let catalogue = catalogue();
-    let (mut n, mut told) = (0, BTreeMap::new());
-    for name in MACHINES {
-        let machine = machine(name);
-        let plan = plan(&machine, 7);
-        for control in CONTROLS {
-            if control::kind_of(&machine, &tables(control)).is_err() {
-                assert!(control == "haas" && machine.side(Side::Tool).any(|a| a.name.is_rotary()), "{control} {name}");
-                continue;
-            }
-            for (effect, parameter, length) in parameters(&catalogue, &machine) {
-                for sign in [1.0, -1.0] {
-                    let value = sign * if length { 0.05 } else { 0.02 };
-                    let (before, after, export) = way(&machine, control, &vec![(effect, &parameter, value)], &plan);
-                    let of = format!("{control} {name} {parameter} ({effect}) {value}");
-                    let foretold: f64 = export.left.iter().filter_map(|l| l.left_um).sum();
-                    if export.left.is_empty() {
-                        // half a step in each of several components, and angles of 0.0005 deg at some 100 mm
-                        let resolution = match control {
-                            "sinumerik" => 0.02,
-                            "fanuc" => 2.0,
-                            "haas" => 3.0,
-                            _ => 0.6,
-                        };
-                        assert!(after < resolution, "{of}: before {before:.3} um, after {after:.3} um");
-                        n += 1;
-                    } else {
-                        // nothing was written for it, so nothing has changed; the figure bounds what is seen here
-                        assert!((after - before).abs() < 0.05 * before + 1.5, "{of}: {before:.3} um, {after:.3} um");
-                        assert!(after <= foretold + 0.5 || foretold == 0.0 && after < 0.05, "{of}: {after:.3} um, foretold {foretold:.3} um");
-                        *told.entry((control, name)).or_insert(0) += 1;
-                    }
+/// For each control, parameter and sign: every touch reads what was foretold; what is carried is gone to the control's
+/// resolution, what is not is said.
+fn every_parameter(name: &str, at_least: usize) {
+    let (catalogue, machine) = (catalogue(), machine(name));
+    let plan = plan(&machine, 7);
+    let (mut carried, mut told) = (0, BTreeMap::new());
+    for control in CONTROLS {
+        if control::kind_of(&machine, &tables(control)).is_err() {
+            assert!(control == "haas" && machine.side(Side::Tool).any(|a| a.name.is_rotary()), "{control} {name}");
+            continue;
+        }
+        for (effect, parameter, length) in parameters(&catalogue, &machine) {
+            for sign in [1.0, -1.0] {
+                let value = sign * if length { 0.05 } else { 0.02 };
+                let (before, after, export) = way(&machine, control, &vec![(effect, &parameter, value)], &plan);
+                let of = format!("{control} {name} {parameter} ({effect}) {value}");
+                if export.left.is_empty() {
+                    // half a step in each of several components, and angles of 0.0005 deg at some 100 mm
+                    let resolution = match control {
+                        "sinumerik" => 0.05,
+                        "fanuc" => 2.0,
+                        "haas" => 3.0,
+                        _ => 0.6,
+                    };
+                    assert!(after < resolution, "{of}: before {before:.3} um, after {after:.3} um");
+                    carried += 1;
+                } else {
+                    // a tilt is held as the offset that it makes at the workpiece's height; nothing gets worse
+                    assert!(after < 1.05 * before + 1.5, "{of}: {before:.3} um, {after:.3} um");
+                    assert!(export.left.iter().all(|l| l.left_um.is_some() && !l.why.is_empty()), "{of}: {:?}", export.left);
+                    *told.entry(control).or_insert(0) += 1;
                 }
             }
         }
     }
-    println!("{n} carried, not carried: {told:?}");
-    assert!(n > 150, "{n}");
+    println!("{name}: {carried} carried; said to be left: {told:?}");
+    assert!(carried >= at_least, "{carried}");
+}
+
+#[test]
+fn every_parameter_of_the_swivel_head_comes_back() {
+    every_parameter("swivel-head", 30);
+}
+
+#[test]
+fn every_parameter_of_the_double_head_comes_back() {
+    every_parameter("double-head", 30);
+}
+
+#[test]
+fn every_parameter_of_the_trunnion_comes_back() {
+    every_parameter("trunnion", 40);
+}
+
+#[test]
+fn every_parameter_of_the_swivel_table_comes_back() {
+    every_parameter("swivel-table-b", 40);
 }
 
 /// Everything at once, of random size and sign: with SINUMERIK nothing stays but where the workpiece is.
@@ -198,13 +243,37 @@ fn random_mixtures_come_back() {
                 println!("{control:<11} {name:<15} before {before:8.2} um, after {after:7.3} um, foretold {:7.3} um, rounding {:.3} um", export.rest_um, export.rounding_um);
                 assert!(before > 10.0, "{control} {name}");
                 // the figure is for a radius of 100 mm and the whole ranges: these blocks stand nearer
-                assert!(after <= export.rest_um + 0.1, "{control} {name}: {after} um, foretold {} um", export.rest_um);
+                assert!(after <= export.rest_um + 0.3, "{control} {name}: {after} um, foretold {} um", export.rest_um);
                 if control == "sinumerik" {
                     // tilts of the workpiece are fitted to first order here: 0.05 deg twice over 200 mm is 0.1 um
                     assert!(after < 0.3, "{name}: {after} um");
                 }
             }
         }
+    }
+}
+
+/// The tool's own tilt has no place: the figure for a longer tool is what a longer stylus then shows.
+#[test]
+fn a_longer_tool_is_off_as_foretold() {
+    for (name, effect, parameter) in [("swivel-head", "location-b", "EA0B"), ("double-head", "location-a", "EC0A"), ("double-head", "location-b", "EC0B")] {
+        let machine = machine(name);
+        let planted = vec![(effect, parameter, 0.02)];
+        let export = export(&machine, "sinumerik", &planted, &accepting());
+        let last = machine.side(Side::Workpiece).last().unwrap().name;
+        let mounting = machine.mountings.iter().find(|m| m.carrier == Carrier::Axis(last) || !last.is_rotary()).unwrap();
+        let mut plan = crate::random::random_plan(&machine, mounting, 200, &mut ChaCha8Rng::seed_from_u64(3));
+        plan.controller_frame = ControllerFrame::Tcp;
+        let control = loaded(&machine, &export, None);
+        let all = readings(&machine, &plan, &scenario(&machine, &planted), Some(&control));
+        let most = |longer: f64| {
+            let of = plan.touches.iter().zip(&all).filter(|(t, _)| (t.tool_length_mm.unwrap() - machine.tool.length_mm - longer).abs() < 1e-9);
+            let (touches, readings): (Vec<_>, Vec<f64>) = of.map(|(t, e)| (t.clone(), *e)).unzip();
+            left(&Plan { touches, ..plan.clone() }, &readings) * 1e3
+        };
+        println!("{name} {parameter}: {:.3} um with the stylus, {:.3} um with one 60 mm longer, foretold for 100 mm {:.3} um", most(0.0), most(60.0), export.longer_tool_um);
+        assert!(most(0.0) < 0.1);
+        assert!(most(60.0) < 0.6 * export.longer_tool_um + 0.1 && export.longer_tool_um < 200.0);
     }
 }
 
@@ -287,8 +356,8 @@ fn fanuc_by_hand() {
 #[test]
 fn run_out_and_positioning_become_position_tables() {
     for (name, planted, least) in [
-        ("swivel-head", vec![("radial-c-1", "EXC1c", 6.0), ("radial-c-1", "EYC1s", -4.0), ("positioning-x-2", "EXX2", 5.0)], 3),
-        ("trunnion", vec![("straightness-yx", "EYX2", 6.0), ("scale-z", "EZZ", 30.0), ("squareness-xy", "EC0Y", 40.0)], 3),
+        ("swivel-head", vec![("radial-c-1", "EXC1c", 6.0), ("radial-c-1", "EXC1s", 2.0), ("radial-c-1", "EYC1c", 1.5), ("radial-c-1", "EYC1s", -4.0), ("positioning-x-2", "EXX2", 5.0)], 3),
+        ("trunnion", vec![("straightness-yx", "EYX2", 6.0), ("straightness-yx", "EYX3", 2.0), ("scale-z", "EZZ", 30.0), ("squareness-xy", "EC0Y", 40.0)], 3),
     ] {
         let machine = machine(name);
         let planted: Planted = planted;
@@ -342,7 +411,7 @@ fn points_of_a_position_table_by_hand() {
 fn the_user_s_own_values_are_added_to() {
     let machine = machine("trunnion");
     let planted = vec![("location-a", "EY0A", 0.02), ("location-c", "EX0C", 0.01), ("location-c", "EB0C", 0.01)];
-    // the builder's C point lies 100 mm higher than that of the description, and 0.004 mm aside
+    // the builder's C point lies 99.95 mm higher than that of the description, and 0.004 mm aside
     let text_of = "\
 N24550 $MC_TRAFO5_BASE_TOOL_1[0]=0.1\n$MC_TRAFO5_BASE_TOOL_1[1]=-0.2 ; remark\n$MC_TRAFO5_BASE_TOOL_1[2]=-250.05EX+00\n\
 $MC_TRAFO5_JOINT_OFFSET_PART_1[0]=0.004\n$MC_TRAFO5_JOINT_OFFSET_PART_1[1]=0\n$MC_TRAFO5_JOINT_OFFSET_PART_1[2]=100\n\
@@ -357,9 +426,9 @@ $MC_TRAFO5_AXIS2_1[0]=0\n$MC_TRAFO5_AXIS2_1[1]=0\n$MC_TRAFO5_AXIS2_1[2]=-1\n$MC_
     let find = |name: &str| export.values.iter().find(|v| v.names.values().any(|n| n == name)).unwrap().clone();
     let y = find("$MC_TRAFO5_BASE_TOOL_1[1]");
     assert_eq!((y.old, y.new), (-0.2, -0.18));
-    // C is stated at the pivot, z = 0: at the axis's point (z = -250, the user's 100 mm higher: -150) it is 0.01 deg more aside
+    // C is stated at the pivot, z = -250: at the user's point, z = -150.05, it is 0.01 deg over 99.95 mm more aside
     let x = find("$MC_TRAFO5_JOINT_OFFSET_PART_1[0]");
-    let by_hand = 0.004 + 0.01 - 0.01_f64.to_radians() * 150.0;
+    let by_hand = 0.004 + 0.01 + 0.01_f64.to_radians() * 99.95;
     assert!((x.new - by_hand).abs() < 3e-6, "{} {by_hand}", x.new);
     // it closes
     let sum = |k: &str| ["BASE_TOOL", "JOINT_OFFSET_PART", "PART_OFFSET"].map(|n| find(&format!("$MC_TRAFO5_{n}_1[{k}]")).new).iter().sum::<f64>();
@@ -382,7 +451,7 @@ fn a_bad_backup_is_refused_with_its_place() {
         (&siemens, "$MC_TRAFO5_BASE_TOOL_1[0]=inf\n", "b:1:1: $MC_TRAFO5_BASE_TOOL_1[0] is no number"),
         (&siemens, "", "none of the values"),
         (&siemens, "\u{0}\u{1}garbage=\n==\n", "none of the values"),
-        (&fanuc, "%\nN19700Q1M1.0;\nN19701Q1M", "cut off"),
+        (&fanuc, "%\nN19700Q1M1.0;\nN19701Q1M1.0;\n", "cut off"),
         (&fanuc, "%\nN19700Q1X1.0;\n%\n", "b:2:1: N19700 is no number here"),
         (&fanuc, "%\nN19700Q1M1.0.0;\n%\n", "b:2:1: N19700 is no number here"),
     ] {

@@ -256,11 +256,15 @@ impl Reader<'_> {
 
     /// What a person entered from a worksheet: lines by vectors between named points, and directions.
     fn worksheet(&mut self, written: &WrittenTables) -> Loaded {
-        let mut points: BTreeMap<&str, Vec3> = BTreeMap::new();
-        for v in &written.vectors {
-            let Some([from, to]) = &v.between else { continue };
-            let base = points.get(from.as_str()).copied().unwrap_or([0.0; 3]);
-            points.insert(to, plus(base, 1.0, v.value));
+        let mut points: BTreeMap<&str, Vec3> = [("machine-zero", [0.0; 3]), ("tool-adapter", [0.0; 3])].into();
+        // as often as there are vectors: each may lead on from any other
+        for _ in &written.vectors {
+            for v in &written.vectors {
+                let Some([from, to]) = &v.between else { continue };
+                if let Some(base) = points.get(from.as_str()).copied() {
+                    points.insert(to, plus(base, 1.0, v.value));
+                }
+            }
         }
         let mut lines = |side: machine::Side, word: &str| -> Vec<(AxisName, Vec3, Vec3)> {
             let axes = self.machine.axes.iter().filter(|a| a.side == side && a.name.is_rotary());

@@ -87,6 +87,19 @@ fn sign(form: &VectorForm) -> f64 {
     if form.reversed && moves_work { -1.0 } else { 1.0 }
 }
 
+/// Vectors that lead on from where another one ends come after it; directions and closing ones last.
+fn in_order<'a, T>(all: impl Iterator<Item = &'a T>, form: impl Fn(&T) -> &VectorForm) -> Vec<&'a T> {
+    let mut waiting: Vec<&T> = all.collect();
+    let (mut out, mut reached) = (Vec::new(), vec![Point::MachineZero, Point::ToolAdapter]);
+    while let Some(next) = waiting.iter().position(|t| form(t).from.is_some_and(|p| reached.contains(&p))) {
+        let found = waiting.remove(next);
+        reached.extend(form(found).to);
+        out.push(found);
+    }
+    out.extend(waiting);
+    out
+}
+
 impl Question<'_> {
     fn step_mm(&self) -> f64 {
         match self.unit {
@@ -145,7 +158,7 @@ impl Question<'_> {
         // where the user's numbers put the points, against the description
         let mut off: BTreeMap<Point, Vector3<f64>> = BTreeMap::new();
         let mut turned: BTreeMap<Turn, Vector3<f64>> = BTreeMap::new();
-        for form in &self.kind.vector {
+        for form in in_order(self.kind.vector.iter(), |f| f) {
             let described = self.described(form, self.before);
             let (old, all) = self.old_vector(form, described);
             known &= all;
@@ -247,7 +260,7 @@ impl Question<'_> {
         seen: &mut Seen,
     ) {
         let mut points: BTreeMap<Point, Vector3<f64>> = BTreeMap::new();
-        for (form, value) in vectors {
+        for (form, value) in in_order(vectors.iter(), |(form, _)| form) {
             if let (Some(from), Some(to)) = (form.from, form.to) {
                 let base = points.get(&from).copied().unwrap_or_default();
                 points.insert(to, base + value);

@@ -32,7 +32,7 @@ impl Pieces<'_> {
         let mut poses = vec![Position::default()];
         for axis in self.machine.rotary() {
             let [low, high] = axis.range;
-            let steps: Vec<f64> = (0..9).map(|i| low.max(-180.0) + (high.min(180.0) - low.max(-180.0)) * f64::from(i) / 8.0).collect();
+            let steps: Vec<f64> = (0..7).map(|i| low.max(-180.0) + (high.min(180.0) - low.max(-180.0)) * f64::from(i) / 6.0).collect();
             poses = poses
                 .iter()
                 .flat_map(|p| {

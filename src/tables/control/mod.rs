@@ -62,6 +62,8 @@ pub struct Export {
     pub files: Vec<(String, Vec<u8>)>,
     /// The record, as written to `compensation.json`.
     pub compensation: Compensation,
+    /// The machine as the written numbers describe it, where the old ones were as its description has it.
+    pub seen: Seen,
     /// What stays.
     pub left: Vec<Left>,
     /// The values, old and new.
@@ -266,7 +268,7 @@ pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: 
         program: program(),
         provenance: correction.provenance.clone(),
     };
-    let mut export = Export { files: Vec::new(), compensation, left, values: filled.values, rounding_um, rest_um, longer_tool_um };
+    let mut export = Export { files: Vec::new(), compensation, seen: filled.seen, left, values: filled.values, rounding_um, rest_um, longer_tool_um };
     files::write(machine, tables, kind, correction, options, filled.known, &mut export, &mut findings)?;
     Ok((export, findings))
 }
