@@ -69,10 +69,10 @@ pub fn mm_from_inch(inch: f64) -> f64 {
     inch * 25.4
 }
 
-/// Inches from millimetres.
+/// Millimetres to inches.
 #[must_use]
 pub fn inch_from_mm(mm: f64) -> f64 {
-    mm / mm_from_inch(1.0)
+    mm / 25.4
 }
 
 /// A number as messages show it: with an exponent where its digits would fill the line.

@@ -87,12 +87,18 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let shown = |f: &&Finding| io.json || !matches!(f.code, "program::unreachable" | "program::lost");
     io.report(&findings.0.iter().chain(&nc.findings.0).filter(shown).cloned().collect::<Vec<_>>());
 
-    let program_file = args.out.join(format!("{}.{}", spec.name, nc.extension));
+    let files: Vec<(PathBuf, &str)> =
+        nc.files(&spec.name).into_iter().map(|(name, text)| (args.out.join(name), text)).collect();
     let own = [Some(Path::new(&args.program)), args.postprocessor.as_deref(), args.machine.machines.as_deref()];
-    keep_inputs(&program_file, own.into_iter().flatten())?;
+    for (file, _) in &files {
+        keep_inputs(file, own.into_iter().flatten())?;
+    }
     files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
-    files::write_whole(&program_file, nc.text.as_bytes())?;
-    summary(&machine, &post.name, &generated, [&program_file, &plan_file], io);
+    for (file, text) in &files {
+        files::write_whole(file, text.as_bytes())?;
+    }
+    let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
+    summary(&machine, &post, &generated, (&written, &plan_file), io);
     Ok(Answer::Done)
 }
 
@@ -196,7 +202,13 @@ fn setups(generated: &Generated) -> Vec<SetupCount> {
     out
 }
 
-fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&PathBuf; 2], io: &Io) {
+fn summary(
+    machine: &Machine,
+    post: &Postprocessor,
+    generated: &Generated,
+    (files, plan_file): (&[&PathBuf], &PathBuf),
+    io: &Io,
+) {
     let (plan, path) = (&generated.plan, &generated.path);
     let setups = setups(generated);
     let skipped = program::skipped_groups(&plan.skipped);
@@ -237,14 +249,20 @@ fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&
             io.say(format!("  {note}"));
         }
     }
-    let [program_file, plan_file] = files;
-    io.say(format!("\nwritten: {}\n         {}", program_file.display(), plan_file.display()));
+    let beside = files.get(1..).unwrap_or_default();
+    let all = files.iter().take(1).chain([&plan_file]).chain(beside);
+    let lines: Vec<String> = all.map(|file| file.display().to_string()).collect();
+    io.say(format!("\nwritten: {}", lines.join("\n         ")));
+    for (file, says) in beside.iter().zip(&post.companions) {
+        io.say(format!("{} goes to the control with the program: {says}", file.display()));
+    }
     io.say("the head of the program says what to set up where");
     io.answer(&json!({
         "format": "axiscal-generated/1",
         "machine": machine.name,
         "program": plan.program,
-        "controller": controller,
+        "controller": post.name,
+        "unverified": post.unverified.iter().map(|(entry, why)| json!({ "entry": entry, "why": why })).collect::<Vec<_>>(),
         "mounting": plan.mounting,
         "controller_frame": plan.controller_frame,
         "touches": plan.touches.len(),
@@ -259,6 +277,6 @@ fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&
             "stage": s.stage, "pose": s.pose, "block": s.block, "face": s.face, "points": s.points, "reason": s.reason,
         })).collect::<Vec<_>>(),
         "notes": plan.notes,
-        "files": { "program": program_file, "plan": plan_file },
+        "files": { "program": files.first(), "plan": plan_file, "beside": beside },
     }));
 }

@@ -362,7 +362,9 @@ fn write(
     let form_file = args.out.join(format!("{}.toml", plan.program));
     files::write_whole(plan_file, plan.to_json().as_bytes())?;
     files::write_whole(&form_file, chosen.text.as_bytes())?;
-    files::write_whole(&program_file, nc.text.as_bytes())?;
+    for (name, text) in nc.files(&plan.program) {
+        files::write_whole(&args.out.join(name), text.as_bytes())?;
+    }
     let seconds = chosen.generated.path.seconds;
     io.say(&questions.says);
     io.say(format!(

@@ -76,7 +76,7 @@ fn show(bytes: &[u8]) -> String {
 
 fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Result<RawTouch, Fault> {
     let mut seen = [false; 256];
-    let (mut id, mut status, mut check, mut time_s) = (None, None, None, None);
+    let (mut id, mut status, mut check) = (None, None, None);
     let mut position = Position::default();
     let mut present = [false; 6];
     let mut sum = 0.0;
@@ -85,7 +85,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
         let Some((letter, after)) = rest.split_first() else { break };
         let word = rest;
         let axis = axis_of(*letter);
-        if axis.is_none() && !matches!(letter, b'N' | b'S') && ![rule.check_word, rule.time_word].contains(&Some(*letter)) {
+        if axis.is_none() && !matches!(letter, b'N' | b'S') && Some(*letter) != rule.check_word {
             return Err(Fault::at(line, word, 1, "log::unknown_word", format!("unknown word {}", show(word))));
         }
         if std::mem::replace(&mut seen[usize::from(*letter)], true) {
@@ -114,8 +114,6 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
                 0.0 => Status::Miss,
                 _ => return Err(Fault::at(line, word, width, "log::status", "status S is 1 (hit) or 0 (miss)")),
             });
-        } else if Some(*letter) == rule.time_word {
-            time_s = Some(value.value);
         } else {
             exact(line, word, width, value, rule)?;
             check = Some((value.value, word, width));
@@ -141,7 +139,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
             return Err(Fault::at(line, word, width, "log::sum", message));
         }
     }
-    Ok(RawTouch { id: Some(id), position, present, status, time_s, temperature_deg_c: None, line: line_number })
+    Ok(RawTouch { id: Some(id), position, present, status, time_s: None, temperature_deg_c: None, line: line_number })
 }
 
 fn axis_of(letter: u8) -> Option<AxisName> {
@@ -213,14 +211,9 @@ fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault
     let fault = |message: &str| Fault::at(line, rest, rest.len(), "log::head", message);
     let text = std::str::from_utf8(rest).map_err(|_| fault("the head of a run holds characters that are not ASCII"))?;
     let words: Vec<&str> = text.split_ascii_whitespace().collect();
-    // logs of before the unit was written are in mm
-    let words = if words.len() == 8 { [&words[..6], &["MM"], &words[6..]].concat() } else { words };
-    let [mark, version, controller, machine, program, digest, unit, touches, setup] = words[..] else {
-        return Err(fault("the head of a run is `H AXISCAL 1 controller machine program digest unit N touches U set-up`"));
+    let [mark, version, controller, machine, program, digest, touches, setup] = words[..] else {
+        return Err(fault("the head of a run is `H AXISCAL 1 controller machine program digest N touches U set-up`"));
     };
-    if unit != "MM" {
-        return Err(fault("the unit of a log is MM"));
-    }
     if mark != "AXISCAL" || version != crate::post::LOG_VERSION.to_string() {
         return Err(fault("this is not the head of a log of this version of axiscal"));
     }

@@ -13,7 +13,7 @@ fn post() -> Postprocessor {
 }
 
 fn record(id: u64, position: Position) -> LogRecord {
-    LogRecord { id, status: Status::Hit, position, time_s: None }
+    LogRecord { id, status: Status::Hit, position }
 }
 
 /// A log of the plan's touches, each a little off its nominal place.
@@ -321,7 +321,7 @@ proptest! {
         let plan = plan(&machine, "head", "x+");
         let position = Position([values[0], values[1], values[2], 0.0, values[3] / 10.0, values[4]]);
         let status = if miss { Status::Miss } else { Status::Hit };
-        let text = post().log_text(&machine, &plan, &[LogRecord { id: 2, status, position, time_s: None }]);
+        let text = post().log_text(&machine, &plan, &[LogRecord { id: 2, status, position }]);
         let (parsed, findings) = parse(text.as_bytes(), "t", &post()).unwrap();
         prop_assert!(findings.0.is_empty(), "{:?}", findings.0);
         prop_assert_eq!(parsed.touches.len(), 1);
