@@ -55,6 +55,7 @@ fn loaded(machine: &Machine, mode: Mode, terms: Vec<Term>, stock: Option<Stock>)
         reference_mm: machine.reference.pivot.into(),
         terms,
         stock,
+        tables: None,
         program: String::new(),
         provenance: compensation::Provenance::default(),
     };

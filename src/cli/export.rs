@@ -3,10 +3,15 @@
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::{self, Subject, Verdict};
 use crate::files;
-use crate::fit::{self, Fit};
+use crate::fit::{self, Fit, Settings};
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use crate::post::tables::{LengthUnit, Tables};
 use crate::report::fit::{number, significant, table};
 use crate::tables::compensation::{Compensation, Provenance};
+use crate::tables::control::{self, backup, backup::Old};
 use crate::tables::correction::Correction;
 use crate::tables::linuxcnc::{self, Export, Left, Options, ini::UserIni};
 use comfy_table::Cell;
@@ -33,6 +38,18 @@ pub struct Args {
     /// LinuxCNC: the machine's INI file, for its old values
     #[arg(long, value_name = "FILE")]
     pub ini: Option<PathBuf>,
+    /// The control's own backup of the values that are to be changed: they are added to
+    #[arg(long, value_name = "FILE", alias = "active")]
+    pub backup: Option<PathBuf>,
+    /// One old value of the control, in its unit (in place of a backup, or beside it)
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub old: Vec<String>,
+    /// Unit of lengths in the control's tables
+    #[arg(long, value_enum, default_value = "mm")]
+    pub unit: LengthUnit,
+    /// Write entries that nobody has verified on a control
+    #[arg(long)]
+    pub accept_unverified: bool,
     /// Date of the data, YYYY-MM-DD (default: of the newest log file)
     #[arg(long)]
     pub date: Option<String>,
@@ -43,12 +60,24 @@ pub struct Args {
 /// # Errors
 /// When the study is unusable, the controller has no tables, or a value is beyond the limits.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    if args.controller != linuxcnc::CONTROLLER {
-        return Err(Failure::new(
-            "export::controller",
-            format!("no tables are known for controller {:?}", args.controller),
-        )
-        .help("there is: linuxcnc"));
+    let post = match args.controller.as_str() {
+        linuxcnc::CONTROLLER => None,
+        word => {
+            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
+            io.report(&findings);
+            let tables = post.tables.clone().ok_or_else(|| {
+                Failure::new("export::controller", format!("controller {word:?} has no [tables]: no tables are known for it"))
+                    .help("`axiscal controllers` lists those that are built in; [tables] in a file of your own says what it has")
+            })?;
+            Some((post.name, tables))
+        }
+    };
+    if post.is_none() && (args.backup.is_some() || !args.old.is_empty() || args.unit == LengthUnit::Inch) {
+        return Err(Failure::new("export::options", "--backup, --old and --unit are not for linuxcnc")
+            .help("its old values and its unit are in the INI file: --ini"));
+    }
+    if post.is_some() && args.ini.is_some() {
+        return Err(Failure::new("export::options", "--ini is for linuxcnc only").help("give the control's own backup with --backup"));
     }
     if !(args.radius.is_finite() && args.radius > 0.0 && args.radius <= 1e5) {
         return Err(Failure::new(
@@ -75,11 +104,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         Some(date) => date.clone(),
         None => newest_log(&loaded),
     };
-    let export = export(&loaded, &fit, active.as_ref(), args, date, io)?;
+    judged(&loaded, &fit, &settings, args, io)?;
+    let correction = correction(&loaded, &fit, active.as_ref(), date, io)?;
+    if let Some((name, tables)) = &post {
+        return control(&loaded.machine, name, tables, &correction, args, io);
+    }
+    let export = export(&loaded, &correction, args, io)?;
     for (name, contents) in &export.files {
         files::write_whole(&args.out.join(name), contents)?;
     }
-    remove_stale(&args.out, &export)?;
+    remove_stale(&args.out, &export.files)?;
     say(&export, args, io);
     // what has no value of its own is in no table: "nothing is left" speaks of the rest
     for u in &fit.outcome.undetermined {
@@ -98,14 +132,30 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     Ok(Answer::Done)
 }
 
-fn export(
-    loaded: &Loaded,
-    fit: &Fit,
-    active: Option<&Compensation>,
-    args: &Args,
-    date: String,
-    io: &Io,
-) -> Result<Export> {
+/// A model that does not fit must not become a compensation: what is missing stands in the wrong parameters.
+fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io) -> Result<()> {
+    let settings = Settings { quick: true, ..settings.clone() };
+    let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit };
+    let options = diagnose::Options { at_most: 1, refit: false, power: false };
+    let found = diagnose::diagnose(subject, &options)?;
+    let (word, next) = match found.verdict {
+        Verdict::Adequate | Verdict::TooLittleData => return Ok(()),
+        Verdict::MissingEffect => {
+            let named = found.candidates.first().map_or_else(String::new, |c| format!(" (first: {})", c.effect));
+            ("missing-effect", format!("an effect is missing from the model{named}"))
+        }
+        Verdict::Unexplained => ("unexplained", "the model fails, and no known effect explains it".to_owned()),
+    };
+    let finding = Finding::error("export::verdict", format!("the diagnosis is {word}: {next}; the parameters of this model are then wrong"))
+        .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
+    if args.force {
+        io.report(&[Finding { severity: crate::diag::Severity::Warning, help: None, ..finding }]);
+        return Ok(());
+    }
+    Err(finding.into())
+}
+
+fn correction(loaded: &Loaded, fit: &Fit, active: Option<&Compensation>, date: String, io: &Io) -> Result<Correction> {
     if !fit.outcome.converged {
         return Err(Failure::new(
             "export::not_converged",
@@ -119,14 +169,96 @@ fn export(
     let (correction, findings) =
         Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, active, provenance)?;
     io.report(&findings.0);
+    Ok(correction)
+}
+
+fn export(loaded: &Loaded, correction: &Correction, args: &Args, io: &Io) -> Result<Export> {
     let ini = match &args.ini {
         Some(path) => Some(UserIni::read(&source(path.display().to_string(), files::read_text(path)?))?),
         None => None,
     };
     let options = Options { radius_mm: args.radius, force: args.force, ini, ..Options::default() };
-    let (export, findings) = linuxcnc::export(&loaded.machine, &correction, &options)?;
+    let (export, findings) = linuxcnc::export(&loaded.machine, correction, &options)?;
     io.report(&findings.0);
     Ok(export)
+}
+
+/// Old values: the backup, and what was given by hand.
+fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
+    let names = control::names(machine, tables);
+    let mut old = match &args.backup {
+        Some(path) => {
+            let text = source(path.display().to_string(), files::read_text(path)?);
+            backup::read(&text, &tables.backup, &names)?
+        }
+        None => Old::default(),
+    };
+    for word in &args.old {
+        let bad = |what: &str| {
+            Failure::new("export::old", format!("--old {word:?}: {what}"))
+                .help(format!("write NAME=VALUE with one of: {}", names.iter().cloned().collect::<Vec<_>>().join(", ")))
+        };
+        let (name, value) = word.rsplit_once('=').ok_or_else(|| bad("there is no ="))?;
+        let plain = backup::plain_name(name);
+        let known = names.iter().find(|n| backup::plain_name(n) == plain).ok_or_else(|| bad("no such value is written"))?;
+        let value: f64 = value.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| bad("that is no number"))?;
+        if old.values.insert(known.clone(), (value, Some(args.unit))).is_some() {
+            return Err(bad("it is given twice"));
+        }
+    }
+    Ok(old)
+}
+
+/// Tables of a control that is described by data.
+fn control(machine: &Machine, name: &str, tables: &Tables, correction: &Correction, args: &Args, io: &Io) -> Result<Answer> {
+    let options = control::Options {
+        radius_mm: args.radius,
+        force: args.force,
+        accept_unverified: args.accept_unverified,
+        unit: args.unit,
+        old: old_values(machine, tables, args)?,
+        ..control::Options::default()
+    };
+    let (export, findings) = control::export(machine, name, tables, correction, &options)?;
+    io.report(&findings.0);
+    for (file, contents) in &export.files {
+        files::write_whole(&args.out.join(file), contents)?;
+    }
+    remove_stale(&args.out, &export.files)?;
+    let mut t = table(&["value", "old", "new", "change", "unit"]);
+    for v in &export.values {
+        let show = |x: f64| number(format!("{x:.*}", v.decimals));
+        let shown = v.names.values().next().cloned().unwrap_or_default();
+        t.add_row(vec![Cell::new(shown), show(v.old), show(v.new), show(v.new - v.old), Cell::new(v.unit)]);
+    }
+    io.say(format!("{}\n{t}", tables.says));
+    if let Some(record) = &export.compensation.tables {
+        for grid in &record.grids {
+            io.say(format!(
+                "position table {}: {} by the position of {}, {} points from {} to {}",
+                grid.number, grid.output, grid.input, grid.values.len(), grid.min, grid.max()
+            ));
+        }
+    }
+    say_left("which leaves", &export.left, args, io);
+    io.say(format!(
+        "rounding to the control's resolution leaves up to {} um; all constant errors together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
+        significant(export.rounding_um), significant(export.rest_um), significant(export.longer_tool_um)
+    ));
+    io.say(format!("{}: {} files; README.txt says how to load them and what must be set again", args.out.display(), export.files.len()));
+    io.answer(&json!({
+        "controller": args.controller,
+        "out": args.out.display().to_string(),
+        "files": export.files.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        "terms": export.compensation.terms,
+        "values": export.values,
+        "left": export.left,
+        "rounding_um": export.rounding_um,
+        "rest_um": export.rest_um,
+        "longer_tool_um": export.longer_tool_um,
+        "radius_mm": args.radius,
+    }));
+    Ok(Answer::Done)
 }
 
 /// Is it a day of the calendar, YYYY-MM-DD?
@@ -166,15 +298,15 @@ fn free_folder(out: &Path, loaded: &Loaded) -> Result<()> {
 }
 
 /// Files of an earlier export that this one does not have: loaded by mistake they would be a wrong compensation.
-fn remove_stale(out: &Path, export: &Export) -> Result<()> {
+fn remove_stale(out: &Path, written: &[(String, Vec<u8>)]) -> Result<()> {
     for folder in ["", "stock"] {
         let Ok(entries) = std::fs::read_dir(out.join(folder)) else { continue };
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             let relative = if folder.is_empty() { name.clone() } else { format!("{folder}/{name}") };
-            let ours = name.starts_with("axiscal") || name.starts_with("restore.") || name == "tool_table.ngc";
+            let ours = name.starts_with("axiscal") || name.starts_with("restore") || name == "tool_table.ngc";
             let is_file = entry.file_type().is_ok_and(|t| t.is_file());
-            if ours && is_file && !export.files.iter().any(|(n, _)| *n == relative) {
+            if ours && is_file && !written.iter().any(|(n, _)| *n == relative) {
                 std::fs::remove_file(entry.path()).map_err(|e| {
                     Failure::new(
                         "export::stale",

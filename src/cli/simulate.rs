@@ -130,7 +130,11 @@ fn reported<T>((value, findings): (T, Findings), io: &Io) -> T {
 fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Findings)> {
     let file = if path.is_dir() { path.join("compensation.json") } else { path.to_path_buf() };
     let text = source(file.display().to_string(), files::read_text(&file)?);
-    Compensation::parse(&text, machine)
+    let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
+    Compensation::parse_with(&text, machine, &|name| {
+        let beside = folder.join(name);
+        Ok(source(beside.display().to_string(), files::read_text(&beside)?))
+    })
 }
 
 /// The touches as a CSV holds them; every simulated touch has its number.

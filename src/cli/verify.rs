@@ -67,7 +67,7 @@ fn can_show(after: &Loaded, question: Question) -> Result<()> {
         return Ok(());
     }
     let axes = |f: ControllerFrame| f == ControllerFrame::Axes;
-    let off = after.runs.iter().find(|r| active.mode == Mode::Stock && axes(r.plan.controller_frame));
+    let off = after.runs.iter().find(|r| active.mode != Mode::Component && axes(r.plan.controller_frame));
     match off {
         Some(run) => Err(Failure::new(
             "verify::cannot_show",

@@ -45,6 +45,8 @@ pub struct File {
     pub tcp: Option<Tcp>,
     /// The log: how it is called and how it is read.
     pub log: Log,
+    /// The compensation tables that the control has; absent: none are known.
+    pub tables: Option<super::tables::Tables>,
 }
 
 /// The program file.

@@ -40,6 +40,9 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         }
         Tcp { rotary_step_deg: step, says: tcp.says.clone(), other_stylus: tcp.other_stylus }
     });
+    if let Some(tables) = &file.tables {
+        super::tables::check(&mut check, tables);
+    }
     let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {
         name: file.name.get_ref().clone(),
@@ -61,20 +64,21 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         tcp,
         log,
         unverified: std::mem::take(&mut check.unverified),
+        tables: file.tables.clone(),
         text: text.clone(),
         templates,
     };
     check.findings.finish(post)
 }
 
-struct Check<'a> {
+pub(super) struct Check<'a> {
     source: &'a Source,
     findings: Findings,
     unverified: Vec<(String, String)>,
 }
 
 impl Check<'_> {
-    fn error(&mut self, span: &Range<usize>, code: &'static str, message: String, help: &str) {
+    pub(super) fn error(&mut self, span: &Range<usize>, code: &'static str, message: String, help: &str) {
         self.findings.push(Finding::error(code, message).help(help).at(self.source, span.clone()));
     }
 

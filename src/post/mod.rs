@@ -13,6 +13,7 @@ mod log_text;
 mod moves;
 mod opening;
 mod spelling;
+pub mod tables;
 
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
@@ -79,6 +80,8 @@ pub struct Postprocessor {
     pub log: LogRule,
     /// Entries that nobody has verified: name of the entry, why.
     pub unverified: Vec<(String, String)>,
+    /// The compensation tables that the control has.
+    pub tables: Option<tables::Tables>,
     /// The file as it was read.
     pub text: String,
     templates: minijinja::Environment<'static>,

@@ -7,6 +7,7 @@ use super::place::{Dof, Place, Spot};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_json};
 use crate::machine::Machine;
+use crate::post::tables::{LengthUnit, Point, Turn};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -21,6 +22,8 @@ pub enum Mode {
     Component,
     /// By what the control has without it.
     Stock,
+    /// By the tables of the control's own transformation.
+    Table,
 }
 
 impl std::fmt::Display for Mode {
@@ -28,6 +31,7 @@ impl std::fmt::Display for Mode {
         f.write_str(match self {
             Self::Component => "component",
             Self::Stock => "stock",
+            Self::Table => "table",
         })
     }
 }
@@ -115,6 +119,89 @@ impl AxisTable {
     }
 }
 
+/// What the control's own tables hold: the same numbers as its files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tables {
+    /// What the control calls this kind of machine.
+    pub kind: String,
+    /// Unit of lengths in the files; here they are in mm.
+    pub unit: LengthUnit,
+    /// Which reader of the virtual machine knows the files; none: it takes the numbers below.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reads: Option<String>,
+    /// The files that are to be loaded.
+    pub files: Vec<String>,
+    /// The vectors.
+    pub vectors: Vec<Vector>,
+    /// By rotary axis: the coordinate at which it really stands at zero, deg.
+    #[serde(default)]
+    pub zero_deg: BTreeMap<AxisName, f64>,
+    /// Tables of one axis's correction by another's position.
+    #[serde(default)]
+    pub grids: Vec<Grid>,
+    /// How far the workpiece stands off in the control's coordinates until it is touched off again, mm.
+    pub workpiece_shift_mm: [f64; 3],
+}
+
+/// A vector as it is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Vector {
+    /// Its short name.
+    pub id: String,
+    /// Between these points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub between: Option<[Point; 2]>,
+    /// Or the direction of this axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Turn>,
+    /// A direction against the motion.
+    #[serde(default)]
+    pub against: bool,
+    /// mm, or components of a direction.
+    pub value: [f64; 3],
+}
+
+/// A table of one axis's correction by another's position (or its own), machine coordinates, mm and deg.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// The control's number of it.
+    pub number: usize,
+    /// By whose position.
+    pub input: AxisName,
+    /// Whose correction.
+    pub output: AxisName,
+    /// 0: in both senses; 1, -1: while the input moves up, down.
+    pub sense: i8,
+    /// First point.
+    pub min: f64,
+    /// Distance of two points.
+    pub step: f64,
+    /// After the last point the first follows.
+    pub modulo: bool,
+    /// What is added to the output's position.
+    pub values: Vec<f64>,
+}
+
+impl Grid {
+    /// Last point.
+    #[must_use]
+    pub fn max(&self) -> f64 {
+        self.min + self.step * (self.values.len().max(1) - 1) as f64
+    }
+
+    /// What it adds at a coordinate of its input, mm or deg.
+    #[must_use]
+    pub fn at(&self, position: f64) -> f64 {
+        let last = self.values.len().saturating_sub(1);
+        let value = |i: usize| self.values.get(i.min(last)).copied().unwrap_or(0.0);
+        let span = self.max() - self.min;
+        let off = position - self.min;
+        let place = if self.modulo && span > 0.0 { off.rem_euclid(span) } else { off.clamp(0.0, span) } / self.step;
+        let low = place.floor().max(0.0);
+        value(low as usize) + (place - low) * (value(low as usize + 1) - value(low as usize))
+    }
+}
+
 /// Where a compensation comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Provenance {
@@ -149,6 +236,9 @@ pub struct Compensation {
     /// What the control's own means carry.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stock: Option<Stock>,
+    /// What the control's own tables hold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tables: Option<Tables>,
     /// Version of the program that wrote it.
     #[serde(default)]
     pub program: String,
@@ -199,6 +289,12 @@ impl Compensation {
         }
         if !read.reference_mm.iter().all(|v| v.is_finite()) {
             wrong("reference_mm is not a point".to_owned());
+        }
+        for grid in read.tables.iter().flat_map(|t| &t.grids) {
+            let numbers = [grid.min, grid.step].iter().chain(&grid.values).all(|v| v.is_finite());
+            if grid.values.len() < 2 || grid.step <= 0.0 || !numbers {
+                wrong(format!("position table {} is too short, not ascending or not of numbers", grid.number));
+            }
         }
         for (axis, table) in read.stock.iter().flat_map(|s| &s.axis_tables) {
             let ascending = table.rows.windows(2).all(|w| w[0][0] < w[1][0]);

@@ -2,13 +2,13 @@
 //! what is left out, each with its reason.
 
 use super::compensation::{Compensation, Provenance, Term};
-use super::place::{Dof, Meaning, Place, Spot, coordinate_off, meaning};
+use super::place::{Dof, Meaning, Place, Spot, across, coordinate_off, meaning};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result};
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::geometry::Displacement;
-use crate::machine::{Machine, Side};
-use crate::model::catalogue::{Catalogue, Effect};
+use crate::machine::{Axis, Machine, Side};
+use crate::model::catalogue::{Catalogue, Effect, Place as At};
 use crate::model::formula::VARIABLES;
 use crate::units::{deg_from_rad, rad_from_deg, rad_from_mrad, ratio_from_ppm, um_from_mm};
 use nalgebra::Vector3;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 /// mm or deg.
 pub type CoordinateError = Box<dyn Fn(f64, f64) -> f64>;
 
-/// An identified error of one axis's own position, which depends on nothing but that position and its sense.
+/// An identified error of one axis's position, which depends on nothing but one axis's position and its sense.
 pub struct AxisShape {
     /// Name of the parameter.
     pub parameter: String,
@@ -26,7 +26,9 @@ pub struct AxisShape {
     pub effect: String,
     /// The axis.
     pub axis: AxisName,
-    /// With the identified value.
+    /// The axis by whose position: the same one, or another.
+    pub input: AxisName,
+    /// With the identified value; of the input's coordinate and sense.
     pub error: CoordinateError,
 }
 
@@ -60,6 +62,8 @@ pub struct Correction {
     pub terms: Vec<Term>,
     /// Errors of an axis's own position.
     pub shapes: Vec<AxisShape>,
+    /// Errors of a linear axis by the position of another one. They are in `left_out` too: few controls have a place.
+    pub across: Vec<AxisShape>,
     /// The tool is this much longer than the study assumed, mm: belongs into the tool table.
     pub tool_length_mm: Option<f64>,
     /// What is not carried.
@@ -142,6 +146,7 @@ impl Correction {
             correction: Self {
                 terms: Vec::new(),
                 shapes: Vec::new(),
+                across: Vec::new(),
                 tool_length_mm: None,
                 left_out: Vec::new(),
                 of_measurement: BTreeMap::new(),
@@ -261,8 +266,18 @@ impl Collector<'_> {
                 let sum = self.correction.tool_length_mm.unwrap_or(0.0) + p.value * per_unit;
                 self.correction.tool_length_mm = Some(rounded(sum));
             }
-            Meaning::Position(axis) => self.take_shape(p, effect, axis),
-            Meaning::Nothing(why) => self.leave_out(p, true, why),
+            Meaning::Position(axis) => match self.shape(p, effect, axis, axis) {
+                Ok(shape) => self.correction.shapes.push(shape),
+                Err(why) => self.leave_out(p, true, why),
+            },
+            Meaning::Nothing(why) => {
+                self.leave_out(p, true, why);
+                let index = effect.parameters.iter().position(|known| known.name == p.name);
+                let found = index.and_then(|i| across(effect, i, self.machine));
+                if let Some(Ok(shape)) = found.map(|(input, output)| self.shape(p, effect, input, output)) {
+                    self.correction.across.push(shape);
+                }
+            }
             Meaning::Measurement => {}
         }
     }
@@ -282,44 +297,51 @@ impl Collector<'_> {
         }
     }
 
-    fn take_shape(&mut self, p: &Parameter, effect: &Effect, name: AxisName) {
-        let Some(axis) = self.machine.axis(name).cloned() else { return };
-        let Some(index) = effect.parameters.iter().position(|known| known.name == p.name) else { return };
+    /// The error of `output`'s position by that of `input`, or why it cannot be computed.
+    fn shape(&self, p: &Parameter, effect: &Effect, input: AxisName, output: AxisName) -> Result<AxisShape, String> {
+        let none = || "the machine has no such axis".to_owned();
+        let axis = self.machine.axis(output).cloned().ok_or_else(none)?;
+        let index = effect.parameters.iter().position(|known| known.name == p.name).ok_or_else(none)?;
         // a formula may hold other parameters of its effect: they must be known to be used
         let mut values = Vec::new();
         for known in &effect.parameters {
             let found = self.outcome.parameters.iter().find(|o| o.effect == effect.id && o.name == known.name);
             let usable =
                 found.filter(|o| known.shape.is_none() || matches!(o.status, Status::Identified | Status::Fixed));
-            let Some(other) = usable else {
-                return self.leave_out(p, true, format!("{} in its formula is not known", known.name));
-            };
+            let other = usable.ok_or_else(|| format!("{} in its formula is not known", known.name))?;
             values.push(other.value);
         }
         let terms: Vec<_> = effect.terms.iter().filter(|t| t.parameter == index).cloned().collect();
         let amount = p.value * effect.parameters[index].factor;
+        // what is across moves with the side that its own axis stands on, not with that of the axis that mends it
+        let of = match terms.first().map(|t| t.place) {
+            Some(At::Before(name) | At::After(name)) => self.machine.axis(name).map(|a| a.side),
+            _ => None,
+        };
+        let mends = Axis { side: of.unwrap_or(axis.side), ..axis };
         let error = move |q: f64, sense: f64| -> f64 {
             let mut state = [0.0; VARIABLES.len()];
             for (variable, slot) in VARIABLES.iter().zip(&mut state) {
-                if *variable == axis.name.to_string() {
-                    *slot = if axis.name.is_rotary() { rad_from_deg(q) } else { q };
-                } else if *variable == format!("s{}", axis.name) {
+                if *variable == input.to_string() {
+                    *slot = if input.is_rotary() { rad_from_deg(q) } else { q };
+                } else if *variable == format!("s{input}") {
                     *slot = sense;
                 }
             }
             let off: f64 =
-                terms.iter().map(|t| coordinate_off(t, &axis, amount * t.formula.eval(&state, &values))).sum();
-            if axis.name.is_rotary() { deg_from_rad(off) } else { off }
+                terms.iter().map(|t| coordinate_off(t, &mends, amount * t.formula.eval(&state, &values))).sum();
+            if mends.name.is_rotary() { deg_from_rad(off) } else { off }
         };
         if !error(0.0, 1.0).is_finite() {
-            return self.leave_out(p, true, "its formula has no value at 0".to_owned());
+            return Err("its formula has no value at 0".to_owned());
         }
-        self.correction.shapes.push(AxisShape {
+        Ok(AxisShape {
             parameter: p.name.clone(),
             effect: p.effect.clone(),
-            axis: name,
+            axis: output,
+            input,
             error: Box::new(error),
-        });
+        })
     }
 
     /// Adds what was active, restated at the new reference point.

@@ -7,8 +7,10 @@
 //! Nothing here reads or writes a file or knows how the values were found.
 
 pub mod compensation;
+pub mod control;
 pub mod correction;
 pub mod kins;
+pub mod lines;
 pub mod linuxcnc;
 pub mod place;
 

@@ -172,6 +172,36 @@ fn location(effect: &Effect, term: &Term, factor: f64, machine: &Machine) -> Opt
     }
 }
 
+/// The linear axis that can take an error out which depends on the position of one axis only: (input, output).
+///
+/// The displacement must lie along a linear axis whatever the other axes do: no rotary axis may stand between the base and
+/// its place.
+#[must_use]
+pub fn across(effect: &Effect, parameter: usize, machine: &Machine) -> Option<(AxisName, AxisName)> {
+    let terms: Vec<&Term> = effect.terms.iter().filter(|t| t.parameter == parameter).collect();
+    let [term] = terms.as_slice() else { return None };
+    let (name, behind) = match term.place {
+        At::Before(name) => (name, false),
+        At::After(name) => (name, true),
+        _ => return None,
+    };
+    let axis = machine.axis(name)?;
+    let mut inner = machine.side(axis.side).take_while(|a| a.name != name);
+    if inner.any(|a| a.name.is_rotary()) || (behind && name.is_rotary()) || Dof::ALL.get(term.component)?.is_angle() {
+        return None;
+    }
+    let output = AxisName::ALL[term.component];
+    along(machine.axis(output)?, Dof::ALL[term.component])?;
+    let inputs: Vec<AxisName> = term
+        .formula
+        .variables()
+        .into_iter()
+        .map(|v| AxisName::from_letter(v.chars().last()?).filter(|a| v == a.to_string() || v == format!("s{a}")))
+        .collect::<Option<Vec<_>>>()?;
+    let first = *inputs.first()?;
+    (inputs.iter().all(|i| *i == first) && machine.axis(first).is_some()).then_some((first, output))
+}
+
 /// The axis whose own position a term is an error of, or why it is none.
 fn own_position(term: &Term, machine: &Machine) -> Result<AxisName, String> {
     let name = match term.place {

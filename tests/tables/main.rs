@@ -3,8 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "../common/random.rs"]
+mod random;
+
 mod by_hand;
 mod component;
+mod controls;
 mod export;
 mod mapping;
 mod stock;

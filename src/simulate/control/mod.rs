@@ -4,6 +4,8 @@
 //! linear axes, home offsets and axis tables add what they hold, and so the real axes move.
 
 mod component;
+mod lines;
+mod loaded;
 mod stock;
 mod table;
 mod written;
@@ -13,6 +15,8 @@ use super::rigid::{Vec3, minus, plus};
 use super::terms::Shifts;
 use crate::axes::{AxisName, Position};
 use component::Component;
+use lines::Vectors;
+use loaded::Cross;
 use stock::TiltingTable;
 use table::Table;
 
@@ -25,6 +29,7 @@ pub struct Compensation {
     /// How much less than the commanded angle the rotary axes are told, deg.
     told_less_deg: [f64; 6],
     tables: Vec<Table>,
+    cross: Vec<Cross>,
 }
 
 /// What the control computes with.
@@ -36,6 +41,8 @@ enum Kinematics {
     Component(Box<Component>),
     /// LinuxCNC's own kinematics of a tilting table with a turntable; acts on tool centre point programs only.
     TiltingTable(TiltingTable),
+    /// Vectors of the control's own transformation; acts on tool centre point programs only.
+    Vectors(Box<Vectors>),
 }
 
 impl Compensation {
@@ -44,6 +51,8 @@ impl Compensation {
         match (&self.kinematics, tcp) {
             (Kinematics::TiltingTable(_), false) => Err("the pins of the control's own kinematics act only under its \
                 transformation: without it home offsets and axis tables are all that shows"),
+            (Kinematics::Vectors(_), false) => Err("the vectors of the control's own transformation act only under it: \
+                without it zero positions and position tables are all that shows"),
             (Kinematics::Component(_), true) => {
                 Err("the kinematics component knows axis positions only, no tool centre point")
             }
@@ -66,9 +75,10 @@ impl Compensation {
         let linear = match &self.kinematics {
             Kinematics::Component(component) => component.linear(nominal, start, stylus)?,
             Kinematics::TiltingTable(table) if tcp => table.linear(nominal, start, stylus),
-            Kinematics::Identity | Kinematics::TiltingTable(_) => Linear::SAME,
+            Kinematics::Vectors(vectors) if tcp => vectors.linear(nominal, start, stylus),
+            Kinematics::Identity | Kinematics::TiltingTable(_) | Kinematics::Vectors(_) => Linear::SAME,
         };
-        let mut out = Mapping { linear, told_less_deg: self.told_less_deg, tables: &self.tables, up: [false; 6] };
+        let mut out = Mapping { linear, told_less_deg: self.told_less_deg, tables: &self.tables, cross: &self.cross, up: [false; 6] };
         let (from, to) = (out.kinematic(start), out.kinematic(end));
         for name in AxisName::ALL {
             let i = name.index();
@@ -125,6 +135,7 @@ pub struct Mapping<'a> {
     linear: Linear,
     told_less_deg: [f64; 6],
     tables: &'a [Table],
+    cross: &'a [Cross],
     /// Which axes move up.
     up: [bool; 6],
 }
@@ -132,11 +143,11 @@ pub struct Mapping<'a> {
 impl Mapping<'_> {
     /// A control without any compensation.
     pub const DIRECT: Mapping<'static> =
-        Mapping { linear: Linear::SAME, told_less_deg: [0.0; 6], tables: &[], up: [false; 6] };
+        Mapping { linear: Linear::SAME, told_less_deg: [0.0; 6], tables: &[], cross: &[], up: [false; 6] };
 
     /// Does a straight commanded line give a straight line of the axes?
     pub fn is_affine(&self) -> bool {
-        self.tables.iter().all(|t| t.axis.is_rotary())
+        self.tables.iter().all(|t| t.axis.is_rotary()) && self.cross.iter().all(|c| c.input.is_rotary())
     }
 
     /// What the kinematics says.
@@ -152,7 +163,12 @@ impl Mapping<'_> {
 
     /// The axes' positions for a commanded position.
     pub fn joints(&self, commanded: &Position) -> Position {
-        let mut out = self.kinematic(commanded);
+        let kinematic = self.kinematic(commanded);
+        let mut out = kinematic;
+        for cross in self.cross {
+            let added = cross.added(kinematic.get(cross.input), self.up[cross.input.index()]);
+            out.set(cross.output, out.get(cross.output) + added);
+        }
         for table in self.tables {
             let told = out.get(table.axis);
             out.set(table.axis, told + table.added(told, self.up[table.axis.index()]));

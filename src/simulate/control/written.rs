@@ -5,10 +5,11 @@ use super::stock::TiltingTable;
 use super::table::Table;
 use super::{Compensation, Kinematics};
 use crate::axes::AxisName;
-use crate::diag::{Finding, Findings, Result, Source, from_json};
-use crate::machine::Machine;
+use super::loaded::{self, Loaded};
+use crate::diag::{Failure, Finding, Findings, Result, Source, from_json};
+use crate::machine::{self, Machine};
 use crate::simulate::chain::Chain;
-use crate::simulate::rigid::Vec3;
+use crate::simulate::rigid::{Vec3, plus};
 use crate::simulate::terms::Shifts;
 use crate::units::rad_from_deg;
 use serde::Deserialize;
@@ -28,6 +29,31 @@ struct Written {
     terms: Vec<WrittenTerm>,
     #[serde(default)]
     stock: Option<WrittenStock>,
+    #[serde(default)]
+    tables: Option<WrittenTables>,
+}
+
+/// Tables of the control's own transformation.
+#[derive(Debug, Deserialize)]
+struct WrittenTables {
+    /// Who knows the files.
+    #[serde(default)]
+    reads: Option<String>,
+    files: Vec<String>,
+    vectors: Vec<WrittenVector>,
+    #[serde(default)]
+    zero_deg: BTreeMap<AxisName, f64>,
+}
+
+#[derive(Debug, Deserialize)]
+struct WrittenVector {
+    #[serde(default)]
+    between: Option<[String; 2]>,
+    #[serde(default)]
+    direction: Option<String>,
+    #[serde(default)]
+    against: bool,
+    value: Vec3,
 }
 
 /// An error that the control takes into account, mm or deg.
@@ -69,6 +95,21 @@ impl Compensation {
     /// # Errors
     /// When the text is not of this form, or was made for another machine.
     pub fn parse(source: &Source, machine: &Machine) -> Result<(Self, Findings)> {
+        Self::parse_with(source, machine, &|name| {
+            Err(Failure::new("compensation::file", format!("the compensation names the file {name}"))
+                .help("give the folder that `axiscal export` wrote, not the one file"))
+        })
+    }
+
+    /// The same; `open` gives the text of a file beside it: where the control reads files of its own, they count.
+    ///
+    /// # Errors
+    /// As [`Self::parse`], or when such a file cannot be read.
+    pub fn parse_with(
+        source: &Source,
+        machine: &Machine,
+        open: &dyn Fn(&str) -> Result<Source>,
+    ) -> Result<(Self, Findings)> {
         let written: Written = serde_json::from_str(source.inner()).map_err(|e| {
             from_json(&e, source, "compensation::not_json")
                 .help("a compensation is written by `axiscal export` (axiscal-compensation/1)")
@@ -88,6 +129,7 @@ impl Compensation {
         }
         let stock = written.stock.unwrap_or_default();
         let mut told_less_deg = [0.0; 6];
+        let mut cross = Vec::new();
         let kinematics = match written.mode.as_str() {
             "component" => {
                 let p = &machine.reference.pivot;
@@ -105,14 +147,19 @@ impl Compensation {
                     Some(module) => reader.tilting_table(module, &stock).unwrap_or(Kinematics::Identity),
                 }
             }
+            "table" => {
+                let loaded = reader.tables(written.tables.as_ref(), open, &mut told_less_deg)?;
+                cross = loaded.cross;
+                loaded.vectors.map_or(Kinematics::Identity, |v| Kinematics::Vectors(Box::new(v)))
+            }
             other => {
-                let message = format!("mode is {other:?}, expected \"component\" or \"stock\"");
+                let message = format!("mode is {other:?}, expected \"component\", \"stock\" or \"table\"");
                 reader.error("compensation::mode", message, "export again with this version");
                 Kinematics::Identity
             }
         };
         let tables = stock.axis_tables.iter().filter_map(|(axis, table)| reader.table(*axis, table)).collect();
-        reader.findings.finish(Self { kinematics, told_less_deg, tables })
+        reader.findings.finish(Self { kinematics, told_less_deg, tables, cross })
     }
 }
 
@@ -174,6 +221,68 @@ impl Reader<'_> {
             // homed to where it stands: a command of that much less brings it to the same place
             told_less_deg[axis.index()] += deg;
         }
+    }
+
+    fn tables(
+        &mut self,
+        written: Option<&WrittenTables>,
+        open: &dyn Fn(&str) -> Result<Source>,
+        told_less_deg: &mut [f64; 6],
+    ) -> Result<Loaded> {
+        let Some(written) = written else {
+            self.error("compensation::tables", "mode is \"table\", but there are no tables", UNCHANGED);
+            return Ok(Loaded::default());
+        };
+        for (&axis, &deg) in &written.zero_deg {
+            if self.machine.axis(axis).is_none() || !deg.is_finite() {
+                self.error("compensation::zero", format!("the zero position of {axis} is {deg}"), UNCHANGED);
+                continue;
+            }
+            // an offset is added to what is commanded
+            told_less_deg[axis.index()] -= deg;
+        }
+        let files = || written.files.iter().map(|name| open(name)).collect::<Result<Vec<_>>>();
+        Ok(match written.reads.as_deref() {
+            Some("sinumerik-data") => loaded::sinumerik(&files()?, self.machine, &mut self.findings),
+            Some("fanuc-parameters") => loaded::fanuc(&files()?, self.machine, &mut self.findings),
+            Some(other) => {
+                let message = format!("files of the kind {other:?} are not known");
+                self.error("compensation::reads", message, "there are: sinumerik-data, fanuc-parameters");
+                Loaded::default()
+            }
+            None => self.worksheet(written),
+        })
+    }
+
+    /// What a person entered from a worksheet: lines by vectors between named points, and directions.
+    fn worksheet(&mut self, written: &WrittenTables) -> Loaded {
+        let mut points: BTreeMap<&str, Vec3> = [("machine-zero", [0.0; 3]), ("tool-adapter", [0.0; 3])].into();
+        // as often as there are vectors: each may lead on from any other
+        for _ in &written.vectors {
+            for v in &written.vectors {
+                let Some([from, to]) = &v.between else { continue };
+                if let Some(base) = points.get(from.as_str()).copied() {
+                    points.insert(to, plus(base, 1.0, v.value));
+                }
+            }
+        }
+        let mut lines = |side: machine::Side, word: &str| -> Vec<(AxisName, Vec3, Vec3)> {
+            let axes = self.machine.axes.iter().filter(|a| a.side == side && a.name.is_rotary());
+            let mut out = Vec::new();
+            for (i, axis) in axes.enumerate() {
+                let name = format!("{word}-{}", i + 1);
+                let given = written.vectors.iter().find(|v| v.direction.as_deref() == Some(name.as_str()));
+                let nominal = [axis.direction.x, axis.direction.y, axis.direction.z].map(|d| d * axis.sense);
+                let direction = given.map_or(nominal, |v| if v.against { v.value.map(|x| -x) } else { v.value });
+                match points.get(name.as_str()) {
+                    Some(point) => out.push((axis.name, direction, *point)),
+                    None => self.findings.push(Finding::error("compensation::tables", format!("no vector leads to {name}")).help(UNCHANGED)),
+                }
+            }
+            out
+        };
+        let (table, head) = (lines(machine::Side::Workpiece, "workpiece"), lines(machine::Side::Tool, "tool"));
+        Loaded { vectors: Some(loaded::through(self.machine, &table, &head)), cross: Vec::new() }
     }
 
     fn tilting_table(&mut self, module: &str, stock: &WrittenStock) -> Option<Kinematics> {

@@ -93,7 +93,7 @@ mod tests {
     }
 
     fn shape(axis: AxisName, error: fn(f64, f64) -> f64) -> AxisShape {
-        AxisShape { parameter: "k".to_owned(), effect: "test".to_owned(), axis, error: Box::new(error) }
+        AxisShape { parameter: "k".to_owned(), effect: "test".to_owned(), axis, input: axis, error: Box::new(error) }
     }
 
     fn one(machine: &Machine, shape: AxisShape) -> AxisTable {

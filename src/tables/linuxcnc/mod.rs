@@ -139,7 +139,7 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
 fn mode_note(active: Mode) -> Finding {
     let other = match active {
         Mode::Component => "stock/",
-        Mode::Stock => "the component",
+        Mode::Stock | Mode::Table => "the component",
     };
     Finding::info(
         "tables::one_way",
@@ -150,7 +150,7 @@ fn mode_note(active: Mode) -> Finding {
 
 /// Renders a template with a context; templates are part of the program, so that failing is a fault of ours that the
 /// user sees as an error, not as a panic.
-fn render(name: &str, template: &str, context: &minijinja::Value) -> Result<String> {
+pub(in crate::tables) fn render(name: &str, template: &str, context: &minijinja::Value) -> Result<String> {
     let fault = |e: minijinja::Error| {
         Failure::new("tables::template", format!("template {name}: {e:#}"))
             .help("this is a fault of the program: please report it with the study and the machine file")
@@ -167,7 +167,7 @@ fn render(name: &str, template: &str, context: &minijinja::Value) -> Result<Stri
 
 /// A text of the user's on one line of a comment: no line ends, no end of a C comment, no brackets that an NC comment
 /// would end at.
-fn one_line(text: &str) -> String {
+pub(in crate::tables) fn one_line(text: &str) -> String {
     let cleaned: String = text
         .chars()
         .map(|c| match c {
@@ -181,7 +181,7 @@ fn one_line(text: &str) -> String {
 }
 
 /// The lines at the head of every file.
-fn head(machine: &Machine, correction: &Correction) -> Vec<String> {
+pub(in crate::tables) fn head(machine: &Machine, correction: &Correction) -> Vec<String> {
     let p = &correction.provenance;
     let or = |text: &str| if text.is_empty() { "not stated".to_owned() } else { one_line(text) };
     vec![

@@ -126,6 +126,7 @@ impl Packing<'_> {
             reference_mm: self.correction.reference_mm,
             terms,
             stock,
+            tables: None,
             program: program(),
             provenance: self.correction.provenance.clone(),
         }

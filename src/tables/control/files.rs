@@ -1,0 +1,156 @@
+//! The files of an export: the control's own through its templates, and what a person reads.
+
+use super::fill::Value as Entry;
+use super::{Export, Options};
+use crate::diag::{Failure, Findings, Result};
+use crate::machine::Machine;
+use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, compile};
+use crate::tables::compensation::Grid;
+use crate::tables::correction::Correction;
+use crate::tables::linuxcnc::{head, one_line, render};
+use minijinja::{Value, context};
+
+const README: &str = include_str!("../templates/control/readme.txt.j2");
+
+/// A number with so many digits; a minus before zero is none.
+fn digits(value: f64, decimals: usize, always_mark: bool) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text };
+    if always_mark && !text.contains('.') { text + "." } else { text }
+}
+
+fn entry(value: &Entry, spelling: Option<&str>, restore: bool, always_mark: bool) -> Option<Value> {
+    let name = match spelling {
+        Some(s) => value.names.get(s)?.clone(),
+        None => value.names.values().next()?.clone(),
+    };
+    let show = |v: f64| digits(v, value.decimals, always_mark);
+    let (now, other) = if restore { (value.old, value.new) } else { (value.new, value.old) };
+    let change = digits(value.new - value.old, value.decimals, false);
+    Some(context! {
+        id => value.id.clone(), name, value => show(now), other => show(other), old => show(value.old), new => show(value.new),
+        change, says => one_line(&value.says), unit => value.unit, changed => value.new != value.old,
+    })
+}
+
+fn grid(machine: &Machine, tables: &Tables, grid: &Grid, restore: Option<&Grid>) -> Value {
+    let name = |axis| {
+        let number = machine.axes.iter().map(|a| a.name.index()).filter(|i| *i <= crate::axes::AxisName::index(axis)).count();
+        tables.grid.as_ref().map_or_else(String::new, |form| form.axis_name(axis, number))
+    };
+    let output_step = if grid.output.is_rotary() { tables.step_deg.get_ref() } else { tables.step_mm.get_ref() };
+    let decimals = super::fill::decimals(*output_step);
+    let values: Vec<String> = (0..grid.values.len())
+        .map(|i| {
+            let at = grid.min + grid.step * i as f64;
+            restore.map_or(grid.values[i], |old| old.at(at))
+        })
+        .map(|v| digits(v, decimals, tables.always_mark))
+        .collect();
+    let at = |v: f64| format!("{}", crate::tables::correction::rounded(v));
+    context! {
+        number => grid.number, input => name(grid.input), output => name(grid.output), sense => grid.sense,
+        input_axis => grid.input.to_string(), output_axis => grid.output.to_string(),
+        min => at(grid.min), max => at(grid.max()), step => at(grid.step), modulo => grid.modulo, values,
+    }
+}
+
+#[allow(clippy::too_many_arguments)] // one place, one call
+pub(super) fn write(
+    machine: &Machine,
+    tables: &Tables,
+    kind: &Kind,
+    correction: &Correction,
+    options: &Options,
+    known: bool,
+    export: &mut Export,
+    findings: &mut Findings,
+) -> Result<()> {
+    let doubts: Vec<String> =
+        findings.0.iter().filter(|f| f.code == "tables::unverified").map(|f| one_line(&f.message)).collect();
+    let head = head(machine, correction);
+    let record = export.compensation.tables.clone();
+    let grids = record.map(|r| r.grids).unwrap_or_default();
+    let active = correction.active.as_ref().and_then(|a| a.tables.clone()).map(|t| t.grids).unwrap_or_default();
+    let none = |g: &Grid| Grid { values: vec![0.0; g.values.len()], ..g.clone() };
+    let unit = match options.unit {
+        LengthUnit::Mm => context! { name => "mm", letter => "M" },
+        LengthUnit::Inch => context! { name => "inch", letter => "I" },
+    };
+    let common = |restore: bool, form: Option<&FileForm>| {
+        let spelling = form.and_then(|f| f.spelling.as_deref());
+        let entries: Vec<Value> =
+            export.values.iter().filter_map(|v| entry(v, spelling, restore, tables.always_mark)).collect();
+        let shown: Vec<Value> = grids
+            .iter()
+            .map(|g| {
+                let same = |o: &&Grid| (o.input, o.output, o.sense) == (g.input, g.output, g.sense);
+                let old = active.iter().find(same).cloned().unwrap_or_else(|| none(g));
+                grid(machine, tables, g, restore.then_some(&old))
+            })
+            .collect();
+        context! {
+            head => head.clone(), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
+            axes => machine.rotary().map(|a| a.name.to_string()).collect::<Vec<_>>(),
+            unit => unit.clone(), restore, known, doubts => doubts.clone(),
+        }
+    };
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    for form in &tables.file {
+        if form.grids && grids.is_empty() {
+            continue;
+        }
+        for (name, restore) in [(Some(&form.name), false), (form.restore.as_ref(), true)] {
+            let Some(name) = name else { continue };
+            let text = own(form, &common(restore, Some(form)))?;
+            let text = if form.crlf { text.replace('\n', "\r\n") } else { text };
+            files.push((name.clone(), text.into_bytes()));
+        }
+    }
+    let left: Vec<Value> = export
+        .left
+        .iter()
+        .map(|l| {
+            let size = l.left_um.map_or_else(|| "an error of unknown size".to_owned(), |um| format!("{um:.2} um"));
+            context! { parameter => l.parameter.clone(), value => format!("{:.6}", l.value), unit => l.unit.clone(), size,
+            lever => format!("{:.0}", l.lever_mm), why => one_line(&l.why) }
+        })
+        .collect();
+    let not: Vec<Value> = correction
+        .left_out
+        .iter()
+        .filter(|l| !l.known)
+        .map(|l| context! { parameter => l.parameter.clone(), effect => l.effect.clone(), why => one_line(&l.why) })
+        .collect();
+    let shift = export.compensation.tables.as_ref().map_or([0.0; 3], |t| t.workpiece_shift_mm);
+    let shape = |s: &crate::tables::correction::AxisShape| format!("{} ({})", s.parameter, s.effect);
+    let in_grids: Vec<String> = if tables.grid.is_some() { correction.shapes.iter().chain(&correction.across).map(shape).collect() } else { Vec::new() };
+    let text = render("readme", README, &context! {
+        ..common(false, None), ..context! {
+            says => tables.says.clone(), worksheet => tables.worksheet, load => tables.load.clone(), cannot => tables.cannot.clone(),
+            files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
+            variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
+            reads => tables.reads.is_some(),
+            left, omitted => not, in_grids, radius => format!("{}", options.radius_mm),
+            rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
+            longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
+            shift => shift.map(|v| format!("{v:+.4}")).to_vec(), tool => correction.tool_length_mm.map(|v| format!("{v:+.4}")),
+            measured => correction.of_measurement.keys().cloned().collect::<Vec<_>>(),
+            step => format!("{}", tables.step_mm.get_ref()),
+        }
+    })?;
+    files.push(("README.txt".to_owned(), text.into_bytes()));
+    files.push(("compensation.json".to_owned(), export.compensation.to_json()?.into_bytes()));
+    export.files = files;
+    Ok(())
+}
+
+/// A template of the postprocessor file: the user may have changed it.
+fn own(form: &FileForm, context: &Value) -> Result<String> {
+    let fault = |e: minijinja::Error| {
+        Failure::new("tables::template", format!("template of {}: {e:#}", form.name))
+            .help("compare it with that of the built-in controllers: `axiscal controllers show NAME`")
+    };
+    let environment = compile(form.template.get_ref()).map_err(fault)?;
+    environment.get_template("file").and_then(|t| t.render(context)).map_err(fault)
+}

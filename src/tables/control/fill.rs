@@ -1,0 +1,315 @@
+//! Lines → the vectors of a control's table, on top of its old values, rounded to what it stores.
+
+use super::backup::Old;
+use crate::diag::{Finding, Findings};
+use crate::machine::{Machine, Side};
+use crate::post::tables::{Kind, LengthUnit, Point, Tables, Turn, VectorForm, doubt};
+use crate::tables::correction::{Limits, rounded};
+use crate::tables::lines::{Line, Seen};
+use crate::units::{deg_from_rad, inch_from_mm, mm_from_inch};
+use nalgebra::{Unit, Vector3};
+use std::collections::BTreeMap;
+
+/// A value of a table, in the control's unit.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Value {
+    /// Short name of the vector or angle.
+    pub id: String,
+    /// What it is.
+    pub says: String,
+    /// Spelling → name.
+    pub names: BTreeMap<String, String>,
+    /// What the control held.
+    pub old: f64,
+    /// What it is to hold.
+    pub new: f64,
+    /// `mm`, `inch`, `deg`, or nothing for a direction.
+    pub unit: &'static str,
+    /// Digits behind the point.
+    pub decimals: usize,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// A filled table.
+#[derive(Debug, Clone)]
+pub struct Filled {
+    /// Its values.
+    pub values: Vec<Value>,
+    /// Its vectors, mm or components of a direction.
+    pub vectors: Vec<(VectorForm, Vector3<f64>)>,
+    /// The machine as this table describes it, in the terms of the machine's own description.
+    pub seen: Seen,
+    /// Did every old value come from the user?
+    pub known: bool,
+}
+
+/// What the filling needs to know.
+pub struct Question<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// What the control has.
+    pub tables: &'a Tables,
+    /// Its kind for this machine.
+    pub kind: &'a Kind,
+    /// With what was active during the measurement.
+    pub before: &'a Seen,
+    /// With what is to be.
+    pub now: &'a Seen,
+    /// The user's old values.
+    pub old: &'a Old,
+    /// Unit of the control.
+    pub unit: LengthUnit,
+    /// How far old values may lie off the description.
+    pub limits: Limits,
+}
+
+/// Digits behind the point that a step needs.
+#[must_use]
+pub fn decimals(step: f64) -> usize {
+    (-step.log10() - 1e-9).ceil().clamp(0.0, 15.0) as usize
+}
+
+/// The line of a kind's axis.
+#[must_use]
+pub fn line_of(seen: &Seen, turn: Turn) -> Option<(Side, usize, &Line)> {
+    let (side, place) = turn.place();
+    Some((side, place, seen.side(side).get(place)?))
+}
+
+fn point_of(seen: &Seen, point: Point) -> Vector3<f64> {
+    point.turn().and_then(|t| line_of(seen, t)).map_or_else(Vector3::zeros, |(_, _, line)| line.point)
+}
+
+/// +1, or -1 where the control counts a direction against the motion.
+fn sign(form: &VectorForm) -> f64 {
+    let moves_work = form.direction.is_some_and(|t| t.place().0 == Side::Workpiece);
+    if form.reversed && moves_work { -1.0 } else { 1.0 }
+}
+
+/// Vectors that lead on from where another one ends come after it; directions and closing ones last.
+fn in_order<'a, T>(all: impl Iterator<Item = &'a T>, form: impl Fn(&T) -> &VectorForm) -> Vec<&'a T> {
+    let mut waiting: Vec<&T> = all.collect();
+    let (mut out, mut reached) = (Vec::new(), vec![Point::MachineZero, Point::ToolAdapter]);
+    while let Some(next) = waiting.iter().position(|t| form(t).from.is_some_and(|p| reached.contains(&p))) {
+        let found = waiting.remove(next);
+        reached.extend(form(found).to);
+        out.push(found);
+    }
+    out.extend(waiting);
+    out
+}
+
+impl Question<'_> {
+    fn step_mm(&self) -> f64 {
+        match self.unit {
+            LengthUnit::Mm => *self.tables.step_mm.get_ref(),
+            LengthUnit::Inch => mm_from_inch(*self.tables.step_inch.get_ref()),
+        }
+    }
+
+    fn in_unit(&self, mm: f64) -> f64 {
+        match self.unit {
+            LengthUnit::Mm => mm,
+            LengthUnit::Inch => inch_from_mm(mm),
+        }
+    }
+
+    /// An old value by any of its names, in mm for a length.
+    fn old_value(&self, names: &BTreeMap<String, [String; 3]>, k: usize, length: bool) -> Option<f64> {
+        let (value, unit) = names.values().find_map(|n| self.old.values.get(&n[k]))?;
+        let inch = length && unit.unwrap_or(self.unit) == LengthUnit::Inch;
+        Some(if inch { mm_from_inch(*value) } else { *value })
+    }
+
+    /// The old vector: the user's numbers where they are known, else as described. True where all are the user's.
+    fn old_vector(&self, form: &VectorForm, described: Vector3<f64>) -> (Vector3<f64>, bool) {
+        let mut known = true;
+        let value = Vector3::from_fn(|k, _| {
+            if form.names.values().all(|n| n[k].is_empty()) {
+                return described[k];
+            }
+            self.old_value(&form.names, k, form.direction.is_none()).unwrap_or_else(|| {
+                known = false;
+                described[k]
+            })
+        });
+        (value, known)
+    }
+
+    /// As the description has it.
+    fn described(&self, form: &VectorForm, seen: &Seen) -> Vector3<f64> {
+        match (form.from, form.to, form.direction) {
+            (Some(from), Some(to), _) => point_of(seen, to) - point_of(seen, from),
+            (_, _, Some(turn)) => line_of(seen, turn)
+                .map_or_else(Vector3::zeros, |(_, _, line)| line.direction.into_inner() * sign(form)),
+            _ => {
+                let parts = self.kind.vector.iter().filter(|v| form.close.iter().flatten().any(|id| *id == v.id));
+                -parts.map(|v| self.described(v, seen)).sum::<Vector3<f64>>()
+            }
+        }
+    }
+
+    /// Fills the table.
+    #[must_use]
+    pub fn fill(&self) -> (Filled, Findings) {
+        let mut findings = Findings::default();
+        let mut known = true;
+        // where the user's numbers put the points, against the description
+        let mut off: BTreeMap<Point, Vector3<f64>> = BTreeMap::new();
+        let mut turned: BTreeMap<Turn, Vector3<f64>> = BTreeMap::new();
+        for form in in_order(self.kind.vector.iter(), |f| f) {
+            let described = self.described(form, self.before);
+            let (old, all) = self.old_vector(form, described);
+            known &= all;
+            match (form.from, form.to, form.direction) {
+                (Some(from), Some(to), _) => {
+                    let base = off.get(&from).copied().unwrap_or_default();
+                    off.insert(to, base + old - described);
+                }
+                (_, _, Some(turn)) => {
+                    turned.insert(turn, (old.try_normalize(1e-9).unwrap_or(described) - described) * sign(form));
+                }
+                _ => {
+                    let sum: Vector3<f64> =
+                        form.close.iter().flatten().filter_map(|id| self.kind.vector.iter().find(|v| v.id == *id)).map(|v| self.old_vector(v, self.described(v, self.before)).0).sum();
+                    if (sum + old).amax() > 2.5 * self.step_mm() {
+                        findings.push(Finding::warning(
+                            "tables::open_chain",
+                            format!("the old vectors do not close: {} is {:.4} {:.4} {:.4} mm off minus the sum of {}", form.id, (sum + old).x, (sum + old).y, (sum + old).z, form.close.iter().flatten().cloned().collect::<Vec<_>>().join(" and ")),
+                        ).help("the new ones close: machine coordinates at rotary zero change by that much, so check the work offsets"));
+                    }
+                }
+            }
+        }
+        self.compare(&off, &turned, &mut findings);
+        let (mut seen, mut target) = (self.now.clone(), self.now.clone());
+        for (point, by) in &off {
+            let Some((side, place)) = point.turn().map(Turn::place) else { continue };
+            let (Some(was), Some(line)) = (self.before.side(side).get(place), target.side_mut(side).get_mut(place)) else { continue };
+            // further along a line that has tilted, its points have moved further
+            let along = by.dot(&was.direction);
+            line.point += by + along * (line.direction.into_inner() - was.direction.into_inner());
+        }
+        for (turn, by) in &turned {
+            let (side, place) = turn.place();
+            if let Some(line) = target.side_mut(side).get_mut(place) {
+                line.direction = Unit::new_normalize(line.direction.into_inner() + by);
+            }
+        }
+        let mut values = Vec::new();
+        let mut vectors: Vec<(VectorForm, Vector3<f64>)> = Vec::new();
+        let step = self.step_mm();
+        let direction_step = 0.1_f64.powi(i32::try_from(self.tables.direction_decimals).unwrap_or(9));
+        for form in &self.kind.vector {
+            let described = self.described(form, self.before);
+            let old = self.old_vector(form, described).0;
+            let direction = form.direction.is_some();
+            let step = if direction { direction_step } else { step };
+            let exact = match &form.close {
+                // of the written ones, so that they close to the last digit
+                Some(ids) => -vectors.iter().filter(|(f, _)| ids.contains(&f.id)).map(|(_, v)| *v).sum::<Vector3<f64>>(),
+                None => self.described(form, &target),
+            };
+            let new = exact.map(|v| (v / step).round() * step);
+            for k in 0..3 {
+                let names: BTreeMap<String, String> = form
+                    .names
+                    .iter()
+                    .filter(|(_, n)| !n[k].is_empty())
+                    .map(|(spelling, n)| (spelling.clone(), n[k].clone()))
+                    .collect();
+                if names.is_empty() {
+                    continue;
+                }
+                if !direction && new[k].abs() > self.tables.limit_mm {
+                    findings.push(Finding::error("tables::range", format!("{} of {} is {:.4} mm, the control takes up to {} mm", ["X", "Y", "Z"][k], form.id, new[k], self.tables.limit_mm)).help("check `origin` in machines.toml"));
+                }
+                let shown = |v: f64| if direction { v } else { self.in_unit(v) };
+                values.push(Value {
+                    id: format!("{}.{}", form.id, ["x", "y", "z"][k]),
+                    says: form.says.clone(),
+                    names,
+                    old: rounded(shown(old[k])),
+                    new: rounded(shown(new[k])),
+                    unit: match (direction, self.unit) {
+                        (true, _) => "",
+                        (_, LengthUnit::Mm) => "mm",
+                        (_, LengthUnit::Inch) => "inch",
+                    },
+                    decimals: if direction { self.tables.direction_decimals } else { decimals(self.in_unit(step)) },
+                    unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
+                });
+            }
+            // components that the control has no place for stay as they are described
+            let held = Vector3::from_fn(|k, _| {
+                if form.names.values().all(|n| n[k].is_empty()) { described[k] } else { new[k] }
+            });
+            vectors.push((form.clone(), held));
+        }
+        self.as_written(&vectors, &off, &turned, &mut seen);
+        (Filled { values, vectors, seen, known }, findings)
+    }
+
+    /// The machine that the written vectors describe, without what the user's numbers are off the description.
+    fn as_written(
+        &self,
+        vectors: &[(VectorForm, Vector3<f64>)],
+        off: &BTreeMap<Point, Vector3<f64>>,
+        turned: &BTreeMap<Turn, Vector3<f64>>,
+        seen: &mut Seen,
+    ) {
+        let mut points: BTreeMap<Point, Vector3<f64>> = BTreeMap::new();
+        for (form, value) in in_order(vectors.iter(), |(form, _)| form) {
+            if let (Some(from), Some(to)) = (form.from, form.to) {
+                let base = points.get(&from).copied().unwrap_or_default();
+                points.insert(to, base + value);
+            }
+            if let Some(turn) = form.direction {
+                let (side, place) = turn.place();
+                let by = turned.get(&turn).copied().unwrap_or_default();
+                if let Some(line) = seen.side_mut(side).get_mut(place) {
+                    line.direction = Unit::new_normalize(value * sign(form) - by);
+                }
+            }
+        }
+        for (point, at) in points {
+            let Some((side, place)) = point.turn().map(Turn::place) else { continue };
+            let along = self.before.side(side).get(place).map(|l| l.direction);
+            let by = off.get(&point).copied().unwrap_or_default();
+            let (Some(line), Some(was)) = (seen.side_mut(side).get_mut(place), along) else { continue };
+            let further = by.dot(&was) * (line.direction.into_inner() - was.into_inner());
+            line.point = at - by - further;
+        }
+    }
+
+    /// Do the user's numbers describe the machine that was measured?
+    fn compare(&self, off: &BTreeMap<Point, Vector3<f64>>, turned: &BTreeMap<Turn, Vector3<f64>>, findings: &mut Findings) {
+        for (point, by) in off {
+            let Some((_, _, line)) = point.turn().and_then(|t| line_of(self.before, t)) else { continue };
+            let across = by - line.direction.into_inner() * by.dot(&line.direction);
+            if across.norm() > self.limits.mm {
+                findings.push(
+                    Finding::error(
+                        "tables::other_place",
+                        format!("the old values place axis {} {:.3} mm from where the machine's description has it", line.axis, across.norm()),
+                    )
+                    .help("are `origin`, `point` and `pivot` in machines.toml those of this machine, is it this machine's backup? --force adds the difference all the same"),
+                );
+            }
+        }
+        for (turn, by) in turned {
+            let Some((_, _, line)) = line_of(self.before, *turn) else { continue };
+            let angle = deg_from_rad(2.0 * (by.norm() / 2.0).min(1.0).asin());
+            if angle > self.limits.deg {
+                findings.push(
+                    Finding::error(
+                        "tables::other_direction",
+                        format!("the old values turn axis {} about a direction {angle:.3} deg from that of the machine's description", line.axis),
+                    )
+                    .help("is `sense` in machines.toml right, is it this machine's backup? --force adds the difference all the same"),
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Errors that depend on the position of one axis → tables of another one's (or its own) correction.
+
+use crate::axes::AxisName;
+use crate::machine::Machine;
+use crate::post::tables::GridForm;
+use crate::tables::compensation::Grid;
+use crate::tables::correction::{AxisShape, Correction, rounded};
+use crate::units::um_from_mm;
+
+/// A table follows the error to this, mm or deg: a tenth of what a control resolves.
+const CLOSE_ENOUGH: f64 = 1e-5;
+
+/// The tables of a correction, on top of those that were active; `step` is the smallest step of (a length, an angle).
+///
+/// # Errors
+/// When the control has not so many tables.
+pub fn grids(
+    machine: &Machine,
+    correction: &Correction,
+    form: &GridForm,
+    active: &[Grid],
+    step: [f64; 2],
+) -> Result<Vec<Grid>, String> {
+    let shapes: Vec<&AxisShape> = correction.shapes.iter().chain(&correction.across).collect();
+    let mut pairs: Vec<(AxisName, AxisName)> = shapes.iter().map(|s| (s.input, s.axis)).collect();
+    pairs.extend(active.iter().map(|g| (g.input, g.output)));
+    pairs.sort_unstable();
+    pairs.dedup();
+    let (mut out, mut number) = (Vec::new(), form.first);
+    for (input, output) in pairs {
+        let Some(axis) = machine.axis(input) else { continue };
+        let origin = machine.origin.get(input).unwrap_or(0.0);
+        let own: Vec<&&AxisShape> = shapes.iter().filter(|s| (s.input, s.axis) == (input, output)).collect();
+        let before: Vec<&Grid> = active.iter().filter(|g| (g.input, g.output) == (input, output)).collect();
+        let value = |at: f64, sense: f64| -> f64 {
+            let old: f64 = before.iter().filter(|g| f64::from(g.sense) * sense >= 0.0).map(|g| g.at(at)).sum();
+            old - own.iter().map(|s| (s.error)(at - origin, sense)).sum::<f64>()
+        };
+        let [low, high] = axis.range.map(|v| v + origin);
+        let probe = |i: u32| low + (high - low) * f64::from(i) / 97.0;
+        let even = (0..98).all(|i| (value(probe(i), 1.0) - value(probe(i), -1.0)).abs() < 1e-12);
+        let turns = input.is_rotary()
+            && high - low >= 360.0
+            && (0..98).all(|i| {
+                let at = probe(i).rem_euclid(360.0);
+                (value(at, 1.0) - value(probe(i), 1.0)).abs() < 1e-9 && (value(at, -1.0) - value(probe(i), -1.0)).abs() < 1e-9
+            });
+        let range = if turns { [0.0, 360.0] } else { [low, high] };
+        let smallest = step[usize::from(output.is_rotary())];
+        for sense in if even { &[0_i8][..] } else { &[1, -1] } {
+            let of = |at: f64| value(at, if *sense < 0 { -1.0 } else { 1.0 });
+            let (min, distance, values) = points(range, turns, form.most_points, smallest, of);
+            out.push(Grid { number, input, output, sense: *sense, min, step: distance, modulo: turns, values });
+            number += 1;
+        }
+    }
+    if out.len() > form.most {
+        return Err(format!("{} position tables are needed, the control has {}", out.len(), form.most));
+    }
+    Ok(out)
+}
+
+/// First point, distance and values: as few as follow the value to [`CLOSE_ENOUGH`].
+fn points(
+    [low, high]: [f64; 2],
+    turns: bool,
+    most: usize,
+    smallest: f64,
+    value: impl Fn(f64) -> f64,
+) -> (f64, f64, Vec<f64>) {
+    // whole degrees for a turn; zero is a point of a symmetrical range
+    let counts: &[usize] = if turns { &[37, 73, 121, 181, 361] } else { &[3, 5, 9, 17, 33, 65, 97, 129, 193, 257] };
+    let exact = |n: usize, i: f64| value(low + (high - low) * i / (n - 1) as f64);
+    let follows = |n: usize| {
+        (0..n - 1).all(|i| {
+            let (a, b) = (exact(n, i as f64), exact(n, i as f64 + 1.0));
+            [0.25, 0.5, 0.75].iter().all(|s| (exact(n, i as f64 + s) - a - s * (b - a)).abs() <= CLOSE_ENOUGH)
+        })
+    };
+    let fitting = counts.iter().copied().filter(|n| *n <= most);
+    let n = fitting.clone().find(|n| follows(*n)).or(fitting.last()).unwrap_or(2);
+    let mut values: Vec<f64> = (0..n).map(|i| rounded((exact(n, i as f64) / smallest).round() * smallest)).collect();
+    if turns && let Some(first) = values.first().copied() {
+        values[n - 1] = first;
+    }
+    (rounded(low), rounded((high - low) / (n - 1) as f64), values)
+}
+
+/// The largest error that a shape makes over the range of its input, µm (linear axes) or deg.
+#[must_use]
+pub fn largest_um(machine: &Machine, shape: &AxisShape, radius_mm: f64) -> f64 {
+    let range = machine.axis(shape.input).map_or([0.0, 0.0], |a| a.range);
+    let at = |i: u32, sense: f64| (shape.error)(range[0] + (range[1] - range[0]) * f64::from(i) / 360.0, sense).abs();
+    let most = (0..=360).flat_map(|i| [at(i, 1.0), at(i, -1.0)]).fold(0.0, f64::max);
+    um_from_mm(if shape.axis.is_rotary() { crate::units::rad_from_deg(most) * radius_mm } else { most })
+}

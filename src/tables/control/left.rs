@@ -1,0 +1,136 @@
+//! What a table leaves: found by driving the machine with its errors by the control that knows the table.
+
+use super::{Carried, Filled, grids};
+use crate::axes::{AxisName, Position};
+use crate::machine::{Machine, Side};
+use crate::tables::compensation::Term;
+use crate::tables::correction::{Correction, left_um};
+use crate::tables::kins::{Errors, Kins};
+use crate::tables::lines::Seen;
+use crate::tables::linuxcnc::Left;
+use crate::units::um_from_mm;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// A control's steps are larger than this, µm: less is rounding of numbers, not of tables.
+const NOTHING_UM: f64 = 1e-3;
+
+/// What the figures are made from.
+pub(super) struct Pieces<'a> {
+    pub machine: &'a Machine,
+    pub correction: &'a Correction,
+    pub carried: &'a Carried,
+    pub filled: &'a Filled,
+    pub zero: &'a BTreeMap<AxisName, f64>,
+    pub has_grids: bool,
+    pub radius_mm: f64,
+}
+
+impl Pieces<'_> {
+    /// Poses over the ranges of the rotary axes.
+    fn poses(&self) -> Vec<Position> {
+        let mut poses = vec![Position::default()];
+        for axis in self.machine.rotary() {
+            let [low, high] = axis.range;
+            let steps: Vec<f64> = (0..7).map(|i| low.max(-180.0) + (high.min(180.0) - low.max(-180.0)) * f64::from(i) / 6.0).collect();
+            poses = poses
+                .iter()
+                .flat_map(|p| {
+                    steps.iter().map(|deg| {
+                        let mut at = *p;
+                        at.set(axis.name, *deg);
+                        at
+                    })
+                })
+                .collect();
+        }
+        poses
+    }
+
+    /// Places of the workpiece: about its last rotary axis at the stated radius, at the ball's height.
+    fn places(&self) -> Vec<Vector3<f64>> {
+        let ball = self.machine.reference.ball;
+        let Some(axis) = self.machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last() else {
+            return vec![ball];
+        };
+        let d = axis.direction.into_inner();
+        let foot = axis.point + d * d.dot(&(ball - axis.point));
+        let u = d.cross(&if d.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() }).normalize();
+        let v = d.cross(&u);
+        [u, v, -u, -v].map(|w| foot + w * self.radius_mm).to_vec()
+    }
+
+    /// Largest distance of the ball, µm, where a control drives a machine with these errors.
+    fn worst(&self, control: &Seen, errors: Errors, longer: f64, told_deg: &BTreeMap<AxisName, f64>) -> f64 {
+        let length = self.machine.tool.length_mm;
+        let nominal = Seen::of(self.machine, &Errors::from_terms(&[], self.carried.reference_mm), length);
+        let kins = Kins::new(self.machine, errors, length + longer);
+        let (poses, places) = (self.poses(), self.places());
+        let off = |pose: &Position| {
+            places.iter().map(|place| control.ball_off((&nominal, &kins), place, pose, longer, told_deg).norm()).fold(0.0, f64::max)
+        };
+        um_from_mm(poses.iter().map(off).fold(0.0, f64::max))
+    }
+
+    fn errors(&self, terms: &[Term]) -> Errors {
+        Errors::from_terms(terms, self.carried.reference_mm)
+    }
+
+    /// Distance at which a tilt acts, mm.
+    fn lever(&self, axis: AxisName) -> f64 {
+        match self.machine.axis(axis) {
+            Some(axis) if axis.side == Side::Tool => self.machine.tool.length_mm,
+            _ => self.radius_mm,
+        }
+    }
+
+    /// What is known and not held, each alone.
+    pub(super) fn left(&self) -> Vec<Left> {
+        let mut out = Vec::new();
+        let length = self.machine.tool.length_mm;
+        let nominal = Seen::of(self.machine, &self.errors(&[]), length);
+        for (term, why) in self.carried.not.iter().filter(|(t, _)| t.value != 0.0) {
+            let um = self.worst(&nominal, self.errors(std::slice::from_ref(term)), 0.0, &BTreeMap::new());
+            let um = if um < NOTHING_UM { 0.0 } else { um };
+            out.push(row(&term.parameter, &term.effect, (term.value, &term.unit), self.lever(term.axis), Some(um), why.clone()));
+        }
+        for l in self.correction.left_out.iter().filter(|l| l.known) {
+            let mended = |s: &&crate::tables::correction::AxisShape| (&s.parameter, &s.effect) == (&l.parameter, &l.effect);
+            let shape = self.correction.across.iter().find(mended);
+            if shape.is_some() && self.has_grids {
+                continue;
+            }
+            let um = match shape {
+                Some(shape) => Some(grids::largest_um(self.machine, shape, self.radius_mm)),
+                None => left_um(l.value, &l.unit, self.radius_mm),
+            };
+            out.push(row(&l.parameter, &l.effect, (l.value, &l.unit), self.radius_mm, um, l.why.clone()));
+        }
+        if !self.has_grids {
+            for shape in &self.correction.shapes {
+                let um = grids::largest_um(self.machine, shape, self.radius_mm);
+                let why = format!("it depends on the position of {}: this program knows no table of this control for that", shape.input);
+                out.push(row(&shape.parameter, &shape.effect, (um, "um"), self.radius_mm, Some(um), why));
+            }
+        }
+        out
+    }
+
+    /// What rounding leaves; what everything of constant errors leaves; what a tool 100 mm longer adds. µm.
+    pub(super) fn figures(&self, exact: &Seen) -> (f64, f64, f64) {
+        let held = self.errors(&self.carried.terms);
+        let none = BTreeMap::new();
+        let rounding = self.worst(&self.filled.seen, held.clone(), 0.0, &none) - self.worst(exact, held.clone(), 0.0, &none);
+        let mut all = self.carried.terms.clone();
+        all.extend(self.carried.zero.iter().cloned());
+        all.extend(self.carried.not.iter().map(|(t, _)| t.clone()));
+        let rest = self.worst(&self.filled.seen, self.errors(&all), 0.0, self.zero);
+        let longer = self.worst(exact, held.clone(), 100.0, &none) - self.worst(exact, held, 0.0, &none);
+        let clean = |um: f64| if um < NOTHING_UM { 0.0 } else { um };
+        (clean(rounding), clean(rest), clean(longer))
+    }
+}
+
+fn row(parameter: &str, effect: &str, (value, unit): (f64, &str), lever_mm: f64, left_um: Option<f64>, why: String) -> Left {
+    Left { parameter: parameter.to_owned(), effect: effect.to_owned(), value, unit: unit.to_owned(), lever_mm, left_um, why }
+}

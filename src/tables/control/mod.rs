@@ -1,0 +1,336 @@
+//! The tables of any control whose transformation knows rotary axes as lines: what they are is data (`[tables]` of its
+//! postprocessor file), see `crate::post::tables`.
+//!
+//! What is known of the machine becomes lines ([`super::lines`]), the lines become the control's vectors and directions
+//! ([`fill`]), on top of the user's own old values ([`backup`]), rounded to what it stores; errors that depend on a
+//! position become position tables ([`grids`]). What the control has no place for is left, with the error that it leaves.
+
+pub mod backup;
+mod files;
+pub mod fill;
+pub mod grids;
+mod left;
+
+use super::compensation::{Compensation, FORMAT, Mode, Tables as Record, Term, Vector};
+use super::correction::{Correction, Limits, restated, rounded};
+use super::kins::Errors;
+use super::lines::{self, Seen};
+use super::linuxcnc::{Left, program};
+use super::place::{Place, along};
+use crate::axes::AxisName;
+use crate::diag::{Failure, Finding, Findings, Result, Severity};
+use crate::machine::{Machine, Side};
+use crate::post::tables::{Kind, LengthUnit, Tables, doubt};
+use backup::Old;
+use fill::{Filled, Question, Value};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How to export.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Distance from the rotary axis at which what is left is stated, mm.
+    pub radius_mm: f64,
+    /// Above these an export is refused.
+    pub limits: Limits,
+    /// Export all the same.
+    pub force: bool,
+    /// Write entries that nobody has verified.
+    pub accept_unverified: bool,
+    /// Unit of lengths in the control's tables.
+    pub unit: LengthUnit,
+    /// Old values of the control.
+    pub old: Old,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            radius_mm: 100.0,
+            limits: Limits::default(),
+            force: false,
+            accept_unverified: false,
+            unit: LengthUnit::Mm,
+            old: Old::default(),
+        }
+    }
+}
+
+/// The files of an export, with what they carry.
+#[derive(Debug, Clone)]
+pub struct Export {
+    /// Name and contents.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// The record, as written to `compensation.json`.
+    pub compensation: Compensation,
+    /// The machine as the written numbers describe it, where the old ones were as its description has it.
+    pub seen: Seen,
+    /// What stays.
+    pub left: Vec<Left>,
+    /// The values, old and new.
+    pub values: Vec<Value>,
+    /// What rounding to the control's resolution leaves, µm.
+    pub rounding_um: f64,
+    /// What all that is known and not carried leaves together, rounding included, µm.
+    pub rest_um: f64,
+    /// A tool 100 mm longer or shorter than the stylus is off by so much, because the tool's own tilt is not held, µm.
+    pub longer_tool_um: f64,
+}
+
+/// Names of a control's values for a machine: what a backup is searched for.
+#[must_use]
+pub fn names(machine: &Machine, tables: &Tables) -> BTreeSet<String> {
+    let Ok(kind) = kind_of(machine, tables) else { return BTreeSet::new() };
+    let vectors = kind.vector.iter().flat_map(|v| v.names.values().flatten().cloned());
+    vectors.chain(kind.angle.iter().flat_map(|a| a.names.values().cloned())).filter(|n| !n.is_empty()).collect()
+}
+
+/// The control's kind for the machine.
+///
+/// # Errors
+/// When its transformation does not know such a machine.
+pub fn kind_of<'a>(machine: &Machine, tables: &'a Tables) -> Result<&'a Kind> {
+    let count = |side: Side| machine.side(side).filter(|a| a.name.is_rotary()).count();
+    let (workpiece, tool) = (count(Side::Workpiece), count(Side::Tool));
+    let refuse = |why: String| {
+        Failure::new("tables::kind", format!("the tables of this control do not describe machine {:?}: {why}", machine.name))
+            .help("`axiscal controllers show` prints what its [tables] hold; another kind can be added there")
+    };
+    lines::fits(machine).map_err(refuse)?;
+    let found = tables.kind.iter().find(|k| (k.workpiece, k.tool) == (workpiece, tool));
+    found.ok_or_else(|| refuse(format!("it has {workpiece} rotary axes in the table and {tool} in the head")))
+}
+
+/// What the control can hold of the terms, where it holds them, and the rest with the reason.
+struct Carried {
+    /// Terms in lines.
+    terms: Vec<Term>,
+    /// Terms as zero positions.
+    zero: Vec<Term>,
+    /// Where `before` of workpiece-side axes is stated, mm in R.
+    reference_mm: [f64; 3],
+    /// Not held.
+    not: Vec<(Term, String)>,
+}
+
+/// Is it a turn of an axis about itself?
+fn own_turn(machine: &Machine, term: &Term) -> bool {
+    term.dof.is_angle() && machine.axis(term.axis).is_some_and(|a| along(a, term.dof).is_some())
+}
+
+fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
+    let axis_of = |turn: crate::post::tables::Turn| {
+        let (side, place) = turn.place();
+        machine.side(side).filter(|a| a.name.is_rotary()).nth(place).map(|a| a.name)
+    };
+    let held: BTreeSet<AxisName> = kind.vector.iter().filter_map(|v| axis_of(v.direction?)).collect();
+    let tilts = machine.rotary().all(|a| held.contains(&a.name));
+    let angles: BTreeSet<AxisName> = kind.angle.iter().filter_map(|a| axis_of(a.axis)).collect();
+    let reference_mm = if tilts { correction.reference_mm } else { machine.reference.ball.into() };
+    // without directions an offset is right at one height only: that of the workpiece
+    let before: Vec<Term> = correction.terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect();
+    let before = restated(&before, machine, correction.reference_mm, reference_mm);
+    let mut terms = restated(&correction.terms, machine, correction.reference_mm, reference_mm);
+    for term in &mut terms {
+        let old = before.iter().find(|b| b.spot() == term.spot()).map_or(0.0, |b| b.value);
+        term.value = rounded(term.value);
+        term.active_before = rounded(old);
+        term.identified = rounded(term.value - term.active_before);
+    }
+    let last_work = machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
+    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new() };
+    for term in terms {
+        let own = own_turn(machine, &term) && term.place != Place::After;
+        if own && angles.contains(&term.axis) {
+            out.zero.push(term);
+        } else if own && Some(term.axis) == last_work {
+            let why = format!("a turn of {} about itself turns the workpiece with it: set the work offset of {} again", term.axis, term.axis);
+            out.not.push((term, why));
+        } else if term.dof.is_angle() && !tilts {
+            let why = if own {
+                format!("the control's tables have no place for the zero position of {}: it belongs into the reference point of that axis", term.axis)
+            } else {
+                "the control's tables hold places of rotary axes, no directions".to_owned()
+            };
+            out.not.push((term, why));
+        } else {
+            out.terms.push(term);
+        }
+    }
+    out
+}
+
+fn with_active(terms: &[Term]) -> Vec<Term> {
+    terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect()
+}
+
+/// How much further each axis shows than it stands, in its own count, by a value of the terms, deg.
+fn zero_deg(machine: &Machine, terms: &[Term]) -> BTreeMap<AxisName, f64> {
+    let mut out = BTreeMap::new();
+    for term in terms {
+        let Some(axis) = machine.axis(term.axis) else { continue };
+        let sign = if term.place == Place::Zero { 1.0 } else { along(axis, term.dof).unwrap_or(1.0) };
+        *out.entry(axis.name).or_insert(0.0) -= sign * axis.sense * term.value;
+    }
+    out
+}
+
+/// The tables of a control.
+///
+/// # Errors
+/// When the control's tables do not describe the machine, a value is beyond the limits (and `force` is not set), an entry
+/// is not verified (and `accept_unverified` is not set), or the old values do not belong to this machine.
+pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: &Correction, options: &Options) -> Result<(Export, Findings)> {
+    let mut findings = Findings::default();
+    let kind = kind_of(machine, tables)?;
+    findings.0.extend(correction.beyond(&options.limits));
+    let active = correction.active.as_ref();
+    if let Some(active) = active {
+        match active.check_belongs(machine, controller) {
+            Ok(more) => findings.0.extend(more.0),
+            Err(failure) => findings.0.extend(failure.0),
+        }
+    }
+    let carried = carried(machine, correction, kind);
+    let length = machine.tool.length_mm;
+    let seen = |terms: &[Term]| Seen::of(machine, &Errors::from_terms(terms, carried.reference_mm), length);
+    let (before, now) = (seen(&with_active(&carried.terms)), seen(&carried.terms));
+    let question = Question { machine, tables, kind, before: &before, now: &now, old: &options.old, unit: options.unit, limits: options.limits };
+    let (mut filled, more) = question.fill();
+    findings.0.extend(more.0);
+    let zero = add_angles(machine, tables, kind, &carried, options, &mut filled);
+    let old_grids = active.and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.grids);
+    let unit_step = *tables.step_mm.get_ref();
+    let mut grid_list = Vec::new();
+    if let Some(form) = &tables.grid {
+        match grids::grids(machine, correction, form, old_grids, [unit_step, *tables.step_deg.get_ref()]) {
+            Ok(found) => grid_list = found,
+            Err(why) => findings.push(Finding::error("tables::grids", why).help("take the smallest effects out of the study's model, one by one")),
+        }
+    }
+    if grid_list.iter().any(|_| options.unit == LengthUnit::Inch) {
+        findings.push(Finding::error("tables::inch", "position tables are written for metric controls only").help("leave the position-dependent effects out, or export with --unit mm"));
+    }
+    if options.force {
+        for finding in findings.0.iter_mut().filter(|f| f.severity == Severity::Error) {
+            finding.severity = Severity::Warning;
+            finding.help = Some("exported because it was forced: move the machine slowly at first".to_owned());
+        }
+    }
+    say_unverified(tables, kind, &filled, !grid_list.is_empty(), options, &mut findings);
+    if !filled.known && !filled.values.is_empty() {
+        findings.push(
+            Finding::warning("tables::old_assumed", "the control's old values are not known: they are taken from the machine's description and what was active")
+                .help("give the control's own backup with --backup FILE; without it neither the new values nor the restoring file are this machine's own"),
+        );
+    }
+    if carried.terms.is_empty() && carried.zero.is_empty() && grid_list.is_empty() {
+        findings.push(Finding::warning("tables::nothing", "no parameter of status \"identified\" that a table of this control can hold").help("`axiscal identify` says what the data cannot tell"));
+    }
+    let ((), mut findings) = findings.finish(())?;
+    let pieces = left::Pieces { machine, correction, carried: &carried, filled: &filled, zero: &zero, has_grids: tables.grid.is_some(), radius_mm: options.radius_mm };
+    let left = pieces.left();
+    let (rounding_um, rest_um, longer_tool_um) = pieces.figures(&now);
+    let mut terms = carried.terms.clone();
+    terms.extend(carried.zero.iter().cloned());
+    terms.sort_by_key(Term::spot);
+    let shift = now.workpiece_off.inverse().translation.vector.map(rounded);
+    let record = Record {
+        kind: kind.name.clone(),
+        unit: options.unit,
+        reads: tables.reads.clone(),
+        files: tables.file.iter().filter(|f| !f.variant && (!f.grids || !grid_list.is_empty())).map(|f| f.name.clone()).collect(),
+        vectors: filled
+            .vectors
+            .iter()
+            .map(|(form, value)| Vector {
+                id: form.id.clone(),
+                between: form.from.zip(form.to).map(|(a, b)| [a, b]),
+                direction: form.direction,
+                against: form.reversed && form.direction.is_some_and(|t| t.place().0 == Side::Workpiece),
+                value: value.map(rounded).into(),
+            })
+            .collect(),
+        zero_deg: zero,
+        grids: grid_list,
+        workpiece_shift_mm: shift.into(),
+    };
+    let compensation = Compensation {
+        format: FORMAT.to_owned(),
+        controller: controller.to_owned(),
+        machine: machine.name.clone(),
+        machine_sha256: machine.sha256.clone(),
+        mode: Mode::Table,
+        component: None,
+        reference_mm: carried.reference_mm,
+        terms,
+        stock: None,
+        tables: Some(record),
+        program: program(),
+        provenance: correction.provenance.clone(),
+    };
+    let mut export = Export { files: Vec::new(), compensation, seen: filled.seen, left, values: filled.values, rounding_um, rest_um, longer_tool_um };
+    files::write(machine, tables, kind, correction, options, filled.known, &mut export, &mut findings)?;
+    Ok((export, findings))
+}
+
+/// Zero positions of rotary axes; gives what the control is to hold beyond its old values, deg by axis.
+fn add_angles(machine: &Machine, tables: &Tables, kind: &Kind, carried: &Carried, options: &Options, filled: &mut Filled) -> BTreeMap<AxisName, f64> {
+    let (now, before) = (zero_deg(machine, &carried.zero), zero_deg(machine, &with_active(&carried.zero)));
+    let step = *tables.step_deg.get_ref();
+    let mut out = BTreeMap::new();
+    for form in &kind.angle {
+        let (side, place) = form.axis.place();
+        let Some(axis) = machine.side(side).filter(|a| a.name.is_rotary()).nth(place) else { continue };
+        let (now, before) = (now.get(&axis.name).copied(), before.get(&axis.name).copied().unwrap_or(0.0));
+        let Some(now) = now else { continue };
+        let given = form.names.values().find_map(|n| options.old.values.get(n)).map(|(v, _)| *v);
+        filled.known &= given.is_some();
+        let old = given.unwrap_or(before);
+        let new = rounded(((old + now - before) / step).round() * step);
+        out.insert(axis.name, rounded(new - old + before));
+        filled.values.push(Value {
+            id: form.id.clone(),
+            says: form.says.clone(),
+            names: form.names.clone(),
+            old: rounded(old),
+            new,
+            unit: "deg",
+            decimals: fill::decimals(step),
+            unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
+        });
+    }
+    out
+}
+
+/// Entries that nobody has verified: refused, or said.
+fn say_unverified(tables: &Tables, kind: &Kind, filled: &Filled, grids: bool, options: &Options, findings: &mut Findings) {
+    let mut doubts: Vec<(String, String)> = Vec::new();
+    let mut add = |what: String, why: Option<String>| {
+        if let Some(why) = why {
+            doubts.push((what, why));
+        }
+    };
+    add("the tables".to_owned(), doubt(tables.source.as_ref(), tables.unverified.as_ref()));
+    add(format!("kind {}", kind.name), doubt(kind.source.as_ref(), kind.unverified.as_ref()));
+    let mut seen = BTreeSet::new();
+    for value in &filled.values {
+        let id = value.id.split('.').next().unwrap_or_default().to_owned();
+        if seen.insert(id.clone()) {
+            add(id, value.unverified.clone());
+        }
+    }
+    if grids && let Some(form) = &tables.grid {
+        add("position tables".to_owned(), doubt(form.source.as_ref(), form.unverified.as_ref()));
+    }
+    for file in tables.file.iter().filter(|f| !f.grids || grids) {
+        add(format!("file {}", file.name), doubt(file.source.as_ref(), file.unverified.as_ref()));
+    }
+    for (what, why) in doubts {
+        let message = format!("{what}: not verified: {why}");
+        findings.push(if options.accept_unverified {
+            Finding::warning("tables::unverified", message).help("compare it with the control's manual and its own backup before you load it")
+        } else {
+            Finding::error("tables::unverified", message).help("compare it with the control's manual and backup; --accept-unverified writes it all the same")
+        });
+    }
+}
