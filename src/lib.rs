@@ -21,6 +21,7 @@ pub mod fit;
 pub mod log;
 pub mod machine;
 pub mod model;
+pub mod page;
 pub mod paper;
 pub mod post;
 pub mod program;

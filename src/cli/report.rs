@@ -40,7 +40,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             .map_err(|e| Failure::new("report::view", format!("the view cannot be written: {e}")))?;
         files::write_whole(path, text.as_bytes())?;
     }
+    let page = crate::page::page(&view)?;
+    files::write_whole(&args.out, page.as_bytes())?;
     io.say(&view.headline.sentence);
-    io.answer(&json!({ "format": "axiscal-report/1" }));
+    io.say(format!("{}: open it in a browser, mail it, print it", args.out.display()));
+    io.answer(&json!({
+        "format": "axiscal-report/1",
+        "out": args.out.display().to_string(),
+        "bytes": page.len(),
+        "headline": view.headline,
+        "next": view.next,
+    }));
     Ok(Answer::Done)
 }

@@ -17,6 +17,8 @@ use crate::{design, study::history::History};
 pub struct Worked {
     /// The fit of the study's model.
     pub fit: Fit,
+    /// The fit with what the diagnosis proposes.
+    pub proposed: Option<Fit>,
     /// Where it fails.
     pub comparison: Comparison,
     /// What is missing.
@@ -45,6 +47,7 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
     let tried: Vec<Vec<String>> =
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();
     let mut ladder = climb(&loaded.machine, &loaded.catalogue, &settings, &fit, &tried);
+    let mut proposed = None;
     if diagnosis.verdict == Verdict::MissingEffect
         && let Some(first) = diagnosis.candidates.first().filter(|c| c.proposed)
     {
@@ -52,13 +55,16 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
         // a candidate that cannot be fitted beside the others is still a candidate
         match with_effects(subject, &[first.effect.as_str()]) {
-            Ok(with) => ladder.push(Rung::of(&with, Kind::Proposed)),
+            Ok(with) => {
+                ladder.push(Rung::of(&with, Kind::Proposed));
+                proposed = Some(with);
+            }
             Err(failure) => ladder.notes.push(format!("{} cannot be put beside the model: {failure}", first.effect)),
         }
     }
     let date = newest_log(loaded);
     let correction = correction(loaded, &fit, &date);
-    Ok(Worked { comparison: compare(&fit), diagnosis, ladder, correction, date, fit })
+    Ok(Worked { comparison: compare(&fit), proposed, diagnosis, ladder, correction, date, fit })
 }
 
 fn correction(loaded: &Loaded, fit: &Fit, date: &str) -> std::result::Result<Correction, String> {
@@ -104,6 +110,7 @@ pub fn view_of(loaded: &Loaded, worked: &Worked, study: &str) -> View {
         runs: &runs,
         tolerance: &loaded.study.tolerance,
         fit: &worked.fit,
+        proposed: worked.proposed.as_ref(),
         comparison: &worked.comparison,
         diagnosis: &worked.diagnosis,
         ladder: &worked.ladder,

@@ -10,7 +10,7 @@ mod parameters;
 pub mod record;
 mod touches;
 
-pub use headline::{Headline, Next};
+pub use headline::{Headline, Level, Next};
 pub use record::View;
 
 use crate::compare::Comparison;
@@ -60,6 +60,8 @@ pub struct Material<'a> {
     pub tolerance: &'a Tolerance,
     /// The fit of the study's model.
     pub fit: &'a Fit,
+    /// The fit with what the diagnosis proposes.
+    pub proposed: Option<&'a Fit>,
     /// Where it fails.
     pub comparison: &'a Comparison,
     /// What is missing.
@@ -74,7 +76,7 @@ pub struct Material<'a> {
 #[must_use]
 pub fn gather(m: &Material) -> View {
     let fit = m.fit;
-    let parameters = parameters::parameters(m);
+    let parameters = parameters::parameters(m, fit);
     let compensation = parameters::compensation(m);
     let headline = headline::headline(m, &parameters, &compensation);
     let next = headline::next(m, &headline, &parameters, &compensation);
@@ -122,6 +124,7 @@ pub fn gather(m: &Material) -> View {
             converged: fit.outcome.converged,
         },
         parameters,
+        proposed: m.proposed.map(|fit| parameters::parameters(m, fit)).unwrap_or_default(),
         tolerance: m.tolerance.clone(),
         ladder: touches::rungs(m),
         ladder_notes: m.ladder.notes.clone(),

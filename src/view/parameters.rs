@@ -8,8 +8,7 @@ use crate::model::catalogue::Effect;
 use crate::tables::correction::left_um;
 
 /// The results: everything that is no set-up of a block and no other unknown of the measurement.
-pub(super) fn parameters(m: &Material) -> Vec<ParameterRecord> {
-    let fit = m.fit;
+pub(super) fn parameters(m: &Material, fit: &Fit) -> Vec<ParameterRecord> {
     let effects = effects_of(&fit.outcome.effects, m.catalogue, m.machine).unwrap_or_default();
     let each = fit.outcome.parameters.iter().zip(&fit.model.unknowns);
     each.filter(|(_, u)| !u.nuisance).map(|(p, u)| record(m, p, &statement::meaning(u, &effects), &effects)).collect()

@@ -30,6 +30,8 @@ pub struct View {
     pub errors: Errors,
     /// The results with their doubt, against the tolerance.
     pub parameters: Vec<ParameterRecord>,
+    /// The same with what the diagnosis proposes in the model; empty where it proposes nothing.
+    pub proposed: Vec<ParameterRecord>,
     /// The tolerance.
     pub tolerance: Tolerance,
     /// The models on these touches.

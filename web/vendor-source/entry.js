@@ -1,4 +1,4 @@
-// the kinds of traces that the plots use: a whole plotly.js is three times as large
+// the kinds of traces that the plots use (scattergl without generated code, so that pages may forbid it)
 const Plotly = require('plotly.js/lib/core');
 Plotly.register([
   require('plotly.js/lib/bar'),
@@ -6,6 +6,6 @@ Plotly.register([
   require('plotly.js/lib/heatmap'),
   require('plotly.js/lib/mesh3d'),
   require('plotly.js/lib/scatter3d'),
-  require('plotly.js/lib/scattergl'),
+  require('plotly.js/src/traces/scattergl/strict'),
 ]);
 module.exports = Plotly;
