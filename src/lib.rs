@@ -23,6 +23,7 @@ pub mod machine;
 pub mod model;
 pub mod page;
 pub mod paper;
+pub mod plots;
 pub mod post;
 pub mod program;
 pub mod report;

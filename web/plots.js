@@ -32,7 +32,7 @@ globalThis.axiscalPlots = (() => {
     if (x === null || x === undefined) return '–';
     if (!sigma) return digits(x);
     const places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
-    return x.toFixed(places).replace('-', '−');
+    return (Number(x.toFixed(places)) + 0).toFixed(places).replace(/^-(?=[0.]*$)/, '').replace('-', '−');
   }
 
   const colours = (el) => {
@@ -47,7 +47,7 @@ globalThis.axiscalPlots = (() => {
     const out = {
       paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
       font: { family: 'system-ui, sans-serif', size: 12, color: c.ink },
-      margin: { l: 52, r: 12, t: 8, b: 40 }, showlegend: false, hoverlabel: { font: { family: 'system-ui, sans-serif' } },
+      margin: { l: 8, r: 12, t: 8, b: 8 }, showlegend: false, hoverlabel: { font: { family: 'system-ui, sans-serif' } },
       dragmode: 'zoom', ...more,
     };
     out.xaxis = { ...axis, ...more.xaxis };
@@ -77,11 +77,12 @@ globalThis.axiscalPlots = (() => {
       { i: after, name: proposed ? `after, with<br>${safe(view.ladder[after].added.join(', '))}` : 'after (what the<br>model leaves)', colour: OKABE.blue },
     ].filter((r, k, all) => k === 0 || r.i !== all[0].i);
     const values = rows.map((r) => view.ladder[r.i].rms_um);
+    rows.forEach((r, k) => { r.name = `${r.name}<br><b>${digits(values[k])} µm</b>`; });
     const top = Math.max(...values, noise);
     const traces = [{
       type: 'bar', orientation: 'h', y: rows.map((r) => r.name), x: values,
       marker: { color: rows.map((r) => r.colour) }, width: 0.5,
-      text: values.map((v) => `<b>${digits(v)} µm</b>`), textposition: 'outside', cliponaxis: false, hoverinfo: 'skip',
+      hoverinfo: 'skip',
     }];
     const held = rows.map((r) => view.ladder[r.i].held_out_rms_um);
     if (held.some((h) => h !== null)) {
@@ -91,13 +92,13 @@ globalThis.axiscalPlots = (() => {
       });
     }
     const lay = layout(el, {
-      margin: { l: 10, r: 20, t: 26, b: 40 },
-      xaxis: { title: { text: 'how far the touches miss (RMS), µm' }, range: [0, 1.22 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
+      margin: { l: 8, r: 14, t: 26, b: 8 },
+      xaxis: { title: { text: 'how far the touches miss (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
       yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [{ type: 'line', x0: noise, x1: noise, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: noise, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: noise > 0.6 * top ? 'right' : 'left', showarrow: false, text: `probe's noise ${digits(noise)} µm`, font: { size: 11 } }],
     });
-    const say = rows.map((r, k) => `${r.name.replace('<br>', ' ')} ${digits(values[k])} µm`).join('; ');
+    const say = rows.map((r) => r.name.replace(/<[^>]*>/g, ' ')).join('; ');
     return draw(el, traces, lay, `Error of the touches: ${say}; the probe's noise is ${digits(noise)} µm.`);
   }
 
@@ -136,7 +137,7 @@ globalThis.axiscalPlots = (() => {
     }] : []));
     const reach = 1.08 * Math.max(view.tolerance.error_um * 1.15, ...shown.map((p) => Math.abs(p.at_radius_um) + (p.at_radius_expanded_um || 0)));
     const lay = layout(el, {
-      margin: { l: 10, r: 12, t: 8, b: 40 }, shapes,
+      margin: { l: 8, r: 12, t: 8, b: 8 }, shapes,
       xaxis: { title: { text: `error at ${view.tolerance.radius_mm} mm, µm (bar: 95 %)` }, range: [-reach, reach], zeroline: true },
       yaxis: { autorange: 'reversed', ticks: '', gridcolor: 'rgba(0,0,0,0)', tickfont: { size: 11 } },
     });
@@ -157,9 +158,9 @@ globalThis.axiscalPlots = (() => {
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
     const wide = Math.max(...all) / Math.min(...all) > 12;
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.12, x: 0 }, margin: { l: 60, r: 30, t: 40, b: 70 },
+      showlegend: true, legend: { orientation: 'h', y: 1.12, x: 0 }, margin: { l: 8, r: 30, t: 40, b: 8 },
       xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], title: { text: 'model, step by step' } },
-      yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', dtick: 'D2', range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
+      yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: 1, xref: 'paper', xanchor: 'right', y: wide ? Math.log10(noise) : noise, yanchor: 'top', showarrow: false, text: `probe's noise ${digits(noise)} µm` }],
     });
@@ -282,8 +283,8 @@ globalThis.axiscalPlots = (() => {
     for (let i = 0; i < t.n; i += 1) if (t.rejected[i] === null) sizes.push(Math.abs(t.residual_um[rung][i]));
     sizes.sort((a, b) => a - b);
     const large = Math.max(sizes[Math.floor(0.98 * sizes.length)] ?? 1, 1e-3);
-    // an arrow of the largest misses is a fifth of the artefact long
-    const magnification = round125((0.2 * extent) / (large / 1000));
+    // an arrow of the largest misses is a quarter of the artefact long
+    const magnification = round125((0.25 * extent) / (large / 1000));
     const arrows = stages.map((stage) => {
       const shafts = [];
       const tips = [];
@@ -316,7 +317,7 @@ globalThis.axiscalPlots = (() => {
       const to = a.rotary ? sum(at, a.direction, half) : sum(at, a.direction, 0.4 * extent);
       return { name: a.name, rotary: a.rotary, line: [from, to] };
     });
-    const scaleUm = round125((1000 * 0.2 * extent) / magnification);
+    const scaleUm = round125((1000 * 0.25 * extent) / magnification);
     const foot = [high[0] + 0.2 * extent, low[1] - 0.2 * extent, low[2]];
     const scale = { um: scaleUm, line: [foot, sum(foot, [0, 0, 1], (scaleUm / 1000) * magnification)] };
     return { arrows, rejected, blocks, table, axes, scale, magnification, extent, centre };
@@ -389,7 +390,7 @@ globalThis.axiscalPlots = (() => {
     const r = 1.05 * parts.extent;
     const lay = flat
       ? layout(el, { ...common, xaxis: { ...off, range: undefined }, yaxis: { ...off, scaleanchor: 'x' } })
-      : layout(el, { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 1.2, y: -1.5, z: 0.9 } },
+      : layout(el, { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 0.85, y: -1.15, z: 0.6 } },
         xaxis: { ...side('X, mm'), range: [parts.centre[0] - r, parts.centre[0] + r] },
         yaxis: { ...side('Y, mm'), range: [parts.centre[1] - r, parts.centre[1] + r] },
         zaxis: { ...side('Z, mm'), range: [parts.centre[2] - r, parts.centre[2] + r] } } });
@@ -414,7 +415,7 @@ globalThis.axiscalPlots = (() => {
       text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2)))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
       hovertemplate: '%{y} and %{x}: %{z:.2f}<extra></extra>',
     }];
-    const lay = layout(el, { margin: { l: 70, r: 10, t: 10, b: 60 }, yaxis: { autorange: 'reversed', ticks: '' }, xaxis: { ticks: '', tickangle: -45 } });
+    const lay = layout(el, { margin: { l: 8, r: 10, t: 10, b: 8 }, yaxis: { autorange: 'reversed', ticks: '' }, xaxis: { ticks: '', tickangle: -45 } });
     return draw(el, traces, lay, `Correlation of the results, from −1 to 1: ${names.join(', ')}.`);
   }
 
@@ -430,7 +431,7 @@ globalThis.axiscalPlots = (() => {
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: -0.28 }, margin: { l: 10, r: 16, t: 26, b: 60 },
+      showlegend: true, legend: { orientation: 'h', y: 1.28, x: 0 }, margin: { l: 8, r: 16, t: 50, b: 8 },
       xaxis: { title: { text: 'error left (RMS), µm' }, range: [0, 1.12 * top] }, yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [line(view.diagnosis.rms_um, 'solid'), line(view.errors.noise_um, 'dash')],
       annotations: [

@@ -15,7 +15,9 @@
       if (name.startsWith('on')) el.addEventListener(name.slice(2), value);
       else if (value !== null && value !== undefined && value !== false) el.setAttribute(name, value === true ? '' : value);
     }
-    el.append(...children.filter((c) => c !== null && c !== undefined));
+    // the rooms write um in plain letters
+    const micro = (c) => (typeof c === 'string' && tag !== 'code' ? c.replace(/(\d )um\b/g, '$1µm') : c);
+    el.append(...children.filter((c) => c !== null && c !== undefined).map(micro));
     return el;
   }
 
@@ -125,7 +127,8 @@
     const s = section('candidates', d.verdict === 'adequate' ? 'What was looked for' : 'What may be missing', d.verdict === 'adequate'
       ? `${d.tested} known effects were tried on what is left over, and none of them is there. These would be the next best; they do not pass.`
       : d.says);
-    for (const w of d.where) s.append(make('p', {}, w.says));
+    if (d.where.length) s.append(make('p', {}, d.where[0].says));
+    if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it goes with (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
     if (d.candidates.length) {
       const [f, div] = figure('candidates-plot', 'Filled: proposed. A candidate that is not proposed takes away less than chance may.');
       plot(div, () => P.candidates(div, view));

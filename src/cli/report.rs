@@ -42,12 +42,24 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let page = crate::page::page(&view)?;
     files::write_whole(&args.out, page.as_bytes())?;
+    let mut plots = Vec::new();
+    if let Some(folder) = &args.plots {
+        for (name, contents) in crate::plots::files(&view)? {
+            let path = folder.join(name);
+            files::write_whole(&path, &contents)?;
+            plots.push(path.display().to_string());
+        }
+    }
     io.say(&view.headline.sentence);
     io.say(format!("{}: open it in a browser, mail it, print it", args.out.display()));
+    if let Some(folder) = &args.plots {
+        io.say(format!("{}: {} files", folder.display(), plots.len()));
+    }
     io.answer(&json!({
         "format": "axiscal-report/1",
         "out": args.out.display().to_string(),
         "bytes": page.len(),
+        "plots": plots,
         "headline": view.headline,
         "next": view.next,
     }));

@@ -3,7 +3,7 @@
 
 use super::Point;
 use crate::diag::Result;
-use crate::fit::{Fit, Settings, identify_data};
+use crate::fit::{Fit, Settings, held_out, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Data;
@@ -67,7 +67,8 @@ impl Rung {
             added: Vec::new(),
             removed: Vec::new(),
             rms_um: o.rms_um,
-            held_out_rms_um: o.held_out_rms_um,
+            // a quick fit leaves it out
+            held_out_rms_um: o.held_out_rms_um.or_else(|| held_out::by_visit(fit).map(|h| h.rms_um)),
             chi2_per_dof: o.chi2_per_dof,
             unknowns: o.unknowns,
             residual_um: fit.residual_mm.iter().map(|r| um_from_mm(*r)).collect(),

@@ -118,25 +118,29 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
 
 fn missing(m: &Material, c: &Candidate) -> String {
     let name = |id: &str| m.catalogue.get(id, m.machine).map_or_else(|| id.to_owned(), |e| e.name.clone());
+    let d = m.diagnosis;
     let falls = format!(
-        "the touches miss the model by {}; with it they miss by {}, and the probe's noise is {}.",
-        um(m.diagnosis.rms_um),
-        um(c.rms_after_um),
-        um(m.diagnosis.noise_um)
+        "The touches miss by {}, and by {} once it is in the model; the probe's noise is {}.",
+        um(d.rms_um),
+        um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
+        um(d.noise_um)
     );
-    match &c.same_as[..] {
-        [] => format!("The machine has an error that is not in the model yet: {}. Without it {falls}", c.name),
-        [one] => format!(
-            "The machine has an error that is not in the model yet: {} or {} (these touches cannot tell which). Without it {falls}",
-            c.name,
-            name(one)
-        ),
-        several => format!(
-            "The machine has an error that is not in the model yet: {}, or one of {} others that these touches cannot tell from it. Without it {falls}",
-            c.name,
-            several.len()
-        ),
-    }
+    let size: Vec<String> = c
+        .parameters
+        .iter()
+        .filter(|p| p.sigma.is_some())
+        .take(2)
+        .map(|p| format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit))
+        .collect();
+    let size =
+        if size.is_empty() || c.parameters.len() > 2 { String::new() } else { format!(" ({})", size.join(", ")) };
+    let what = match &c.same_as[..] {
+        [] => format!("{}{size}", c.name),
+        [one] => format!("{}, or {}: these touches cannot tell which", c.name, name(one)),
+        several => format!("{}, or one of {} others that these touches cannot tell from it", c.name, several.len()),
+    };
+    let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
+    format!("The machine has an error that is not in the model yet: {what}. {falls}{rest}")
 }
 
 fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (Level, String) {

@@ -1,7 +1,7 @@
 // `npm ci && npm run vendor`: bundles the parts of plotly.js that the plots use into ../vendor/plotly.min.js, with the
-// licences of everything that is in it. The result is committed, so that nothing of this is needed to build the crate.
+// licences of everything that is in it, and copies the font of the plots. The result is committed, so that nothing of this is needed to build the crate.
 import { build } from 'esbuild';
-import { existsSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { copyFileSync, existsSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 
 const result = await build({
@@ -40,4 +40,7 @@ for (const [folder, p] of [...packages].sort((a, b) => a[1].name.localeCompare(b
 const head = `/* plotly.js ${packages.get('node_modules/plotly.js').version}, MIT (LICENSES.txt): core, bar, cone, heatmap, mesh3d, scatter3d, scattergl */\n`;
 writeFileSync('../vendor/plotly.min.js', head + script.text);
 writeFileSync('../vendor/LICENSES.txt', licences);
+// the letters of the plots that are drawn without a browser
+copyFileSync('node_modules/dejavu-fonts-ttf/ttf/DejaVuSans.ttf', '../vendor/DejaVuSans.ttf');
+copyFileSync('node_modules/dejavu-fonts-ttf/LICENSE', '../vendor/DejaVuSans-LICENSE.txt');
 console.log(`${script.text.length} bytes, ${packages.size} packages`);
