@@ -50,8 +50,10 @@ globalThis.axiscalPlots = (() => {
       margin: { l: 8, r: 12, t: 8, b: 8 }, showlegend: false, hoverlabel: { font: { family: 'system-ui, sans-serif' } },
       dragmode: 'zoom', ...more,
     };
-    out.xaxis = { ...axis, ...more.xaxis };
-    out.yaxis = { ...axis, ...more.yaxis };
+    for (const name of ['xaxis', 'yaxis']) {
+      out[name] = { ...axis, ...more[name] };
+      if (out[name].title) out[name].title = { standoff: 8, ...out[name].title };
+    }
     return out;
   }
 

@@ -127,7 +127,7 @@ fn results(view: &View) -> Chart {
         );
     let names: Vec<String> = shown.iter().map(|p| format!("{} {}", p.says, p.name)).collect();
     let x = Axis::new(format!("error at {} mm, µm (bar: 95 %)", view.tolerance.radius_mm), (-reach, reach));
-    let mut c = chart("results", "What is wrong by how much", x, Axis::named(names));
+    let mut c = chart("results", "The machine's errors against the tolerance", x, Axis::named(names));
     c.downwards = true;
     c.aspect = (0.22 + 0.032 * shown.len() as f64).clamp(0.4, 1.1);
     for (i, p) in shown.iter().enumerate() {

@@ -149,7 +149,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     let judged = beyond + open + count(Judgement::Within);
     let lost = parameters.iter().filter(|p| p.status == Status::Undetermined).count();
     let limit = if m.tolerance.parameters.is_empty() {
-        format!("{} at {} mm", um(m.tolerance.error_um), m.tolerance.radius_mm)
+        format!("{} µm at {} mm", m.tolerance.error_um, m.tolerance.radius_mm)
     } else {
         "their own limits".to_owned()
     };
@@ -161,7 +161,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     let start = |text: &str| if with.is_empty() { capital(text) } else { format!("{with}{text}") };
     if let Some(worst) = largest(parameters, Judgement::Beyond) {
         let sentence = format!(
-            "{} {} larger than the tolerance ({limit}); the largest is {} ({}): {}.{untold}",
+            "{} {} larger than the tolerance ({limit}), the largest {} ({}): {}. Nothing else is missing that these touches can show.{untold}",
             start(&of(beyond, judged)),
             verb(beyond),
             worst.says,
@@ -187,7 +187,14 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
         );
     }
     let level = if lost == 0 { Level::Good } else { Level::Unknown };
-    (level, format!("{} within the tolerance ({limit}).{untold}", start(&format!("{} {}", all(judged), verb(judged)))))
+    let nothing = "nothing else is missing that these touches can show";
+    (
+        level,
+        format!(
+            "{} within the tolerance ({limit}), and {nothing}.{untold}",
+            start(&format!("{} {}", all(judged), verb(judged)))
+        ),
+    )
 }
 
 fn all(n: usize) -> String {
