@@ -34,7 +34,7 @@ const WRITTEN: [&str; 8] = [
 ];
 
 /// A step: what it is for, and the call; `OUT/` stands for the folder.
-const STEPS: [(&str, &str); 16] = [
+const STEPS: [(&str, &str); 17] = [
     (
         "a probing program for LinuxCNC: every move checked for limits and collisions",
         "generate --machine swivel-head --program full --controller linuxcnc --out OUT",
@@ -53,6 +53,7 @@ const STEPS: [(&str, &str); 16] = [
     ("the effects are added one by one, until nothing is left to find", "solve OUT/study.toml --yes"),
     ("every model tried, and the error falling", "history OUT/study.toml"),
     ("the errors again, now that nothing is missing", "identify OUT/study.toml"),
+    ("all of it on one page, to look at, mail or print", "report OUT/study.toml --out OUT/report.html"),
     (
         "the compensation as the control's own tables",
         "export OUT/study.toml --controller linuxcnc --out OUT/compensation",
@@ -124,6 +125,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         ("full.log", "what LinuxCNC would have written"),
         ("wrong.toml", "what was wrong with the machine"),
         ("study.toml", "the study, with the effects that were added"),
+        ("report.html", "all of it as one page: open it in a browser"),
         ("compensation/README.txt", "how to load the compensation, and what must be set again"),
     ] {
         io.say(format!("  {:<38} {what}", format!("{out}/{file}")));

@@ -15,18 +15,20 @@ mod effects;
 mod export;
 mod generate;
 mod identify;
-mod load;
+pub mod load;
 mod machines;
 mod new;
 mod parse;
 mod plan_next;
 mod programs;
+mod report;
 mod reproduce;
 mod schema;
 mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
+pub mod view;
 
 pub use common::{Answer, Io};
 
@@ -90,6 +92,8 @@ enum Verb {
     Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
+    /// One page with the verdict, the plots and every touch: opens with no network
+    Report(report::Args),
     /// Print the JSON schema of a file, for editors
     Schema(schema::Args),
     /// Print the completions of verbs and options for a shell
@@ -143,6 +147,7 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::History(args) => add::history(&args, io),
         Verb::Verify(args) => verify::run(&args, io),
         Verb::Export(args) => export::run(&args, io),
+        Verb::Report(args) => report::run(&args, io),
         Verb::Schema(args) => schema::run(&args, io),
         Verb::Completions(args) => completions::completions(&args, io),
         Verb::Man(args) => completions::man(&args, io),
