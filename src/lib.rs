@@ -29,3 +29,4 @@ pub mod search;
 pub mod simulate;
 pub mod study;
 pub mod tables;
+pub mod workbench;

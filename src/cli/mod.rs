@@ -26,6 +26,7 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
+mod workbench;
 
 pub use common::{Answer, Io};
 
@@ -89,6 +90,8 @@ enum Verb {
     Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
+    /// A study live in the browser: switch effects on and off and watch the error
+    Workbench(workbench::Args),
     /// Print the JSON schema of a file, for editors
     Schema(schema::Args),
 }
@@ -138,6 +141,7 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::History(args) => add::history(&args, io),
         Verb::Verify(args) => verify::run(&args, io),
         Verb::Export(args) => export::run(&args, io),
+        Verb::Workbench(args) => workbench::run(&args, io),
         Verb::Schema(args) => schema::run(&args, io),
     }
 }
