@@ -184,7 +184,8 @@ fn remove_stale(out: &Path, export: &Export) -> Result<()> {
 }
 
 /// The day on which the newest log was written: the data's own date, not that of the export.
-fn newest_log(loaded: &Loaded) -> String {
+#[must_use]
+pub fn newest_log(loaded: &Loaded) -> String {
     let folder = loaded.path.parent().map(Path::to_path_buf).unwrap_or_default();
     let newest =
         loaded.study.data.iter().filter_map(|d| std::fs::metadata(folder.join(&d.log)).ok()?.modified().ok()).max();

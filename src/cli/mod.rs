@@ -14,19 +14,24 @@ mod effects;
 mod export;
 mod generate;
 mod identify;
-mod load;
+pub mod load;
 mod machines;
 mod new;
 mod parse;
 mod plan_next;
 mod programs;
+mod report;
 mod reproduce;
 mod schema;
 mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
+<<<<<<< HEAD
 mod workbench;
+=======
+pub mod view;
+>>>>>>> report
 
 pub use common::{Answer, Io};
 
@@ -90,8 +95,13 @@ enum Verb {
     Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
+<<<<<<< HEAD
     /// A study live in the browser: switch effects on and off and watch the error
     Workbench(workbench::Args),
+=======
+    /// One page with the verdict, the plots and every touch: opens with no network
+    Report(report::Args),
+>>>>>>> report
     /// Print the JSON schema of a file, for editors
     Schema(schema::Args),
 }
@@ -141,7 +151,11 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::History(args) => add::history(&args, io),
         Verb::Verify(args) => verify::run(&args, io),
         Verb::Export(args) => export::run(&args, io),
+<<<<<<< HEAD
         Verb::Workbench(args) => workbench::run(&args, io),
+=======
+        Verb::Report(args) => report::run(&args, io),
+>>>>>>> report
         Verb::Schema(args) => schema::run(&args, io),
     }
 }

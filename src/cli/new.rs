@@ -102,6 +102,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         visit_sigma_mm: None,
         type_b: std::collections::BTreeMap::new(),
         masked: Vec::new(),
+        tolerance: crate::study::tolerance::Tolerance::default(),
     };
     files::write_whole(&args.out, study.fresh()?.as_bytes())?;
     io.say(format!("{}: {} run(s), model: {}", args.out.display(), args.plan.len(), effects.join(", ")));

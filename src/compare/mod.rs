@@ -4,6 +4,7 @@
 
 pub mod change;
 mod factors;
+pub mod rungs;
 mod share;
 pub mod verify;
 
@@ -174,13 +175,14 @@ pub struct Point {
 }
 
 impl Point {
-    /// Value of something to plot against: an axis letter, `time`, `order`, `approach`.
+    /// Value of something to plot against: an axis letter, `time`, `order`, `approach`, `stylus`.
     #[must_use]
     pub fn value(&self, variable: &str) -> Option<f64> {
         match variable {
             "time" => Some(self.time_h),
             "order" => Some(self.order as f64),
             "approach" => self.approach_deg,
+            "stylus" => Some(self.stylus_mm),
             axis => self.axes.get(axis).copied(),
         }
     }

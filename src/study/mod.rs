@@ -9,6 +9,7 @@ pub mod mask;
 pub use join::{Joined, join};
 pub mod edit;
 pub mod history;
+pub mod tolerance;
 
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
 use crate::fit::{Knowledge, Mask, Settings};
@@ -45,6 +46,8 @@ pub struct AsWritten {
     /// Touches that are not to be used.
     #[serde(default)]
     pub mask: Vec<MaskAsWritten>,
+    /// How large an error may be before somebody has to do something.
+    pub tolerance: Option<tolerance::AsWritten>,
 }
 
 /// A touch that is not to be used.
@@ -142,6 +145,8 @@ pub struct Study {
     pub type_b: BTreeMap<String, f64>,
     /// Touches that are not to be used.
     pub masked: Vec<Mask>,
+    /// How large an error may be.
+    pub tolerance: tolerance::Tolerance,
 }
 
 /// One run.
@@ -263,6 +268,7 @@ impl Study {
                 ),
             }
         }
+        let tolerance = tolerance::Tolerance::read(w.tolerance, source, &mut findings);
         findings.finish(Self {
             machines: w.machines,
             machine: w.machine.into_inner(),
@@ -274,6 +280,7 @@ impl Study {
             visit_sigma_mm,
             type_b: w.uncertainty.into_iter().map(|(name, sigma)| (name, sigma.into_inner())).collect(),
             masked,
+            tolerance,
         })
     }
 
@@ -377,6 +384,7 @@ mod tests {
             visit_sigma_mm: None,
             type_b: BTreeMap::new(),
             masked: vec![],
+            tolerance: tolerance::Tolerance::default(),
         }
     }
 

@@ -1,0 +1,55 @@
+//! `axiscal report`: one page with everything that a study says.
+
+use super::load::load_study;
+use super::view::{history_of, view_of, work_out};
+use super::{Answer, Io};
+use crate::diag::{Failure, Finding, Result};
+use crate::files;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `report`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The study
+    pub study: PathBuf,
+    /// The page to write: one file that opens with no network
+    #[arg(long, value_name = "FILE", default_value = "report.html")]
+    pub out: PathBuf,
+    /// Every plot as SVG and PNG, with its numbers as CSV
+    #[arg(long, value_name = "DIR")]
+    pub plots: Option<PathBuf>,
+    /// What the page is drawn from, as JSON (axiscal-view/1)
+    #[arg(long, value_name = "FILE")]
+    pub view: Option<PathBuf>,
+}
+
+/// Runs `report`.
+///
+/// # Errors
+/// When the study or a file that it names is unusable, or a file cannot be written.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let loaded = load_study(&args.study, io)?;
+    let history = history_of(&loaded)?;
+    let worked = work_out(&loaded, history.as_ref())?;
+    let name = args.study.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let view = view_of(&loaded, &worked, &name);
+    io.report(&view.ladder_notes.iter().map(|n| Finding::info("report::ladder", n.clone())).collect::<Vec<_>>());
+    if let Some(path) = &args.view {
+        let text = serde_json::to_string(&view)
+            .map_err(|e| Failure::new("report::view", format!("the view cannot be written: {e}")))?;
+        files::write_whole(path, text.as_bytes())?;
+    }
+    let page = crate::page::page(&view)?;
+    files::write_whole(&args.out, page.as_bytes())?;
+    io.say(&view.headline.sentence);
+    io.say(format!("{}: open it in a browser, mail it, print it", args.out.display()));
+    io.answer(&json!({
+        "format": "axiscal-report/1",
+        "out": args.out.display().to_string(),
+        "bytes": page.len(),
+        "headline": view.headline,
+        "next": view.next,
+    }));
+    Ok(Answer::Done)
+}

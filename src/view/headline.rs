@@ -1,0 +1,353 @@
+//! The verdict in one sentence for somebody who knows machines and not statistics, and what to do next.
+
+use super::Material;
+use super::record::{Compensation, Judgement, ParameterRecord};
+use crate::diagnose::Verdict;
+use crate::diagnose::answer::Candidate;
+use crate::fit::outcome::Status;
+use crate::units::um_from_mm;
+use serde::Serialize;
+
+/// How the page is coloured and which sign stands before the sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Nothing needs to be done.
+    Good,
+    /// Something is wrong with the machine.
+    Act,
+    /// The data does not say.
+    Unknown,
+}
+
+/// The verdict.
+#[derive(Debug, Clone, Serialize)]
+pub struct Headline {
+    /// Good, act, unknown.
+    pub level: Level,
+    /// One sentence.
+    pub sentence: String,
+    /// What stands behind it, in a second one.
+    pub detail: String,
+}
+
+/// A thing to do.
+#[derive(Debug, Clone, Serialize)]
+pub struct Next {
+    /// What to do.
+    pub what: String,
+    /// How, or why.
+    pub how: String,
+    /// What to type; empty where nothing is typed.
+    pub command: String,
+}
+
+impl Next {
+    fn new(what: impl Into<String>, how: impl Into<String>, command: impl Into<String>) -> Self {
+        Self { what: what.into(), how: how.into(), command: command.into() }
+    }
+}
+
+/// Three digits that a person reads, µm.
+pub(super) fn um(x: f64) -> String {
+    let x = x.abs();
+    let digits = if x >= 100.0 {
+        0
+    } else if x >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{x:.digits$} µm")
+}
+
+/// "3 of 8 errors", "1 of 8 errors", "the one error".
+fn of(n: usize, total: usize) -> String {
+    if total == 1 { "the one error".to_owned() } else { format!("{n} of {total} errors") }
+}
+
+fn verb(n: usize) -> &'static str {
+    if n == 1 { "is" } else { "are" }
+}
+
+fn largest(parameters: &[ParameterRecord], judgement: Judgement) -> Option<&ParameterRecord> {
+    let ratio = |p: &ParameterRecord| p.tolerance.map_or(0.0, |t| p.value.abs() / t);
+    let those = parameters.iter().filter(|p| p.judgement == judgement);
+    those.max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+fn size(p: &ParameterRecord, m: &Material) -> String {
+    let own = || format!("{} {}", crate::report::fit::digits(p.value, p.sigma), p.unit);
+    match (p.at_radius_um, p.unit.as_str()) {
+        (Some(size), "mm" | "um") => um(size),
+        (Some(size), _) => format!("{}, that is {} at {} mm", own(), um(size), m.tolerance.radius_mm),
+        (None, _) => own(),
+    }
+}
+
+/// The sentence on top of the page.
+pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> Headline {
+    let d = m.diagnosis;
+    let first = d.candidates.first().filter(|c| c.proposed || d.verdict == Verdict::MissingEffect);
+    let (level, sentence) = match d.verdict {
+        Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
+        Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
+        Verdict::Unexplained => (
+            Level::Act,
+            format!(
+                "The machine does something that no known effect explains: the touches miss the model by {}, and the probe's noise is {}.",
+                um(d.rms_um),
+                um(d.noise_um)
+            ),
+        ),
+        Verdict::Adequate if !m.fit.outcome.converged => (
+            Level::Unknown,
+            format!(
+                "The search for the errors did not come to an end ({}): do not use these values.",
+                m.fit.outcome.stopped
+            ),
+        ),
+        Verdict::Adequate => adequate(m, parameters, c),
+    };
+    let detail = match d.verdict {
+        Verdict::TooLittleData => String::new(),
+        _ => d.says.clone(),
+    };
+    Headline { level, sentence, detail }
+}
+
+fn missing(m: &Material, c: &Candidate) -> String {
+    let name = |id: &str| m.catalogue.get(id, m.machine).map_or_else(|| id.to_owned(), |e| e.name.clone());
+    let falls = format!(
+        "the touches miss the model by {}; with it they miss by {}, and the probe's noise is {}.",
+        um(m.diagnosis.rms_um),
+        um(c.rms_after_um),
+        um(m.diagnosis.noise_um)
+    );
+    match &c.same_as[..] {
+        [] => format!("The machine has an error that is not in the model yet: {}. Without it {falls}", c.name),
+        [one] => format!(
+            "The machine has an error that is not in the model yet: {} or {} (these touches cannot tell which). Without it {falls}",
+            c.name,
+            name(one)
+        ),
+        several => format!(
+            "The machine has an error that is not in the model yet: {}, or one of {} others that these touches cannot tell from it. Without it {falls}",
+            c.name,
+            several.len()
+        ),
+    }
+}
+
+fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (Level, String) {
+    let count = |j: Judgement| parameters.iter().filter(|p| p.judgement == j).count();
+    let (beyond, open) = (count(Judgement::Beyond), count(Judgement::Open));
+    let judged = beyond + open + count(Judgement::Within);
+    let lost = parameters.iter().filter(|p| p.status == Status::Undetermined).count();
+    let limit = if m.tolerance.parameters.is_empty() {
+        format!("{} at {} mm", um(m.tolerance.error_um), m.tolerance.radius_mm)
+    } else {
+        "their own limits".to_owned()
+    };
+    let untold = match lost {
+        0 => String::new(),
+        n => format!(" {n} more {} not told by these touches.", if n == 1 { "error is" } else { "errors are" }),
+    };
+    let with = if c.active { "With the compensation that was active, " } else { "" };
+    let start = |text: &str| if with.is_empty() { capital(text) } else { format!("{with}{text}") };
+    if let Some(worst) = largest(parameters, Judgement::Beyond) {
+        let sentence = format!(
+            "{} {} larger than the tolerance ({limit}); the largest is {} ({}): {}.{untold}",
+            start(&of(beyond, judged)),
+            verb(beyond),
+            worst.says,
+            worst.name,
+            size(worst, m)
+        );
+        return (Level::Act, sentence);
+    }
+    if let Some(worst) = largest(parameters, Judgement::Open) {
+        let sentence = format!(
+            "{} too uncertain to say whether {} within the tolerance ({limit}): {} ({}) is the worst; no error is certainly larger.{untold}",
+            start(&format!("{} {}", of(open, judged), verb(open))),
+            if open == 1 { "it is" } else { "they are" },
+            worst.says,
+            worst.name
+        );
+        return (Level::Unknown, sentence);
+    }
+    if judged == 0 {
+        return (
+            Level::Unknown,
+            format!("The model fits, and none of its errors can be held against a tolerance.{untold}"),
+        );
+    }
+    let level = if lost == 0 { Level::Good } else { Level::Unknown };
+    (level, format!("{} within the tolerance ({limit}).{untold}", start(&format!("{} {}", all(judged), verb(judged)))))
+}
+
+fn all(n: usize) -> String {
+    if n == 1 {
+        "the one error that these touches tell".to_owned()
+    } else {
+        format!("all {n} errors that these touches tell")
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |c| c.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+/// What to do, the first thing first.
+pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation) -> Vec<Next> {
+    let mut out = Vec::new();
+    let study = m.study;
+    let controller = m.runs.iter().map(|r| r.controller).find(|c| *c != "csv").unwrap_or("YOUR-CONTROLLER");
+    let plan_next = format!("axiscal plan-next {study} --controller {controller} --out next");
+    let d = m.diagnosis;
+    match d.verdict {
+        Verdict::TooLittleData => out.push(Next::new(
+            "Measure more touches",
+            "A richer program sees what this one cannot. First make sure that the log belongs to the plan and that the blocks stand where it says.",
+            format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
+        )),
+        Verdict::MissingEffect => {
+            if let Some(first) = d.candidates.first() {
+                found(m, first, &plan_next, &mut out);
+            }
+        }
+        Verdict::Unexplained => unexplained(m, &mut out),
+        Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
+    }
+    if d.verdict != Verdict::TooLittleData && !m.fit.outcome.undetermined.is_empty() && d.verdict == Verdict::Adequate {
+        let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
+        let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);
+        out.push(Next::new("Measure what is not told yet", capital(&how), plan_next));
+    }
+    odd_touches(m, &mut out);
+    out
+}
+
+fn found(m: &Material, first: &Candidate, plan_next: &str, out: &mut Vec<Next>) {
+    out.push(Next::new("Look at the machine", first.look.clone(), ""));
+    if !first.same_as.is_empty() {
+        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
+    }
+    out.push(Next::new(
+        "Put it into the model",
+        "The error falls, the other values become right, and this page says what comes next.",
+        format!("axiscal add {} {}", m.study, first.effect),
+    ));
+    let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
+    if !mends.is_empty() {
+        out.push(Next::new("What mends it", mends, ""));
+    }
+}
+
+fn unexplained(m: &Material, out: &mut Vec<Next>) {
+    let d = m.diagnosis;
+    if let Some(gross) = d.gross.first() {
+        out.push(Next::new("Check for a gross mistake", gross.says.clone(), ""));
+    }
+    if let Some(shape) = &d.shape {
+        let depends = d.depends.first().map_or("", |w| w.says.as_str());
+        out.push(Next::new("Look for it on the machine", format!("{}. {depends}.", capital(&shape.kind)), ""));
+    }
+    out.push(Next::new(
+        "Write down its formula",
+        "A starting formula for what no known effect explains; then put it into the model.",
+        format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
+    ));
+}
+
+fn settled(
+    m: &Material,
+    headline: &Headline,
+    parameters: &[ParameterRecord],
+    c: &Compensation,
+    controller: &str,
+    out: &mut Vec<Next>,
+) {
+    if let Some(why) = &c.refused {
+        out.push(Next::new(
+            "Do not compensate yet",
+            format!(
+                "{}. Such values are faults of the set-up: look for a wrong block, sense or length first.",
+                capital(why)
+            ),
+            "",
+        ));
+        return;
+    }
+    let beyond: Vec<&ParameterRecord> = parameters.iter().filter(|p| p.judgement == Judgement::Beyond).collect();
+    let carried =
+        |p: &&&ParameterRecord| !c.left.iter().any(|l| l.known && crate::symbols::same(&l.parameter, &p.name));
+    if beyond.iter().any(|p| carried(&p)) {
+        out.push(Next::new(
+            "Load the compensation",
+            "The values go into the control as its own tables; the README beside them says how, and what must be set again.",
+            format!("axiscal export {} --controller {controller} --out compensation", m.study),
+        ));
+        out.push(Next::new(
+            "Measure again and compare",
+            "Run the same program with the compensation loaded; the two studies side by side say whether it works.",
+            format!("axiscal verify {} again.toml", m.study),
+        ));
+    }
+    for p in beyond.iter().filter(|p| !carried(p)).take(2) {
+        out.push(Next::new(format!("Mend {}", p.says), p.mends.clone(), ""));
+    }
+    if headline.level == Level::Good {
+        out.push(Next::new(
+            "Nothing needs to be done",
+            "Keep this page: the next measurement can be held against it.",
+            format!("axiscal verify {} LATER-STUDY.toml", m.study),
+        ));
+    }
+    if beyond.is_empty() && parameters.iter().any(|p| p.judgement == Judgement::Open) {
+        out.push(Next::new(
+            "Measure more touches",
+            "The uncertainty is larger than what the tolerance leaves: repeats and further poses make it smaller.",
+            format!("axiscal plan-next {} --controller {controller} --out next", m.study),
+        ));
+    }
+}
+
+/// Touches that do not belong to the rest are a finding of their own.
+fn odd_touches(m: &Material, out: &mut Vec<Next>) {
+    let odd: Vec<(&usize, &String)> =
+        m.fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).collect();
+    if odd.is_empty() {
+        return;
+    }
+    let named: Vec<String> = odd
+        .iter()
+        .take(4)
+        .map(|(i, _)| {
+            let o = &m.fit.data.observations[**i];
+            let origin = &m.fit.data.origins[**i];
+            let file = m.runs.get(o.run).map_or("log", |r| r.log);
+            format!(
+                "touch {} ({} {}, {file}:{}, {} off)",
+                o.id,
+                origin.block,
+                origin.face,
+                origin.line,
+                um(um_from_mm(m.fit.residual_mm[**i]))
+            )
+        })
+        .collect();
+    let more = odd.len().saturating_sub(named.len());
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    out.push(Next::new(
+        format!(
+            "Look at {} {} that do not belong to the rest",
+            odd.len(),
+            if odd.len() == 1 { "touch" } else { "touches" }
+        )
+        .replace("1 touch that do not belong", "1 touch that does not belong"),
+        format!("Chips, dirt, a false trigger? {}{rest}. They are not used.", named.join(", ")),
+        "",
+    ));
+}

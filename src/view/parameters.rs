@@ -1,0 +1,121 @@
+//! Results against their tolerance, how they hang together, and the compensation.
+
+use super::Material;
+use super::record::{Compensation, Correlation, Judgement, LeftRecord, ParameterRecord, ShapeRecord};
+use crate::fit::outcome::{Parameter, Status};
+use crate::fit::{Fit, effects_of, statement, uncertainty};
+use crate::model::catalogue::Effect;
+use crate::tables::correction::left_um;
+
+/// The results: everything that is no set-up of a block and no other unknown of the measurement.
+pub(super) fn parameters(m: &Material, fit: &Fit) -> Vec<ParameterRecord> {
+    let effects = effects_of(&fit.outcome.effects, m.catalogue, m.machine).unwrap_or_default();
+    let each = fit.outcome.parameters.iter().zip(&fit.model.unknowns);
+    each.filter(|(_, u)| !u.nuisance).map(|(p, u)| record(m, p, &statement::meaning(u, &effects), &effects)).collect()
+}
+
+fn record(m: &Material, p: &Parameter, meaning: &str, effects: &[&Effect]) -> ParameterRecord {
+    let t = m.tolerance;
+    let effect = effects.iter().find(|e| e.id == p.effect);
+    // a shape parameter (a period, a time constant) scales nothing: it has no size as an error
+    let is_shape = effect.is_some_and(|e| e.parameters.iter().any(|q| q.name == p.name && q.shape.is_some()));
+    let size = |value: f64| left_um(value, &p.unit, t.radius_mm).filter(|_| !is_shape);
+    let per_unit = size(1.0).filter(|s| *s > 0.0);
+    let own = t.parameters.iter().find(|(name, _)| crate::symbols::same(name, &p.name)).map(|(_, v)| *v);
+    let tolerance = own.or_else(|| per_unit.map(|s| t.error_um / s));
+    let expanded = p.expanded.filter(|e| e.is_finite());
+    let told = matches!(p.status, Status::Identified | Status::PriorDominated);
+    let judgement = match (tolerance, expanded) {
+        (Some(limit), Some(doubt)) if told && !is_shape => {
+            if p.value.abs() - doubt > limit {
+                Judgement::Beyond
+            } else if p.value.abs() + doubt <= limit {
+                Judgement::Within
+            } else {
+                Judgement::Open
+            }
+        }
+        _ => Judgement::None,
+    };
+    ParameterRecord {
+        name: p.name.clone(),
+        alias: p.alias.clone(),
+        // "the place of axis C in Y (EY0C)": the symbol has a place of its own
+        says: meaning.rsplit_once(" (").map_or(meaning, |(words, _)| words).to_owned(),
+        effect: p.effect.clone(),
+        effect_name: effect.map_or_else(String::new, |e| e.name.clone()),
+        mends: effect.map_or_else(String::new, |e| e.mends.clone()),
+        value: p.value,
+        unit: p.unit.clone(),
+        sigma: p.sigma,
+        expanded,
+        status: p.status,
+        at_radius_um: size(p.value).map(|s| s.copysign(p.value)),
+        at_radius_expanded_um: expanded.and_then(size),
+        tolerance,
+        tolerance_um: tolerance.and_then(size),
+        judgement,
+    }
+}
+
+/// Correlation coefficients of the results.
+pub(super) fn correlation(fit: &Fit) -> Correlation {
+    let c = uncertainty::results_covariance(fit);
+    let sd = |i: usize| c.matrix[i][i].max(0.0).sqrt();
+    let matrix = (0..c.names.len())
+        .map(|i| {
+            let row = (0..c.names.len()).map(|j| {
+                let r = c.matrix[i][j] / (sd(i) * sd(j));
+                r.is_finite().then(|| ((r.clamp(-1.0, 1.0)) * 1e4).round() / 1e4)
+            });
+            row.collect()
+        })
+        .collect();
+    Correlation { names: c.names, matrix }
+}
+
+/// What a compensation carries and leaves, whoever controls the machine.
+pub(super) fn compensation(m: &Material) -> Compensation {
+    let empty = Compensation {
+        refused: None,
+        active: false,
+        terms: Vec::new(),
+        shapes: Vec::new(),
+        tool_length_mm: None,
+        left: Vec::new(),
+        of_measurement: Vec::new(),
+        reference_mm: m.fit.outcome.reference_mm,
+    };
+    let c = match m.correction {
+        Ok(c) => c,
+        Err(why) => return Compensation { refused: Some(why.to_owned()), ..empty },
+    };
+    let refused = c.beyond(&crate::tables::correction::Limits::default());
+    Compensation {
+        refused: (!refused.is_empty())
+            .then(|| refused.iter().map(|f| f.message.clone()).collect::<Vec<_>>().join("; ")),
+        active: c.active.is_some(),
+        terms: c.terms.clone(),
+        shapes: c
+            .shapes
+            .iter()
+            .map(|s| ShapeRecord { parameter: s.parameter.clone(), effect: s.effect.clone(), axis: s.axis.to_string() })
+            .collect(),
+        tool_length_mm: c.tool_length_mm,
+        left: c
+            .left_out
+            .iter()
+            .map(|l| LeftRecord {
+                parameter: l.parameter.clone(),
+                effect: l.effect.clone(),
+                value: l.value,
+                unit: l.unit.clone(),
+                left_um: left_um(l.value, &l.unit, m.tolerance.radius_mm).filter(|_| l.known),
+                why: l.why.clone(),
+                known: l.known,
+            })
+            .collect(),
+        of_measurement: c.of_measurement.keys().cloned().collect(),
+        ..empty
+    }
+}

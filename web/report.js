@@ -1,0 +1,315 @@
+// The report's page: fills the sections from the view and draws them. Every word goes in as text, never as HTML.
+'use strict';
+(() => {
+  const view = JSON.parse(document.getElementById('view').textContent);
+  const P = axiscalPlots;
+  const { digits, valued } = P;
+  const id = (name) => document.getElementById(name);
+
+  /** An element: tag.class, properties, children (texts or elements). */
+  function make(what, attributes = {}, ...children) {
+    const [tag, ...classes] = what.split('.');
+    const el = document.createElement(tag);
+    if (classes.length) el.className = classes.join(' ');
+    for (const [name, value] of Object.entries(attributes)) {
+      if (name.startsWith('on')) el.addEventListener(name.slice(2), value);
+      else if (value !== null && value !== undefined && value !== false) el.setAttribute(name, value === true ? '' : value);
+    }
+    el.append(...children.filter((c) => c !== null && c !== undefined));
+    return el;
+  }
+
+  const more = id('more');
+  function section(name, title, says, page = false) {
+    const s = make(page ? 'section.page' : 'section', { 'aria-labelledby': `${name}-title` }, make('h2', { id: `${name}-title` }, title));
+    if (says) s.append(make('p', {}, says));
+    more.append(s);
+    return s;
+  }
+
+  // plots are drawn when they come near, so that the first screen stands at once; the printer gets them all
+  const redraw = [];
+  const waiting = new Map();
+  const watcher = new IntersectionObserver((entries) => {
+    for (const e of entries) if (e.isIntersecting) drawNow(e.target);
+  }, { rootMargin: '400px' });
+  function drawNow(el) {
+    const job = waiting.get(el);
+    if (!job) return;
+    waiting.delete(el);
+    watcher.unobserve(el);
+    job();
+  }
+  function plot(el, job, now = false) {
+    redraw.push(() => { if (!waiting.has(el)) job(); });
+    if (now) { job(); return; }
+    waiting.set(el, job);
+    watcher.observe(el);
+  }
+  const figure = (name, caption, tall = false) => {
+    const div = make(tall ? 'div.plot.tall' : 'div.plot', { id: name });
+    return [make('figure', {}, div, caption ? make('figcaption', {}, caption) : null), div];
+  };
+
+  // ---------------------------------------------------------------- theme
+  const dark = () => document.documentElement.dataset.theme === 'dark'
+    || (!document.documentElement.dataset.theme && matchMedia('(prefers-color-scheme: dark)').matches);
+  const button = id('theme');
+  const named = () => { button.textContent = dark() ? 'light' : 'dark'; button.setAttribute('aria-label', `change to ${dark() ? 'light' : 'dark'} colours`); };
+  button.removeAttribute('aria-pressed');
+  named();
+  button.addEventListener('click', () => {
+    document.documentElement.dataset.theme = dark() ? 'light' : 'dark';
+    named();
+    redraw.forEach((job) => job());
+  });
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { named(); redraw.forEach((job) => job()); });
+  // paper is white
+  let before = null;
+  addEventListener('beforeprint', () => {
+    before = document.documentElement.dataset.theme ?? '';
+    document.documentElement.dataset.theme = 'light';
+    [...waiting.keys()].forEach(drawNow);
+    redraw.forEach((job) => job());
+  });
+  addEventListener('afterprint', () => {
+    if (before) document.documentElement.dataset.theme = before;
+    else delete document.documentElement.dataset.theme;
+    redraw.forEach((job) => job());
+  });
+
+  // ---------------------------------------------------------------- the first screen
+  const e = view.errors;
+  const proposed = view.proposed.length > 0;
+  plot(id('errors'), () => P.errors(id('errors'), view), true);
+  id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: touches that had no part in the fit' : ''}. Touches cannot miss by less than about the probe's noise.`;
+  plot(id('parameters'), () => P.parameters(id('parameters'), view), true);
+  const t = view.tolerance;
+  const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (nobody stated one: this is the default; [tolerance] in the study changes it)'}.`;
+  id('parameters-says').append(
+    proposed ? make('span.warn', {}, 'Values with the missing error in the model; hollow: without it, and wrong. ') : '',
+    `Circle: within, diamond: too large, square: uncertain. ${limit}`,
+  );
+  const copy = (text) => make('button.noprint', { type: 'button', 'aria-label': `copy the command ${text}`, onclick: (ev) => {
+    navigator.clipboard?.writeText(text).then(() => { ev.target.textContent = 'copied'; }, () => {});
+  } }, 'copy');
+  for (const n of view.next) {
+    id('next').append(make('li', {}, make('strong', {}, n.what), make('span.how', {}, n.how), n.command ? make('div.command', {}, make('code', {}, n.command), copy(n.command)) : null));
+  }
+
+  // ---------------------------------------------------------------- results
+  {
+    const s = section('results', 'The results', proposed ? 'With the missing error in the model. What the model without it says is in the last column: it is not to be used.' : '', true);
+    const list = proposed ? view.proposed : view.parameters;
+    const head = ['', 'symbol', 'what it is', 'value', 'std. unc.', '95 %', 'unit', `at ${t.radius_mm} mm, µm`, 'tolerance', ...(proposed ? ['without it'] : [])];
+    const body = list.map((p) => {
+      const j = P.JUDGEMENTS[p.judgement];
+      const old = view.parameters.find((q) => q.name === p.name);
+      const untold = p.status === 'undetermined';
+      const word = untold ? 'not told' : p.status === 'fixed' ? 'held' : j.word;
+      const kind = { within: 'good', beyond: 'act', open: 'unknown' }[p.judgement] ?? '';
+      return make('tr', {}, make('td', {}, make(`span.badge${kind ? `.${kind}` : ''}`, {}, word)),
+        make('th', { scope: 'row' }, p.name + (p.alias ? ` (${p.alias})` : '')), make('td', {}, p.says),
+        make('td.n', {}, untold ? '?' : valued(p.value, p.sigma)), make('td.n', {}, digits(p.sigma, 2)), make('td.n', {}, p.expanded === null ? '–' : `± ${digits(p.expanded, 2)}`),
+        make('td', {}, p.unit), make('td.n', {}, untold ? '?' : digits(p.at_radius_um)), make('td.n', {}, p.tolerance === null ? '–' : digits(p.tolerance)),
+        proposed ? make('td.n.muted', {}, old ? valued(old.value, old.sigma) : '–') : null);
+    });
+    s.append(make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': 'table of the results' }, make('table', {}, make('thead', {}, make('tr', {}, ...head.map((h, k) => make(k >= 3 && k !== 6 ? 'th.n' : 'th', { scope: 'col' }, h || 'verdict')))), make('tbody', {}, ...body))));
+    s.append(make('p.muted', {}, `${e.noise_says}. ${e.used} of ${e.touches} touches used, ${e.unknowns} unknowns. Model: ${view.study.effects.join(', ')}.`));
+    for (const w of view.warnings) s.append(make('p.warn', {}, w));
+  }
+
+  // ---------------------------------------------------------------- candidates
+  const d = view.diagnosis;
+  if (d.candidates.length || d.where.length) {
+    const s = section('candidates', d.verdict === 'adequate' ? 'What was looked for' : 'What may be missing', d.verdict === 'adequate'
+      ? `${d.tested} known effects were tried on what is left over, and none of them is there. These would be the next best; they do not pass.`
+      : d.says);
+    for (const w of d.where) s.append(make('p', {}, w.says));
+    if (d.candidates.length) {
+      const [f, div] = figure('candidates-plot', 'Filled: proposed. A candidate that is not proposed takes away less than chance may.');
+      plot(div, () => P.candidates(div, view));
+      const cards = make('div.grid');
+      d.candidates.forEach((c, k) => {
+        const p = c.p_adjusted < 1e-4 ? 'less than 1 in 10 000' : c.p_adjusted > 0.5 ? 'as good as certain' : `1 in ${Math.round(1 / c.p_adjusted)}`;
+        const fact = (name, value) => [make('dt', {}, name), make('dd', {}, value)];
+        const mends = d.effects[c.effect]?.mends;
+        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(c.proposed ? 'span.badge.act' : 'span.badge', {}, c.proposed ? 'proposed' : 'not shown by this data')),
+          make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
+            ...fact('on touches left out', `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm)`),
+            ...fact('chance alone does as well', `${p} (p = ${digits(c.p_adjusted, 2)}, all ${d.tested} effects counted in)`),
+            ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
+            ...(c.same_as.length ? fact('cannot be told from', c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)).join('; ')) : []),
+            ...(c.tell_apart ? fact('what tells them apart', c.tell_apart) : []),
+            ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
+          make('p', {}, c.says), make('p', {}, make('strong', {}, 'Look: '), c.look), mends ? make('p', {}, make('strong', {}, 'Mends it: '), mends) : null));
+      });
+      s.append(f, cards);
+    }
+    for (const g of d.gross ?? []) s.append(make('p.warn', {}, `${g.says}: the error would be ${digits(g.rms_um)} µm`));
+  }
+
+  // ---------------------------------------------------------------- the ladder
+  {
+    const s = section('ladder', 'Step by step to the noise', 'What each model leaves. The lower the better, and nothing is gained below the noise; a model that falls on its own touches and not on those left out only learns by heart.', true);
+    const [f, div] = figure('ladder-plot', view.ladder_notes.join(' '));
+    plot(div, () => P.ladder(div, view));
+    s.append(f);
+  }
+
+  // ---------------------------------------------------------------- residuals
+  const state = { from: e.before, to: e.after, directions: new Set(['X', 'Y', 'Z']), rung: e.before };
+  const select = (label, value, change) => {
+    const el = make('select', { 'aria-label': label }, ...view.ladder.map((r, k) => make('option', { value: k, selected: k === value }, `${k}: ${r.label}`)));
+    el.addEventListener('change', () => change(Number(el.value)));
+    return el;
+  };
+  {
+    const s = section('residuals', 'How far each touch misses, and on what that depends', 'Hollow marks: before; full marks: after; line: what the added effect says. A miss is stated as the ball standing off in X, Y or Z of the machine. What lies in the shaded band (twice the noise) is the probe itself.');
+    const plots = [];
+    const again = () => plots.forEach((job) => job());
+    const toggles = ['X', 'Y', 'Z'].map((l) => {
+      const sign = { circle: '●', square: '■', 'triangle-up': '▲' }[P.DIRECTION[l].symbol];
+      const b = make('button', { type: 'button', 'aria-pressed': 'true' }, make('span.swatch', { style: `color:${P.DIRECTION[l].colour}`, 'aria-hidden': 'true' }, sign), `in ${l}`);
+      b.addEventListener('click', () => {
+        if (state.directions.has(l)) state.directions.delete(l); else state.directions.add(l);
+        b.setAttribute('aria-pressed', state.directions.has(l));
+        again();
+      });
+      return b;
+    });
+    s.append(make('div.controls', {}, make('span.noprint', {}, 'before: '), select('model shown as before', state.from, (v) => { state.from = v; again(); }),
+      make('span.noprint', {}, 'after: '), select('model shown as after', state.to, (v) => { state.to = v; again(); }), ...toggles));
+    const grid = make('div.grid');
+    for (const v of [...view.variables].sort((a, b) => (b.share ?? -1) - (a.share ?? -1))) {
+      const share = v.share !== null && d.verdict !== 'adequate' && v.share >= 0.05 ? `${Math.round(100 * v.share)} % of what the model does not explain goes with this` : '';
+      const [f, div] = figure(`residual-${v.id}`, share);
+      const job = () => P.residuals(div, view, v, state);
+      plots.push(() => { if (!waiting.has(div)) job(); });
+      plot(div, job);
+      grid.append(f);
+    }
+    s.append(grid);
+    s.append(make('p', {}, view.comparison_says));
+  }
+
+  // ---------------------------------------------------------------- the machine
+  {
+    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch points the way the touched face seems to stand off.', true);
+    const [f, div] = figure('machine-plot', '', true);
+    const scale = make('figcaption', {});
+    const job = () => P.machine(div, view, state).then((parts) => {
+      scale.textContent = `Arrows are drawn ${parts.magnification.toLocaleString('en')} times as long as the misses are; the thick bar is ${digits(parts.scale.um, 1)} µm. ${view.machine.says}.`;
+    });
+    plot(div, job);
+    f.append(scale);
+    s.append(make('div.controls.noprint', {}, 'model: ', select('model whose misses are drawn', state.rung, (v) => { state.rung = v; job(); })), f);
+  }
+
+  // ---------------------------------------------------------------- what is not told
+  {
+    const s = section('doubt', 'What this data cannot tell', '', true);
+    const list = make('ul.plain');
+    for (const u of view.undetermined) list.append(make('li', {}, u.says, u.parted_by?.length ? ` ${u.parted_by.length ? `It would take: ${u.parted_by.join('; or ')}.` : ''}` : ''));
+    for (const w of view.weak) list.append(make('li', {}, w.says));
+    if (d.not_seen.length) list.append(make('li', {}, `These effects leave no trace in these touches, so nobody can say whether the machine has them: ${d.not_seen.map((n) => d.effects[n]?.name ?? n).join(', ')}.`));
+    const seen = [...d.power].sort((a, b) => b.minimal_detectable_um - a.minimal_detectable_um).slice(0, 8);
+    if (seen.length) list.append(make('li', {}, `Effects that would have been found only from this size on: ${seen.map((q) => `${q.effect} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));
+    s.append(list.children.length ? list : make('p', {}, 'Every result of the model is told by these touches.'));
+    if (view.correlation.names.length > 1) {
+      const [f, div] = figure('correlation-plot', 'How the results hang together: near 0 they are told apart, near 1 or −1 only their difference or sum is known well.');
+      div.style.height = `${Math.min(640, 160 + 34 * view.correlation.names.length)}px`;
+      f.style.maxWidth = '760px';
+      plot(div, () => P.correlation(div, view));
+      s.append(f);
+    }
+  }
+
+  // ---------------------------------------------------------------- compensation
+  {
+    const c = view.compensation;
+    const s = section('compensation', 'The compensation, and what it leaves', c.active ? 'A compensation was active during the measurement: what was found is added to it.' : '');
+    if (d.verdict === 'missing-effect' || d.verdict === 'unexplained') s.append(make('p.warn', {}, 'Not to be loaded yet: something is missing in the model, and these values hold part of it.'));
+    if (c.refused) s.append(make('p.warn', {}, c.refused));
+    const table = (name, head, rows, from) => make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': name }, make('table', {}, make('thead', {}, make('tr', {}, ...head.map((h, k) => make(k >= from[0] && k <= from[1] ? 'th.n' : 'th', { scope: 'col' }, h)))),
+      make('tbody', {}, ...rows.map((r) => make('tr', {}, ...r.map((v, k) => make(k >= from[0] && k <= from[1] ? 'td.n' : 'td', {}, v)))))));
+    const fixed = (v) => v.toFixed(5).replace('-', '−');
+    if (c.terms.length) s.append(table('what the control is given', ['carried', 'axis', 'component', 'active before', 'found', 'given to the control', 'std. unc.', 'unit'], c.terms.map((q) => [q.parameter, q.axis, `${q.place} ${q.dof}`, fixed(q.active_before), fixed(q.identified), fixed(q.value), digits(q.sigma, 2), q.unit]), [3, 6]));
+    for (const q of c.shapes) s.append(make('p', {}, `${q.parameter} (${q.effect}): into the table of axis ${q.axis}.`));
+    if (c.tool_length_mm !== null) s.append(make('p', {}, `Tool table: the tool is ${digits(c.tool_length_mm)} mm longer than was assumed.`));
+    s.append(make('h3', {}, 'What it leaves'));
+    s.append(c.left.length ? table('what the compensation leaves', ['not carried', 'effect', 'value', 'unit', `leaves at ${t.radius_mm} mm, µm`, 'why'], c.left.map((q) => [q.parameter, q.effect, digits(q.value), q.unit, q.left_um === null ? '–' : digits(q.left_um), q.why]), [2, 2])
+      : make('p', {}, `Nothing of what was found, whatever the control can carry: axiscal export says what its tables leave. The touches are then missed by about ${digits(view.ladder[e.after].rms_um)} µm, and the noise is ${digits(e.noise_um)} µm.`));
+  }
+
+  // ---------------------------------------------------------------- every touch
+  {
+    const s = section('touches', 'Every touch', '', true);
+    const q = view.touches;
+    const letters = Object.keys(q.axes).sort((a, b) => 'XYZABC'.indexOf(a) - 'XYZABC'.indexOf(b));
+    const rows = q.id.map((_, i) => i).map((i) => ({ i, run: q.run[i], id: q.id[i], stage: q.words[q.stage[i]], block: q.words[q.block[i]], face: q.words[q.face[i]], ...Object.fromEntries(letters.map((l) => [l, q.axes[l][i]])), time: q.time_h[i],
+      before: q.residual_um[e.before][i], after: q.residual_um[e.after][i], std: q.standardised[i], why: q.rejected[i] ?? '', source: P.source(view, i) }));
+    for (const u of view.unusable) rows.push({ i: -1, run: u.run, id: u.id, stage: '', block: '', face: '', time: null, before: null, after: null, std: null, why: u.reason, source: `${view.study.runs[u.run - 1]?.log ?? 'log'}:${u.line}` });
+    const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? 'deg' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ['after', 'after, µm', 1], ['std', 'in noise units', 1], ['why', 'not used because'], ['source', 'source line']];
+    const SIZE = 50;
+    const sort = { by: 'after', down: true };
+    let filter = '';
+    let page = 0;
+    const body = make('tbody');
+    const count = make('span', { role: 'status' });
+    const previous = make('button', { type: 'button', onclick: () => { page -= 1; show(); } }, 'previous');
+    const next = make('button', { type: 'button', onclick: () => { page += 1; show(); } }, 'next');
+    const heads = columns.map(([key, title, number]) => {
+      const th = make(number ? 'th.n' : 'th', { scope: 'col' }, make('button', { type: 'button', onclick: () => {
+        sort.down = sort.by === key ? !sort.down : Boolean(number);
+        sort.by = key;
+        page = 0;
+        show();
+      } }, title));
+      th.dataset.key = key;
+      return th;
+    });
+    const text = (key, v) => {
+      if (v === null || v === undefined) return '';
+      if (letters.includes(key) || key === 'time') return v.toFixed(3).replace('-', '−');
+      if (['before', 'after', 'std'].includes(key)) return v.toFixed(2).replace('-', '−');
+      return String(v);
+    };
+    function show() {
+      const words = filter.toLowerCase().split(/\s+/).filter(Boolean);
+      const kept = rows.filter((r) => words.every((w) => columns.some(([key]) => text(key, r[key]).toLowerCase().includes(w))));
+      // misses are sorted by size, whichever way they go
+      const key = (r) => (['before', 'after', 'std'].includes(sort.by) && r[sort.by] !== null ? Math.abs(r[sort.by]) : r[sort.by]);
+      kept.sort((a, b) => {
+        const [x, y] = [key(a), key(b)];
+        if (x === y) return a.i - b.i;
+        if (x === null || x === undefined) return 1;
+        if (y === null || y === undefined) return -1;
+        return (x < y ? -1 : 1) * (sort.down ? -1 : 1);
+      });
+      const pages = Math.max(1, Math.ceil(kept.length / SIZE));
+      page = Math.min(Math.max(0, page), pages - 1);
+      body.replaceChildren(...kept.slice(page * SIZE, (page + 1) * SIZE).map((r) => make(r.why ? 'tr.off' : 'tr', {}, ...columns.map(([k, , number]) => make(number ? 'td.n' : 'td', {}, text(k, r[k]))))));
+      count.textContent = `${kept.length} of ${rows.length} touches, page ${page + 1} of ${pages}`;
+      previous.disabled = page === 0;
+      next.disabled = page === pages - 1;
+      for (const th of heads) {
+        const own = th.dataset.key === sort.by;
+        th.setAttribute('aria-sort', own ? (sort.down ? 'descending' : 'ascending') : 'none');
+        th.firstChild.textContent = columns.find(([k]) => k === th.dataset.key)[1] + (own ? (sort.down ? ' ▼' : ' ▲') : '');
+      }
+    }
+    const input = make('input', { type: 'search', id: 'filter', placeholder: 'block, face, line …' });
+    input.addEventListener('input', () => { filter = input.value; page = 0; show(); });
+    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest misses first; the source line is the touch's place in the log.`),
+      make('div.controls.noprint', {}, make('label', { for: 'filter' }, 'show only'), input, previous, next, count),
+      make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
+    show();
+  }
+
+  id('foot').append(
+    make('p', {}, `${view.program}; study ${view.study.name}, SHA-256 ${view.study.sha256}; data of ${view.study.date}. Runs: ${view.study.runs.map((r) => `${r.program} (${r.plan}, ${r.log}, ${r.controller}, ${r.touches} touches)`).join('; ')}.`),
+    make('p', {}, 'Misses are measured less model along the outward normal of the touched face. Location errors are stated as ISO 230-1 and 230-7 name them. Bars and ± are 95 % unless they are called standard uncertainties. Plots: plotly.js, MIT licence.'),
+  );
+  document.documentElement.dataset.ready = 'yes';
+})();
