@@ -27,11 +27,8 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
-<<<<<<< HEAD
 mod workbench;
-=======
 pub mod view;
->>>>>>> report
 
 pub use common::{Answer, Io};
 
@@ -95,13 +92,10 @@ enum Verb {
     Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
-<<<<<<< HEAD
     /// A study live in the browser: switch effects on and off and watch the error
     Workbench(workbench::Args),
-=======
     /// One page with the verdict, the plots and every touch: opens with no network
     Report(report::Args),
->>>>>>> report
     /// Print the JSON schema of a file, for editors
     Schema(schema::Args),
 }
@@ -151,11 +145,8 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::History(args) => add::history(&args, io),
         Verb::Verify(args) => verify::run(&args, io),
         Verb::Export(args) => export::run(&args, io),
-<<<<<<< HEAD
         Verb::Workbench(args) => workbench::run(&args, io),
-=======
         Verb::Report(args) => report::run(&args, io),
->>>>>>> report
         Verb::Schema(args) => schema::run(&args, io),
     }
 }
