@@ -21,7 +21,7 @@ export function chance(p, lnP) {
   if (p === null || p === undefined) return "–";
   if (p >= 0.0001) return p.toFixed(4);
   const power = Math.floor((lnP ?? Math.log(p)) / Math.LN10);
-  return `10^${power}`;
+  return `10${[...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("")}`;
 }
 
 /** An element; attributes that are functions are listeners. Text is always text, never markup. */
