@@ -17,7 +17,7 @@ async function opened(t, name) {
   return { folder, address, page, seen };
 }
 
-const told = (page) => page.waitForSelector("#candidates[data-complete=true]", { timeout: 120_000 });
+const told = (page) => page.waitForSelector("#candidates[data-complete=true]", { state: "attached", timeout: 120_000 });
 
 /** Waits for the state after this one, drawn in the plots that are in sight. */
 async function after(page, work) {
@@ -26,8 +26,8 @@ async function after(page, work) {
   await page.waitForFunction((v) => Number(document.body.dataset.version) > v, before);
   const now = await version(page);
   await page.waitForFunction((v) => {
-    const seen = [...document.querySelectorAll("#residuals .plot")].filter((p) => p.dataset.version);
-    return seen.length > 0 && seen.some((p) => Number(p.dataset.version) === v);
+    const inSight = (p) => { const r = p.getBoundingClientRect(); return r.bottom > 0 && r.top < innerHeight; };
+    return [...document.querySelectorAll("#residuals .plot")].filter(inSight).every((p) => Number(p.dataset.version) === v);
   }, now);
 }
 

@@ -92,7 +92,7 @@ function grid() {
   cells.length = 0;
   box.replaceChildren();
   for (const variable of state.inputs.variables) {
-    const plot = element("div", { class: "plot", role: "img", "aria-label": `residual against ${variable.title}` });
+    const plot = element("div", { class: "plot", role: "group", "aria-label": `residual against ${variable.title}` });
     const ring = element("div", { class: "ring", hidden: true });
     const cell = { variable, plot, ring, stale: true, seen: false, made: false };
     plot.dataset.variable = variable.id;
