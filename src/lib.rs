@@ -31,4 +31,5 @@ pub mod search;
 pub mod simulate;
 pub mod study;
 pub mod tables;
+pub mod workbench;
 pub mod view;

@@ -45,13 +45,15 @@ pub struct Io {
     pub json: bool,
     /// A verb that another one calls: it says and answers nothing, findings go to stderr all the same.
     pub within: bool,
+    /// Findings go here instead of to stderr: a page shows them.
+    pub heard: Option<&'static std::sync::Mutex<Vec<Finding>>>,
 }
 
 impl Io {
     /// For a call with or without `--json`.
     #[must_use]
     pub fn new(json: bool) -> Self {
-        Self { json, within: false }
+        Self { json, within: false, heard: None }
     }
 
     /// For a verb that this one calls: the caller answers.
@@ -97,6 +99,10 @@ impl Io {
 
     /// Findings to stderr, each with its place and remedy.
     pub fn report(&self, findings: &[Finding]) {
+        if let Some(heard) = self.heard {
+            heard.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend_from_slice(findings);
+            return;
+        }
         for finding in findings {
             let place = finding.place().map(|p| format!("{p}: ")).unwrap_or_default();
             let word = match finding.severity {

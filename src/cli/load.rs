@@ -90,16 +90,7 @@ impl Loaded {
     /// What the study asks of the fit.
     #[must_use]
     pub fn settings(&self) -> Settings {
-        Settings {
-            effects: self.study.effects.clone(),
-            knowledge: self.study.knowledge.clone(),
-            touch_sigma_mm: self.study.touch_sigma_mm,
-            visit_sigma_mm: self.study.visit_sigma_mm,
-            reference: None,
-            type_b: self.study.type_b.clone(),
-            masked: self.study.masked.clone(),
-            quick: false,
-        }
+        self.study.settings()
     }
 }
 

@@ -28,6 +28,7 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
+mod workbench;
 pub mod view;
 
 pub use common::{Answer, Io};
@@ -92,6 +93,8 @@ enum Verb {
     Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
+    /// A study live in the browser: switch effects on and off and watch the error
+    Workbench(workbench::Args),
     /// One page with the verdict, the plots and every touch: opens with no network
     Report(report::Args),
     /// Print the JSON schema of a file, for editors
@@ -147,6 +150,7 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::History(args) => add::history(&args, io),
         Verb::Verify(args) => verify::run(&args, io),
         Verb::Export(args) => export::run(&args, io),
+        Verb::Workbench(args) => workbench::run(&args, io),
         Verb::Report(args) => report::run(&args, io),
         Verb::Schema(args) => schema::run(&args, io),
         Verb::Completions(args) => completions::completions(&args, io),

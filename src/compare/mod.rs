@@ -286,7 +286,9 @@ impl Comparison {
     }
 }
 
-fn points(fit: &Fit) -> Vec<Point> {
+/// Every touch with what its residual may depend on.
+#[must_use]
+pub fn points(fit: &Fit) -> Vec<Point> {
     let axes: Vec<crate::axes::AxisName> = fit.model.axes();
     let each = fit.data.observations.iter().zip(&fit.data.origins).enumerate().map(|(i, (o, origin))| {
         let s = &o.state;

@@ -4,6 +4,7 @@
 //! and order stay. Nothing here opens the files that a study names: `cli` does.
 
 mod join;
+pub mod mask;
 
 pub use join::{Joined, join};
 pub mod edit;
@@ -11,7 +12,7 @@ pub mod history;
 pub mod tolerance;
 
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
-use crate::fit::{Knowledge, Mask};
+use crate::fit::{Knowledge, Mask, Settings};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -287,6 +288,21 @@ impl Study {
             masked,
             tolerance,
         })
+    }
+
+    /// What the study asks of the fit.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        Settings {
+            effects: self.effects.clone(),
+            knowledge: self.knowledge.clone(),
+            touch_sigma_mm: self.touch_sigma_mm,
+            visit_sigma_mm: self.visit_sigma_mm,
+            reference: None,
+            type_b: self.type_b.clone(),
+            masked: self.masked.clone(),
+            quick: false,
+        }
     }
 
     /// The text of a fresh study.

@@ -1,0 +1,401 @@
+//! The formula box: an effect as a person types it, checked with the place of each mistake in the line that was typed.
+
+use crate::diag::{Failure, Finding, source};
+use crate::model::catalogue::Catalogue;
+use crate::model::formula::{Formula, VARIABLES};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
+
+/// Longest text of one field, in bytes.
+const LONGEST: usize = 600;
+
+/// Most terms and shapes of an effect that is typed.
+const MOST_ROWS: usize = 24;
+
+/// An effect as it was typed.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Draft {
+    /// Short name, used in studies.
+    pub id: String,
+    /// Name for people.
+    #[serde(default)]
+    pub name: String,
+    /// What it is.
+    #[serde(default)]
+    pub says: String,
+    /// How to confirm it on the machine.
+    #[serde(default)]
+    pub look: String,
+    /// An axis of the chain, or base, tool, workpiece, block, trigger, reading.
+    pub at: String,
+    /// The displacements.
+    pub terms: Vec<DraftTerm>,
+    /// Parameters that stand inside the formulas.
+    #[serde(default)]
+    pub shape: Vec<DraftShape>,
+}
+
+/// A displacement as it was typed.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DraftTerm {
+    /// Name of its factor.
+    pub parameter: String,
+    /// Unit of the factor.
+    pub unit: String,
+    /// dx dy dz rx ry rz, r, or the letter of an axis.
+    pub dof: String,
+    /// The function of the state.
+    pub formula: String,
+}
+
+/// A parameter inside the formulas, as it was typed.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DraftShape {
+    /// Its name in the formulas.
+    pub parameter: String,
+    /// Its unit.
+    pub unit: String,
+    /// Where the search begins.
+    pub start: f64,
+    /// Lowest value.
+    pub min: Option<f64>,
+    /// Highest value.
+    pub max: Option<f64>,
+}
+
+/// What is wrong with a draft, and where it was typed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Mistake {
+    /// `id`, `at`, `terms.0.formula`, …; empty where it is the whole.
+    pub field: String,
+    /// First sign that is wrong, counted in signs from 0; none where it is the whole field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from: Option<usize>,
+    /// The sign behind the last one that is wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to: Option<usize>,
+    /// What is wrong.
+    pub message: String,
+    /// What to do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
+}
+
+impl Mistake {
+    fn of(field: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
+        Self { field: field.into(), from: None, to: None, message: message.into(), help: Some(help.into()) }
+    }
+}
+
+/// The row of the effects file.
+#[must_use]
+pub fn row(draft: &Draft) -> String {
+    let mut table = Table::new();
+    table["id"] = value(&draft.id);
+    for (word, text) in [("name", &draft.name), ("says", &draft.says), ("look", &draft.look)] {
+        if !text.trim().is_empty() {
+            table[word] = value(text.trim());
+        }
+    }
+    table["at"] = value(&draft.at);
+    let mut terms = Array::new();
+    for t in &draft.terms {
+        let mut term = InlineTable::new();
+        for (word, text) in [("parameter", &t.parameter), ("unit", &t.unit), ("dof", &t.dof), ("formula", &t.formula)] {
+            term.insert(word, text.trim().into());
+        }
+        terms.push(term);
+    }
+    table["terms"] = value(in_lines(terms));
+    let mut shapes = Array::new();
+    for s in &draft.shape {
+        let mut shape = InlineTable::new();
+        shape.insert("parameter", s.parameter.trim().into());
+        shape.insert("unit", s.unit.trim().into());
+        shape.insert("start", s.start.into());
+        for (word, bound) in [("min", s.min), ("max", s.max)] {
+            if let Some(bound) = bound {
+                shape.insert(word, bound.into());
+            }
+        }
+        shapes.push(shape);
+    }
+    if !shapes.is_empty() {
+        table["shape"] = value(in_lines(shapes));
+    }
+    let mut tables = ArrayOfTables::new();
+    tables.push(table);
+    let mut doc = DocumentMut::new();
+    doc["effect"] = Item::ArrayOfTables(tables);
+    doc.to_string()
+}
+
+/// One item a line, as a person would write it.
+fn in_lines(mut array: Array) -> Array {
+    for item in array.iter_mut() {
+        item.decor_mut().set_prefix("\n  ");
+    }
+    array.set_trailing("\n");
+    array.set_trailing_comma(true);
+    array
+}
+
+/// The effects file with the draft at its end.
+#[must_use]
+pub fn appended(before: &str, draft: &Draft) -> String {
+    let gap = match before.trim_end() {
+        "" => "",
+        _ if before.ends_with('\n') => "\n",
+        _ => "\n\n",
+    };
+    format!("{before}{gap}{}", row(draft))
+}
+
+/// The catalogue with the draft in it.
+///
+/// # Errors
+/// What is wrong with it, each with its field.
+pub fn check(draft: &Draft, catalogue: &Catalogue) -> Result<Catalogue, Vec<Mistake>> {
+    let mut mistakes = words(draft);
+    let shapes: Vec<&str> = draft.shape.iter().map(|s| s.parameter.trim()).collect();
+    for (i, t) in draft.terms.iter().enumerate() {
+        if let Err(message) = Formula::parse(t.formula.trim(), &shapes) {
+            let lead = t.formula.len() - t.formula.trim_start().len();
+            let at = place(t.formula.trim(), &message);
+            let signs = |byte: usize| t.formula.get(..lead + byte).map_or(0, |text| text.chars().count());
+            let (from, to) = (signs(at.start), signs(at.end));
+            mistakes.push(Mistake {
+                field: format!("terms.{i}.formula"),
+                from: Some(from),
+                to: Some(to),
+                message,
+                help: None,
+            });
+        }
+    }
+    if !mistakes.is_empty() {
+        return Err(mistakes);
+    }
+    let text = row(draft);
+    let mut all = catalogue.clone();
+    match all.add_file(&source("formula box", text.clone())) {
+        Ok(_) => Ok(all),
+        Err(Failure(findings)) => Err(findings.iter().map(|f| from_finding(f, &text, draft)).collect()),
+    }
+}
+
+/// What the file's own form would let pass, but a person cannot mean.
+fn words(draft: &Draft) -> Vec<Mistake> {
+    let mut out = Vec::new();
+    let id = &draft.id;
+    let good = !id.is_empty()
+        && id.len() <= 40
+        && id.starts_with(|c: char| c.is_ascii_lowercase())
+        && id.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+    if !good {
+        out.push(Mistake::of(
+            "id",
+            "the short name is not usable",
+            "small letters, digits and -, a letter first, up to 40 signs: my-sag",
+        ));
+    }
+    if draft.terms.is_empty() || draft.terms.len() > MOST_ROWS || draft.shape.len() > MOST_ROWS {
+        out.push(Mistake::of("", format!("an effect has 1 to {MOST_ROWS} terms"), "add a term, or take some away"));
+    }
+    let fields = [("name", &draft.name), ("says", &draft.says), ("look", &draft.look), ("at", &draft.at)];
+    let mut all: Vec<(String, &String)> = fields.iter().map(|(w, t)| ((*w).to_owned(), *t)).collect();
+    for (i, t) in draft.terms.iter().enumerate() {
+        for (w, text) in [("parameter", &t.parameter), ("unit", &t.unit), ("dof", &t.dof), ("formula", &t.formula)] {
+            all.push((format!("terms.{i}.{w}"), text));
+        }
+    }
+    for (i, s) in draft.shape.iter().enumerate() {
+        all.push((format!("shape.{i}.parameter"), &s.parameter));
+        all.push((format!("shape.{i}.unit"), &s.unit));
+    }
+    for (field, text) in all {
+        if text.len() > LONGEST || text.chars().any(char::is_control) {
+            out.push(Mistake::of(field, "too long, or more than one line", "write it shorter, in one line"));
+        }
+    }
+    out
+}
+
+/// A finding about the row, as a mistake in the field that it is about.
+fn from_finding(f: &Finding, text: &str, draft: &Draft) -> Mistake {
+    let help = f.help.clone();
+    let field = f.span.as_ref().and_then(|span| {
+        let wrong = text.get(span.clone())?.trim_matches(['"', '\'']);
+        // which of the terms: those whose own line begins before the place
+        let term = text.get(..span.start)?.matches("{ parameter").count().checked_sub(1);
+        let found = match term.and_then(|i| draft.terms.get(i).map(|t| (i, t))) {
+            Some((i, t)) => [("parameter", &t.parameter), ("unit", &t.unit), ("dof", &t.dof), ("formula", &t.formula)]
+                .iter()
+                .find(|(_, typed)| typed.trim() == wrong)
+                .map(|(w, _)| format!("terms.{i}.{w}")),
+            None if wrong == draft.id => Some("id".to_owned()),
+            None if wrong == draft.at => Some("at".to_owned()),
+            None => None,
+        };
+        found.or_else(|| (wrong == draft.at).then(|| "at".to_owned()))
+    });
+    Mistake { field: field.unwrap_or_default(), from: None, to: None, message: f.message.clone(), help }
+}
+
+/// Which part of a formula a message is about, in bytes: the word that it quotes, else the bracket that has no partner,
+/// else the end, where something is missing.
+fn place(formula: &str, message: &str) -> Range<usize> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
+    if let Some(word) = message.split('"').nth(1).filter(|w| !w.is_empty()) {
+        let alone = |at: &usize| {
+            let before = formula[..*at].chars().next_back().is_some_and(is_word);
+            let after = formula[*at + word.len()..].chars().next().is_some_and(is_word);
+            !(before || after)
+        };
+        let mut hits = formula.match_indices(word).map(|(at, _)| at);
+        if let Some(at) = hits.clone().find(alone).or_else(|| hits.next()) {
+            return at..at + word.len();
+        }
+    }
+    let mut open = Vec::new();
+    for (at, c) in formula.char_indices() {
+        match c {
+            '(' => open.push(at),
+            ')' if open.pop().is_none() => return at..at + 1,
+            _ => {}
+        }
+    }
+    if let Some(at) = open.pop() {
+        return at..at + 1;
+    }
+    // a sign that no formula knows
+    let known = |c: char| is_word(c) || c.is_whitespace() || "+-*/^(),".contains(c);
+    if let Some((at, c)) = formula.char_indices().find(|(_, c)| !known(*c)) {
+        return at..at + c.len_utf8();
+    }
+    let last = formula.char_indices().next_back().map_or(0, |(at, _)| at);
+    last..formula.len()
+}
+
+/// What each variable of a formula is.
+pub const MEANING: [(&str, &str); VARIABLES.len()] = [
+    ("X", "position of X, mm"),
+    ("Y", "position of Y, mm"),
+    ("Z", "position of Z, mm"),
+    ("A", "position of A, radians"),
+    ("B", "position of B, radians"),
+    ("C", "position of C, radians"),
+    ("t", "hours since the first touch of the study"),
+    ("T", "temperature, °C (20 where the log has none)"),
+    ("nx", "outward normal of the touched face, its X part, in the machine's frame"),
+    ("ny", "the same, its Y part"),
+    ("nz", "the same, its Z part"),
+    ("mx", "outward normal in the probe's frame, which turns with head and spindle, its x part"),
+    ("my", "the same, its y part"),
+    ("mz", "the same, its z part"),
+    ("sX", "sense of the last motion of X: +1 or -1, 0 while it is not known"),
+    ("sY", "sense of the last motion of Y"),
+    ("sZ", "sense of the last motion of Z"),
+    ("sA", "sense of the last motion of A"),
+    ("sB", "sense of the last motion of B"),
+    ("sC", "sense of the last motion of C"),
+    ("feed", "feed of the touch, mm/min"),
+    ("S", "turn of the spindle (M19), radians"),
+    ("gx", "which way is down, in the tool's frame, its x part"),
+    ("gy", "the same, its y part"),
+    ("gz", "the same, its z part: -1 for an upright spindle"),
+    ("L", "pivot to ball of this stylus, mm"),
+    ("L0", "pivot to ball of the machine's own stylus, mm"),
+    ("bx", "outward normal in the frame of what carries the block, all axes at 0, its x part"),
+    ("by", "the same, its y part"),
+    ("bz", "the same, its z part"),
+    ("px", "planned contact, in the frame of what carries the block, x, mm"),
+    ("py", "the same, y, mm"),
+    ("pz", "the same, z, mm"),
+    ("ox", "from the carrier's centre line to the block, unit vector, x part"),
+    ("oy", "the same, y part"),
+    ("oz", "the same, z part"),
+    ("edge", "edge of the block along the touched face's normal, mm"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draft(formula: &str) -> Draft {
+        Draft {
+            id: "my-sag".into(),
+            name: "It \"sags\"".into(),
+            at: "B".into(),
+            terms: vec![DraftTerm {
+                parameter: "sag".into(),
+                unit: "um".into(),
+                dof: "dz".into(),
+                formula: formula.into(),
+            }],
+            ..Draft::default()
+        }
+    }
+
+    #[test]
+    fn every_variable_has_its_meaning() {
+        assert_eq!(MEANING.map(|m| m.0), VARIABLES);
+    }
+
+    #[test]
+    fn a_good_draft_is_a_row_of_an_effects_file() {
+        let built_in = Catalogue::built_in().unwrap();
+        let all = check(&draft("1 - cos(B)"), &built_in).unwrap();
+        assert!(all.knows("my-sag") && !built_in.knows("my-sag"));
+        let two = appended(
+            "# mine\n[[effect]]\nid = \"other\"\nat = \"B\"\nterms = [{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"B\" }]",
+            &draft("1 - cos(B)"),
+        );
+        let mut read = Catalogue::default();
+        read.add_file(&source("f", two.clone())).unwrap();
+        assert!(read.knows("my-sag") && read.knows("other") && two.starts_with("# mine"), "{two}");
+    }
+
+    #[test]
+    fn mistakes_have_their_place() {
+        let built_in = Catalogue::built_in().unwrap();
+        for (formula, from, to) in [
+            ("1 - cos(Q)", 8, 9),
+            ("  1 - kos(B)", 6, 9),
+            ("1 - cos(B", 7, 8),
+            ("B) + 1", 1, 2),
+            ("B +", 2, 3),
+            ("", 0, 0),
+            ("B ° 2", 2, 3),
+            ("BB + B + Ω", 0, 2),
+        ] {
+            let mistakes = check(&draft(formula), &built_in).unwrap_err();
+            let first = &mistakes[0];
+            assert_eq!(first.field, "terms.0.formula", "{formula}");
+            assert_eq!((first.from, first.to), (Some(from), Some(to)), "{formula}: {}", first.message);
+        }
+    }
+
+    #[test]
+    fn mistakes_of_other_fields_name_the_field() {
+        let built_in = Catalogue::built_in().unwrap();
+        let good = draft("1 - cos(B)");
+        let with = |change: &dyn Fn(&mut Draft)| {
+            let mut d = good.clone();
+            change(&mut d);
+            check(&d, &built_in).unwrap_err()[0].field.clone()
+        };
+        assert_eq!(with(&|d| d.id = "../evil".into()), "id");
+        assert_eq!(with(&|d| d.id = "location-b".into()), "id");
+        assert_eq!(with(&|d| d.terms[0].unit = "inch".into()), "terms.0.unit");
+        assert_eq!(with(&|d| d.terms[0].dof = "dq".into()), "terms.0.dof");
+        assert_eq!(with(&|d| d.at = "Q".into()), "at");
+        assert_eq!(with(&|d| d.terms[0].parameter = "X".into()), "terms.0.parameter");
+        assert_eq!(with(&|d| d.name = "a\nb".into()), "name");
+        assert_eq!(with(&|d| d.terms.clear()), "");
+    }
+}

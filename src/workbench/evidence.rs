@@ -1,0 +1,96 @@
+//! What the touches say of every effect, worked out behind the fit: first the score tests of the list, then the whole
+//! diagnosis.
+
+use super::session::Snapshot;
+use crate::diag::Result;
+use crate::diagnose::evidence::Evidence;
+use crate::diagnose::named::Named;
+use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
+use crate::search::Search;
+use serde::Serialize;
+
+/// What the touches say of one effect that is not in the model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scored {
+    /// Its id.
+    pub effect: String,
+    /// Does it leave a trace in these touches?
+    pub visible: bool,
+    /// Probability of so much misfit in its direction where nothing is missing.
+    pub p: f64,
+    /// Its natural logarithm, which is finite where p is not.
+    pub ln_p: f64,
+    /// The same, with all effects that were tested counted in (Holm).
+    pub p_adjusted: f64,
+    /// Does it pass Holm's test?
+    pub proposed: bool,
+    /// Share of the misfit's sum of squares that it takes away.
+    pub share: f64,
+    /// Expected sizes.
+    pub parameters: Vec<Size>,
+}
+
+/// An expected size.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Size {
+    /// Parameter.
+    pub name: String,
+    /// Expected value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Standard uncertainty.
+    pub sigma: f64,
+}
+
+/// The score tests of all effects that are not in the model, the most significant first.
+#[must_use]
+pub fn scores(state: &Snapshot) -> Vec<Scored> {
+    let (fit, opened) = (&*state.fit, &*state.opened);
+    if fit.n_used() == 0 || fit.dof == 0 {
+        return Vec::new();
+    }
+    let evidence = Evidence::of(fit);
+    let named = Named::of(fit, &evidence, &opened.machine, &opened.catalogue);
+    let search = Search::new(evidence.question(), &named.library);
+    let total = evidence.residual.norm_squared().max(f64::MIN_POSITIVE);
+    let each = search.scores.iter().enumerate().map(|(i, s)| {
+        let columns = &named.columns[i];
+        let sizes = columns.iter().zip(s.estimate.iter()).enumerate().map(|(k, (c, estimate))| Size {
+            name: c.name.clone(),
+            value: estimate * c.typical,
+            unit: c.unit.clone(),
+            sigma: s.covariance.get((k, k)).map_or(f64::NAN, |v| v.max(0.0).sqrt() * c.typical),
+        });
+        Scored {
+            effect: named.effects[i].id.clone(),
+            visible: s.visible(),
+            p: s.p,
+            ln_p: s.ln_p,
+            p_adjusted: s.p_adjusted,
+            proposed: s.proposed(),
+            share: (s.delta_ss / total).clamp(0.0, 1.0),
+            // sets of many blocks say nothing to a reader
+            parameters: if columns.len() > 12 { Vec::new() } else { sizes.collect() },
+        }
+    });
+    let mut out: Vec<Scored> = each.collect();
+    out.sort_by(|a, b| b.visible.cmp(&a.visible).then(a.ln_p.total_cmp(&b.ln_p)).then(a.effect.cmp(&b.effect)));
+    out
+}
+
+/// The whole diagnosis.
+///
+/// # Errors
+/// When a refit is impossible.
+pub fn diagnosis(state: &Snapshot) -> Result<Diagnosis> {
+    let mut settings = state.opened.study.settings();
+    settings.quick = true;
+    let subject = Subject {
+        machine: &state.opened.machine,
+        catalogue: &state.opened.catalogue,
+        settings: &settings,
+        fit: &state.fit,
+    };
+    diagnose(subject, &Options::default())
+}

@@ -1,0 +1,526 @@
+//! What the page is told, as JSON (`axiscal-workbench/1`).
+//!
+//! In two parts, because a step must be quick: *inputs* (touches, effects, words: the same until other data are read) and
+//! *live* (what a step changes). Touches stand column by column. Lengths mm and angles deg, µm where a name ends in
+//! `_um`, hours in `_h`.
+
+use super::draft::{self, Draft, MEANING};
+use super::evidence::Scored;
+use super::session::{Refused, Snapshot};
+use super::{Answered, Host};
+use crate::diag::{Failure, Finding, Severity};
+use crate::diagnose::Diagnosis;
+use crate::fit::outcome::{Combination, Parameter, Undetermined};
+use crate::fit::{self, noise};
+use crate::machine::{Machine, Shape};
+use crate::model::formula::FUNCTIONS;
+use crate::study::history::History;
+use crate::units::um_from_mm;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The format line.
+pub const FORMAT: &str = "axiscal-workbench/1";
+
+/// A finding for the page.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Message {
+    severity: &'static str,
+    code: &'static str,
+    message: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    help: Option<String>,
+    /// `file:line:column`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    place: Option<String>,
+}
+
+/// Findings for the page.
+#[must_use]
+pub fn messages(findings: &[Finding]) -> Vec<Message> {
+    let each = findings.iter().map(|f| Message {
+        severity: match f.severity {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+            Severity::Info => "info",
+        },
+        code: f.code,
+        message: f.message.clone(),
+        help: f.help.clone(),
+        place: f.place(),
+    });
+    each.collect()
+}
+
+/// What is worked out behind a state.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Behind {
+    /// Of which state.
+    pub version: u64,
+    /// Is everything there?
+    pub complete: bool,
+    /// The score tests.
+    pub scores: Option<Vec<Scored>>,
+    /// The diagnosis.
+    pub diagnosis: Option<Diagnosis>,
+    /// RMS on index visits left out.
+    pub held_out_rms_um: Option<f64>,
+    /// Milliseconds that it took.
+    pub ms: f64,
+    /// Why there is none.
+    pub failed: Vec<Message>,
+}
+
+/// A verb that was called from the page.
+#[derive(Debug, Clone, Serialize)]
+pub struct Job {
+    /// `plan-next` or `export`.
+    pub verb: &'static str,
+    /// The state that it was called on.
+    pub version: u64,
+    /// Its answer, once it is there.
+    pub answered: Option<Answered>,
+    /// Why there is none.
+    pub failed: Vec<Message>,
+}
+
+#[derive(Serialize)]
+struct Live<'a> {
+    format: &'static str,
+    version: u64,
+    inputs: u64,
+    study: &'a str,
+    machine: &'a str,
+    effects: &'a [String],
+    undo: &'a Option<String>,
+    redo: &'a Option<String>,
+    fault: Vec<Message>,
+    fit_ms: f64,
+    rms_um: f64,
+    noise_um: f64,
+    noise_says: &'a str,
+    visit_um: f64,
+    chi2_per_dof: f64,
+    explained_by_noise: bool,
+    converged: bool,
+    touches: usize,
+    used: usize,
+    unknowns: usize,
+    dof: usize,
+    parameters: Vec<&'a Parameter>,
+    undetermined: &'a [Undetermined],
+    weak: &'a [Combination],
+    warnings: &'a [String],
+    /// Measured less model along the outward normal.
+    residual_um: Vec<f64>,
+    /// Externally studentised.
+    standardised: Vec<f64>,
+    /// Index among the touches, and why it is not used.
+    rejected: Vec<(usize, &'a str)>,
+    /// Indices of those that the study itself takes out.
+    masked: Vec<usize>,
+    ladder: &'a History,
+    job: Option<&'a Job>,
+}
+
+/// What is shown needs no more digits than these.
+fn short(x: f64, per_unit: f64) -> f64 {
+    (x * per_unit).round() / per_unit + 0.0
+}
+
+fn bytes(record: &impl Serialize) -> Vec<u8> {
+    // records of numbers and words always have a JSON
+    serde_json::to_vec(record).unwrap_or_else(|_| b"{}".to_vec())
+}
+
+/// What a step changes.
+#[must_use]
+pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
+    let (fit, o) = (&*now.fit, &now.fit.outcome);
+    let masks = &now.opened.study.masked;
+    let taken_out = |run: usize, id: u64| masks.iter().any(|m| m.run == run && m.id == id);
+    let observations = &fit.data.observations;
+    let nuisance: Vec<bool> = fit.model.unknowns.iter().map(|u| u.nuisance).collect();
+    bytes(&Live {
+        format: FORMAT,
+        version: now.version,
+        inputs: now.inputs,
+        study: name,
+        machine: &o.machine,
+        effects: &o.effects,
+        undo: &now.undo,
+        redo: &now.redo,
+        fault: now.fault.as_ref().map_or_else(Vec::new, |f| messages(&f.0)),
+        fit_ms: now.fit_ms,
+        rms_um: o.rms_um,
+        noise_um: o.noise_um,
+        noise_says: &o.noise_says,
+        visit_um: o.visit_um,
+        chi2_per_dof: o.chi2_per_dof,
+        explained_by_noise: fit.dof == 0 || o.chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof),
+        converged: o.converged,
+        touches: o.touches,
+        used: fit.n_used(),
+        unknowns: o.unknowns,
+        dof: fit.dof,
+        parameters: o.parameters.iter().zip(nuisance).filter(|(_, n)| !n).map(|(p, _)| p).collect(),
+        undetermined: &o.undetermined,
+        weak: &o.weak,
+        warnings: &o.warnings,
+        residual_um: fit.residual_mm.iter().map(|r| short(um_from_mm(*r), 1e4)).collect(),
+        standardised: fit.studentised.iter().map(|s| short(*s, 1e3)).collect(),
+        rejected: fit.rejected.iter().map(|(i, why)| (*i, why.as_str())).collect(),
+        masked: (0..observations.len()).filter(|&i| taken_out(observations[i].run, observations[i].id)).collect(),
+        ladder: &now.opened.history,
+        job,
+    })
+}
+
+/// What is known of a state behind its fit.
+#[must_use]
+pub fn evidence(behind: &Behind) -> Vec<u8> {
+    bytes(behind)
+}
+
+#[derive(Serialize)]
+struct Inputs<'a> {
+    format: &'static str,
+    inputs: u64,
+    study: String,
+    remarks: Vec<Message>,
+    runs: Vec<RunRecord<'a>>,
+    effects: Vec<EffectRecord<'a>>,
+    words: Words,
+    controllers: Vec<String>,
+    effects_file: String,
+    machine: MachineRecord<'a>,
+    touches: Touches,
+    variables: Vec<Variable>,
+}
+
+#[derive(Serialize)]
+struct RunRecord<'a> {
+    plan: &'a str,
+    log: &'a str,
+    controller: &'a str,
+}
+
+#[derive(Serialize)]
+struct EffectRecord<'a> {
+    id: &'a str,
+    name: &'a str,
+    family: &'a str,
+    says: &'a str,
+    look: &'a str,
+    mends: &'a str,
+    own: bool,
+    nuisance: bool,
+    paper: bool,
+    formulas: Vec<String>,
+}
+
+/// What the formula box offers.
+#[derive(Serialize)]
+struct Words {
+    variables: Vec<FormulaVariable>,
+    functions: &'static [&'static str],
+    places: Vec<PlaceWord>,
+    units: &'static [&'static str],
+}
+
+#[derive(Serialize)]
+struct FormulaVariable {
+    name: &'static str,
+    says: &'static str,
+    /// Lowest and highest value in these touches.
+    range: Option<[f64; 2]>,
+}
+
+#[derive(Serialize)]
+struct PlaceWord {
+    at: String,
+    says: String,
+    dofs: Vec<&'static str>,
+}
+
+#[derive(Serialize)]
+struct MachineRecord<'a> {
+    name: &'a str,
+    says: &'a str,
+    solids: Vec<Solid<'a>>,
+    blocks: Vec<Block<'a>>,
+    axes: Vec<AxisRecord>,
+}
+
+#[derive(Serialize)]
+struct AxisRecord {
+    name: String,
+    rotary: bool,
+    direction: [f64; 3],
+    point: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct Solid<'a> {
+    name: &'a str,
+    at: [f64; 3],
+    size: Option<[f64; 3]>,
+    direction: Option<[f64; 3]>,
+    radius_height: Option<[f64; 2]>,
+}
+
+#[derive(Serialize)]
+struct Block<'a> {
+    name: &'a str,
+    centre: [f64; 3],
+}
+
+/// Every touch that the model can use.
+#[derive(Serialize, Default)]
+struct Touches {
+    n: usize,
+    run: Vec<usize>,
+    id: Vec<u64>,
+    line: Vec<usize>,
+    /// Words that `stage`, `block` and `face` count, from 0.
+    words: Vec<String>,
+    stage: Vec<usize>,
+    block: Vec<usize>,
+    face: Vec<usize>,
+    visit: Vec<usize>,
+    axes: BTreeMap<String, Vec<f64>>,
+    time_h: Vec<f64>,
+    approach_deg: Vec<Option<f64>>,
+    /// Nominal contact point and outward normal, in the carrier's frame.
+    point: Vec<[f64; 3]>,
+    normal: Vec<[f64; 3]>,
+    /// Outward normal in R at the touch.
+    normal_r: Vec<[f64; 3]>,
+}
+
+/// What residuals are drawn against.
+#[derive(Serialize)]
+struct Variable {
+    id: String,
+    title: String,
+}
+
+/// What stays the same until other data are read.
+#[must_use]
+pub fn inputs(now: &Snapshot, host: &dyn Host) -> Vec<u8> {
+    let opened = &*now.opened;
+    let machine = &*opened.machine;
+    let applying = opened.catalogue.iter().filter(|e| e.applies_to(machine) && !e.discrete);
+    let touches = touches(now);
+    bytes(&Inputs {
+        format: FORMAT,
+        inputs: now.inputs,
+        study: host.name(),
+        remarks: messages(&opened.remarks),
+        runs: opened
+            .study
+            .data
+            .iter()
+            .map(|d| RunRecord { plan: &d.plan, log: &d.log, controller: &d.controller })
+            .collect(),
+        effects: applying
+            .map(|e| EffectRecord {
+                id: &e.id,
+                name: &e.name,
+                family: &e.family,
+                says: &e.says,
+                look: &e.look,
+                mends: &e.mends,
+                own: !e.built_in,
+                nuisance: e.nuisance,
+                paper: e.paper,
+                formulas: e.terms.iter().take(8).map(|t| t.formula.text().to_owned()).collect(),
+            })
+            .collect(),
+        words: words(now),
+        controllers: host.controllers(),
+        effects_file: host.effects_file(&opened.study),
+        variables: variables(machine, &touches),
+        machine: machine_record(now),
+        touches,
+    })
+}
+
+fn words(now: &Snapshot) -> Words {
+    let range = |slot: usize| {
+        let values = now.fit.data.observations.iter().map(|o| o.state[slot]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        (low <= high).then_some([low, high])
+    };
+    let motion = ["dx", "dy", "dz", "rx", "ry", "rz"];
+    let mut places: Vec<PlaceWord> = Vec::new();
+    for a in &now.opened.machine.axes {
+        let says = format!("error motion of axis {}, in the frame that it moves in", a.name);
+        places.push(PlaceWord { at: a.name.to_string(), says, dofs: motion.to_vec() });
+    }
+    let fixed: [(&str, &str, &[&'static str]); 6] = [
+        ("base", "between the tool's chain and the workpiece's, in the machine's frame", &motion),
+        ("tool", "of the tool, in its own frame", &motion),
+        ("workpiece", "of what bears the workpiece", &motion),
+        ("block", "of each touched block, about its centre", &motion),
+        ("trigger", "of the probe's trigger, along the approach: positive comes late", &["r"]),
+        ("reading", "of what the control shows for an axis", &["X", "Y", "Z", "A", "B", "C"]),
+    ];
+    for (at, says, dofs) in fixed {
+        places.push(PlaceWord { at: at.into(), says: says.into(), dofs: dofs.to_vec() });
+    }
+    Words {
+        variables: MEANING
+            .iter()
+            .enumerate()
+            .map(|(slot, (name, says))| FormulaVariable { name, says, range: range(slot) })
+            .collect(),
+        functions: &FUNCTIONS,
+        places,
+        units: &["um", "mm", "urad", "mrad", "deg", "um/m", "um/h", "um/K", "ppm/K", "ms", "s", "h", "1"],
+    }
+}
+
+fn machine_record(now: &Snapshot) -> MachineRecord<'_> {
+    let machine = &*now.opened.machine;
+    let three = |v: &nalgebra::Vector3<f64>| [v.x, v.y, v.z];
+    let solids = machine.solids.iter().map(|s| match s.shape {
+        Shape::Box { centre, size } => {
+            Solid { name: &s.name, at: three(&centre), size: Some(three(&size)), direction: None, radius_height: None }
+        }
+        Shape::Cylinder { foot, direction, radius, height } => Solid {
+            name: &s.name,
+            at: three(&foot),
+            size: None,
+            direction: Some(three(&direction)),
+            radius_height: Some([radius, height]),
+        },
+    });
+    let set_ups = &now.opened.data.set_ups;
+    MachineRecord {
+        name: &machine.name,
+        says: &machine.says,
+        solids: solids.collect(),
+        blocks: set_ups.iter().map(|s| Block { name: &s.label, centre: three(&s.centre) }).collect(),
+        axes: machine
+            .axes
+            .iter()
+            .map(|a| AxisRecord {
+                name: a.name.to_string(),
+                rotary: a.name.is_rotary(),
+                direction: three(&a.direction),
+                point: three(&a.point),
+            })
+            .collect(),
+    }
+}
+
+fn touches(now: &Snapshot) -> Touches {
+    let points = crate::compare::points(&now.fit);
+    let mut out = Touches { n: points.len(), ..Touches::default() };
+    let mut known: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
+    let mut words: Vec<String> = Vec::new();
+    let mut word = |text: String| {
+        *known.entry(text).or_insert_with_key(|text| {
+            words.push(text.clone());
+            words.len() - 1
+        })
+    };
+    let position = |x: f64| short(x, 1e5);
+    let three = |v: &nalgebra::Vector3<f64>| [position(v.x), position(v.y), position(v.z)];
+    for (p, o) in points.into_iter().zip(&now.fit.data.observations) {
+        out.run.push(p.run);
+        out.id.push(p.id);
+        out.line.push(p.line);
+        out.stage.push(word(p.stage));
+        out.block.push(word(p.block));
+        out.face.push(word(p.face));
+        out.visit.push(p.visit);
+        for (name, value) in p.axes {
+            out.axes.entry(name).or_default().push(position(value));
+        }
+        out.time_h.push(short(p.time_h, 1e6));
+        out.approach_deg.push(p.approach_deg.map(|a| short(a, 1e3)));
+        out.point.push(three(&o.point));
+        out.normal.push(three(&o.normal));
+        out.normal_r.push(p.normal.map(position));
+    }
+    out.words = words;
+    out
+}
+
+/// The rotary axes, the linear ones, then time, order and approach; only what varies.
+fn variables(machine: &Machine, touches: &Touches) -> Vec<Variable> {
+    fn varies(mut values: impl Iterator<Item = f64>) -> bool {
+        let first = values.next();
+        values.any(|x| first.is_some_and(|f| (x - f).abs() > 1e-6))
+    }
+    let mut out = Vec::new();
+    let rotary = machine.axes.iter().filter(|a| a.name.is_rotary());
+    for axis in rotary.chain(machine.axes.iter().filter(|a| !a.name.is_rotary())) {
+        let id = axis.name.to_string();
+        let (kind, unit) = if axis.name.is_rotary() { ("angle of", "deg") } else { ("position of", "mm") };
+        if touches.axes.get(&id).is_some_and(|v| varies(v.iter().copied())) {
+            out.push(Variable { title: format!("{kind} axis {id}, {unit}"), id });
+        }
+    }
+    let mut more = |id: &str, title: &str, there: bool| {
+        if there {
+            out.push(Variable { id: id.into(), title: title.into() });
+        }
+    };
+    more("time", "time since the first touch, h", varies(touches.time_h.iter().copied()));
+    more("order", "order of the touches, number", touches.n > 1);
+    let approach = varies(touches.approach_deg.iter().flatten().copied());
+    more("approach", "direction of approach about the probe's axis, deg", approach);
+    out
+}
+
+#[derive(Serialize)]
+struct Tried<'a> {
+    version: u64,
+    effect: &'a str,
+    rms_before_um: f64,
+    rms_after_um: f64,
+    chi2_per_dof: f64,
+    parameters: Vec<&'a Parameter>,
+    /// What the effect takes away from the residual of each touch.
+    curve_um: Vec<f64>,
+    row: Option<String>,
+}
+
+/// What an effect of the catalogue, or one that was typed, would do at each touch.
+///
+/// # Errors
+/// When it is in the model, is unknown, was typed wrongly, or cannot be fitted.
+pub fn tried(now: &Snapshot, effect: Option<&str>, draft: Option<&Draft>) -> Result<Vec<u8>, Refused> {
+    let opened = &*now.opened;
+    let catalogue = match draft {
+        Some(draft) => draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?,
+        None => crate::model::catalogue::Catalogue::clone(&opened.catalogue),
+    };
+    let id = draft.map(|d| d.id.as_str()).or(effect).ok_or_else(|| {
+        Refused::Unusable(Failure::new("workbench::nothing", "no effect is named").help("choose one of the list"))
+    })?;
+    let mut settings = opened.study.settings();
+    settings.quick = true;
+    if settings.effects.iter().any(|e| e == id) {
+        let says = format!("effect {id:?} is in the model already");
+        return Err(Refused::Unusable(Failure::new("study::in_model", says)));
+    }
+    settings.effects.push(id.to_owned());
+    let data = crate::model::data::Data::clone(&opened.data);
+    let fit = fit::identify_data(&opened.machine, &catalogue, data, &settings)?;
+    let before = &now.fit.residual_mm;
+    let own = fit.outcome.parameters.iter().filter(|p| p.effect == id);
+    Ok(bytes(&Tried {
+        version: now.version,
+        effect: id,
+        rms_before_um: now.fit.outcome.rms_um,
+        rms_after_um: fit.outcome.rms_um,
+        chi2_per_dof: fit.outcome.chi2_per_dof,
+        parameters: own.take(12).collect(),
+        curve_um: before.iter().zip(&fit.residual_mm).map(|(b, a)| short(um_from_mm(b - a), 1e4)).collect(),
+        row: draft.map(draft::row),
+    }))
+}

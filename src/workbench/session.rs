@@ -1,0 +1,484 @@
+//! The study that is being worked on: one writer, steps with versions, undo and redo.
+//!
+//! A step is made in this order: what is asked is worked out on a copy, fitted, and only when the fit stands are the
+//! files written (the effects file before the study that names it) and the copy put in the place of the old state. A
+//! step that fails leaves everything as it was; a process that is killed leaves whole files of before or after the step.
+
+use super::draft::{self, Draft, Mistake};
+use super::{Host, Opened, Place};
+use crate::diag::{Failure, Result, source};
+use crate::fit::{self, Fit, held_out};
+use crate::study::history::Step as Rung;
+use crate::study::{Study, edit, mask};
+use std::sync::Arc;
+
+/// Most steps that can be undone.
+const MOST_STEPS: usize = 500;
+
+/// Why something is not done.
+#[derive(Debug)]
+pub enum Refused {
+    /// It was asked of an older state; the number of the present one.
+    Stale(u64),
+    /// It cannot be done.
+    Unusable(Failure),
+    /// What was typed is wrong.
+    Mistakes(Vec<Mistake>),
+}
+
+impl From<Failure> for Refused {
+    fn from(failure: Failure) -> Self {
+        Self::Unusable(failure)
+    }
+}
+
+/// Contents of the files that steps change. `effects` is `None` where a step has nothing to do with that file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Files {
+    study: Vec<u8>,
+    effects: Option<Option<Vec<u8>>>,
+}
+
+/// A step that was made.
+#[derive(Debug, Clone)]
+struct Made {
+    says: String,
+    before: Files,
+    after: Files,
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub enum Ask {
+    /// An effect into the model, or out of it.
+    Switch {
+        /// Its id.
+        effect: String,
+        /// In or out.
+        on: bool,
+    },
+    /// Touches taken out.
+    Mask {
+        /// Run (from 0) and number of each.
+        touches: Vec<(usize, u64)>,
+        /// Why.
+        reason: String,
+    },
+    /// Touches taken back in.
+    Unmask {
+        /// Run (from 0) and number of each.
+        touches: Vec<(usize, u64)>,
+    },
+    /// An effect of the user's own into the effects file, and into the model if so wanted.
+    Save {
+        /// The effect.
+        draft: Box<Draft>,
+        /// Into the model, too?
+        on: bool,
+    },
+    /// The last step taken back.
+    Undo,
+    /// The step that was taken back made again.
+    Redo,
+}
+
+/// A state as others see it: nothing in it changes any more.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// Number of the state.
+    pub version: u64,
+    /// Number of the reading: touches and effects are the same while it is.
+    pub inputs: u64,
+    /// The study.
+    pub opened: Arc<Opened>,
+    /// Its fit, without the figures that need the whole catalogue.
+    pub fit: Arc<Fit>,
+    /// What undo would take back.
+    pub undo: Option<String>,
+    /// What redo would make again.
+    pub redo: Option<String>,
+    /// Why the study on the disk cannot be used, where it cannot.
+    pub fault: Option<Failure>,
+    /// Milliseconds that the fit took.
+    pub fit_ms: f64,
+}
+
+/// The study that is being worked on.
+pub struct Session {
+    host: Arc<dyn Host>,
+    state: Snapshot,
+    past: Vec<Made>,
+    future: Vec<Made>,
+    mark: u64,
+}
+
+impl Session {
+    /// Opens the study.
+    ///
+    /// # Errors
+    /// When it cannot be read or fitted.
+    pub fn open(host: Arc<dyn Host>) -> Result<Self> {
+        let opened = host.open()?;
+        let mark = host.mark(&opened.study);
+        let (fit, fit_ms) = fit(&opened)?;
+        let mut opened = opened;
+        opened.history.push(rung(&opened, &fit));
+        let state = Snapshot {
+            version: 1,
+            inputs: 1,
+            opened: Arc::new(opened),
+            fit: Arc::new(fit),
+            undo: None,
+            redo: None,
+            fault: None,
+            fit_ms,
+        };
+        Ok(Self { host, state, past: Vec::new(), future: Vec::new(), mark })
+    }
+
+    /// The present state.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            undo: self.past.last().map(|m| m.says.clone()),
+            redo: self.future.last().map(|m| m.says.clone()),
+            ..self.state.clone()
+        }
+    }
+
+    /// Makes a step that was asked of state `version`.
+    ///
+    /// # Errors
+    /// When that is not the present state, or the step cannot be made; nothing has changed then.
+    pub fn step(&mut self, version: u64, ask: Ask) -> std::result::Result<Snapshot, Refused> {
+        self.follow();
+        if version != self.state.version {
+            return Err(Refused::Stale(self.state.version));
+        }
+        if let Some(fault) = &self.state.fault {
+            return Err(Refused::Unusable(fault.clone()));
+        }
+        match ask {
+            Ask::Undo => self.turn_back()?,
+            Ask::Redo => self.turn_forward()?,
+            Ask::Save { draft, on } => self.save(&draft, on)?,
+            Ask::Switch { .. } | Ask::Mask { .. } | Ask::Unmask { .. } => {
+                let (text, says) = self.edited(&ask)?;
+                let after = Files { study: self.with_mark(&text), effects: None };
+                self.make(says, after)?;
+            }
+        }
+        Ok(self.snapshot())
+    }
+
+    /// Looks at the disk: has somebody else changed the study? True when the state has changed.
+    pub fn follow(&mut self) -> bool {
+        let mark = self.host.mark(&self.state.opened.study);
+        if mark == self.mark {
+            return false;
+        }
+        self.mark = mark;
+        let read = self.host.open().and_then(|opened| fit(&opened).map(|(fit, ms)| (opened, fit, ms)));
+        self.state.version += 1;
+        match read {
+            Ok((mut opened, fit, fit_ms)) => {
+                self.state.fault = None;
+                // the files may name others than before
+                self.mark = self.host.mark(&opened.study);
+                if opened.bytes != self.state.opened.bytes {
+                    let made = Made {
+                        says: "change of the study's file".into(),
+                        before: Files { study: self.state.opened.bytes.clone(), effects: None },
+                        after: Files { study: opened.bytes.clone(), effects: None },
+                    };
+                    self.remember(made);
+                }
+                opened.history.push(rung(&opened, &fit));
+                self.state.inputs += 1;
+                self.state.opened = Arc::new(opened);
+                self.state.fit = Arc::new(fit);
+                self.state.fit_ms = fit_ms;
+            }
+            Err(failure) => self.state.fault = Some(failure),
+        }
+        true
+    }
+
+    /// Puts the error on touches left out into the ladder, once it is known.
+    pub fn enter_held_out(&mut self, version: u64, rms_um: Option<f64>) {
+        if version != self.state.version || self.state.fault.is_some() {
+            return;
+        }
+        let mut opened = Opened::clone(&self.state.opened);
+        let step = Rung { held_out_rms_um: rms_um, ..rung(&opened, &self.state.fit) };
+        opened.history.push(step);
+        // who only looks leaves no file
+        if let (true, Ok(text)) = (version > 1, opened.history.to_json()) {
+            // a ladder that cannot be written is no reason to stop: it is written again with the next step
+            let _ = self.host.write(Place::History, Some(text.as_bytes()));
+        }
+        self.state.opened = Arc::new(opened);
+    }
+
+    fn text(&self) -> Result<String> {
+        let bytes = &self.state.opened.bytes;
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        String::from_utf8(bytes.to_vec()).map_err(|_| Failure::new("study::not_text", "the study is not text"))
+    }
+
+    /// A mark at the beginning of the file is no part of the text, but of the file.
+    fn with_mark(&self, text: &str) -> Vec<u8> {
+        let mark: &[u8] = if self.state.opened.bytes.starts_with(b"\xef\xbb\xbf") { b"\xef\xbb\xbf" } else { b"" };
+        [mark, text.as_bytes()].concat()
+    }
+
+    /// The text of the study with what is asked for, and what that is in words.
+    fn edited(&self, ask: &Ask) -> Result<(String, String)> {
+        let text = self.text()?;
+        let opened = &self.state.opened;
+        let count = |n: usize| if n == 1 { "1 touch".to_owned() } else { format!("{n} touches") };
+        match ask {
+            Ask::Switch { effect, on: true } => {
+                applies(opened, effect)?;
+                Ok((edit::add(&text, std::slice::from_ref(effect))?, format!("{effect} on")))
+            }
+            Ask::Switch { effect, on: false } => {
+                nothing_said_of(opened, effect)?;
+                Ok((edit::remove(&text, std::slice::from_ref(effect))?, format!("{effect} off")))
+            }
+            Ask::Mask { touches, reason } => {
+                every_touch_exists(opened, touches)?;
+                Ok((
+                    mask::mask(&text, touches, reason)?,
+                    format!("{} taken out: {}", count(touches.len()), reason.trim()),
+                ))
+            }
+            Ask::Unmask { touches } => {
+                Ok((mask::unmask(&text, touches)?, format!("{} taken back", count(touches.len()))))
+            }
+            Ask::Save { .. } | Ask::Undo | Ask::Redo => {
+                Err(Failure::new("workbench::step", "this step is no edit of the study"))
+            }
+        }
+    }
+
+    /// Writes the effect into the user's file and names that file in the study.
+    fn save(&mut self, draft: &Draft, on: bool) -> std::result::Result<(), Refused> {
+        let opened = &self.state.opened;
+        draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?;
+        let file = self.host.effects_file(&opened.study);
+        let before = self.host.read(Place::Effects)?;
+        let old = String::from_utf8(before.clone().unwrap_or_default())
+            .map_err(|_| Failure::new("workbench::effects", format!("{file} is not text")).help("save it as UTF-8"))?;
+        let new = draft::appended(&old, draft);
+        // the file as a whole must be readable, or the study that names it is not
+        crate::model::catalogue::Catalogue::built_in()?.add_file(&source(&file, new.clone()))?;
+        let mut text = mask::name_effects_file(&self.text()?, &file)?;
+        if on {
+            text = edit::add(&text, std::slice::from_ref(&draft.id))?;
+        }
+        let after = Files { study: self.with_mark(&text), effects: Some(Some(new.into_bytes())) };
+        let before = Files { study: opened.bytes.clone(), effects: Some(before) };
+        let says = format!("{} saved in {file}{}", draft.id, if on { ", and on" } else { "" });
+        let made = Made { says, before, after };
+        self.put(&made.before, &made.after)?;
+        self.remember(made);
+        Ok(())
+    }
+
+    fn make(&mut self, says: String, after: Files) -> Result<()> {
+        let before = Files { study: self.state.opened.bytes.clone(), effects: None };
+        if before == after {
+            return Ok(());
+        }
+        self.put(&before, &after)?;
+        self.remember(Made { says, before, after });
+        Ok(())
+    }
+
+    fn remember(&mut self, made: Made) {
+        self.future.clear();
+        self.past.push(made);
+        if self.past.len() > MOST_STEPS {
+            self.past.remove(0);
+        }
+    }
+
+    fn turn_back(&mut self) -> Result<()> {
+        let Some(made) = self.past.last().cloned() else {
+            return Err(Failure::new("workbench::undo", "there is nothing to undo"));
+        };
+        self.put(&made.after, &made.before)?;
+        self.past.pop();
+        self.future.push(made);
+        Ok(())
+    }
+
+    fn turn_forward(&mut self) -> Result<()> {
+        let Some(made) = self.future.last().cloned() else {
+            return Err(Failure::new("workbench::redo", "there is nothing to make again"));
+        };
+        self.put(&made.before, &made.after)?;
+        self.future.pop();
+        self.past.push(made);
+        Ok(())
+    }
+
+    /// Puts files in the place of those that are there, and the state that belongs to them in the place of the old one.
+    fn put(&mut self, from: &Files, to: &Files) -> Result<()> {
+        let changed = || {
+            Failure::new("workbench::changed", "a file of the study was changed meanwhile")
+                .help("nothing was written: look at the new state and try again")
+        };
+        if self.host.read(Place::Study)?.as_deref() != Some(&from.study[..]) {
+            return Err(changed());
+        }
+        if let Some(effects) = &from.effects
+            && self.host.read(Place::Effects)? != *effects
+        {
+            return Err(changed());
+        }
+        let effects_change = to.effects.as_ref().filter(|_| to.effects != from.effects);
+        let mut opened = Opened::clone(&self.state.opened);
+        opened.bytes = to.study.clone();
+        let text = String::from_utf8(to.study.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&to.study).to_vec())
+            .map_err(|_| Failure::new("study::not_text", "the study is not text"))?;
+        opened.study = Study::parse(&source(self.host.name(), text))?.0;
+        let same_inputs = opened.study.data == self.state.opened.study.data
+            && opened.study.machine == self.state.opened.study.machine
+            && opened.study.machines == self.state.opened.study.machines
+            && opened.study.effects_files == self.state.opened.study.effects_files
+            && effects_change.is_none();
+        let putting = Putting { host: &*self.host, from, to, effects: effects_change };
+        let (fit, fit_ms) = if same_inputs {
+            let fitted = fit(&opened)?;
+            putting.write()?;
+            fitted
+        } else {
+            // what the study names is read anew from the disk; where that fails everything is put back
+            putting.write()?;
+            let history = opened.history.clone();
+            match self.host.open().and_then(|o| fit(&o).map(|(fit, ms)| (o, fit, ms))) {
+                Ok((read, fit, ms)) => {
+                    opened = Opened { history, ..read };
+                    (fit, ms)
+                }
+                Err(failure) => {
+                    putting.undo()?;
+                    return Err(failure);
+                }
+            }
+        };
+        opened.history.push(rung(&opened, &fit));
+        let history = opened.history.to_json()?;
+        self.host.write(Place::History, Some(history.as_bytes()))?;
+        self.mark = self.host.mark(&opened.study);
+        self.state = Snapshot {
+            version: self.state.version + 1,
+            inputs: self.state.inputs + u64::from(!same_inputs),
+            opened: Arc::new(opened),
+            fit: Arc::new(fit),
+            undo: None,
+            redo: None,
+            fault: None,
+            fit_ms,
+        };
+        Ok(())
+    }
+}
+
+/// Files on their way to the disk, in an order in which the study never names what is not there.
+struct Putting<'a> {
+    host: &'a dyn Host,
+    from: &'a Files,
+    to: &'a Files,
+    effects: Option<&'a Option<Vec<u8>>>,
+}
+
+impl Putting<'_> {
+    fn write(&self) -> Result<()> {
+        self.in_order(self.to, self.effects.map(Option::as_deref))
+    }
+
+    fn undo(&self) -> Result<()> {
+        let effects = self.effects.and(self.from.effects.as_ref());
+        self.in_order(self.from, effects.map(Option::as_deref))
+    }
+
+    fn in_order(&self, files: &Files, effects: Option<Option<&[u8]>>) -> Result<()> {
+        match effects {
+            // a longer file goes before the study that uses it, a shorter one behind the study that no longer does
+            Some(Some(bytes)) if bytes.len() >= self.size_there() => {
+                self.host.write(Place::Effects, Some(bytes))?;
+                self.host.write(Place::Study, Some(&files.study))
+            }
+            Some(effects) => {
+                self.host.write(Place::Study, Some(&files.study))?;
+                self.host.write(Place::Effects, effects)
+            }
+            None => self.host.write(Place::Study, Some(&files.study)),
+        }
+    }
+
+    fn size_there(&self) -> usize {
+        self.host.read(Place::Effects).ok().flatten().map_or(0, |b| b.len())
+    }
+}
+
+/// The fit of a study without the figures that need the whole catalogue, and the milliseconds that it took.
+fn fit(opened: &Opened) -> Result<(Fit, f64)> {
+    let began = std::time::Instant::now();
+    let mut settings = opened.study.settings();
+    settings.quick = true;
+    let data = crate::model::data::Data::clone(&opened.data);
+    let fit = fit::identify_data(&opened.machine, &opened.catalogue, data, &settings)?;
+    Ok((fit, began.elapsed().as_secs_f64() * 1e3))
+}
+
+/// A fit as a step of the ladder; the error on touches left out follows.
+fn rung(opened: &Opened, fit: &Fit) -> Rung {
+    Rung {
+        effects: opened.study.effects.clone(),
+        rms_um: fit.outcome.rms_um,
+        held_out_rms_um: None,
+        later_run_rms_um: held_out::later_run(fit).map(|h| h.rms_um),
+        chi2_per_dof: fit.outcome.chi2_per_dof,
+        unknowns: fit.outcome.unknowns,
+        data_sha256: opened.data_sha256.clone(),
+        ..Rung::default()
+    }
+}
+
+fn applies(opened: &Opened, id: &str) -> Result<()> {
+    if opened.study.effects.iter().any(|e| e == id) {
+        return Err(Failure::new("study::in_model", format!("effect {id:?} is in the model already")));
+    }
+    fit::effects_of(&[id.to_owned()], &opened.catalogue, &opened.machine).map(|_| ())
+}
+
+/// What the study says of a parameter would be said of nothing.
+fn nothing_said_of(opened: &Opened, id: &str) -> Result<()> {
+    let Some(effect) = opened.catalogue.get(id, &opened.machine) else { return Ok(()) };
+    let gone = |name: &String| effect.parameters.iter().any(|p| crate::symbols::same(&p.name, name));
+    match opened.study.knowledge.keys().find(|k| gone(k)) {
+        None => Ok(()),
+        Some(name) => Err(Failure::new("study::still_said", format!("the study says something of {name}"))
+            .help(format!("take [model.parameters.{name}] out of the study first"))),
+    }
+}
+
+fn every_touch_exists(opened: &Opened, touches: &[(usize, u64)]) -> Result<()> {
+    if touches.is_empty() {
+        return Err(Failure::new("workbench::no_touches", "no touch is chosen")
+            .help("choose touches in a plot or in the table"));
+    }
+    let known: std::collections::HashSet<(usize, u64)> =
+        opened.data.observations.iter().map(|o| (o.run, o.id)).collect();
+    match touches.iter().find(|t| !known.contains(t)) {
+        None => Ok(()),
+        Some((run, id)) => {
+            Err(Failure::new("workbench::no_touch", format!("there is no touch {id} in run {}", run.saturating_add(1)))
+                .help("touches without a reading are not used anyway"))
+        }
+    }
+}

@@ -1,0 +1,51 @@
+// The report and the workbench in a real browser: Chromium as Debian has it, driven by Playwright.
+//
+// AXISCAL (the program), AXISCAL_CHROMIUM, AXISCAL_BROWSER_OUT (screenshots and times) and AXISCAL_ROOT come from main.rs.
+// Words on the command line choose cases by their names.
+
+import { chromium } from "playwright-core";
+import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { reportCases } from "./report.mjs";
+import { workbenchCases } from "./workbench.mjs";
+
+const out = process.env.AXISCAL_BROWSER_OUT;
+mkdirSync(out, { recursive: true });
+const pictures = process.env.AXISCAL_PICTURES ? join(process.env.AXISCAL_ROOT, "docs/pictures") : null;
+if (pictures) mkdirSync(pictures, { recursive: true });
+
+const wanted = process.argv.slice(2);
+const cases = [...reportCases, ...workbenchCases].filter(([name]) => !wanted.length || wanted.some((w) => name.includes(w)));
+const dir = mkdtempSync(join(tmpdir(), "axiscal-browser-"));
+
+const browser = await chromium.launch({
+  executablePath: process.env.AXISCAL_CHROMIUM,
+  headless: true,
+  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"],
+});
+
+let failed = 0;
+for (const [name, run] of cases) {
+  const began = performance.now();
+  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, reducedMotion: "reduce" });
+  const ends = [];
+  try {
+    await run({ context, dir, out, pictures, atEnd: (end) => ends.push(end) });
+    console.log(`test ${name} ... ok (${((performance.now() - began) / 1e3).toFixed(1)} s)`);
+  } catch (error) {
+    failed += 1;
+    console.log(`test ${name} ... FAILED\n${error.stack ?? error}`);
+    let k = 0;
+    for (const page of context.pages()) {
+      await page.screenshot({ path: join(out, `failed-${name}-${k++}.png`) }).catch(() => {});
+    }
+  }
+  for (const end of ends.reverse()) await end();
+  await context.close();
+}
+await browser.close();
+rmSync(dir, { recursive: true, force: true });
+console.log(`\ntest result: ${failed ? "FAILED" : "ok"}. ${cases.length - failed} passed; ${failed} failed; 0 ignored; 0 measured; 0 filtered out\n`);
+process.exitCode = failed ? 1 : 0;

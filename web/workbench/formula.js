@@ -1,0 +1,146 @@
+// The formula box: an effect as a person types it, its curve over the residual, and the way into the effects file.
+
+import { state, on, step, tryOut } from "./talk.js";
+import { byId, element, show, significant, stated } from "./words.js";
+
+let terms = 0;
+let timer = null;
+
+function dofs() {
+  const at = byId("draft-at").value;
+  return state.inputs.words.places.find((p) => p.at === at);
+}
+
+function fill(select, words, kept) {
+  const before = kept ?? select.value;
+  select.replaceChildren(...words.map((w) => element("option", { value: w }, w)));
+  if (words.includes(before)) select.value = before;
+}
+
+function term(formula = "1 - cos(B)") {
+  terms += 1;
+  const n = terms;
+  const label = (word, control, css) => element("label", { class: css }, word, control);
+  const parameter = element("input", { "data-word": "parameter", value: n === 1 ? "size" : `size_${n}`, maxlength: 40, spellcheck: "false" });
+  const unit = element("select", { "data-word": "unit" });
+  const dof = element("select", { "data-word": "dof" });
+  const typed = element("input", { "data-word": "formula", class: "formula", value: formula, maxlength: 500, spellcheck: "false", "aria-describedby": `caret-${n}` });
+  const box = element("div", { class: "term" },
+    element("div", { class: "row" }, label("factor", parameter), label("unit", unit), label("moves", dof), label("times the formula", typed, "grow"),
+      n === 1 ? null : element("button", { type: "button", "aria-label": `take term ${n} away`, click: () => { box.remove(); typing(); } }, "×")),
+    element("pre", { class: "caret", "aria-hidden": "true" }),
+    element("p", { class: "mistake", id: `caret-${n}` }));
+  fill(unit, state.inputs.words.units);
+  byId("draft-terms").append(box);
+  fill(dof, dofs().dofs, "dz");
+  return box;
+}
+
+function draft() {
+  const word = (box, name) => box.querySelector(`[data-word=${name}]`).value;
+  const rows = [...byId("draft-terms").children];
+  return {
+    id: byId("draft-id").value.trim(), name: byId("draft-name").value.trim(), at: byId("draft-at").value,
+    terms: rows.map((box) => ({ parameter: word(box, "parameter").trim(), unit: word(box, "unit"), dof: word(box, "dof"), formula: word(box, "formula") })),
+  };
+}
+
+function clear() {
+  for (const at of byId("draft").querySelectorAll("[aria-invalid]")) at.removeAttribute("aria-invalid");
+  for (const at of byId("draft").querySelectorAll(".caret, .mistake")) at.textContent = "";
+}
+
+/** Each mistake stands below the field that it is about, with a mark below the signs that are wrong. */
+function mark(mistakes) {
+  const rest = [];
+  for (const m of mistakes) {
+    const words = m.help ? `${m.message}: ${m.help}` : m.message;
+    const [kind, n, word] = m.field.split(".");
+    const box = kind === "terms" ? byId("draft-terms").children[Number(n)] : null;
+    const input = box ? box.querySelector(`[data-word=${word}]`) : byId(`draft-${kind}`);
+    if (input) input.setAttribute("aria-invalid", "true");
+    if (box) {
+      box.querySelector(".mistake").textContent = words;
+      if (m.from !== undefined) {
+        box.querySelector(".caret").textContent = `${[...input.value].join("")}\n${" ".repeat(m.from)}${"^".repeat(Math.max(1, m.to - m.from))}`;
+      }
+    } else {
+      rest.push(words);
+    }
+  }
+  show("draft-answer", rest.join("\n"));
+}
+
+function failed(error) {
+  if (error.mistakes) mark(error.mistakes);
+  else show("draft-answer", (error.messages ?? [{ message: String(error) }]).map((m) => (m.help ? `${m.message}: ${m.help}` : m.message)).join("\n"));
+}
+
+async function look() {
+  clear();
+  try {
+    const found = await tryOut({ draft: draft() });
+    const sizes = found.parameters.map((p) => `${p.name} = ${stated(p.value, p.sigma)} ${p.sigma ? `± ${significant(p.sigma, 2)} ` : ""}${p.unit}`);
+    show("draft-answer", `with it ${significant(found.rms_before_um)} → ${significant(found.rms_after_um)} µm RMS; ${sizes.join(", ")}`);
+  } catch (error) {
+    failed(error);
+  }
+}
+
+function typing() {
+  clearTimeout(timer);
+  timer = setTimeout(look, 250);
+}
+
+async function save(isOn) {
+  clearTimeout(timer);
+  clear();
+  const wanted = draft();
+  try {
+    // mistakes are shown in their place before anything is written
+    await tryOut({ draft: wanted });
+  } catch (error) {
+    failed(error);
+    return;
+  }
+  if (await step({ save: { draft: wanted, on: isOn } })) show("draft-answer", `saved in ${state.inputs.effects_file}`);
+}
+
+byId("draft").addEventListener("submit", (e) => { e.preventDefault(); look(); });
+byId("draft-terms").addEventListener("input", typing);
+byId("draft-at").addEventListener("change", () => {
+  const place = dofs();
+  show("draft-at-says", place.says);
+  for (const select of byId("draft-terms").querySelectorAll("[data-word=dof]")) fill(select, place.dofs);
+  typing();
+});
+byId("draft-more").addEventListener("click", () => term("1").querySelector("[data-word=formula]").focus());
+byId("draft-save").addEventListener("click", () => save(false));
+byId("draft-save-on").addEventListener("click", () => save(true));
+
+let known = null;
+on("live", () => {
+  if (known === state.inputs) return;
+  known = state.inputs;
+  const { words } = known;
+  const select = byId("draft-at");
+  const rotary = known.machine.axes.find((a) => a.rotary)?.name;
+  fill(select, words.places.map((p) => p.at), select.value || rotary);
+  show("draft-at-says", dofs().says);
+  if (terms === 0) term(rotary ? `1 - cos(${rotary})` : "1");
+  const range = (r) => (r ? (r[0] === r[1] ? `always ${significant(r[0])}` : `${significant(r[0])} to ${significant(r[1])}`) : "");
+  const rows = words.variables.map((v) => element("tr", {}, element("td", {},
+    element("button", { type: "button", "aria-label": `put ${v.name} into the formula`, click: () => insert(v.name) }, v.name)),
+    element("td", { class: "word" }, v.says), element("td", {}, range(v.range))));
+  const table = byId("draft-words");
+  table.replaceChildren(table.caption, element("thead", {}, element("tr", {}, ["word", "what it is", "in these touches"].map((h) => element("th", { scope: "col" }, h)))), element("tbody", {}, rows));
+  show("draft-functions", `Functions: ${words.functions.join(" ")}; pi is a constant. Angles are in radians.`);
+});
+
+function insert(word) {
+  const inputs = byId("draft-terms").querySelectorAll("input.formula");
+  const at = inputs[inputs.length - 1];
+  at.setRangeText(word, at.selectionStart, at.selectionEnd, "end");
+  at.focus();
+  typing();
+}

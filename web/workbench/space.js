@@ -1,0 +1,115 @@
+// The blocks with the residual of every touch as an arrow, magnified.
+
+import { state, on } from "./talk.js";
+import { layoutOf, onHover } from "./plots.js";
+import { byId, colour, show, significant } from "./words.js";
+
+let stale = true;
+let seen = false;
+let possible = null;
+const box = byId("space");
+
+function webgl() {
+  if (possible === null) {
+    const canvas = document.createElement("canvas");
+    possible = Boolean(canvas.getContext("webgl2") ?? canvas.getContext("webgl"));
+  }
+  return possible;
+}
+
+new IntersectionObserver((entries) => {
+  seen = entries[entries.length - 1].isIntersecting;
+  draw();
+}).observe(box);
+
+/** Edges of a box, or rims of a cylinder, as one broken line. */
+function outline(solid) {
+  const lines = [];
+  const { at } = solid;
+  if (solid.size) {
+    const h = solid.size.map((s) => s / 2);
+    const corner = (a, b, c) => [at[0] + a * h[0], at[1] + b * h[1], at[2] + c * h[2]];
+    for (const z of [-1, 1]) lines.push(...[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]].map(([a, b]) => corner(a, b, z)), null);
+    for (const [a, b] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) lines.push(corner(a, b, -1), corner(a, b, 1), null);
+  } else if (solid.radius_height) {
+    const [radius, height] = solid.radius_height;
+    const d = solid.direction;
+    const help = Math.abs(d[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
+    const cross = (p, q) => [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+    const raw = cross(help, d);
+    const size = Math.hypot(...raw);
+    const u = raw.map((v) => v / size);
+    const w = cross(d, u);
+    for (const along of [0, height]) {
+      for (let k = 0; k <= 36; k += 1) {
+        const t = (k / 36) * 2 * Math.PI;
+        lines.push([0, 1, 2].map((i) => at[i] + along * d[i] + radius * (Math.cos(t) * u[i] + Math.sin(t) * w[i])));
+      }
+      lines.push(null);
+    }
+  }
+  return lines;
+}
+
+const columns = (points) => ({ x: points.map((p) => p && p[0]), y: points.map((p) => p && p[1]), z: points.map((p) => p && p[2]) });
+
+function draw() {
+  if (!stale || !seen || !state.live) return;
+  stale = false;
+  if (!webgl()) {
+    box.textContent = "this browser draws no 3D (WebGL is off): the plots above show the same touches";
+    return;
+  }
+  const { live, inputs } = state;
+  const t = inputs.touches;
+  const out = new Set(live.rejected.map(([i]) => i));
+  const spread = [0, 1, 2].map((k) => {
+    let low = Infinity, high = -Infinity;
+    for (const p of t.point) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
+    return high - low;
+  });
+  let top = live.noise_um;
+  live.residual_um.forEach((r, i) => { if (!out.has(i)) top = Math.max(top, Math.abs(r)); });
+  // the largest residual is a sixth of the whole, in a round magnification
+  const wish = (Math.max(...spread, 1) / 6) / (top * 1e-3);
+  const power = 10 ** Math.floor(Math.log10(wish));
+  const times = Math.floor(wish / power) * power;
+  const arrows = [], tips = [];
+  t.point.forEach((p, i) => {
+    if (out.has(i)) return;
+    const tip = p.map((v, k) => v + t.normal[i][k] * live.residual_um[i] * 1e-3 * times);
+    arrows.push(p, tip, null);
+    tips.push(tip);
+  });
+  const kept = t.point.map((_, i) => i).filter((i) => !out.has(i));
+  const machine = inputs.machine.solids.flatMap(outline);
+  const line = (points, name, style) => ({ type: "scatter3d", mode: "lines", name, ...columns(points), line: style, hoverinfo: "skip" });
+  const traces = [
+    line(machine, inputs.machine.name, { color: colour("line"), width: 2 }),
+    line(arrows, "residual", { color: colour("x"), width: 3 }),
+    { type: "scatter3d", mode: "markers", name: "touches", ...columns(tips), customdata: kept, marker: { size: 2, color: colour("y") },
+      text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
+    { type: "scatter3d", mode: "markers", name: "the touch", x: [null], y: [null], z: [null], marker: { size: 8, color: colour("ink"), symbol: "circle-open" }, hoverinfo: "skip" },
+  ];
+  const axis = (title) => ({ title: { text: title }, color: colour("ink"), gridcolor: colour("line"), backgroundcolor: colour("paper") });
+  const layout = layoutOf({
+    uirevision: "keep", margin: { l: 0, r: 0, t: 0, b: 0 },
+    scene: { aspectmode: "data", xaxis: axis("X, mm"), yaxis: axis("Y, mm"), zaxis: axis("Z, mm") },
+  });
+  delete layout.xaxis;
+  delete layout.yaxis;
+  Plotly.react(box, traces, layout, { responsive: true, displaylogo: false, displayModeBar: false });
+  show("space-scale", `Arrows are ${times.toLocaleString("en")} times as long as the residual: ${significant(top)} µm are drawn as ${significant(top * 1e-3 * times)} mm. Blocks as the plan has them, all axes at zero.`);
+}
+
+onHover((i) => {
+  if (!seen || !possible || stale || box.data === undefined) return;
+  const t = state.inputs.touches;
+  const p = i === null ? [null, null, null] : t.point[i];
+  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [3]);
+});
+on("live", (live, newer) => {
+  if (!newer) return;
+  stale = true;
+  draw();
+});

@@ -1,0 +1,168 @@
+// Talks with the server, and holds what it has said: `inputs` (touches, effects), `live` (the fit) and `behind` (evidence).
+
+const TOKEN_KEY = "axiscal-token";
+
+function token() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (given) {
+    sessionStorage.setItem(TOKEN_KEY, given);
+    // out of the address line, so that it is in no bookmark and on no screenshot
+    history.replaceState(null, "", location.pathname);
+  }
+  return given ?? sessionStorage.getItem(TOKEN_KEY) ?? "";
+}
+
+const headers = { "x-axiscal-token": token() };
+
+export const state = { inputs: null, live: null, behind: null, preview: null };
+
+const listeners = { live: [], behind: [], job: [], trouble: [], preview: [] };
+export const on = (what, listener) => listeners[what].push(listener);
+const tell = (what, ...words) => listeners[what].forEach((listener) => listener(...words));
+
+async function ask(path, body) {
+  const options = body === undefined
+    ? { headers }
+    : { method: "POST", headers: { ...headers, "content-type": "application/json" }, body: JSON.stringify(body) };
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch {
+    throw { messages: [{ message: "the workbench does not answer", help: "is it still running in the terminal?" }] };
+  }
+  const text = await response.text();
+  let answer;
+  try {
+    answer = JSON.parse(text);
+  } catch {
+    answer = { messages: [{ message: text || `answer ${response.status}` }] };
+  }
+  if (!response.ok) throw { status: response.status, ...answer };
+  return answer;
+}
+
+/** Puts a new state in the place of the old one; an older one that arrives late is dropped. */
+async function put(live) {
+  if (state.live && live.version < state.live.version) return;
+  if (!state.inputs || state.inputs.inputs !== live.inputs) {
+    const inputs = await ask("/api/inputs");
+    if (inputs.inputs !== live.inputs) return refresh();
+    state.inputs = inputs;
+  }
+  const first = !state.live;
+  const newer = first || live.version !== state.live.version;
+  state.live = live;
+  if (newer) setPreview(null);
+  tell("live", live, newer, first);
+  tell("job", live.job);
+}
+
+export async function refresh() {
+  await put(await ask("/api/state"));
+}
+
+async function refreshBehind() {
+  const behind = await ask("/api/evidence");
+  if (!state.live || behind.version !== state.live.version) return;
+  state.behind = behind;
+  tell("behind", behind);
+}
+
+export function trouble(error) {
+  tell("trouble", error);
+}
+
+let busy = false;
+
+/** Makes a step: one at a time, each asked of the state that is shown. */
+export async function step(what) {
+  if (busy || !state.live) return false;
+  busy = true;
+  const began = performance.now();
+  try {
+    tell("trouble", null);
+    const live = await ask("/api/step", { version: state.live.version, ask: what });
+    const answered = performance.now();
+    await put(live);
+    const drawn = performance.now();
+    window.axiscalTimes = { answered: answered - began, drawn: drawn - began, fit: live.fit_ms };
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+    window.axiscalTimes.painted = performance.now() - began;
+    return true;
+  } catch (error) {
+    if (error.status === 409) await refresh().catch(trouble);
+    trouble(error);
+    return false;
+  } finally {
+    busy = false;
+  }
+}
+
+let tries = 0;
+
+/** What an effect would do, without a step: its curve over the residual. */
+export async function tryOut(what) {
+  const mine = ++tries;
+  const found = await ask("/api/try", { version: state.live.version, ...what });
+  if (mine === tries && found.version === state.live.version) setPreview(found);
+  return found;
+}
+
+export function setPreview(found) {
+  if (found === null) tries += 1;
+  if (state.preview === found) return;
+  state.preview = found;
+  tell("preview", found);
+}
+
+export async function call(what) {
+  await ask("/api/call", { version: state.live.version, ...what });
+}
+
+/** Hears of every change, in this tab, in another one, and on the disk; comes back by itself when the line breaks. */
+export async function listen() {
+  let pause = 500;
+  for (;;) {
+    try {
+      const response = await fetch("/api/events", { headers });
+      if (!response.ok) throw await response.json();
+      pause = 500;
+      const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+      let text = "";
+      for (;;) {
+        const { done, value } = await reader.read();
+        if (done) break;
+        text += value;
+        const parts = text.split("\n\n");
+        text = parts.pop();
+        for (const part of parts) {
+          const line = part.split("\n").find((l) => l.startsWith("data:"));
+          if (line) heard(JSON.parse(line.slice(5)));
+        }
+      }
+    } catch (error) {
+      if (error.messages && !state.live) {
+        trouble(error);
+        return;
+      }
+    }
+    trouble({ messages: [{ message: "the workbench does not answer", help: "is it still running in the terminal? this page looks again by itself" }] });
+    await new Promise((again) => setTimeout(again, pause));
+    pause = Math.min(5000, pause * 2);
+  }
+}
+
+function heard(event) {
+  const known = state.live?.version ?? 0;
+  const newer = event.version > known;
+  const work = {
+    hello: async () => { await refresh(); tell("trouble", null); await refreshBehind(); },
+    lagged: async () => { await refresh(); await refreshBehind(); },
+    // a step of this page brings its state itself
+    state: async () => { if (newer && !busy) await refresh(); },
+    scores: refreshBehind,
+    evidence: async () => { if (!busy) await refresh(); await refreshBehind(); },
+    job: refresh,
+  }[event.what];
+  if (work) work().catch(trouble);
+}
