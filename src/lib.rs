@@ -14,6 +14,7 @@ pub mod symbols;
 pub mod units;
 
 pub mod cli;
+pub mod check;
 pub mod compare;
 pub mod design;
 pub mod diagnose;

@@ -31,6 +31,8 @@ pub struct File {
     pub result: ResultPlaces,
     /// The templates.
     pub write: Write,
+    /// How `check` reads a program back; absent: it cannot.
+    pub check: Option<Check>,
     /// Programs under the control's own transformation (`--tcp`); absent: the control has none.
     pub tcp: Option<Tcp>,
     /// The log: how it is called and how it is read.
@@ -279,6 +281,32 @@ pub enum Role {
     Release,
     /// The slow touch that is measured.
     Measure,
+}
+
+/// How a program is read back.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    /// The grammar.
+    pub dialect: DialectName,
+    /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
+    #[schemars(with = "String")]
+    pub from: Spanned<String>,
+    /// Settings of the control that the program leaves changed, by the names that `check` gives them.
+    #[serde(default)]
+    pub leaves: Vec<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// The grammar of a control's programs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DialectName {
+    /// LinuxCNC: RS274/NGC with O-words.
+    Ngc,
 }
 
 /// The axis of a letter, if axiscal knows it.

@@ -1,7 +1,7 @@
 //! From a postprocessor file as written to a [`Postprocessor`] that can be relied on; all findings at once.
 
 use super::as_written::{self as w, Entry, axis_of};
-use super::{ColumnRule, CommentRule, LogRule, NumberRule, Postprocessor, Tcp};
+use super::{CheckRule, ColumnRule, CommentRule, LogRule, NumberRule, Postprocessor, Tcp};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use minijinja::{Environment, State, UndefinedBehavior, context, syntax::SyntaxConfig};
@@ -40,6 +40,11 @@ pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         }
         Tcp { rotary_step_deg: step, says: tcp.says.clone() }
     });
+    let reading = file.check.as_ref().map(|c| {
+        check.origin("check", &c.source, &c.unverified, &c.from.span());
+        check.word("from", &c.from, |f| !f.trim().is_empty(), "the variable that the program sets to 1 near its top");
+        CheckRule { dialect: c.dialect, from: c.from.get_ref().clone(), leaves: c.leaves.clone() }
+    });
     let templates = check.templates(&file, &comment);
     let post = Postprocessor {
         name: file.name.get_ref().clone(),
@@ -52,6 +57,7 @@ pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         settings: file.settings.clone(),
         result,
         tcp,
+        check: reading,
         log,
         unverified: std::mem::take(&mut check.unverified),
         text: text.clone(),

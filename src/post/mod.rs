@@ -13,6 +13,7 @@ mod moves;
 mod opening;
 mod spelling;
 
+pub use as_written::DialectName;
 pub use check::parse;
 pub use emit::NcProgram;
 pub use frame::Frame;
@@ -52,6 +53,8 @@ pub struct Postprocessor {
     pub result: BTreeMap<AxisName, String>,
     /// The control's own transformation.
     pub tcp: Option<Tcp>,
+    /// How its programs are read back.
+    pub check: Option<CheckRule>,
     /// How its log is called and read.
     pub log: LogRule,
     /// Entries that nobody has verified: name of the entry, why.
@@ -68,6 +71,17 @@ pub struct Tcp {
     pub rotary_step_deg: f64,
     /// What must be switched on at the control.
     pub says: String,
+}
+
+/// How a program is read back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckRule {
+    /// The grammar.
+    pub dialect: DialectName,
+    /// The variable that says at which set-up the program begins.
+    pub from: String,
+    /// Settings that the program leaves changed.
+    pub leaves: Vec<String>,
 }
 
 /// How a log is called and read.
