@@ -432,3 +432,55 @@ const LEVELS: [OpParser; 5] = [
     },
     |i| tag("**").map(|_| Op::Pow).parse(i),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_keep_their_fractions() {
+        let code = parse("G92.2 X-1.5 Y.25 Z[1 + 2 * 3]\n").unwrap();
+        let What::Block(words) = &code.statements[0].what else { panic!() };
+        assert_eq!(words[0].value, Expr::Number(92.2), "{words:?}");
+        assert_eq!(words[1].value, Expr::Number(-1.5));
+        assert_eq!(words[2].value, Expr::Number(0.25));
+    }
+
+    #[test]
+    fn what_is_not_known_is_an_error_with_its_place() {
+        for (text, place) in [
+            ("G0 X1 K3\n", 6),
+            ("G0 X1..5\n", 7),
+            ("G0 X\n", 4),
+            ("(a (b))\n", 3),
+            ("o1 if [1 GT]\no1 endif\n", 11),
+            ("o1 if [1 GT 0]\n", 0),
+            ("o1 endif\n", 0),
+            ("o<a> call\n", 0),
+            ("#<a> = \n", 7),
+            ("G0 X1 X2\n", 6),
+            ("(PRINT,hello)\n", 0),
+            ("hello\n", 0),
+            ("%\nG0 X1\n", 8),
+            ("%\n%\nG0\n", 4),
+            ("(LOG,%x)\n", 0),
+            ("G0 X[1\n", 6),
+        ] {
+            let fault = parse(text).unwrap_err();
+            assert_eq!(fault.at.start, place, "{text:?}: {}", fault.says);
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn rubbish_never_panics(text in "[ -~\n]{0,300}") {
+            let _ = parse(&text);
+        }
+
+        #[test]
+        fn words_of_the_language_never_panic(words in proptest::collection::vec(
+            proptest::sample::select(vec!["G0 ", "X", "-1.5", "[", "]", "#", "<a>", "o1 ", "if ", "else", "endif", "sub", "\n", "(", ")", "LOG,", "%", "call", " = ", "5061"]), 0..80)) {
+            let _ = parse(&words.concat());
+        }
+    }
+}
