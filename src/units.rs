@@ -69,6 +69,12 @@ pub fn mm_from_inch(inch: f64) -> f64 {
     inch * 25.4
 }
 
+/// Millimetres to inches.
+#[must_use]
+pub fn inch_from_mm(mm: f64) -> f64 {
+    mm / 25.4
+}
+
 /// A number as messages show it: with an exponent where its digits would fill the line.
 #[derive(Debug, Clone, Copy)]
 pub struct Plain(pub f64);

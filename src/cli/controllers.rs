@@ -56,6 +56,8 @@ fn facts(post: &Postprocessor) -> serde_json::Value {
         "name": post.name,
         "says": post.says,
         "extension": post.extension,
+        "based_on": post.based_on,
+        "beside": post.companions,
         "tcp": post.tcp.is_some(),
         "log_decimals": post.log.decimals,
         "unverified": unverified,

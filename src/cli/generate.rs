@@ -4,7 +4,8 @@ use super::common::MachineArgs;
 use super::new::default_effects;
 use super::{Answer, Io};
 use crate::axes::AxisMap;
-use crate::diag::{Failure, Finding, Result, source};
+use crate::check::{self, Against};
+use crate::diag::{Failure, Finding, Result, Severity, source};
 use crate::files;
 use crate::fit;
 use crate::log::{Status, Touch};
@@ -13,12 +14,13 @@ use crate::model::catalogue::Catalogue;
 use crate::model::data::{Run, assemble};
 use crate::post::Postprocessor;
 use crate::program::path::{Step, Stop};
-use crate::program::plan::Plan;
+use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
 use crate::tables::linuxcnc;
 use comfy_table::Cell;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `generate`.
@@ -87,13 +89,65 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let shown = |f: &&Finding| io.json || !matches!(f.code, "program::unreachable" | "program::lost");
     io.report(&findings.0.iter().chain(&nc.findings.0).filter(shown).cloned().collect::<Vec<_>>());
 
-    let program_file = args.out.join(format!("{}.{}", spec.name, nc.extension));
+    let files: Vec<(PathBuf, &str)> =
+        nc.files(&spec.name).into_iter().map(|(name, text)| (args.out.join(name), text)).collect();
     let own = [Some(Path::new(&args.program)), args.postprocessor.as_deref(), args.machine.machines.as_deref()];
-    keep_inputs(&program_file, own.into_iter().flatten())?;
+    for (file, _) in &files {
+        keep_inputs(file, own.into_iter().flatten())?;
+    }
+    let name = format!("{}.{}", spec.name, nc.extension);
+    let proof = prove(&machine, &post, &generated.plan, &name, &nc.text, io)?;
+    // the same touches for another control: what was proven of its program stays known
+    if let Some(old) = old_programs(&plan_file, &generated.plan) {
+        generated.plan.programs = old;
+    }
+    generated.plan.programs.extend(proof.map(|p| (post.name.clone(), p)));
     files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
-    files::write_whole(&program_file, nc.text.as_bytes())?;
-    summary(&machine, &post.name, &generated, [&program_file, &plan_file], io);
+    for (file, text) in &files {
+        files::write_whole(file, text.as_bytes())?;
+    }
+    let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
+    summary(&machine, &post, &generated, (&written, &plan_file), io);
     Ok(Answer::Done)
+}
+
+/// Reads the program back and proves it: what cannot be proven is not written.
+///
+/// # Errors
+/// When the program holds anything that `check` refuses.
+pub(super) fn prove(
+    machine: &Machine,
+    post: &Postprocessor,
+    plan: &Plan,
+    name: &str,
+    text: &str,
+    io: &Io,
+) -> Result<Option<Proof>> {
+    if post.check.is_none() {
+        let what = format!("controller {} does not say how its programs are read back: the program was not checked", post.name);
+        io.report(&[Finding::warning("check::no_dialect", what)
+            .help("write [check] in the postprocessor file: docs/guide/check.md")]);
+        return Ok(None);
+    }
+    let against = Against { plan: Some(plan), ..Against::default() };
+    let checked = check::check(machine, post, &source(format!("{name} (not written)"), text), &against)?;
+    if checked.findings.iter().any(|f| f.severity == Severity::Error) {
+        let mut findings = checked.findings;
+        findings.push(
+            Finding::error("check::refused", format!("{name} cannot be proven safe: no file was written"))
+                .help("a template of the postprocessor file was changed? otherwise report it with machine, program and postprocessor"),
+        );
+        return Err(Failure(findings));
+    }
+    Ok(Some(checked.proof))
+}
+
+/// What was proven of other programs for the same plan.
+fn old_programs(file: &Path, plan: &Plan) -> Option<BTreeMap<String, Proof>> {
+    let text = files::read_text(file).ok()?;
+    let (old, _) = Plan::parse(&source(file.display().to_string(), text)).ok()?;
+    let same = Plan { programs: BTreeMap::new(), ..old.clone() }.to_json() == plan.to_json();
+    same.then_some(old.programs)
 }
 
 /// Location errors that the whole program could tell, with blocks of unknown set-up, and the touches that are left cannot.
@@ -196,7 +250,13 @@ fn setups(generated: &Generated) -> Vec<SetupCount> {
     out
 }
 
-fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&PathBuf; 2], io: &Io) {
+fn summary(
+    machine: &Machine,
+    post: &Postprocessor,
+    generated: &Generated,
+    (files, plan_file): (&[&PathBuf], &PathBuf),
+    io: &Io,
+) {
     let (plan, path) = (&generated.plan, &generated.path);
     let setups = setups(generated);
     let skipped = program::skipped_groups(&plan.skipped);
@@ -237,14 +297,20 @@ fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&
             io.say(format!("  {note}"));
         }
     }
-    let [program_file, plan_file] = files;
-    io.say(format!("\nwritten: {}\n         {}", program_file.display(), plan_file.display()));
+    let beside = files.get(1..).unwrap_or_default();
+    let all = files.iter().take(1).chain([&plan_file]).chain(beside);
+    let lines: Vec<String> = all.map(|file| file.display().to_string()).collect();
+    io.say(format!("\nwritten: {}", lines.join("\n         ")));
+    for (file, says) in beside.iter().zip(&post.companions) {
+        io.say(format!("{} goes to the control with the program: {says}", file.display()));
+    }
     io.say("the head of the program says what to set up where");
     io.answer(&json!({
         "format": "axiscal-generated/1",
         "machine": machine.name,
         "program": plan.program,
-        "controller": controller,
+        "controller": post.name,
+        "unverified": post.unverified.iter().map(|(entry, why)| json!({ "entry": entry, "why": why })).collect::<Vec<_>>(),
         "mounting": plan.mounting,
         "controller_frame": plan.controller_frame,
         "touches": plan.touches.len(),
@@ -259,6 +325,6 @@ fn summary(machine: &Machine, controller: &str, generated: &Generated, files: [&
             "stage": s.stage, "pose": s.pose, "block": s.block, "face": s.face, "points": s.points, "reason": s.reason,
         })).collect::<Vec<_>>(),
         "notes": plan.notes,
-        "files": { "program": program_file, "plan": plan_file },
+        "files": { "program": files.first(), "plan": plan_file, "beside": beside },
     }));
 }

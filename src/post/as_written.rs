@@ -10,6 +10,10 @@ use toml::Spanned;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct File {
+    /// Another controller (a name or a file) that says everything that this file does not. A table with a `source` or
+    /// `unverified` of its own takes a new one when any line of it is changed.
+    #[serde(default)]
+    pub based_on: Option<String>,
     /// `axiscal-postprocessor/1`
     #[schemars(with = "String")]
     pub format: Spanned<String>,
@@ -33,6 +37,12 @@ pub struct File {
     pub write: Write,
     /// How `check` reads a program back; absent: it cannot.
     pub check: Option<Check>,
+    /// Pieces of templates by name, for `{% include "NAME" %}`.
+    #[serde(default)]
+    pub parts: BTreeMap<String, Entry>,
+    /// Files that the control needs beside the program, e.g. masks of its log.
+    #[serde(default)]
+    pub companion: Vec<Companion>,
     /// Programs under the control's own transformation (`--tcp`); absent: the control has none.
     pub tcp: Option<Tcp>,
     /// The log: how it is called and how it is read.
@@ -51,6 +61,19 @@ pub struct ProgramFile {
     /// The longest line that the control takes, characters.
     #[schemars(with = "usize")]
     pub line_length: Spanned<usize>,
+    /// Empty lines of the templates stay; false where each line is a block.
+    #[serde(default = "yes")]
+    pub blank_lines: bool,
+    /// A running number before each line, where the control wants one.
+    pub block_numbers: Option<BlockNumbers>,
+    /// What may stand in names of programs at the control (`nc_name` of the templates); others become `name_other`.
+    #[serde(default = "name_characters")]
+    pub name_characters: String,
+    /// For a character that may not.
+    #[serde(default = "name_other")]
+    pub name_other: String,
+    /// The highest number of a label; absent: any.
+    pub last_label: Option<usize>,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -67,6 +90,59 @@ pub enum EndOfLine {
     Crlf,
     /// CR
     Cr,
+}
+
+fn name_characters() -> String {
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-".to_owned()
+}
+
+fn name_other() -> String {
+    "_".to_owned()
+}
+
+/// A file that the control needs beside the program.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Companion {
+    /// Its name: a template.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// What it is for, in one line.
+    pub says: String,
+    /// Its text: a template, given what all templates are given.
+    #[schemars(with = "String")]
+    pub template: Spanned<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A running number before each line of the program.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BlockNumbers {
+    /// Of the first line.
+    pub first: usize,
+    /// From line to line.
+    pub step: usize,
+    /// What stands before the line, from `{n}`: `"{n} "`, `"N{n} "`.
+    pub word: String,
+}
+
+/// Which coordinates a program's words are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Coordinates {
+    /// From the origin of R: the program sets an offset of its own.
+    #[default]
+    Origin,
+    /// What the control displays without any offset. Not under a transformation (`--tcp`): there they are the origin's.
+    Machine,
 }
 
 /// How numbers and axis words are written.
@@ -91,6 +167,15 @@ pub struct Number {
     /// An axis word, from `{axis}` and `{value}`.
     #[schemars(with = "String")]
     pub word: Spanned<String>,
+    /// Which coordinates the words are.
+    #[serde(default)]
+    pub coordinates: Coordinates,
+    /// What the control calls an axis, where that is not its letter: `{ C = "C1" }`.
+    #[serde(default)]
+    pub axis_names: BTreeMap<AxisName, String>,
+    /// The number of an axis at the control, where it is not its place among the machine's axes: `{ C = 6 }`.
+    #[serde(default)]
+    pub axis_numbers: BTreeMap<AxisName, usize>,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -109,6 +194,8 @@ pub struct Comment {
     /// Longer remarks go on in the next line, characters.
     #[schemars(with = "usize")]
     pub width: Spanned<usize>,
+    /// The longest message to the operator that is shown whole, characters.
+    pub message_width: Option<usize>,
     /// Characters that must not stand in a remark, and what is written in their place.
     #[serde(default)]
     pub replace: BTreeMap<String, String>,
@@ -133,7 +220,7 @@ pub struct Comment {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultPlaces {
-    /// Variable of the control, for each axis letter.
+    /// Variable of the control, for each axis letter; `{n}` is the number of the axis, `{nn}` in two digits, `{name}` its name.
     #[serde(rename = "X")]
     pub x: Option<String>,
     #[allow(missing_docs)]
@@ -213,6 +300,9 @@ pub struct Tcp {
     pub rotary_step: Spanned<f64>,
     /// What must be switched on at the control.
     pub says: String,
+    /// A program under the transformation can take up another stylus in the middle.
+    #[serde(default = "yes")]
+    pub other_stylus: bool,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -242,6 +332,27 @@ pub struct Log {
     /// `.` or `,`
     #[schemars(with = "String")]
     pub decimal_mark: Spanned<String>,
+    /// The other decimal mark, where a setting of the control chooses between the two: a log that uses it is read too.
+    #[schemars(with = "Option<String>")]
+    pub other_decimal_mark: Option<Spanned<String>>,
+    /// What lengths are in, in the program and in its log; the head of the log says it too, and what it says counts.
+    #[serde(default)]
+    pub unit: LengthUnit,
+    /// Places before the mark that the control fills with blanks; 0: it pads nothing.
+    #[schemars(with = "Option<usize>")]
+    pub whole_places: Option<Spanned<usize>>,
+    /// Where the blanks stand.
+    #[serde(default)]
+    pub padding: Padding,
+    /// What the control puts before each line, e.g. `;` where the log is a program file; lines without it are read too.
+    #[serde(default)]
+    pub prefix: String,
+    /// Lines that begin like this are the control's own and no part of the log.
+    #[serde(default)]
+    pub skip: Vec<String>,
+    /// Letter of the word with the time of the touch, s since the program began, where the control can give it.
+    #[schemars(with = "Option<String>")]
+    pub time_word: Option<Spanned<String>>,
     /// Letter of the word with the sum of all other numbers of the line, where the control can write one.
     #[schemars(with = "Option<String>")]
     pub check_word: Option<Spanned<String>>,
@@ -251,6 +362,28 @@ pub struct Log {
     pub source: Option<String>,
     /// Why it is not verified.
     pub unverified: Option<String>,
+}
+
+/// What lengths are in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LengthUnit {
+    /// Millimetres.
+    #[default]
+    Mm,
+    /// Inches.
+    Inch,
+}
+
+/// Where a control pads a number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Padding {
+    /// `X  -1.500`: the sign is one of the places.
+    #[default]
+    BeforeSign,
+    /// `X-   1.500`, `X    1.500`: the sign has a place of its own.
+    AfterSign,
 }
 
 /// A log of nothing but columns.

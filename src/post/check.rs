@@ -11,11 +11,11 @@ use toml::Spanned;
 
 const FORMAT: &str = "axiscal-postprocessor/1";
 
-/// Reads and checks a postprocessor file.
+/// Reads and checks a postprocessor file that is complete by itself.
 ///
 /// # Errors
 /// When the text is not TOML of this form, or a template does not compile; every finding has its place and remedy.
-pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
+pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     let text = source.inner();
     let file: w::File = toml::from_str(text).map_err(|e| {
         from_toml(&e, source, "post::not_toml")
@@ -23,7 +23,7 @@ pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     })?;
     let mut check = Check { source, findings: Findings::default(), unverified: Vec::new() };
     check.head(&file);
-    let number = check.number(&file.number);
+    let number = check.number(&file.number, file.log.unit);
     let comment = check.comment(&file.comment);
     let log = check.log(&file.log);
     let result = check.result(&file.result);
@@ -38,20 +38,27 @@ pub fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
                 "more than 0 and at most 30 deg: 2 is a good value",
             );
         }
-        Tcp { rotary_step_deg: step, says: tcp.says.clone() }
+        Tcp { rotary_step_deg: step, says: tcp.says.clone(), other_stylus: tcp.other_stylus }
     });
     let reading = file.check.as_ref().map(|c| {
         check.origin("check", &c.source, &c.unverified, &c.from.span());
         check.word("from", &c.from, |f| !f.trim().is_empty(), "the variable that the program sets to 1 near its top");
         CheckRule { dialect: c.dialect, from: c.from.get_ref().clone(), leaves: c.leaves.clone() }
     });
-    let templates = check.templates(&file, &comment);
+    let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {
         name: file.name.get_ref().clone(),
         says: file.says.clone(),
         extension: file.file.extension.get_ref().clone(),
         end_of_line: file.file.end_of_line,
         line_length: *file.file.line_length.get_ref(),
+        blank_lines: file.file.blank_lines,
+        block_numbers: file.file.block_numbers.clone(),
+        based_on: file.based_on.clone(),
+        name_characters: (file.file.name_characters.clone(), file.file.name_other.clone()),
+        last_label: file.file.last_label,
+        companions: file.companion.iter().map(|c| c.says.clone()).collect(),
+        coordinates: file.number.coordinates,
         number,
         comment,
         settings: file.settings.clone(),
@@ -127,7 +134,7 @@ impl Check<'_> {
         value.min(9)
     }
 
-    fn number(&mut self, number: &w::Number) -> NumberRule {
+    fn number(&mut self, number: &w::Number, unit: w::LengthUnit) -> NumberRule {
         self.origin("number", &number.source, &number.unverified, &number.decimals.span());
         let both = |s: &str| s.contains("{axis}") && s.contains("{value}");
         self.word("word", &number.word, both, "it holds {axis} and {value}");
@@ -138,6 +145,9 @@ impl Check<'_> {
             plus: number.plus,
             mark: self.mark(&number.decimal_mark),
             word: number.word.get_ref().clone(),
+            unit,
+            names: number.axis_names.clone(),
+            numbers: number.axis_numbers.clone(),
         }
     }
 
@@ -166,6 +176,7 @@ impl Check<'_> {
             open: comment.open.clone(),
             close: comment.close.clone(),
             width: width.max(20),
+            message_width: comment.message_width,
             replace,
             other: comment.other.clone(),
             capitals: comment.capitals,
@@ -186,12 +197,33 @@ impl Check<'_> {
             let help = "name at least one of \"lf\", \"crlf\", \"cr\"";
             self.error(&log.file.span(), "post::end_of_line", "[log] end_of_line is empty".into(), help);
         }
-        let check_word = log.check_word.as_ref().and_then(|word| {
-            let free =
-                |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
-            self.word("check_word", word, free, "one capital letter that is no axis and none of N S U H P E");
-            word.get_ref().bytes().next()
+        let free = |w: &str| w.len() == 1 && w.bytes().all(|b| b.is_ascii_uppercase() && !b"XYZABCNSUHPE".contains(&b));
+        let mut letter = |what: &str, word: &Option<Spanned<String>>| {
+            word.as_ref().and_then(|word| {
+                self.word(what, word, free, "one capital letter that is no axis and none of N S U H P E");
+                word.get_ref().bytes().next()
+            })
+        };
+        let check_word = letter("check_word", &log.check_word);
+        let time_word = letter("time_word", &log.time_word);
+        if let Some(word) = log.time_word.as_ref().filter(|_| check_word == time_word) {
+            let help = "two words of a line need two letters";
+            self.error(&word.span(), "post::word", "time_word is check_word".into(), help);
+        }
+        let whole_places = log.whole_places.as_ref().map_or(0, |places| {
+            if *places.get_ref() > 12 {
+                let message = format!("whole_places is {}", places.get_ref());
+                self.error(&places.span(), "post::whole_places", message, "0 to 12");
+            }
+            (*places.get_ref()).min(12)
         });
+        let mark = if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' };
+        let other_mark =
+            log.other_decimal_mark.as_ref().map(|other| if self.mark(other) == ',' { b',' } else { b'.' });
+        if let Some(word) = log.other_decimal_mark.as_ref().filter(|_| other_mark == Some(mark)) {
+            let help = "leave it out, or name the mark that decimal_mark does not name";
+            self.error(&word.span(), "post::word", "other_decimal_mark is decimal_mark".into(), help);
+        }
         let columns = log.columns.as_ref().map(|columns| {
             self.origin("log.columns", &columns.source, &columns.unverified, &columns.axes.span());
             let axes: Vec<_> = columns.axes.get_ref().iter().map(|a| axis_of(a)).collect();
@@ -213,16 +245,25 @@ impl Check<'_> {
             end_of_line: log.end_of_line.clone(),
             decimals: self.decimals(&log.decimals),
             exact_decimals: log.exact_decimals,
-            mark: if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' },
+            mark,
+            other_mark,
+            unit: log.unit,
+            whole_places,
+            padding: log.padding,
+            prefix: log.prefix.clone(),
+            skip: log.skip.clone(),
+            time_word,
             check_word,
             columns,
         }
     }
 
-    fn templates(&mut self, file: &w::File, comment: &CommentRule) -> Environment<'static> {
-        let mut env = environment(comment, *file.file.line_length.get_ref());
+    fn templates(&mut self, file: &w::File, comment: &CommentRule, number: &NumberRule) -> Environment<'static> {
+        let mut env = environment(comment, number, *file.file.line_length.get_ref());
+        // globals reach into messages and macros too
+        env.add_global("settings", minijinja::Value::from(file.settings.clone()));
         let write = &file.write;
-        let entries: [(&'static str, &Entry); 13] = [
+        let entries: [(&str, &Entry); 13] = [
             ("start", &write.start),
             ("note", &write.note),
             ("setup", &write.setup),
@@ -241,12 +282,30 @@ impl Check<'_> {
             self.origin(&format!("write.{name}"), &entry.source, &entry.unverified, &entry.template.span());
             self.template(&mut env, name, &entry.template);
         }
+        for (name, part) in &file.parts {
+            if entries.iter().any(|(taken, _)| taken == name) || ["stop", "log_file"].contains(&name.as_str()) {
+                let message = format!("[parts.{name}] has the name of a template of [write]");
+                self.error(&part.template.span(), "post::part", message, "give it another name");
+            }
+            self.origin(&format!("parts.{name}"), &part.source, &part.unverified, &part.template.span());
+            // a part stands in lines of its own, whatever follows the tag that includes it; one line end is the engine's
+            let text = part.template.get_ref().trim_end_matches('\n');
+            // the engine takes the line end behind a tag
+            let lines = format!("{text}\n\n{}", if text.ends_with("%}") { "\n" } else { "" });
+            self.template(&mut env, name, &Spanned::new(part.template.span(), lines));
+        }
+        for (index, companion) in file.companion.iter().enumerate() {
+            let entry = format!("companion {}", companion.name.get_ref());
+            self.origin(&entry, &companion.source, &companion.unverified, &companion.template.span());
+            self.template(&mut env, &format!("companion {index} name"), &companion.name);
+            self.template(&mut env, &format!("companion {index}"), &companion.template);
+        }
         self.template(&mut env, "log_file", &file.log.file);
         env
     }
 
-    fn template(&mut self, env: &mut Environment<'static>, name: &'static str, text: &Spanned<String>) {
-        if let Err(e) = env.add_template_owned(name, text.get_ref().clone()) {
+    fn template(&mut self, env: &mut Environment<'static>, name: &str, text: &Spanned<String>) {
+        if let Err(e) = env.add_template_owned(name.to_owned(), text.get_ref().clone()) {
             let line = e.line().map(|l| format!(" (line {l} of the template)")).unwrap_or_default();
             let detail = e.detail().unwrap_or("not a template");
             let message = format!("template {name}: {detail}{line}");
@@ -256,8 +315,18 @@ impl Check<'_> {
     }
 }
 
+/// A number without its sign.
+fn unsigned(text: &str) -> &str {
+    text.trim_start_matches(['+', '-'])
+}
+
+/// A number as a term of a sum: `+ 8` or `- 8`.
+fn signed(text: &str, [plus, minus]: [&str; 2]) -> String {
+    format!("{} {}", if text.starts_with('-') { minus } else { plus }, unsigned(text))
+}
+
 /// The templates' language: strict about unknown names, with the filters and functions that spell this control.
-fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static> {
+fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -> Environment<'static> {
     let mut env = Environment::new();
     // the delimiters are the default ones, so this cannot fail; the defaults would only leave more blank lines
     if let Ok(syntax) = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build() {
@@ -267,6 +336,16 @@ fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static
     env.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
     let rule = comment.clone();
     env.add_filter("note", move |text: String| rule.note(&text));
+    let rule = number.clone();
+    env.add_filter("length", move |text: String| -> Result<String, minijinja::Error> {
+        text.trim().parse::<f64>().map(|mm| rule.length(mm)).map_err(|_| {
+            let what = format!("`length` makes the control's number of a number of mm, {text:?} is none");
+            minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what)
+        })
+    });
+    env.add_filter("unsigned", |text: String| unsigned(&text).to_owned());
+    env.add_filter("added", |text: String| signed(&text, ["+", "-"]));
+    env.add_filter("taken", |text: String| signed(&text, ["-", "+"]));
     env.add_filter("words", |words: minijinja::Value| -> Result<String, minijinja::Error> {
         // a mistyped name would make a motion line without words: a move that is not made
         let words: Result<Vec<String>, _> =
@@ -282,6 +361,9 @@ fn environment(comment: &CommentRule, line_length: usize) -> Environment<'static
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away
         let mut clean = rule.clean(&text);
+        if let Some(width) = rule.message_width {
+            clean = clean.chars().take(width).collect();
+        }
         let template = state.env().get_template("message")?;
         loop {
             let filled = match &value {

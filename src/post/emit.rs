@@ -1,7 +1,8 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
-use super::as_written::EndOfLine;
+use super::as_written::{EndOfLine, LengthUnit};
 use super::opening::Opening;
+use super::spelling::name_of;
 use super::{Frame, Postprocessor, log_text};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -18,8 +19,29 @@ pub struct NcProgram {
     pub text: String,
     /// Of the file, without the dot.
     pub extension: String,
+    /// Files that the control needs beside it.
+    pub beside: Vec<SideFile>,
     /// What the person must be told.
     pub findings: Findings,
+}
+
+/// A file that the control needs beside the program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SideFile {
+    /// Its name.
+    pub name: String,
+    /// What it is for.
+    pub says: String,
+    /// Its text.
+    pub text: String,
+}
+
+impl NcProgram {
+    /// All files that are written for a program of this name: the program itself, then what stands beside it.
+    pub fn files(&self, stem: &str) -> Vec<(String, &str)> {
+        let program = (format!("{stem}.{}", self.extension), self.text.as_str());
+        std::iter::once(program).chain(self.beside.iter().map(|f| (f.name.clone(), f.text.as_str()))).collect()
+    }
 }
 
 /// Labels that one step may use.
@@ -79,6 +101,13 @@ pub(super) struct Writer<'a> {
     /// Label of the set-up that is open.
     open_setup: Option<usize>,
     last: Named,
+    /// Approach of the touch made last, and the way back off it: what its retract may use.
+    approach: Vec<Value>,
+    heading_back: Vec<Value>,
+    way: String,
+    back_off: String,
+    /// A move has been written.
+    moving: bool,
 }
 
 impl<'a> Writer<'a> {
@@ -116,6 +145,11 @@ impl<'a> Writer<'a> {
             mounted: path.mounted.clone(),
             open_setup: None,
             last: Named::default(),
+            approach: Vec::new(),
+            heading_back: Vec::new(),
+            way: String::new(),
+            back_off: String::new(),
+            moving: false,
         };
         writer.check_input()?;
         Ok(writer)
@@ -152,32 +186,70 @@ impl<'a> Writer<'a> {
     // ------------------------------------------------------------------------------------------------- rendering
 
     pub(super) fn render(&mut self, template: &str, context: Value) -> Result<()> {
-        let next = self.next_touch();
-        let names = |axes: &[AxisName]| axes.iter().map(ToString::to_string).collect::<Vec<_>>();
-        let rotary: Vec<AxisName> = self.axes.iter().copied().filter(|a| a.is_rotary()).collect();
-        let common = context! {
-            label => self.label,
-            next => next.id,
-            next_says => next.says,
-            last => self.last.id,
-            last_says => self.last.says.clone(),
-            settings => map(self.post.settings.clone()),
-            result => map(self.post.result.iter().map(|(a, v)| (a.to_string(), v.clone()))),
-            axes => names(&self.axes),
-            rotary => names(&rotary),
-            tcp => self.frame.is_tcp(),
-            stops => !self.path.mounted.is_empty(),
-            program => self.plan.program.clone(),
-            machine => self.machine.name.clone(),
-        };
-        let rendered = self.post.render(template, context! { ..context, ..common })?;
-        self.label += LABELS_PER_STEP;
+        let rendered = self.post.render(template, context! { ..context, ..self.common()? })?;
+        if self.post.uses_labels(template) {
+            self.label += LABELS_PER_STEP;
+            if let Some(last) = self.post.last_label.filter(|last| self.label > *last) {
+                let message = format!("the program needs more labels than the {last} of controller {}", self.post.name);
+                return Err(Failure::new("post::labels", message).help("split it: fewer touches in one program"));
+            }
+        }
         let rendered = rendered.strip_suffix('\n').unwrap_or(&rendered);
         if !rendered.is_empty() {
             self.text.push_str(rendered);
             self.text.push('\n');
         }
         Ok(())
+    }
+
+    /// What all templates are given.
+    fn common(&self) -> Result<Value> {
+        let next = self.next_touch();
+        let of_axes = |what: &dyn Fn(AxisName) -> String| map(self.axes.iter().map(|a| (a.to_string(), what(*a))));
+        let names = |axes: &[AxisName]| axes.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let rotary: Vec<AxisName> = self.axes.iter().copied().filter(|a| a.is_rotary()).collect();
+        Ok(context! {
+            label => self.label,
+            next => next.id,
+            next_says => next.says,
+            last => self.last.id,
+            last_says => self.last.says.clone(),
+            result => of_axes(&|a| self.result(a)),
+            axes => names(&self.axes),
+            rotary => names(&rotary),
+            tcp => self.frame.is_tcp(),
+            stops => !self.path.mounted.is_empty(),
+            program => self.plan.program.clone(),
+            machine => self.machine.name.clone(),
+            origin => of_axes(&|a| self.post.number.position(a, self.machine.origin.get(a).unwrap_or(0.0))),
+            names => of_axes(&|a| self.post.number.name(a)),
+            numbers => map_of(self.axes.iter().map(|a| (a.to_string(), Value::from(self.axis_number(*a))))),
+            nc_name => self.post.nc_name(&self.plan.program),
+            unit => if self.post.log.unit == LengthUnit::Inch { "inch" } else { "mm" },
+            touches => self.plan.touches.len(),
+            log_decimals => self.post.log.decimals,
+            seconds => self.path.seconds,
+            first_move => !self.moving,
+            slow_feed => self.length(self.machine.probe.slow_feed),
+            log_name => self.post.log_name(self.plan)?,
+            log_head => log_text::head(self.post, self.plan),
+            log_end => log_text::end(self.plan),
+        })
+    }
+
+    /// The number of an axis at the control.
+    fn axis_number(&self, axis: AxisName) -> usize {
+        let place = || self.axes.iter().position(|a| *a == axis).map_or(0, |at| at + 1);
+        self.post.number.numbers.get(&axis).copied().unwrap_or_else(place)
+    }
+
+    /// Where the control keeps the result of a probing move.
+    fn result(&self, axis: AxisName) -> String {
+        let number = self.axis_number(axis);
+        let text = self.post.result.get(&axis).map(String::as_str).unwrap_or_default();
+        text.replace("{nn}", &format!("{number:02}"))
+            .replace("{n}", &number.to_string())
+            .replace("{name}", &self.post.number.name(axis))
     }
 
     /// The touch that comes next, or the last one when none does.
@@ -206,11 +278,10 @@ impl<'a> Writer<'a> {
         for (entry, why) in &self.post.unverified {
             head.push(format!("NOT VERIFIED on a real control: {entry}: {why}"));
         }
-        let origin = self.axes.iter().map(|a| (a.to_string(), self.number(self.machine.origin.get(*a).unwrap_or(0.0))));
         let near = self.path.start_near.as_ref().map(|near| {
             let window = |a: &crate::machine::Axis| {
-                let [low, high] = near.window(a);
-                context! { axis => a.name.to_string(), low => self.number(low), high => self.number(high) }
+                let [low, high] = near.window(a).map(|v| self.post.number.position(a.name, self.shown(a.name, v)));
+                context! { axis => a.name.to_string(), low, high }
             };
             self.machine.rotary().map(window).collect::<Vec<_>>()
         });
@@ -218,17 +289,13 @@ impl<'a> Writer<'a> {
             head => head,
             start_near => near.unwrap_or_default(),
             setups => setups,
-            origin => map(origin),
-            slow_feed => self.number(self.machine.probe.slow_feed),
-            log_name => self.post.log_name(self.plan)?,
-            log_head => log_text::head(self.post, self.plan),
         };
         self.render("start", context)
     }
 
     fn end(&mut self) -> Result<()> {
         self.close_setup()?;
-        self.render("end", context! { log_end => log_text::end(self.plan) })
+        self.render("end", context! {})
     }
 
     fn close_setup(&mut self) -> Result<()> {
@@ -264,6 +331,7 @@ impl<'a> Writer<'a> {
             Step::Rapid { to } => {
                 let words = self.words(&self.linear_words(to)?)?;
                 self.render("rapid", context! { to => words })?;
+                self.moving = true;
                 self.moved(to);
                 Ok(())
             }
@@ -273,19 +341,45 @@ impl<'a> Writer<'a> {
                 if !self.loose && self.post.number.moved(&self.at, to).is_empty() {
                     return Ok(());
                 }
-                let words = self.words(&self.linear_words(to)?)?;
-                self.render("protected", context! { to => words, feed => self.feed(*feed)? })?;
+                let named = self.linear_words(to)?;
+                let words = self.words(&named)?;
+                let (heading, length) = self.straight(to, &named);
+                self.render("protected", context! { to => words, feed => self.feed(*feed)?, heading, length })?;
                 self.moved(to);
                 Ok(())
             }
             Step::Touch(touch) => self.touch(touch),
             Step::Retract { to, feed } => {
                 let words = self.words(&self.linear_words(to)?)?;
-                self.render("retract", context! { to => words, feed => self.feed(*feed)? })?;
+                let context = context! {
+                    to => words,
+                    feed => self.feed(*feed)?,
+                    approach => self.approach.clone(),
+                    heading => self.heading_back.clone(),
+                    way => self.way.clone(),
+                    back_off => self.back_off.clone(),
+                };
+                self.render("retract", context)?;
                 self.moved(to);
                 Ok(())
             }
         }
+    }
+
+    /// Direction of a straight move, of the axes that it names, and its length; nothing where its beginning is not known.
+    fn straight(&self, to: &AxisMap, named: &AxisMap) -> (Vec<Value>, String) {
+        let known = !self.loose && named.iter().all(|(axis, _)| self.at.get(axis).is_some());
+        let delta = self.controller(&to.or(&self.at)).xyz_mm() - self.controller(&self.at).xyz_mm();
+        let length = delta.norm();
+        if !known || length <= 0.0 {
+            return (Vec::new(), self.length(0.0));
+        }
+        let of = |axis: AxisName| {
+            let direction = self.number(delta[axis.index()] / length);
+            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction }
+        };
+        let way = named.iter().map(|(axis, _)| axis).filter(|a| !a.is_rotary()).map(of).collect();
+        (way, self.length(length))
     }
 
     fn moved(&mut self, to: &AxisMap) {
@@ -294,7 +388,7 @@ impl<'a> Writer<'a> {
     }
 
     fn feed(&self, feed: f64) -> Result<String> {
-        if feed.is_finite() && feed > 0.0 { Ok(self.number(feed)) } else { Err(self.broken(format!("feed {feed}"))) }
+        if feed.is_finite() && feed > 0.0 { Ok(self.length(feed)) } else { Err(self.broken(format!("feed {feed}"))) }
     }
 
     fn setup(&mut self, number: u32, says: &str, resume: Option<&[Step]>) -> Result<()> {
@@ -319,8 +413,9 @@ impl<'a> Writer<'a> {
         let sign = |s: f64| if s < 0.0 { "-" } else { "+" };
         let senses = map(sense.iter().map(|(a, s)| (a.to_string(), sign(s).to_owned())));
         for place in self.rotary_steps(&self.at, to)? {
-            let words = self.words(&place)?;
+            let words = self.words_by(&place, sense)?;
             self.render("rotary", context! { to => words, sense => senses.clone() })?;
+            self.moving = true;
         }
         self.moved(to);
         self.senses = sense.or(&self.senses);
@@ -353,10 +448,12 @@ impl<'a> Writer<'a> {
                 let i = axis.index();
                 context! {
                     axis => axis.to_string(),
+                    name => self.post.number.name(axis),
                     direction => self.number(direction[i]),
-                    start => self.number(start[i]),
-                    nominal => self.number(nominal[i]),
-                    back_off => self.number(direction[i] * touch.back_off_mm),
+                    start => self.length(self.shown(axis, start[i])),
+                    nominal => self.length(self.shown(axis, nominal[i])),
+                    end => self.length(self.shown(axis, end[i])),
+                    back_off => self.length(direction[i] * touch.back_off_mm),
                 }
             })
             .collect();
@@ -365,22 +462,35 @@ impl<'a> Writer<'a> {
             says => touch.says.clone(),
             first => touch.first,
             end => self.words(&target)?,
-            approach => approach,
-            way => self.number((nominal - start).norm()),
-            tolerance => self.number(touch.tolerance_mm),
+            pose => self.words(&touch.pose)?,
+            all => self.words(&xyz(&end))?,
+            length => self.length(length),
+            approach => approach.clone(),
+            way => self.length((nominal - start).norm()),
+            tolerance => self.length(touch.tolerance_mm),
             search_feed => self.feed(touch.search_feed)?,
             measure_feed => self.feed(touch.measure_feed)?,
-            back_off => self.number(touch.back_off_mm),
-            half_back_off => self.number(touch.back_off_mm / 2.0),
+            back_off => self.length(touch.back_off_mm),
+            half_back_off => self.length(touch.back_off_mm / 2.0),
         };
         self.render("touch", context)?;
+        self.approach = approach;
+        let back = |axis: AxisName| {
+            let direction = self.number(-direction[axis.index()]);
+            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction }
+        };
+        self.heading_back = target.iter().map(|(axis, _)| back(axis)).collect();
+        self.way = self.length((nominal - start).norm());
+        self.back_off = self.length(touch.back_off_mm);
         self.at = touch.end.or(&stands);
         self.loose = true;
         Ok(())
     }
 
     fn finish(self) -> Result<NcProgram> {
-        let longest = self.text.lines().enumerate().find(|(_, line)| line.chars().count() > self.post.line_length);
+        let beside = self.beside()?;
+        let text = self.post.lines(&self.text);
+        let longest = text.lines().enumerate().find(|(_, line)| line.chars().count() > self.post.line_length);
         if let Some((index, line)) = longest {
             return Err(Failure::new(
                 "post::line_length",
@@ -394,13 +504,25 @@ impl<'a> Writer<'a> {
             )
             .help("shorten the template, or the names of machine, program and blocks"));
         }
-        let text = match self.post.end_of_line {
-            EndOfLine::Lf => self.text,
-            EndOfLine::Crlf => self.text.replace('\n', "\r\n"),
-            EndOfLine::Cr => self.text.replace('\n', "\r"),
-        };
-        Ok(NcProgram { text, extension: self.post.extension.clone(), findings: self.findings })
+        let text = self.post.ended(text);
+        Ok(NcProgram { text, extension: self.post.extension.clone(), beside, findings: self.findings })
     }
+
+    /// The files that the control needs beside the program.
+    fn beside(&self) -> Result<Vec<SideFile>> {
+        let one = |(index, says): (usize, &String)| {
+            let name = self.post.render(&format!("companion {index} name"), self.common()?)?;
+            let mut text = self.post.render(&format!("companion {index}"), self.common()?)?;
+            text.push('\n');
+            let name = name_of(name.trim(), |c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_'));
+            Ok(SideFile { name, says: says.clone(), text: self.post.ended(text) })
+        };
+        self.post.companions.iter().enumerate().map(one).collect()
+    }
+}
+
+fn map_of(pairs: impl IntoIterator<Item = (String, Value)>) -> Value {
+    Value::from(pairs.into_iter().collect::<BTreeMap<_, _>>())
 }
 
 fn map(pairs: impl IntoIterator<Item = (String, String)>) -> Value {
@@ -412,9 +534,51 @@ fn xyz(v: &nalgebra::Vector3<f64>) -> AxisMap {
 }
 
 impl Postprocessor {
+    /// Whether a template names labels; numbers are scarce on some controls, so only those take any.
+    fn uses_labels(&self, template: &str) -> bool {
+        let names = |text: &str| text.contains("label") || text.contains("include");
+        self.templates.get_template(template).is_ok_and(|t| names(t.source()))
+    }
+
+    /// A name as the control takes it.
+    fn nc_name(&self, name: &str) -> String {
+        let (allowed, other) = &self.name_characters;
+        let spelled = |c: char| if allowed.contains(c) { c.to_string() } else { other.clone() };
+        name.to_ascii_uppercase().chars().map(spelled).collect()
+    }
+
+    /// The text with the control's line ends.
+    fn ended(&self, text: String) -> String {
+        match self.end_of_line {
+            EndOfLine::Lf => text,
+            EndOfLine::Crlf => text.replace('\n', "\r\n"),
+            EndOfLine::Cr => text.replace('\n', "\r"),
+        }
+    }
+
+    /// The text with or without its empty lines, numbered where the control wants it.
+    fn lines(&self, text: &str) -> String {
+        let kept = text.lines().filter(|line| self.blank_lines || !line.trim().is_empty());
+        let mut out = String::with_capacity(text.len());
+        for (index, line) in kept.enumerate() {
+            if let Some(rule) = &self.block_numbers {
+                out.push_str(&rule.word.replace("{n}", &(rule.first + index * rule.step).to_string()));
+            }
+            out.push_str(line);
+            out.push('\n');
+        }
+        out
+    }
+
     /// Renders one template; a failure names the template and its line.
     pub(super) fn render(&self, template: &str, context: Value) -> Result<String> {
-        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|e| {
+        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|outer| {
+            // an error in an included part stands behind the one that says which part
+            let mut e = &outer;
+            while let Some(inner) = std::error::Error::source(e).and_then(|s| s.downcast_ref::<minijinja::Error>()) {
+                e = inner;
+            }
+            let template = e.name().unwrap_or(template);
             let line = e.line().map(|l| format!(", line {l}")).unwrap_or_default();
             let mut detail = e.detail().map_or_else(|| e.kind().to_string(), str::to_owned);
             if e.kind() == minijinja::ErrorKind::UndefinedError {

@@ -1,15 +1,16 @@
 //! The log as the control would have written it: the counterpart of [`crate::log::parse`].
 //!
-//! `H AXISCAL 1 LINUXCNC SWIVEL-HEAD HEAD 0A1B2C3D4E5F N202 U1`, then `P N1 S1 X… K…` for each touch, then `E N202`.
+//! `H AXISCAL 1 LINUXCNC SWIVEL-HEAD HEAD 0A1B2C3D4E5F MM N202 U1`, then `P N1 S1 X… K…` for each touch, then `E N202`.
 //! Capitals, digits, signs, points and blanks only: every control can write that.
 
-use super::as_written::EndOfLine;
-use super::{Frame, Postprocessor, spelling::name_of};
+use super::as_written::{EndOfLine, LengthUnit, Padding};
+use super::{Frame, LogRule, Postprocessor, spelling::name_of};
 use crate::axes::{AxisName, Position};
 use crate::diag::Result;
 use crate::log::Status;
 use crate::machine::Machine;
 use crate::program::plan::{ControllerFrame, Plan};
+use crate::units::inch_from_mm;
 use minijinja::context;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -57,11 +58,15 @@ pub(crate) fn log_word(name: &str) -> String {
 /// The head line up to and with the `U` whose number is the first set-up of the run.
 pub(super) fn head(post: &Postprocessor, plan: &Plan) -> String {
     format!(
-        "H AXISCAL {VERSION} {} {} {} {} N{} U",
+        "H AXISCAL {VERSION} {} {} {} {} {} N{} U",
         log_word(&post.name),
         log_word(&plan.machine),
         log_word(&plan.program),
         digest(plan),
+        match post.log.unit {
+            LengthUnit::Mm => "MM",
+            LengthUnit::Inch => "INCH",
+        },
         plan.touches.len()
     )
 }
@@ -86,27 +91,24 @@ impl Postprocessor {
     #[must_use]
     pub fn log_text(&self, machine: &Machine, plan: &Plan, records: &[LogRecord]) -> String {
         let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();
-        let number = |value: f64| {
-            let text = format!("{value:.*}", self.log.decimals);
-            let zero = text.starts_with('-') && !text.bytes().any(|b| (b'1'..=b'9').contains(&b));
-            let text = if zero { text[1..].to_owned() } else { text };
-            if self.log.mark == b',' { text.replace('.', ",") } else { text }
-        };
         let mut lines = vec![format!("{}1", head(self, plan))];
         for record in records {
             let length = plan.touch(record.id).and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
             let frame = Frame::new(machine, plan.controller_frame, length);
-            let shown = frame.controller_from_axes(&record.position);
+            let mut shown = frame.controller_from_axes(&record.position);
+            if self.log.unit == LengthUnit::Inch {
+                shown = shown.with_xyz_mm(shown.xyz_mm().map(inch_from_mm));
+            }
             let status = i32::from(record.status == Status::Hit);
             let mut line = format!("P N{} S{status}", record.id);
             for axis in &axes {
                 // writing into a String cannot fail
-                let _ = write!(line, " {axis}{}", number(shown.get(*axis)));
+                let _ = write!(line, " {axis}{}", self.log.number(shown.get(*axis)));
             }
             if let Some(letter) = self.log.check_word {
                 // ids are small: a double holds them
                 let sum = record.id as f64 + f64::from(status) + axes.iter().map(|a| shown.get(*a)).sum::<f64>();
-                let _ = write!(line, " {}{}", letter as char, number(sum));
+                let _ = write!(line, " {}{}", letter as char, self.log.number(sum));
             }
             lines.push(line);
         }
@@ -116,6 +118,50 @@ impl Postprocessor {
             Some(EndOfLine::Cr) => "\r",
             _ => "\n",
         };
-        lines.iter().flat_map(|line| [line.as_str(), eol]).collect()
+        lines.iter().flat_map(|line| [self.log.prefix.as_str(), line, eol]).collect()
+    }
+}
+
+impl LogRule {
+    /// A number as the control writes it into its log: rounded, padded, with its mark; never `-0`.
+    #[must_use]
+    pub fn number(&self, value: f64) -> String {
+        let mut digits = format!("{:.*}", self.decimals, value.abs());
+        let negative = value < 0.0 && digits.bytes().any(|b| (b'1'..=b'9').contains(&b));
+        if self.mark == b',' {
+            digits = digits.replace('.', ",");
+        }
+        let whole = digits.find(['.', ',']).unwrap_or(digits.len());
+        let sign = if negative { "-" } else { "" };
+        match self.padding {
+            _ if self.whole_places == 0 => format!("{sign}{digits}"),
+            Padding::BeforeSign => {
+                let blanks = self.whole_places.saturating_sub(whole + sign.len());
+                format!("{:blanks$}{sign}{digits}", "")
+            }
+            Padding::AfterSign => {
+                let (blanks, sign) = (self.whole_places.saturating_sub(whole), if negative { "-" } else { " " });
+                format!("{sign}{:blanks$}{digits}", "")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_padded_as_the_control_does() {
+        let mut rule = LogRule { decimals: 3, ..Postprocessor::load_built_in_or_file("linuxcnc").unwrap().0.log };
+        assert_eq!((rule.number(-1.5), rule.number(-0.0001)), ("-1.500".into(), "0.000".into()));
+        rule.whole_places = 5;
+        assert_eq!((rule.number(128.47398), rule.number(-91.2)), ("  128.474".into(), "  -91.200".into()));
+        assert_eq!(rule.number(-1_234_567.0), "-1234567.000");
+        rule.padding = Padding::AfterSign;
+        // the example of controllers' manuals for DPRNT[X#2[53]Y#5[53]]
+        assert_eq!((rule.number(128.47398), rule.number(-91.2)), ("   128.474".into(), "-   91.200".into()));
+        rule.mark = b',';
+        assert_eq!(rule.number(0.25), "     0,250");
     }
 }

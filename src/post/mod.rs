@@ -8,14 +8,15 @@ pub mod as_written;
 mod check;
 mod emit;
 mod frame;
+mod inherit;
 mod log_text;
 mod moves;
 mod opening;
 mod spelling;
 
 pub use as_written::DialectName;
-pub use check::parse;
-pub use emit::NcProgram;
+pub use inherit::parse_alone as parse;
+pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use log_text::{LogRecord, digest};
 pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
@@ -23,12 +24,20 @@ pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, source};
-use as_written::{EndOfLine, Role};
+use as_written::{BlockNumbers, Coordinates, EndOfLine, LengthUnit, Padding, Role};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The postprocessors that are built in: file name, text.
-pub const BUILT_IN: [(&str, &str); 1] = [("linuxcnc.toml", include_str!("../../postprocessors/linuxcnc.toml"))];
+pub const BUILT_IN: [(&str, &str); 7] = [
+    ("linuxcnc.toml", include_str!("../../postprocessors/linuxcnc.toml")),
+    ("sinumerik.toml", include_str!("../../postprocessors/sinumerik.toml")),
+    ("fanuc.toml", include_str!("../../postprocessors/fanuc.toml")),
+    ("heidenhain.toml", include_str!("../../postprocessors/heidenhain.toml")),
+    ("haas.toml", include_str!("../../postprocessors/haas.toml")),
+    ("fanuc-inspection-plus.toml", include_str!("../../postprocessors/fanuc-inspection-plus.toml")),
+    ("haas-inspection-plus.toml", include_str!("../../postprocessors/haas-inspection-plus.toml")),
+];
 
 /// A checked postprocessor.
 #[derive(Debug, Clone)]
@@ -43,6 +52,20 @@ pub struct Postprocessor {
     pub end_of_line: EndOfLine,
     /// The longest line that the control takes, characters.
     pub line_length: usize,
+    /// Empty lines stay.
+    pub blank_lines: bool,
+    /// A running number before each line.
+    pub block_numbers: Option<BlockNumbers>,
+    /// The controller that it completes itself from.
+    pub based_on: Option<String>,
+    /// Characters of names at the control, and what stands for others.
+    pub name_characters: (String, String),
+    /// The highest number of a label.
+    pub last_label: Option<usize>,
+    /// Files beside the program: what each is for.
+    pub companions: Vec<String>,
+    /// Which coordinates the words of a program are (not under a transformation).
+    pub coordinates: Coordinates,
     /// Numbers and axis words.
     pub number: NumberRule,
     /// Remarks and messages.
@@ -71,6 +94,8 @@ pub struct Tcp {
     pub rotary_step_deg: f64,
     /// What must be switched on at the control.
     pub says: String,
+    /// A program under the transformation can take up another stylus in the middle.
+    pub other_stylus: bool,
 }
 
 /// How a program is read back.
@@ -99,6 +124,20 @@ pub struct LogRule {
     pub exact_decimals: bool,
     /// `.` or `,`
     pub mark: u8,
+    /// The other one, where a setting of the control chooses.
+    pub other_mark: Option<u8>,
+    /// What X, Y and Z are in.
+    pub unit: LengthUnit,
+    /// Places before the mark that are filled with blanks.
+    pub whole_places: usize,
+    /// Where the blanks stand.
+    pub padding: Padding,
+    /// Before each line.
+    pub prefix: String,
+    /// Beginnings of lines that are the control's own.
+    pub skip: Vec<String>,
+    /// Letter of the word with the time, s since the program began.
+    pub time_word: Option<u8>,
     /// Letter of the word with the sum of all other numbers of the line: it shows a damaged digit.
     pub check_word: Option<u8>,
     /// A file of nothing but columns.
@@ -142,10 +181,10 @@ impl Postprocessor {
     ///
     /// # Errors
     /// When there is none of that name, or the file is unusable; the message lists what there is.
-    pub fn load(word: &str, read: impl FnOnce(&Path) -> Result<String>) -> Result<(Self, Vec<Finding>)> {
-        if word.ends_with(".toml") || word.contains(['/', '\\']) {
+    pub fn load(word: &str, read: impl Fn(&Path) -> Result<String>) -> Result<(Self, Vec<Finding>)> {
+        if inherit::is_file(word) {
             let text = read(Path::new(word))?;
-            return parse(&source(word, text)).map(|(post, findings)| (post, findings.0));
+            return inherit::parse(&source(word, text), &read).map(|(post, findings)| (post, findings.0));
         }
         let all = Self::built_in()?;
         let names: Vec<String> = all.iter().map(|p| p.name.clone()).collect();

@@ -1,6 +1,7 @@
 //! Axis words of moves, in the control's own coordinates: what a move must name, and turns in steps under a
 //! transformation.
 
+use super::as_written::Coordinates;
 use super::emit::Writer;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
@@ -9,13 +10,42 @@ use minijinja::{Value, context};
 /// Under a transformation no axis is sent nearer to the end of its range than this, mm.
 const LIMIT_ROOM_MM: f64 = 1e-4;
 
+/// An angle of an axis that counts from 0 to 360 only: 0 that is reached in the negative sense is 360.
+fn turned(deg: f64, sense: f64) -> f64 {
+    let rest = deg.rem_euclid(360.0);
+    let is_zero = rest.min(360.0 - rest) < 1e-9;
+    match (is_zero, sense < 0.0) {
+        (false, _) => rest,
+        (true, true) => 360.0,
+        (true, false) => 0.0,
+    }
+}
+
 impl Writer<'_> {
     pub(super) fn number(&self, value: f64) -> String {
         self.post.number.number(value)
     }
 
-    /// Axis words of a template: `{ axis, value, word, rotary }`.
+    /// A place of an axis as the program's words name it: from the origin of R, or the control's own machine coordinate.
+    pub(super) fn shown(&self, axis: AxisName, value: f64) -> f64 {
+        match self.post.coordinates {
+            Coordinates::Machine if !self.frame.is_tcp() => value + self.machine.origin.get(axis).unwrap_or(0.0),
+            _ => value,
+        }
+    }
+
+    /// A length or a feed, mm or mm/min.
+    pub(super) fn length(&self, mm: f64) -> String {
+        self.post.number.length(mm)
+    }
+
+    /// Axis words of a template: `{ axis, name, value, word, rotary, sense, turned, by }`.
     pub(super) fn words(&self, to: &AxisMap) -> Result<Value> {
+        self.words_by(to, &AxisMap::default())
+    }
+
+    /// The same with the sense (+1, -1) in which rotary axes must go.
+    pub(super) fn words_by(&self, to: &AxisMap, senses: &AxisMap) -> Result<Value> {
         let mut words = Vec::new();
         for (axis, value) in to.iter() {
             if !value.is_finite() {
@@ -24,11 +54,16 @@ impl Writer<'_> {
             if self.machine.axis(axis).is_none() {
                 return Err(self.broken(format!("axis {axis} is moved, which machine {} lacks", self.machine.name)));
             }
+            let value = self.shown(axis, value);
             words.push(context! {
                 axis => axis.to_string(),
-                value => self.number(value),
+                name => self.post.number.name(axis),
+                value => self.post.number.position(axis, value),
                 word => self.post.number.axis_word(axis, value),
                 rotary => axis.is_rotary(),
+                sense => senses.get(axis).map_or("", |s| if s < 0.0 { "-" } else { "+" }),
+                by => self.at.get(axis).map_or(String::new(), |at| self.post.number.position(axis, value - self.shown(axis, at))),
+                turned => self.number(turned(value, senses.get(axis).unwrap_or(1.0))),
             });
         }
         Ok(Value::from(words))

@@ -74,11 +74,17 @@ impl Writer<'_> {
             )
             .help("describe it under [write.stop] in the postprocessor file, or make a program with one mounting and stylus"));
         }
+        let changes = stop.tool_length_mm.to_bits() != self.frame.length_mm().to_bits();
+        if self.frame.is_tcp() && changes && self.post.tcp.as_ref().is_some_and(|tcp| !tcp.other_stylus) {
+            let message = format!("under its transformation controller {} cannot take up another stylus in the middle of a program", self.post.name);
+            return Err(Failure::new("post::other_stylus", message)
+                .help("make a program for each stylus, or generate without --tcp"));
+        }
         self.mounted.clone_from(&stop.mounted);
         // all rotary axes stand at 0, where the control's coordinates are the same for every length
         self.frame = Frame::new(self.machine, self.plan.controller_frame, stop.tool_length_mm);
-        let longer = self.number(stop.tool_length_mm - self.plan.tool_length_mm);
-        let origin_z = self.number(self.machine.origin.get(AxisName::Z).unwrap_or(0.0));
+        let longer = self.length(stop.tool_length_mm - self.plan.tool_length_mm);
+        let origin_z = self.length(self.machine.origin.get(AxisName::Z).unwrap_or(0.0));
         self.render("stop", context! { says => stop.says.clone(), longer, origin_z })
     }
 
@@ -97,25 +103,26 @@ impl Writer<'_> {
         if self.frame.is_tcp() && self.frame.length_mm().to_bits() != self.plan.tool_length_mm.to_bits() {
             return Ok(None);
         }
-        let (mut stands, mut places) = (opening, Vec::new());
+        let (mut stands, mut places): (_, Vec<(AxisMap, AxisMap)>) = (opening, Vec::new());
         for step in way {
             match step {
-                Step::Rotary { to, .. } => {
-                    places.extend(self.rotary_steps(&stands, to)?);
+                Step::Rotary { to, sense } => {
+                    places.extend(self.rotary_steps(&stands, to)?.into_iter().map(|place| (place, *sense)));
                     stands = to.or(&stands);
                 }
                 Step::Rapid { to } => {
                     stands = to.or(&stands);
-                    places.push(if self.frame.is_tcp() {
+                    let place = if self.frame.is_tcp() {
                         let world = self.controller(&stands);
                         AxisMap::xyz(world.0[0], world.0[1], world.0[2])
                     } else {
                         *to
-                    });
+                    };
+                    places.push((place, AxisMap::default()));
                 }
                 _ => return Err(self.broken("the way to a set-up holds more than rapids and turns".into())),
             }
         }
-        Ok(Some(places.iter().map(|place| self.words(place)).collect::<Result<_>>()?))
+        Ok(Some(places.iter().map(|(place, sense)| self.words_by(place, sense)).collect::<Result<_>>()?))
     }
 }

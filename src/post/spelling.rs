@@ -1,6 +1,8 @@
 //! How one control spells numbers, axis words, remarks and names. Pure functions over the checked data.
 
+use super::as_written::LengthUnit;
 use crate::axes::{AxisMap, AxisName};
+use crate::units::inch_from_mm;
 use std::collections::BTreeMap;
 
 /// How numbers and axis words are written.
@@ -18,6 +20,12 @@ pub struct NumberRule {
     pub mark: char,
     /// `{axis}{value}`
     pub word: String,
+    /// What lengths are in.
+    pub unit: LengthUnit,
+    /// What the control calls an axis, where that is not its letter.
+    pub names: BTreeMap<AxisName, String>,
+    /// The number of an axis at the control, where it is not its place among the machine's axes.
+    pub numbers: BTreeMap<AxisName, usize>,
 }
 
 impl NumberRule {
@@ -44,10 +52,31 @@ impl NumberRule {
         if self.mark == '.' { text } else { text.replace('.', &self.mark.to_string()) }
     }
 
+    /// A length (or a feed) in the control's unit, from mm.
+    #[must_use]
+    pub fn length(&self, mm: f64) -> String {
+        self.number(match self.unit {
+            LengthUnit::Mm => mm,
+            LengthUnit::Inch => inch_from_mm(mm),
+        })
+    }
+
+    /// A position of an axis, from mm or deg.
+    #[must_use]
+    pub fn position(&self, axis: AxisName, value: f64) -> String {
+        if axis.is_rotary() { self.number(value) } else { self.length(value) }
+    }
+
+    /// What the control calls an axis.
+    #[must_use]
+    pub fn name(&self, axis: AxisName) -> String {
+        self.names.get(&axis).cloned().unwrap_or_else(|| axis.to_string())
+    }
+
     /// An axis word, e.g. `X-33.5`.
     #[must_use]
     pub fn axis_word(&self, axis: AxisName, value: f64) -> String {
-        self.word.replace("{axis}", &axis.to_string()).replace("{value}", &self.number(value))
+        self.word.replace("{axis}", &self.name(axis)).replace("{value}", &self.position(axis, value))
     }
 
     /// The axes whose words differ between two places: those that a move from one to the other must name.
@@ -55,7 +84,7 @@ impl NumberRule {
     pub fn moved(&self, from: &AxisMap, to: &AxisMap) -> AxisMap {
         let mut moved = AxisMap::default();
         for (axis, value) in to.iter() {
-            if from.get(axis).is_none_or(|old| self.number(old) != self.number(value)) {
+            if from.get(axis).is_none_or(|old| self.position(axis, old) != self.position(axis, value)) {
                 moved.set(axis, value);
             }
         }
@@ -72,6 +101,8 @@ pub struct CommentRule {
     pub close: String,
     /// Longer remarks go on in the next line, characters.
     pub width: usize,
+    /// The longest message to the operator that is shown whole, characters.
+    pub message_width: Option<usize>,
     /// Replaced characters.
     pub replace: BTreeMap<char, String>,
     /// For a character outside printable ASCII.
@@ -165,6 +196,9 @@ mod tests {
             plus: false,
             mark: '.',
             word: "{axis}{value}".into(),
+            unit: LengthUnit::Mm,
+            names: BTreeMap::new(),
+            numbers: BTreeMap::new(),
         }
     }
 
@@ -190,6 +224,7 @@ mod tests {
             open: "(".into(),
             close: ")".into(),
             width: 20,
+            message_width: None,
             replace: BTreeMap::from([('(', "[".into()), (')', "]".into())]),
             other: "?".into(),
             capitals: false,
