@@ -571,7 +571,8 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
     let stuck = branch.deviation == Deviation::Stuck;
     let moves = branch.trace.iter().skip(1).find(|h| match &h.event {
         Event::Move { from, to, .. } => !(stuck && goes_back(branch, from, to)),
-        Event::Probe { probe, .. } => !(stuck && goes_back(branch, &probe.from, &probe.to)),
+        // with the probe deflected a search ends where it begins
+        Event::Probe { probe, outcome } => !(stuck && (outcome.part == 0.0 || goes_back(branch, &probe.from, &probe.to))),
         _ => false,
     });
     if let Some(moves) = moves {
@@ -619,10 +620,13 @@ fn settings_return(case: &Case<'_>, told: &Told, said: &mut Said) {
     }
     let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
     compare_settings(case, &told.settings[0], &told.settings[1], &end, "at the end", said);
+    let kept = case.post.check.as_ref().map(|c| c.after_abort.as_slice()).unwrap_or_default();
     for (place, after) in &told.aborted {
         let at = told.trunk.get(*place).map_or(0..0, |h| h.at.clone());
         let what = "broken off here by hand, then started once more to give the settings back";
-        compare_settings(case, &told.settings[0], after, &at, what, said);
+        let after: BTreeMap<String, String> =
+            after.iter().filter(|(name, _)| kept.contains(name)).map(|(n, v)| (n.clone(), v.clone())).collect();
+        compare_settings(case, &told.settings[0], &after, &at, what, said);
     }
 }
 

@@ -1,10 +1,6 @@
 //! What the grammars of all dialects share: lines with their places, numbers, and how a nom error becomes a finding.
 
 use super::run::Fault;
-use nom::branch::alt;
-use nom::bytes::complete::tag;
-use nom::character::complete::{digit0, digit1, one_of};
-use nom::combinator::{opt, recognize};
 use nom::{IResult, Parser};
 use std::ops::Range;
 
@@ -73,14 +69,24 @@ pub fn blanks(input: &str) -> IResult<&str, &str> {
 
 /// A number without exponent: value, and whether it has a decimal point.
 pub fn number(input: &str) -> IResult<&str, (f64, bool)> {
-    let (rest, text) = recognize((
-        opt(one_of("+-")),
-        alt((recognize((digit1, opt((tag("."), digit0)))), recognize((tag("."), digit1)))),
-    ))
-    .parse(input)?;
-    // what the grammar lets through is a number
-    let value = text.parse().map_err(|_| nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Float)))?;
-    Ok((rest, (value, text.contains('.'))))
+    let digits = |s: &str| s.bytes().take_while(u8::is_ascii_digit).count();
+    let bad = || nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Float));
+    let sign = usize::from(input.starts_with(['+', '-']));
+    let whole = digits(&input[sign..]);
+    let mut end = sign + whole;
+    let point = input[end..].starts_with('.');
+    if point {
+        let decimals = digits(&input[end + 1..]);
+        if whole + decimals == 0 {
+            return Err(bad());
+        }
+        end += 1 + decimals;
+    } else if whole == 0 {
+        return Err(bad());
+    }
+    let (text, rest) = input.split_at(end);
+    let value = text.parse().map_err(|_| bad())?;
+    Ok((rest, (value, point)))
 }
 
 /// A number without a sign.
@@ -89,4 +95,27 @@ pub fn unsigned(input: &str) -> IResult<&str, (f64, bool)> {
         return Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Digit)));
     }
     number(input)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_end_where_they_end() {
+        assert_eq!(number("92.2"), Ok(("", (92.2, true))));
+        assert_eq!(number("-1.X2"), Ok(("X2", (-1.0, true))));
+        assert_eq!(number("+.5.5"), Ok((".5", (0.5, true))));
+        assert_eq!(number("10 "), Ok((" ", (10.0, false))));
+        for bad in ["", "-", ".", "X", "-.", "+-1"] {
+            assert!(number(bad).is_err(), "{bad}");
+        }
+        assert!(unsigned("-1").is_err());
+    }
+
+    #[test]
+    fn lines_know_where_they_begin() {
+        let all: Vec<_> = lines("a\r\nbc\n\nd").map(|l| (l.start, l.text)).collect();
+        assert_eq!(all, [(0, "a"), (3, "bc"), (6, ""), (7, "d")]);
+    }
 }

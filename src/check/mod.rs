@@ -13,6 +13,7 @@ mod code;
 mod explore;
 mod judge;
 mod lines;
+mod macro_b;
 mod ngc;
 mod proof;
 mod run;

@@ -3,7 +3,7 @@
 
 use super::code::{Code, Expr, Var, What};
 use super::explore::{Limits, Told, explore};
-use super::ngc;
+use super::{macro_b, ngc};
 use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
 use super::world::World;
@@ -36,6 +36,7 @@ impl Program {
     pub fn parse(rule: &CheckRule, text: &str) -> Result<Self, Fault> {
         let code = match rule.dialect {
             DialectName::Ngc => ngc::parse(text)?,
+            DialectName::MacroB => macro_b::parse(text)?,
         };
         let var = variable(&rule.from);
         let set_at = code.statements.iter().position(|s| matches!(&s.what, What::Set(v, Expr::Number(_)) if *v == var));
@@ -122,6 +123,7 @@ pub fn all(
 ) -> All {
     match program.dialect {
         DialectName::Ngc => Runs::<ngc::Ngc>::new(machine, post, plan, program, world, scenes).all(),
+        DialectName::MacroB => Runs::<macro_b::MacroB>::new(machine, post, plan, program, world, scenes).all(),
     }
 }
 

@@ -425,6 +425,12 @@ pub struct Check {
     /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
     #[schemars(with = "String")]
     pub from: Spanned<String>,
+    /// The control logs to a device that is always there: the program neither names nor opens a log.
+    #[serde(default)]
+    pub log_always_open: bool,
+    /// Settings that a run behind the last set-up gives back after a person has broken the program off.
+    #[serde(default)]
+    pub after_abort: Vec<String>,
     /// Settings of the control that the program leaves changed, by the names that `check` gives them.
     #[serde(default)]
     pub leaves: Vec<String>,
@@ -440,6 +446,8 @@ pub struct Check {
 pub enum DialectName {
     /// LinuxCNC: RS274/NGC with O-words.
     Ngc,
+    /// Fanuc, Haas: custom macro B.
+    MacroB,
 }
 
 /// The axis of a letter, if axiscal knows it.

@@ -105,6 +105,10 @@ pub struct CheckRule {
     pub dialect: DialectName,
     /// The variable that says at which set-up the program begins.
     pub from: String,
+    /// The program neither names nor opens a log.
+    pub log_always_open: bool,
+    /// Settings that a run behind the last set-up gives back after the program was broken off.
+    pub after_abort: Vec<String>,
     /// Settings that the program leaves changed.
     pub leaves: Vec<String>,
 }

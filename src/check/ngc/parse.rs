@@ -450,7 +450,7 @@ mod tests {
     fn what_is_not_known_is_an_error_with_its_place() {
         for (text, place) in [
             ("G0 X1 K3\n", 6),
-            ("G0 X1..5\n", 7),
+            ("G0 X1..5\n", 6),
             ("G0 X\n", 4),
             ("(a (b))\n", 3),
             ("o1 if [1 GT]\no1 endif\n", 11),
