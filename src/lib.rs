@@ -13,6 +13,7 @@ pub mod geometry;
 pub mod symbols;
 pub mod units;
 
+pub mod check;
 pub mod cli;
 pub mod compare;
 pub mod design;
@@ -31,5 +32,5 @@ pub mod search;
 pub mod simulate;
 pub mod study;
 pub mod tables;
-pub mod workbench;
 pub mod view;
+pub mod workbench;

@@ -4,7 +4,8 @@ use super::common::MachineArgs;
 use super::new::default_effects;
 use super::{Answer, Io};
 use crate::axes::AxisMap;
-use crate::diag::{Failure, Finding, Result, source};
+use crate::check::{self, Against};
+use crate::diag::{Failure, Finding, Result, Severity, source};
 use crate::files;
 use crate::fit;
 use crate::log::{Status, Touch};
@@ -13,12 +14,13 @@ use crate::model::catalogue::Catalogue;
 use crate::model::data::{Run, assemble};
 use crate::post::Postprocessor;
 use crate::program::path::{Step, Stop};
-use crate::program::plan::Plan;
+use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
 use crate::tables::linuxcnc;
 use comfy_table::Cell;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `generate`.
@@ -93,6 +95,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for (file, _) in &files {
         keep_inputs(file, own.into_iter().flatten())?;
     }
+    let name = format!("{}.{}", spec.name, nc.extension);
+    let proof = prove(&machine, &post, &generated.plan, &name, &nc.text, io)?;
+    // the same touches for another control: what was proven of its program stays known
+    if let Some(old) = old_programs(&plan_file, &generated.plan) {
+        generated.plan.programs = old;
+    }
+    generated.plan.programs.extend(proof.map(|p| (post.name.clone(), p)));
     files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
     for (file, text) in &files {
         files::write_whole(file, text.as_bytes())?;
@@ -100,6 +109,48 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
     summary(&machine, &post, &generated, (&written, &plan_file), io);
     Ok(Answer::Done)
+}
+
+/// Reads the program back and proves it: what cannot be proven is not written.
+///
+/// # Errors
+/// When the program holds anything that `check` refuses.
+pub(super) fn prove(
+    machine: &Machine,
+    post: &Postprocessor,
+    plan: &Plan,
+    name: &str,
+    text: &str,
+    io: &Io,
+) -> Result<Option<Proof>> {
+    if post.check.is_none() {
+        let what = format!(
+            "controller {} does not say how its programs are read back: the program was not checked",
+            post.name
+        );
+        io.report(&[Finding::warning("check::no_dialect", what)
+            .help("write [check] in the postprocessor file: docs/guide/check.md")]);
+        return Ok(None);
+    }
+    let against = Against { plan: Some(plan), ..Against::default() };
+    let checked = check::check(machine, post, &source(format!("{name} (not written)"), text), &against)?;
+    if checked.findings.iter().any(|f| f.severity == Severity::Error) {
+        let mut findings = checked.findings;
+        findings.push(
+            Finding::error("check::refused", format!("{name} cannot be proven safe: no file was written"))
+                .help("a template of the postprocessor file was changed? otherwise report it with machine, program and postprocessor"),
+        );
+        return Err(Failure(findings));
+    }
+    Ok(Some(checked.proof))
+}
+
+/// What was proven of other programs for the same plan.
+fn old_programs(file: &Path, plan: &Plan) -> Option<BTreeMap<String, Proof>> {
+    let text = files::read_text(file).ok()?;
+    let (old, _) = Plan::parse(&source(file.display().to_string(), text)).ok()?;
+    let same = Plan { programs: BTreeMap::new(), ..old.clone() }.to_json() == plan.to_json();
+    same.then_some(old.programs)
 }
 
 /// Location errors that the whole program could tell, with blocks of unknown set-up, and the touches that are left cannot.

@@ -5,6 +5,7 @@
 
 mod add;
 mod assess;
+mod check;
 mod common;
 mod compare;
 mod completions;
@@ -28,8 +29,8 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
-mod workbench;
 pub mod view;
+mod workbench;
 
 pub use common::{Answer, Io};
 
@@ -63,6 +64,8 @@ enum Verb {
     Assess(assess::Args),
     /// Write an NC probing program and its plan
     Generate(generate::Args),
+    /// Read an NC program back, run it on the virtual machine: limits, collisions, unguarded moves, touches, settings
+    Check(check::Args),
     /// The virtual machine: write the log that the controller would have written
     Simulate(simulate::Args),
     /// Read a controller's log into a touches CSV
@@ -135,6 +138,7 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::Programs(args) => programs::run(&args, io),
         Verb::Assess(args) => assess::run(&args, io),
         Verb::Generate(args) => generate::run(&args, io),
+        Verb::Check(args) => check::run(&args, io),
         Verb::Simulate(args) => simulate::run(&args, io),
         Verb::Parse(args) => parse::run(&args, io),
         Verb::Reproduce(args) => reproduce::run(&args, io),

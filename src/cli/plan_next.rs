@@ -348,7 +348,11 @@ fn write(
     io.report(&nc.findings.0);
     let program_file = args.out.join(format!("{}.{}", plan.program, nc.extension));
     let form_file = args.out.join(format!("{}.toml", plan.program));
-    files::write_whole(plan_file, plan.to_json().as_bytes())?;
+    let name = format!("{}.{}", plan.program, nc.extension);
+    let proof = super::generate::prove(&loaded.machine, post, plan, &name, &nc.text, io)?;
+    let mut proven = plan.clone();
+    proven.programs.extend(proof.map(|p| (post.name.clone(), p)));
+    files::write_whole(plan_file, proven.to_json().as_bytes())?;
     files::write_whole(&form_file, chosen.text.as_bytes())?;
     for (name, text) in nc.files(&plan.program) {
         files::write_whole(&args.out.join(name), text.as_bytes())?;

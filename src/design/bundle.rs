@@ -222,6 +222,7 @@ pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_
         touches,
         skipped: Vec::new(),
         notes: Vec::new(),
+        programs: std::collections::BTreeMap::new(),
     }
 }
 

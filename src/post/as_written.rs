@@ -35,6 +35,8 @@ pub struct File {
     pub result: ResultPlaces,
     /// The templates.
     pub write: Write,
+    /// How `check` reads a program back; absent: it cannot.
+    pub check: Option<Check>,
     /// Pieces of templates by name, for `{% include "NAME" %}`.
     #[serde(default)]
     pub parts: BTreeMap<String, Entry>,
@@ -414,6 +416,40 @@ pub enum Role {
     Release,
     /// The slow touch that is measured.
     Measure,
+}
+
+/// How a program is read back.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    /// The grammar.
+    pub dialect: DialectName,
+    /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
+    #[schemars(with = "String")]
+    pub from: Spanned<String>,
+    /// The control logs to a device that is always there: the program neither names nor opens a log.
+    #[serde(default)]
+    pub log_always_open: bool,
+    /// Settings that a run behind the last set-up gives back after a person has broken the program off.
+    #[serde(default)]
+    pub after_abort: Vec<String>,
+    /// Settings of the control that the program leaves changed, by the names that `check` gives them.
+    #[serde(default)]
+    pub leaves: Vec<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// The grammar of a control's programs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DialectName {
+    /// LinuxCNC: RS274/NGC with O-words.
+    Ngc,
+    /// Fanuc, Haas: custom macro B.
+    MacroB,
 }
 
 /// The axis of a letter, if axiscal knows it.

@@ -1,7 +1,7 @@
 //! From a postprocessor file as written to a [`Postprocessor`] that can be relied on; all findings at once.
 
 use super::as_written::{self as w, Entry, axis_of};
-use super::{ColumnRule, CommentRule, LogRule, NumberRule, Postprocessor, Tcp};
+use super::{CheckRule, ColumnRule, CommentRule, LogRule, NumberRule, Postprocessor, Tcp};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use minijinja::{Environment, State, UndefinedBehavior, context, syntax::SyntaxConfig};
@@ -43,6 +43,17 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     if let Some(tables) = &file.tables {
         super::tables::check(&mut check, tables);
     }
+    let reading = file.check.as_ref().map(|c| {
+        check.origin("check", &c.source, &c.unverified, &c.from.span());
+        check.word("from", &c.from, |f| !f.trim().is_empty(), "the variable that the program sets to 1 near its top");
+        CheckRule {
+            dialect: c.dialect,
+            from: c.from.get_ref().clone(),
+            leaves: c.leaves.clone(),
+            after_abort: c.after_abort.clone(),
+            log_always_open: c.log_always_open,
+        }
+    });
     let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {
         name: file.name.get_ref().clone(),
@@ -62,6 +73,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         settings: file.settings.clone(),
         result,
         tcp,
+        check: reading,
         log,
         unverified: std::mem::take(&mut check.unverified),
         tables: file.tables.clone(),

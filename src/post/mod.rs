@@ -15,6 +15,7 @@ mod opening;
 mod spelling;
 pub mod tables;
 
+pub use as_written::DialectName;
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
@@ -76,6 +77,8 @@ pub struct Postprocessor {
     pub result: BTreeMap<AxisName, String>,
     /// The control's own transformation.
     pub tcp: Option<Tcp>,
+    /// How its programs are read back.
+    pub check: Option<CheckRule>,
     /// How its log is called and read.
     pub log: LogRule,
     /// Entries that nobody has verified: name of the entry, why.
@@ -96,6 +99,21 @@ pub struct Tcp {
     pub says: String,
     /// A program under the transformation can take up another stylus in the middle.
     pub other_stylus: bool,
+}
+
+/// How a program is read back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckRule {
+    /// The grammar.
+    pub dialect: DialectName,
+    /// The variable that says at which set-up the program begins.
+    pub from: String,
+    /// The program neither names nor opens a log.
+    pub log_always_open: bool,
+    /// Settings that a run behind the last set-up gives back after the program was broken off.
+    pub after_abort: Vec<String>,
+    /// Settings that the program leaves changed.
+    pub leaves: Vec<String>,
 }
 
 /// How a log is called and read.

@@ -74,5 +74,6 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
         touches,
         skipped: Vec::new(),
         notes: Vec::new(),
+        programs: std::collections::BTreeMap::new(),
     })
 }

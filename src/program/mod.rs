@@ -128,6 +128,7 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
         touches: routed.touches,
         skipped: routed.skipped,
         notes,
+        programs: std::collections::BTreeMap::new(),
     };
     let generated = Generated { plan, path: routed.path };
     let violations = verify(machine, &generated.plan, &generated.path)?;

@@ -3,6 +3,7 @@
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Finding, Findings, Result, Source, from_json};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The format line of a plan.
 pub const FORMAT: &str = "axiscal-plan/1";
@@ -42,6 +43,19 @@ pub struct Plan {
     /// What was lost by leaving touches out, and other remarks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+    /// What the programs do that were written for this plan, by controller: `check` shows whether one was changed.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub programs: BTreeMap<String, Proof>,
+}
+
+/// What a program does, as [`crate::check`] has found it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Proof {
+    /// Digest of everything that it does: moves, log, messages, and what it does when something goes wrong.
+    pub sha256: String,
+    /// Of what happens up to each line of the log, the run from the beginning only: the first eight digits. They show
+    /// where a program was changed.
+    pub lines: Vec<String>,
 }
 
 /// What the controller's coordinates mean.

@@ -13,6 +13,7 @@ pub mod catalogue;
 mod chain;
 mod contact;
 pub mod control;
+mod errorless;
 mod noise;
 mod own;
 mod prepare;
@@ -26,6 +27,7 @@ mod written;
 mod tests;
 
 pub use control::Compensation;
+pub use errorless::{Errorless, Met};
 pub use scenario::Scenario;
 
 use crate::diag::{Finding, Findings, Result};

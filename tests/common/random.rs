@@ -79,5 +79,6 @@ pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng
         touches,
         skipped: Vec::new(),
         notes: Vec::new(),
+        programs: std::collections::BTreeMap::new(),
     }
 }

@@ -51,6 +51,7 @@ pub fn empty_plan(machine: &Machine, mounting: &str) -> Plan {
         touches: Vec::new(),
         skipped: Vec::new(),
         notes: Vec::new(),
+        programs: std::collections::BTreeMap::new(),
     }
 }
 

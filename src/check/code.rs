@@ -1,0 +1,268 @@
+//! A program as all dialects give it to the one interpreter: statements in a row, jumps by place, expressions as trees.
+//!
+//! What a word, a variable or a G number *means* is not here: that is the dialect's (`run::Dialect`).
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A variable of the control.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Var {
+    /// `#5061`, `Q115`
+    Number(u32),
+    /// `#<_axiscal_from>`, `$AA_MM[X]`, `AXC_LINE`
+    Name(Arc<str>),
+}
+
+impl std::fmt::Display for Var {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(n) => write!(f, "#{n}"),
+            Self::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+/// An operation of two numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Op {
+    /// Sum.
+    Add,
+    /// Difference.
+    Sub,
+    /// Product.
+    Mul,
+    /// Quotient.
+    Div,
+    /// Remainder.
+    Mod,
+    /// Power.
+    Pow,
+    /// Equal.
+    Eq,
+    /// Not equal.
+    Ne,
+    /// Greater.
+    Gt,
+    /// Greater or equal.
+    Ge,
+    /// Less.
+    Lt,
+    /// Less or equal.
+    Le,
+    /// Both.
+    And,
+    /// At least one.
+    Or,
+    /// Exactly one.
+    Xor,
+}
+
+/// A function of one number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Function {
+    /// Without its sign.
+    Abs,
+    /// Square root.
+    Sqrt,
+    /// Next whole number below.
+    Floor,
+    /// Next whole number above.
+    Ceil,
+    /// Nearest whole number.
+    Round,
+    /// Whole part.
+    Trunc,
+    /// Logical opposite.
+    Not,
+    /// Sign changed.
+    Minus,
+}
+
+/// An expression.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Expr {
+    /// A number.
+    Number(f64),
+    /// What a variable holds.
+    Var(Var),
+    /// The variable whose number this is.
+    Indirect(Box<Expr>),
+    /// Does the variable exist?
+    Exists(Var),
+    /// A function of one number.
+    Call(Function, Box<Expr>),
+    /// An operation of two.
+    Two(Op, Box<Expr>, Box<Expr>),
+}
+
+/// A piece of a text that the program writes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Piece {
+    /// As it stands.
+    Text(Arc<str>),
+    /// A number with so many digits after the point.
+    Fixed {
+        /// Digits after the point.
+        decimals: usize,
+        /// Whole digits that room is kept for, with blanks; 0: none.
+        width: usize,
+        /// What is written.
+        value: Expr,
+    },
+    /// The text of a text variable.
+    Var(Var),
+}
+
+/// A text that the program writes.
+pub type Text = Vec<Piece>;
+
+/// A word of a block: address and value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Word {
+    /// `X`, `G`, `MEAS`: one of the words that the dialect knows.
+    pub address: &'static str,
+    /// Its value.
+    pub value: Expr,
+    /// Written with a decimal point: some controls count in thousandths without one.
+    pub point: bool,
+}
+
+/// What a statement does.
+#[derive(Debug, Clone, PartialEq)]
+pub enum What {
+    /// Moves, modes, auxiliary functions.
+    Block(Vec<Word>),
+    /// A value is kept.
+    Set(Var, Expr),
+    /// A value is kept in a variable whose number is computed.
+    SetIndirect(Expr, Expr),
+    /// A text is kept.
+    SetText(Var, Text),
+    /// On at another statement.
+    Jump(usize),
+    /// On at another statement when the condition does not hold.
+    JumpUnless(Expr, usize),
+    /// A subroutine: the number of its first statement.
+    Call(usize),
+    /// Back to where it was called.
+    Return(Option<Expr>),
+    /// A message to the operator.
+    Message(Text),
+    /// A log is opened; `append`: what it holds is kept.
+    LogOpen {
+        /// Its name.
+        name: Text,
+        /// What it holds is kept.
+        append: bool,
+    },
+    /// A line of a log.
+    LogLine(Text),
+    /// The log is closed.
+    LogClose,
+    /// The program waits for a person, who is shown a text.
+    Wait(Text),
+    /// The program is broken off with a message.
+    Abort(Text),
+    /// Where execution is said to stand still until all moves are done.
+    Sync,
+    /// The end.
+    End,
+}
+
+/// A statement and its place in the text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statement {
+    /// Bytes.
+    pub at: Range<usize>,
+    /// What it does.
+    pub what: What,
+}
+
+/// A program.
+#[derive(Debug, Clone, Default)]
+pub struct Code {
+    /// In the order of the text.
+    pub statements: Vec<Statement>,
+}
+
+impl Code {
+    /// Adds a statement and gives its place.
+    pub fn push(&mut self, at: Range<usize>, what: What) -> usize {
+        self.statements.push(Statement { at, what });
+        self.statements.len() - 1
+    }
+}
+
+/// Variables and their values.
+pub type Values = BTreeMap<Var, f64>;
+
+/// Numbers that differ by less are equal to every control here.
+const SAME: f64 = 1e-9;
+
+impl Expr {
+    /// The value.
+    ///
+    /// # Errors
+    /// What cannot be computed, and why.
+    pub fn value(
+        &self,
+        read: &dyn Fn(&Var) -> Result<f64, String>,
+        exists: &dyn Fn(&Var) -> bool,
+    ) -> Result<f64, String> {
+        let truth = |yes: bool| if yes { 1.0 } else { 0.0 };
+        match self {
+            Self::Number(x) => Ok(*x),
+            Self::Var(var) => read(var),
+            Self::Exists(var) => Ok(truth(exists(var))),
+            Self::Indirect(number) => read(&numbered(number.value(read, exists)?)?),
+            Self::Call(function, of) => {
+                let x = of.value(read, exists)?;
+                match function {
+                    Function::Abs => Ok(x.abs()),
+                    Function::Minus => Ok(-x),
+                    Function::Sqrt if x < 0.0 => Err(format!("the root of {x} does not exist")),
+                    Function::Sqrt => Ok(x.sqrt()),
+                    Function::Floor => Ok(x.floor()),
+                    Function::Ceil => Ok(x.ceil()),
+                    Function::Round => Ok(x.round()),
+                    Function::Trunc => Ok(x.trunc()),
+                    Function::Not => Ok(truth(x == 0.0)),
+                }
+            }
+            Self::Two(op, left, right) => {
+                let (a, b) = (left.value(read, exists)?, right.value(read, exists)?);
+                match op {
+                    Op::Add => Ok(a + b),
+                    Op::Sub => Ok(a - b),
+                    Op::Mul => Ok(a * b),
+                    Op::Div | Op::Mod if b == 0.0 => Err("a division by 0".to_owned()),
+                    Op::Div => Ok(a / b),
+                    Op::Mod => Ok(a.rem_euclid(b)),
+                    Op::Pow => Ok(a.powf(b)),
+                    Op::Eq => Ok(truth((a - b).abs() < SAME)),
+                    Op::Ne => Ok(truth((a - b).abs() >= SAME)),
+                    Op::Gt => Ok(truth(a > b)),
+                    Op::Ge => Ok(truth(a >= b)),
+                    Op::Lt => Ok(truth(a < b)),
+                    Op::Le => Ok(truth(a <= b)),
+                    Op::And => Ok(truth(a != 0.0 && b != 0.0)),
+                    Op::Or => Ok(truth(a != 0.0 || b != 0.0)),
+                    Op::Xor => Ok(truth((a != 0.0) != (b != 0.0))),
+                }
+            }
+        }
+    }
+}
+
+/// The variable of a computed number.
+///
+/// # Errors
+/// When it is no whole number of a variable.
+pub fn numbered(number: f64) -> Result<Var, String> {
+    if number.fract().abs() > SAME || !(0.0..1e6).contains(&number) {
+        return Err(format!("there is no variable number {number}"));
+    }
+    Ok(Var::Number(number.round() as u32))
+}

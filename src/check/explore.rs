@@ -1,0 +1,243 @@
+//! A program run with everything that may happen at its probing moves.
+//!
+//! The trunk is the run in which all is as it should be. At each probing move branches leave it: no contact, contact on
+//! the way, contact at once, a block that stands off, a probe that does not close again, a search and a measuring touch
+//! that disagree, a person who breaks the program off. A branch is followed until the program ends or moves on.
+
+use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Vm};
+use super::world::way_mm;
+use std::collections::BTreeMap;
+
+/// What happens otherwise than it should.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Deviation {
+    /// Contact after this part of the way.
+    Contact(f64),
+    /// The search meets nothing.
+    Miss,
+    /// The block stands further along the approach by this, mm.
+    Shift(f64),
+    /// The measuring touch triggers further along than the search did by this, mm.
+    Disagree(f64),
+    /// The probe triggers and does not close again.
+    Stuck,
+}
+
+impl Deviation {
+    /// Is the program to stop?
+    pub fn must_stop(self) -> bool {
+        !matches!(self, Self::Shift(mm) if mm.abs() < 1.0)
+    }
+}
+
+/// What the program does then.
+#[derive(Debug, Clone)]
+pub struct Branch {
+    /// Place in the trunk at which it leaves it: the event would stand there.
+    pub leaves: usize,
+    /// What happened.
+    pub deviation: Deviation,
+    /// From the deviating move on.
+    pub trace: Vec<Happened>,
+    /// The program has ended.
+    pub over: bool,
+    /// It could not go on.
+    pub fault: Option<Fault>,
+    /// The control's settings at the end.
+    pub settings: BTreeMap<String, String>,
+}
+
+/// A run with its branches.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Set-up at which it was told to begin.
+    pub from: u32,
+    /// What happened when all was as it should be.
+    pub trunk: Vec<Happened>,
+    /// What is mounted at each event.
+    pub parts: Vec<usize>,
+    /// What happens otherwise.
+    pub branches: Vec<Branch>,
+    /// It could not go on.
+    pub fault: Option<Fault>,
+    /// The control's settings before and after.
+    pub settings: [BTreeMap<String, String>; 2],
+    /// After a person broke it off and gave the settings back: those that were not given back, and where it was broken
+    /// off (place in the trunk).
+    pub aborted: Vec<(usize, BTreeMap<String, String>)>,
+}
+
+/// How far, in parts of their limits, things deviate.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// How far a block may stand off, mm.
+    pub placement_mm: f64,
+    /// Way back between search and measuring touch, mm.
+    pub back_off_mm: f64,
+}
+
+/// Numbers of the probing moves at which a person breaks the program off.
+const ABORTED_AT: [usize; 12] = [1, 2, 3, 5, 8, 20, 50, 100, 200, 500, 2000, 5000];
+
+/// Probing moves that a branch may make when the probe stays deflected: it backs off and asks again.
+const MOVES_WHILE_STUCK: usize = 3;
+
+/// Runs a program that stands at its beginning. `restart` makes the run that gives the settings back after a person
+/// has broken the program off, where the dialect and the program can.
+pub fn explore<'p, D: Dialect>(
+    mut run: Run<'p, D>,
+    from: u32,
+    limits: Option<Limits>,
+    restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
+) -> Told {
+    let before = run.dialect.settings();
+    let mut told = Told {
+        from,
+        trunk: Vec::new(),
+        parts: Vec::new(),
+        branches: Vec::new(),
+        fault: None,
+        settings: [before, BTreeMap::new()],
+        aborted: Vec::new(),
+    };
+    let mut probes = 0;
+    loop {
+        let part_before = run.vm.part;
+        let paused = run.on();
+        // events before the last stop belong to the part that was up then; a stop is at most the last of them
+        note_parts(&mut told.parts, &run.vm, part_before);
+        match paused {
+            Err(fault) => {
+                told.fault = Some(fault);
+                break;
+            }
+            Ok(Pause::Done) => break,
+            Ok(Pause::Probe(probe)) => {
+                probes += 1;
+                let outcome = run.vm.world.outcome(&run.vm, &probe);
+                if let Some(limits) = limits {
+                    let leaves = run.vm.trace.len();
+                    let trace = std::mem::take(&mut run.vm.trace);
+                    for deviation in deviations(&run.vm, &probe, outcome, limits) {
+                        told.branches.push(follow(run.clone(), &probe, outcome, deviation, leaves));
+                    }
+                    if ABORTED_AT.contains(&probes)
+                        && let Some(again) = restart(&run)
+                    {
+                        told.aborted.push((leaves, settings_after(again)));
+                    }
+                    run.vm.trace = trace;
+                }
+                run.resolve(outcome);
+            }
+        }
+    }
+    told.settings[1] = run.dialect.settings();
+    note_parts(&mut told.parts, &run.vm, run.vm.part);
+    told.trunk = run.vm.trace;
+    told
+}
+
+fn note_parts(parts: &mut Vec<usize>, vm: &Vm, before: usize) {
+    let mut part = parts.last().copied().unwrap_or(before).max(before);
+    let known = parts.len();
+    for happened in vm.trace.iter().skip(known) {
+        parts.push(part);
+        if matches!(happened.event, Event::Wait(_)) {
+            part = vm.part;
+        }
+    }
+}
+
+fn settings_after<D: Dialect>(mut run: Run<'_, D>) -> BTreeMap<String, String> {
+    let moved = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Move { .. }));
+    match run.on() {
+        Ok(Pause::Done) if !moved(&run) => run.dialect.settings(),
+        Ok(_) => BTreeMap::from([("the run that gives the settings back".to_owned(), "moves".to_owned())]),
+        Err(fault) => BTreeMap::from([("the run that gives the settings back".to_owned(), fault.says)]),
+    }
+}
+
+fn deviations(vm: &Vm, probe: &Probe, outcome: Outcome, limits: Limits) -> Vec<Deviation> {
+    if !probe.toward {
+        return Vec::new();
+    }
+    if !outcome.hit {
+        return vec![Deviation::Contact(0.0), Deviation::Contact(0.5)];
+    }
+    if vm.hits == 0 {
+        const OUTSIDE: f64 = 1.2;
+        const INSIDE: f64 = 0.4;
+        let mm = limits.placement_mm;
+        vec![
+            Deviation::Miss,
+            Deviation::Contact(0.0),
+            Deviation::Shift(OUTSIDE * mm.max(1.0)),
+            Deviation::Shift(-OUTSIDE * mm.max(1.0)),
+            Deviation::Shift(INSIDE * mm.min(1.0)),
+            Deviation::Stuck,
+        ]
+    } else {
+        const OUTSIDE: f64 = 0.6;
+        let mm = OUTSIDE * limits.back_off_mm;
+        vec![
+            Deviation::Miss,
+            Deviation::Contact(0.0),
+            Deviation::Disagree(mm),
+            Deviation::Disagree(-mm),
+            Deviation::Stuck,
+        ]
+    }
+}
+
+fn follow<D: Dialect>(
+    mut run: Run<'_, D>,
+    probe: &Probe,
+    nominal: Outcome,
+    deviation: Deviation,
+    leaves: usize,
+) -> Branch {
+    let way = way_mm(probe);
+    let shifted = |mm: f64| Outcome { hit: true, part: (nominal.part + mm / way).clamp(0.0, 1.0) };
+    let outcome = match deviation {
+        Deviation::Contact(part) => Outcome { hit: true, part },
+        Deviation::Miss => Outcome { hit: false, part: 1.0 },
+        Deviation::Disagree(mm) => shifted(mm),
+        Deviation::Shift(mm) => {
+            let along = (probe.to.xyz_mm() - probe.from.xyz_mm()) * (mm / way);
+            run.vm.shift = [along.x, along.y, along.z];
+            run.vm.world.outcome(&run.vm, probe)
+        }
+        Deviation::Stuck => {
+            run.vm.stuck = true;
+            nominal
+        }
+    };
+    run.resolve(outcome);
+    let mut fault = None;
+    let mut moves = 0;
+    let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));
+    loop {
+        match run.on() {
+            Err(f) => {
+                fault = Some(f);
+                break;
+            }
+            Ok(Pause::Done) => break,
+            Ok(Pause::Probe(next)) => {
+                let goes_on = match deviation {
+                    Deviation::Stuck => moves < MOVES_WHILE_STUCK,
+                    _ if !deviation.must_stop() => !logged(&run),
+                    _ => false,
+                };
+                if !goes_on {
+                    break;
+                }
+                moves += 1;
+                let outcome = run.vm.world.outcome(&run.vm, &next);
+                run.resolve(outcome);
+            }
+        }
+    }
+    Branch { leaves, deviation, over: run.is_over(), fault, settings: run.dialect.settings(), trace: run.vm.trace }
+}

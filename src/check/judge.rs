@@ -1,0 +1,661 @@
+//! What is wrong with a program: its runs, move by move, against the machine's limits, the shapes, and the plan.
+//!
+//! Shapes and the proof that a move is clear are those of [`crate::program`]; the order of moves, what a touch is and what
+//! must happen when something goes wrong are judged here, from what the program did and not from how it was made.
+
+use super::explore::{Branch, Told};
+use super::run::{Event, Happened, Probe, Rate};
+use super::touches::{Made, against_plan};
+use super::world::World;
+use crate::axes::{AxisMap, AxisName, Position};
+use crate::diag::{Finding, Source};
+use crate::machine::{Machine, Mounting};
+use crate::post::Postprocessor;
+use crate::program::heights::Lift;
+use crate::program::plan::Plan;
+use crate::program::scene::Scene;
+use crate::program::sweep::Manner;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// What is judged, and against what.
+pub struct Case<'a> {
+    /// The machine with its own stylus.
+    pub machine: &'a Machine,
+    /// The control.
+    pub post: &'a Postprocessor,
+    /// The plan, where there is one.
+    pub plan: Option<&'a Plan>,
+    /// Shapes of each part.
+    pub scenes: &'a [Scene<'a>],
+    /// Blocks and coordinates.
+    pub world: &'a World,
+    /// The program.
+    pub source: &'a Source,
+    /// Coordinates that differ by less are the same, mm or deg.
+    pub same: f64,
+    /// What is mounted in each part.
+    pub mountings: &'a [&'a Mounting],
+    /// A person may start it from anywhere only when this holds.
+    pub clear_from_anywhere: bool,
+}
+
+/// Findings of one kind that are shown; the rest is counted.
+const SHOWN: usize = 8;
+
+/// Collects findings; equal ones are said once.
+#[derive(Default)]
+pub struct Said {
+    findings: Vec<Finding>,
+    seen: BTreeSet<(&'static str, usize, String)>,
+    count: BTreeMap<&'static str, usize>,
+}
+
+impl Said {
+    /// Notes a finding at a place.
+    pub fn say(&mut self, case: &Case<'_>, code: &'static str, at: &Range<usize>, message: String, help: &str) {
+        if !self.seen.insert((code, at.start, message.clone())) {
+            return;
+        }
+        let count = self.count.entry(code).or_default();
+        *count += 1;
+        if *count <= SHOWN {
+            let finding = Finding::error(code, message).at(case.source, at.clone());
+            self.findings.push(if help.is_empty() { finding } else { finding.help(help) });
+        }
+    }
+
+    /// All findings in the order of the program.
+    pub fn finish(mut self) -> Vec<Finding> {
+        self.findings.sort_by_key(|f| f.span.as_ref().map_or(usize::MAX, |s| s.start));
+        for (code, count) in self.count.iter().filter(|(_, n)| **n > SHOWN) {
+            self.findings.push(Finding::error(code, format!("{} more of the kind {code}", count - SHOWN)));
+        }
+        self.findings
+    }
+}
+
+/// Judges all runs. The first one is the whole program.
+pub fn judge(case: &Case<'_>, runs: &[Told]) -> Vec<Finding> {
+    let mut said = Said::default();
+    let mut proofs: BTreeMap<Key, Proof> = BTreeMap::new();
+    for told in runs {
+        let mut walk = Walk::new(case, told, &mut said, &mut proofs);
+        walk.trunk();
+        let made = walk.made;
+        against_plan(case, told, &made, &mut said);
+        for branch in &told.branches {
+            branch_stops(case, told, branch, &mut said);
+        }
+        settings_return(case, told, &mut said);
+    }
+    let proofs: Vec<(Key, Proof)> = proofs.into_iter().collect();
+    let hits: Vec<(Range<usize>, &'static str, String)> =
+        proofs.par_iter().filter_map(|(_, proof)| proof.check(case)).collect();
+    for (at, code, message) in hits {
+        said.say(case, code, &at, message, "");
+    }
+    said.finish()
+}
+
+// ------------------------------------------------------------------------------------------------------- proofs
+
+type Key = (usize, [u64; 6], [u64; 6], u8);
+
+struct Proof {
+    at: Range<usize>,
+    part: usize,
+    from: Position,
+    to: Position,
+    how: How,
+}
+
+#[derive(Clone, Copy)]
+enum How {
+    Straight(Manner),
+    Spanned,
+    Turn(AxisName),
+}
+
+impl How {
+    fn number(self) -> u8 {
+        match self {
+            Self::Straight(Manner::Rapid) => 0,
+            Self::Straight(Manner::Guarded) => 1,
+            Self::Straight(Manner::ToContact(b)) => 32 + (b % 64) as u8,
+            Self::Straight(Manner::PastContact(b)) => 96 + (b % 64) as u8,
+            Self::Spanned => 2,
+            Self::Turn(axis) => 3 + axis.index() as u8,
+        }
+    }
+}
+
+impl Proof {
+    fn check(&self, case: &Case<'_>) -> Option<(Range<usize>, &'static str, String)> {
+        let scene = case.scenes.get(self.part)?;
+        let proven = match self.how {
+            How::Straight(manner) => scene.clear_straight(&self.from, &self.to, manner),
+            How::Turn(axis) => scene.clear_turn(&self.from, axis, self.to.get(axis)),
+            How::Spanned => scene.clear_box(&self.from, &self.to),
+        };
+        let hit = proven.err()?;
+        let unguarded = matches!(self.how, How::Straight(Manner::Rapid) | How::Spanned);
+        let turns = matches!(self.how, How::Turn(_));
+        let overlaps = hit.gap_mm <= 0.0;
+        let (code, what) = match (unguarded, turns, overlaps) {
+            (_, true, _) => ("check::turn_not_clear", "a rotary axis turns where it is not clear: "),
+            (true, _, true) => ("check::collision", "collision: "),
+            (true, _, false) => ("check::unguarded", "a move that does not stop at contact comes too near: "),
+            (false, _, true) => ("check::collision", "collision: "),
+            (false, _, false) => ("check::too_near", ""),
+        };
+        Some((self.at.clone(), code, format!("{what}{hit}")))
+    }
+}
+
+// --------------------------------------------------------------------------------------------------------- trunk
+
+/// The ball at a face.
+struct Contact {
+    /// Where the search began.
+    start: Position,
+    /// Unit direction of the search.
+    along: Vector3<f64>,
+    made: Made,
+}
+
+struct Walk<'a, 'b> {
+    case: &'a Case<'a>,
+    told: &'a Told,
+    said: &'b mut Said,
+    proofs: &'b mut BTreeMap<Key, Proof>,
+    senses: AxisMap,
+    spindle: Option<f64>,
+    contact: Option<Contact>,
+    /// The last motion stopped at contact if there had been any.
+    came_guarded: bool,
+    lift: Option<Lift>,
+    made: Vec<Made>,
+    waited: bool,
+}
+
+impl<'a, 'b> Walk<'a, 'b> {
+    fn new(case: &'a Case<'a>, told: &'a Told, said: &'b mut Said, proofs: &'b mut BTreeMap<Key, Proof>) -> Self {
+        let lift = case.scenes.first().and_then(Scene::lift);
+        Self {
+            case,
+            told,
+            said,
+            proofs,
+            senses: AxisMap::default(),
+            spindle: None,
+            contact: None,
+            came_guarded: false,
+            lift,
+            made: Vec::new(),
+            waited: false,
+        }
+    }
+
+    fn say(&mut self, code: &'static str, at: &Range<usize>, message: String, help: &str) {
+        self.said.say(self.case, code, at, message, help);
+    }
+
+    fn prove(&mut self, at: &Range<usize>, part: usize, from: Position, to: Position, how: How) {
+        let key = (part, from.0.map(f64::to_bits), to.0.map(f64::to_bits), how.number());
+        self.proofs.entry(key).or_insert_with(|| Proof { at: at.clone(), part, from, to, how });
+    }
+
+    fn trunk(&mut self) {
+        let told = self.told;
+        for (happened, part) in told.trunk.iter().zip(&told.parts) {
+            self.event(happened, *part);
+        }
+        let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
+        if self.contact.is_some() {
+            self.say("check::ends_in_contact", &end, "the program ends with the ball at a block".into(), "");
+        }
+        if let Some(fault) = &told.fault {
+            self.say(
+                "check::not_run",
+                &fault.at,
+                fault.says.clone(),
+                "the control would stop here, or do something that axiscal does not know",
+            );
+        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
+            let shown = told.trunk.iter().rev().find_map(|h| match &h.event {
+                Event::Abort(text) | Event::Message(text) if !text.is_empty() => Some(text.as_str()),
+                _ => None,
+            });
+            let says = format!(
+                "the program stops by itself on a machine on which all is as it should be: {}",
+                shown.unwrap_or("without a message")
+            );
+            self.say("check::stops", &end, says, "");
+        }
+    }
+
+    fn event(&mut self, happened: &Happened, part: usize) {
+        let at = &happened.at;
+        match &happened.event {
+            Event::Move { from, to, rate, known, exact, named } => {
+                let (from, to) = (self.case.world.axes(part, from), self.case.world.axes(part, to));
+                if !exact {
+                    self.say(
+                        "check::rounded",
+                        at,
+                        "the control may round the corner between this move and the next".into(),
+                        "exact stop (G61, G60) is missing",
+                    );
+                }
+                self.moved(at, part, &from, &to, *rate, known, named);
+            }
+            Event::Probe { probe, outcome } => {
+                let (from, to) = (self.case.world.axes(part, &probe.from), self.case.world.axes(part, &probe.to));
+                self.probe(at, part, probe, &from, &to, outcome.hit, outcome.part);
+            }
+            Event::Log(text) => {
+                if let Some(mut contact) = self.contact.take() {
+                    contact.made.log = Some(text.clone());
+                    contact.made.at = at.clone();
+                    contact.made.senses = self.senses;
+                    contact.made.spindle_deg = self.spindle;
+                    contact.made.waited = std::mem::take(&mut self.waited);
+                    self.made.push(contact.made.clone());
+                    self.contact = Some(contact);
+                }
+            }
+            Event::Orient(deg) => self.spindle = Some(*deg),
+            Event::Wait(_) => self.waited = true,
+            _ => {}
+        }
+    }
+
+    fn all_known(&self, known: &[bool; 6]) -> bool {
+        self.case.machine.axes.iter().all(|a| known[a.name.index()])
+    }
+
+    fn inside(&mut self, at: &Range<usize>, to: &Position, named: &[bool; 6]) {
+        for axis in &self.case.machine.axes {
+            let [low, high] = axis.program_range();
+            let value = to.get(axis.name);
+            if named[axis.name.index()] && !(value >= low - self.case.same && value <= high + self.case.same) {
+                let origin = self.case.machine.origin.get(axis.name).unwrap_or(0.0);
+                let says = format!(
+                    "{} = {:.3} is outside the range of the axis ({} to {}, machine coordinates)",
+                    axis.name,
+                    value + origin,
+                    low + origin,
+                    high + origin
+                );
+                self.say("check::limit", at, says, "");
+            }
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)] // the fields of one event
+    fn moved(
+        &mut self,
+        at: &Range<usize>,
+        part: usize,
+        from: &Position,
+        to: &Position,
+        rate: Rate,
+        known: &[bool; 6],
+        named: &[bool; 6],
+    ) {
+        let mut moving: Vec<AxisName> = self.moving(from, to);
+        for axis in AxisName::ALL.into_iter().filter(|a| named[a.index()] && !known[a.index()]) {
+            if !moving.contains(&axis) {
+                moving.push(axis);
+            }
+        }
+        let mut bounded = [false; 6];
+        moving.iter().for_each(|a| bounded[a.index()] = true);
+        self.inside(at, to, &bounded);
+        self.came_guarded = false;
+        if moving.is_empty() {
+            return;
+        }
+        if let Rate::Feed(feed) = rate
+            && feed > self.case.machine.probe.position_feed + self.case.same
+            && self.all_known(known)
+        {
+            let most = self.case.machine.probe.position_feed;
+            self.say(
+                "check::feed",
+                at,
+                format!("the feed is {feed} mm/min, the machine's position_feed is {most}"),
+                "",
+            );
+        }
+        let rotary: Vec<AxisName> = moving.iter().copied().filter(|a| a.is_rotary()).collect();
+        if !self.all_known(known) {
+            self.from_unknown(at, &moving, to, known);
+            return;
+        }
+        if let Some(contact) = self.contact.take() {
+            self.from_contact(at, part, contact, from, to, &rotary);
+            return;
+        }
+        match rotary.as_slice() {
+            [] => {
+                let how = match rate {
+                    Rate::Rapid if moving.len() > 1 => How::Spanned,
+                    _ => How::Straight(Manner::Rapid),
+                };
+                self.prove(at, part, *from, *to, how);
+            }
+            [axis] if moving.len() == 1 => {
+                self.senses.set(*axis, (to.get(*axis) - from.get(*axis)).signum());
+                self.prove(at, part, *from, *from, How::Straight(Manner::Rapid));
+                self.prove(at, part, *from, *to, How::Turn(*axis));
+            }
+            _ => self.say(
+                "check::turn_and_move",
+                at,
+                "a rotary axis turns while another axis moves: the way is not proven clear".into(),
+                "one rotary axis at a time",
+            ),
+        }
+    }
+
+    /// The axes that a move moves.
+    fn moving(&self, from: &Position, to: &Position) -> Vec<AxisName> {
+        let far = |a: &AxisName| (to.get(*a) - from.get(*a)).abs() > self.case.same;
+        AxisName::ALL.into_iter().filter(far).collect()
+    }
+
+    /// The first moves, when nobody knows where the machine stands: up to the top, then whatever is clear from anywhere.
+    fn from_unknown(&mut self, at: &Range<usize>, moving: &[AxisName], to: &Position, known: &[bool; 6]) {
+        let Some(lift) = self.lift else { return };
+        let at_top = known[lift.axis.index()] && (to.get(lift.axis) - lift.top).abs() <= self.case.same;
+        let goes_up = moving == [lift.axis] && (to.get(lift.axis) - lift.top).abs() <= self.case.same;
+        if moving.len() != 1 {
+            self.say("check::unknown_start", at, "from an unknown place one axis moves at a time".into(), "");
+        } else if !at_top && !goes_up {
+            let says = format!(
+                "the first move must take {} to its top ({}): nobody knows where the machine stands",
+                lift.axis,
+                lift.top + self.case.machine.origin.get(lift.axis).unwrap_or(0.0)
+            );
+            self.say("check::unknown_start", at, says, "");
+        } else if at_top && !goes_up && !self.case.clear_from_anywhere {
+            self.say("check::unknown_start", at, "the way from an unknown place is not proven clear".into(), "");
+        }
+        // coming from an unknown angle, an axis has no known sense
+        for axis in moving.iter().filter(|a| a.is_rotary()) {
+            let mut senses = AxisMap::default();
+            self.senses.iter().filter(|(a, _)| a != axis).for_each(|(a, s)| senses.set(a, s));
+            if known[axis.index()] {
+                continue;
+            }
+            self.senses = senses;
+        }
+        if let [axis] = moving
+            && axis.is_rotary()
+            && known[axis.index()]
+        {
+            self.turned_in_opening(*axis, to);
+        }
+    }
+
+    fn turned_in_opening(&mut self, axis: AxisName, to: &Position) {
+        let before = self.told.trunk.iter().find_map(|h| match &h.event {
+            Event::Move { from, to: end, .. } if end.get(axis) == to.get(axis) && from.get(axis) != end.get(axis) => {
+                Some(from.get(axis))
+            }
+            _ => None,
+        });
+        if let Some(before) = before {
+            self.senses.set(axis, (to.get(axis) - before).signum());
+        }
+    }
+
+    /// A move that begins at a face: back along the approach, no further than the search began.
+    fn from_contact(
+        &mut self,
+        at: &Range<usize>,
+        part: usize,
+        mut contact: Contact,
+        from: &Position,
+        to: &Position,
+        rotary: &[AxisName],
+    ) {
+        let way = to.xyz_mm() - from.xyz_mm();
+        let back = -way.dot(&contact.along);
+        let aside = (way + contact.along * back).norm();
+        let left = (from.xyz_mm() - contact.start.xyz_mm()).dot(&contact.along);
+        if !rotary.is_empty() || aside > 10.0 * self.case.same || back < -self.case.same {
+            self.say(
+                "check::in_contact",
+                at,
+                "the ball may still press against the block: it must first go back the way it came".into(),
+                "a retract is missing",
+            );
+            return;
+        }
+        if back > left + 10.0 * self.case.same {
+            // further back than the search began: proven from there on
+            self.prove(at, part, contact.start, *to, How::Straight(Manner::Rapid));
+        } else if back < left - 10.0 * self.case.same {
+            contact.made.backed_off = true;
+            self.contact = Some(contact);
+        } else {
+            self.came_guarded = true;
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)] // the fields of one event
+    fn probe(
+        &mut self,
+        at: &Range<usize>,
+        part: usize,
+        probe: &Probe,
+        from: &Position,
+        to: &Position,
+        hit: bool,
+        made_part: f64,
+    ) {
+        let machine = &self.case.machine.probe;
+        let moving = self.moving(from, to);
+        let mut bounded = [false; 6];
+        moving.iter().for_each(|a| bounded[a.index()] = true);
+        if probe.feed > machine.position_feed + self.case.same {
+            let says =
+                format!("it probes at {} mm/min, the machine's position_feed is {}", probe.feed, machine.position_feed);
+            self.say("check::feed", at, says, "");
+        }
+        if moving.iter().any(|a| a.is_rotary()) {
+            self.say("check::turn_and_move", at, "a probing move turns a rotary axis".into(), "");
+            return;
+        }
+        if !self.all_known(&probe.known) {
+            const ASKS_MM: f64 = 0.02;
+            if (to.xyz_mm() - from.xyz_mm()).norm() > ASKS_MM + self.case.same {
+                self.say("check::unknown_start", at, "it probes before the place of every axis is known".into(), "");
+            }
+            return;
+        }
+        self.inside(at, to, &bounded);
+        let way = to.xyz_mm() - from.xyz_mm();
+        let stands = |p: f64| {
+            let mut s = *from;
+            s.0.iter_mut().zip(to.0).for_each(|(slot, end)| *slot += (end - *slot) * p);
+            s
+        };
+        let reached = if made_part >= 1.0 { *to } else { stands(made_part) };
+        let Some(mut contact) = self.contact.take() else {
+            self.free_probe(at, part, probe, (from, to, &reached), hit, way);
+            return;
+        };
+        let onward = way.dot(&contact.along);
+        if onward < 0.0 || moving.is_empty() {
+            // back from the face; the move to the start ends the touch
+            let rotary = [];
+            let released_on_the_way = !probe.toward && hit;
+            let target = if released_on_the_way { &reached } else { to };
+            self.from_contact(at, part, contact, from, target, &rotary);
+            // what the program would drive to without a release is proven as well
+            return;
+        }
+        let aside = (way - contact.along * onward).norm();
+        if aside > 10.0 * self.case.same || !probe.toward {
+            self.say("check::in_contact", at, "a second search goes in another direction than the first".into(), "");
+        }
+        if !contact.made.backed_off {
+            self.say("check::in_contact", at, "it searches again without having moved off the face".into(), "");
+        }
+        contact.made.measure(probe, from, to, &reached, hit);
+        self.contact = Some(contact);
+    }
+
+    /// A probing move from a place in the open: a search when it meets something, positioning otherwise.
+    fn free_probe(
+        &mut self,
+        at: &Range<usize>,
+        part: usize,
+        probe: &Probe,
+        (from, to, reached): (&Position, &Position, &Position),
+        hit: bool,
+        way: Vector3<f64>,
+    ) {
+        if !probe.toward {
+            return; // the probe is closed: the move is over before it begins
+        }
+        if !hit {
+            self.prove(at, part, *from, *to, How::Straight(Manner::Guarded));
+            self.came_guarded = true;
+            return;
+        }
+        let block = self.case.world.met(part, probe);
+        let scene_block = self.case.mountings.get(part).and_then(|m| {
+            let name = block.as_deref()?;
+            m.blocks.iter().position(|b| b.name == name)
+        });
+        if let Some(b) = scene_block {
+            self.prove(at, part, *from, *reached, How::Straight(Manner::ToContact(b)));
+            self.prove(at, part, *reached, *to, How::Straight(Manner::PastContact(b)));
+        }
+        if !self.came_guarded {
+            let says =
+                "the ball did not come to the beginning of the search by a move that stops at contact".to_owned();
+            self.say("check::unguarded", at, says, "");
+        }
+        self.came_guarded = false;
+        let along = way.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
+        let made = Made::search(at, part, block, probe, from, to, reached);
+        self.contact = Some(Contact { start: *from, along, made });
+    }
+}
+
+// ------------------------------------------------------------------------------------------------------ branches
+
+/// When something went wrong the program must say so and stay where it is.
+fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) {
+    use super::explore::Deviation;
+    if !branch.deviation.must_stop() {
+        return;
+    }
+    let Some(first) = branch.trace.first() else { return };
+    let what = match branch.deviation {
+        Deviation::Contact(part) if part > 0.0 => "contact on the way",
+        Deviation::Contact(_) => "the probe is triggered before this move",
+        Deviation::Miss => "no contact up to the end",
+        Deviation::Shift(_) => "the block stands off by more than the placement tolerance",
+        Deviation::Disagree(_) => "search and measuring touch disagree",
+        Deviation::Stuck => "the probe does not close again",
+    };
+    let mut complain = |at: &Range<usize>, says: &str| {
+        said.say(case, "check::goes_on", at, format!("{what}: {says}"), "the program must say what is wrong and stop");
+    };
+    if let Some(fault) = &branch.fault {
+        complain(&fault.at, &fault.says);
+        return;
+    }
+    let stuck = branch.deviation == Deviation::Stuck;
+    let moves = branch.trace.iter().skip(1).find(|h| match &h.event {
+        Event::Move { from, to, .. } => !(stuck && goes_back(branch, from, to)),
+        // with the probe deflected a search ends where it begins
+        Event::Probe { probe, outcome } => {
+            !(stuck && (outcome.part == 0.0 || goes_back(branch, &probe.from, &probe.to)))
+        }
+        _ => false,
+    });
+    if let Some(moves) = moves {
+        complain(&moves.at, "the program moves on");
+        return;
+    }
+    if !branch.over {
+        complain(&first.at, "the program goes on");
+        return;
+    }
+    let shows =
+        |h: &Happened| matches!(&h.event, Event::Message(t) | Event::Wait(t) | Event::Abort(t) if !t.is_empty());
+    if !branch.trace.iter().any(shows) {
+        complain(&first.at, "no message is shown");
+    }
+    let last_line = told.trunk.iter().rev().find_map(|h| match &h.event {
+        Event::Log(text) => Some(text),
+        _ => None,
+    });
+    let logs_end = |h: &Happened| matches!((&h.event, last_line), (Event::Log(t), Some(l)) if t == l);
+    if told.fault.is_none() && branch.trace.iter().any(logs_end) {
+        complain(&first.at, "the log is closed as if the program were complete");
+    }
+    let ends_well = matches!(branch.trace.last().map(|h| &h.event), Some(Event::End));
+    let stops = |h: &Happened| matches!(&h.event, Event::Wait(_) | Event::Abort(_));
+    if ends_well && !branch.trace.iter().any(stops) {
+        complain(&first.at, "the program ends as if it were complete");
+    }
+    compare_settings(case, &told.settings[0], &branch.settings, &first.at, what, said);
+}
+
+/// Does a move go back from where the branch began?
+fn goes_back(branch: &Branch, from: &Position, to: &Position) -> bool {
+    let Some(Event::Probe { probe, .. }) = branch.trace.first().map(|h| &h.event) else { return false };
+    let along = probe.to.xyz_mm() - probe.from.xyz_mm();
+    let way = to.xyz_mm() - from.xyz_mm();
+    let turned = from.0[3..] != to.0[3..];
+    !turned
+        && way.dot(&along) <= 0.0
+        && (way.norm() < 1e-9 || way.cross(&along).norm() < 1e-3 * way.norm() * along.norm())
+}
+
+// ------------------------------------------------------------------------------------------------------ settings
+
+fn settings_return(case: &Case<'_>, told: &Told, said: &mut Said) {
+    if told.fault.is_some() {
+        return;
+    }
+    let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
+    compare_settings(case, &told.settings[0], &told.settings[1], &end, "at the end", said);
+    let kept = case.post.check.as_ref().map(|c| c.after_abort.as_slice()).unwrap_or_default();
+    for (place, after) in &told.aborted {
+        let at = told.trunk.get(*place).map_or(0..0, |h| h.at.clone());
+        let what = "broken off here by hand, then started once more to give the settings back";
+        let after: BTreeMap<String, String> =
+            after.iter().filter(|(name, _)| kept.contains(name)).map(|(n, v)| (n.clone(), v.clone())).collect();
+        compare_settings(case, &told.settings[0], &after, &at, what, said);
+    }
+}
+
+fn compare_settings(
+    case: &Case<'_>,
+    before: &BTreeMap<String, String>,
+    after: &BTreeMap<String, String>,
+    at: &Range<usize>,
+    when: &str,
+    said: &mut Said,
+) {
+    let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
+    for (name, value) in after {
+        if before.get(name) != Some(value) && !left.contains(name) {
+            let was = before.get(name).map_or("nothing", String::as_str);
+            let says = format!("{when}: the user's setting is not given back: {name}: {was} before, {value} after");
+            said.say(case, "check::not_restored", at, says, "");
+        }
+    }
+}

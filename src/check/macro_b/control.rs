@@ -1,0 +1,368 @@
+//! What a Fanuc or a Haas does with a block: modes, work offsets, system variables, G31.
+//!
+//! What a skip move leaves in #5061 … where no signal came (the end point), what #5021 and #5041 mean, and that a number
+//! without its point counts thousandths, is as the postprocessor files say: unverified on a real control.
+
+use crate::axes::{AxisName, Position};
+use crate::check::code::{Values, Var};
+use crate::check::run::{Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use crate::units::mm_from_inch;
+use std::collections::BTreeMap;
+
+/// The state of the control.
+#[derive(Debug, Clone)]
+pub struct MacroB {
+    /// Number of each axis at the control, by place in [`AxisName::ALL`].
+    numbers: [Option<u32>; 6],
+    inch: bool,
+    incremental: bool,
+    plane: f64,
+    feed_mode: f64,
+    /// 54 … 59, 54.1, 154
+    system: f64,
+    /// P of 54.1
+    system_p: f64,
+    cutter: bool,
+    rotated: bool,
+    tool_on: bool,
+    /// mm
+    tool_mm: f64,
+    /// Length in the tool offset memory, mm.
+    stored_mm: f64,
+    /// mm or deg
+    local: [f64; 6],
+    /// mm/min
+    feed: f64,
+    /// #3004
+    holds: f64,
+    lookahead: f64,
+    own: Values,
+    /// In work coordinates, mm and deg.
+    skipped: [f64; 6],
+    seconds: f64,
+}
+
+impl MacroB {
+    fn unit(&self, axis: AxisName) -> f64 {
+        if self.inch && !axis.is_rotary() { mm_from_inch(1.0) } else { 1.0 }
+    }
+
+    /// Offsets of the chosen work coordinate system, mm and deg: each has its own.
+    fn offset(&self, axis: AxisName) -> f64 {
+        if self.system == 54.0 && self.stored_mm == 0.0 {
+            return 0.0;
+        }
+        let n = (self.system - 50.0) + self.system_p;
+        [7.5, -3.25, 11.0, 1.5, -2.0, 0.75][axis.index()] * n / 4.0
+    }
+
+    /// Machine coordinate less work coordinate, mm or deg.
+    fn shift(&self, axis: AxisName) -> f64 {
+        let tool = if axis == AxisName::Z && self.tool_on { self.tool_mm } else { 0.0 };
+        self.offset(axis) + self.local[axis.index()] + tool
+    }
+
+    fn axis(&self, number: u32) -> Option<AxisName> {
+        AxisName::ALL.into_iter().find(|a| self.numbers[a.index()] == Some(number))
+    }
+
+    fn target(&self, words: &[Spoken], vm: &Vm) -> [Option<f64>; 6] {
+        AxisName::ALL.map(|axis| {
+            let way = self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
+            Some(if self.incremental { vm.at.get(axis) + way } else { way + self.shift(axis) })
+        })
+    }
+
+    /// A number without its point counts least increments.
+    fn length(&self, word: &Spoken, axis: AxisName) -> f64 {
+        const LEAST_MM: f64 = 0.001;
+        const LEAST_INCH: f64 = 0.0001;
+        let least = if self.inch && !axis.is_rotary() { LEAST_INCH } else { LEAST_MM };
+        word.value * if word.point { 1.0 } else { least } * self.unit(axis)
+    }
+
+    fn mode(&mut self, tenth: i64, words: &[Spoken]) -> Result<(), String> {
+        let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
+        match tenth {
+            170 | 180 | 190 => self.plane = tenth as f64 / 10.0,
+            200 | 210 => self.inch = tenth == 200,
+            400 => self.cutter = false,
+            490 => self.tool_on = false,
+            540 | 550 | 560 | 570 | 580 | 590 => (self.system, self.system_p) = (tenth as f64 / 10.0, 0.0),
+            541 | 1540 => {
+                (self.system, self.system_p) = (tenth as f64 / 10.0, value("P").ok_or("the work offset needs P")?);
+            }
+            690 => self.rotated = false,
+            800 => {}
+            900 | 910 => self.incremental = tenth == 910,
+            930 | 940 | 950 => self.feed_mode = tenth as f64 / 10.0,
+            1030 => self.lookahead = value("P").ok_or("G103 needs P")?,
+            40 => {
+                value("P").ok_or("G4 needs P")?;
+            }
+            _ => return Err(format!("G{} is not known here", tenth as f64 / 10.0)),
+        }
+        Ok(())
+    }
+
+    fn auxiliary(&mut self, m: f64, words: &[Spoken], vm: &mut Vm) -> Result<bool, String> {
+        let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
+        let whole = m.round() as i64;
+        if (m - m.round()).abs() > 1e-9 {
+            return Err(format!("M{m} is not known here"));
+        }
+        match whole {
+            30 => return Ok(true),
+            0 => vm.note(Event::Wait(String::new())),
+            5 => vm.note(Event::Other("spindle off".to_owned())),
+            9 => vm.note(Event::Other("coolant off".to_owned())),
+            19 => vm.note(Event::Orient(value("R").ok_or("M19 needs R")?)),
+            _ => return Err(format!("M{m} is not known here")),
+        }
+        Ok(false)
+    }
+
+    fn may_move(&self) -> Result<(), String> {
+        if self.cutter {
+            return Err("it moves with cutter compensation on: G40 is missing".to_owned());
+        }
+        if self.rotated {
+            return Err("it moves in a rotated coordinate system: G69 is missing".to_owned());
+        }
+        Ok(())
+    }
+
+    fn unused(words: &[Spoken], gs: &[i64]) -> Result<(), String> {
+        let m = |n: f64| words.iter().any(|w| w.address == "M" && w.value == n);
+        let moves = gs.iter().any(|g| matches!(g, 0 | 10 | 310));
+        for word in words {
+            let used = match word.address {
+                "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 1540)),
+                "R" => m(19.0),
+                "H" => gs.iter().any(|g| matches!(g, 434 | 2340)),
+                "F" => moves,
+                "G" | "M" => true,
+                _ => moves || gs.iter().any(|g| matches!(g, 520 | 434 | 2340)),
+            };
+            if !used {
+                return Err(format!("nothing in the block uses the word {}", word.address));
+            }
+        }
+        Ok(())
+    }
+
+    fn system_variable(&self, n: u32, vm: &Vm) -> Option<f64> {
+        Some(match n {
+            2001 | 11001 => self.stored_mm / self.unit(AxisName::Z),
+            3001 => self.seconds * 1000.0,
+            3004 => self.holds,
+            4002 => self.plane,
+            4003 => {
+                if self.incremental {
+                    91.0
+                } else {
+                    90.0
+                }
+            }
+            4005 => self.feed_mode,
+            4006 => {
+                if self.inch {
+                    20.0
+                } else {
+                    21.0
+                }
+            }
+            4012 | 4014 => self.system,
+            4130 => self.system_p,
+            5021..=5026 => {
+                let axis = self.axis(n - 5020)?;
+                vm.at.get(axis) / self.unit(axis)
+            }
+            5041..=5046 => {
+                let axis = self.axis(n - 5040)?;
+                (vm.at.get(axis) - self.shift(axis)) / self.unit(axis)
+            }
+            5061..=5066 => {
+                let axis = self.axis(n - 5060)?;
+                self.skipped[axis.index()] / self.unit(axis)
+            }
+            _ => return None,
+        })
+    }
+}
+
+/// The G numbers (in tenths) of one modal group: a block may hold one of each.
+const GROUPS: [&[i64]; 7] = [
+    &[0, 10, 310],
+    &[170, 180, 190],
+    &[900, 910],
+    &[930, 940, 950],
+    &[200, 210],
+    &[490, 434, 2340],
+    &[540, 550, 560, 570, 580, 590, 541, 1540],
+];
+
+impl Dialect for MacroB {
+    fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
+        let mut numbers = [None; 6];
+        let there = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some());
+        for (axis, place) in there.zip(1_usize..) {
+            numbers[axis.index()] = u32::try_from(*post.number.numbers.get(&axis).unwrap_or(&place)).ok();
+        }
+        let awkward = start == Start::Awkward;
+        Self {
+            numbers,
+            inch: awkward,
+            incremental: awkward,
+            plane: if awkward { 18.0 } else { 17.0 },
+            feed_mode: if awkward { 93.0 } else { 94.0 },
+            system: if awkward { 56.0 } else { 54.0 },
+            system_p: 0.0,
+            cutter: awkward,
+            rotated: awkward,
+            tool_on: awkward,
+            tool_mm: if awkward { 33.5 } else { 0.0 },
+            stored_mm: if awkward { 120.25 } else { 0.0 },
+            local: [0.0; 6],
+            feed: 0.0,
+            holds: 0.0,
+            lookahead: 0.0,
+            own: Values::new(),
+            skipped: [0.0; 6],
+            seconds: 0.0,
+        }
+    }
+
+    fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
+        let numbers = |address: &'static str| words.iter().filter(move |w| w.address == address).map(|w| w.value);
+        let tenth = |g: f64| {
+            let t = (g * 10.0).round();
+            if (g * 10.0 - t).abs() > 1e-6 { Err(format!("G{g} is not known here")) } else { Ok(t as i64) }
+        };
+        let gs: Vec<i64> = numbers("G").map(tenth).collect::<Result<_, _>>()?;
+        for group in GROUPS {
+            if gs.iter().filter(|g| group.contains(g)).count() > 1 {
+                return Err("two G words of one group stand in one block".to_owned());
+            }
+        }
+        let axes = words.iter().any(|w| "XYZABC".contains(w.address));
+        let motion = gs.iter().copied().find(|g| matches!(g, 0 | 10 | 310));
+        if motion.is_some() && !axes {
+            return Err("no axis word stands with the move".to_owned());
+        }
+        if axes && motion.is_none() && !gs.iter().any(|g| matches!(g, 520 | 434 | 2340)) {
+            return Err("axis words stand without a G word that uses them".to_owned());
+        }
+        Self::unused(words, &gs)?;
+        let mut over = false;
+        for m in numbers("M").collect::<Vec<_>>() {
+            over |= self.auxiliary(m, words, vm)?;
+        }
+        for g in gs.iter().filter(|g| !matches!(g, 0 | 10 | 310 | 520 | 434 | 2340)) {
+            self.mode(*g, words)?;
+        }
+        if gs.contains(&520) {
+            for axis in AxisName::ALL {
+                if let Some(word) = words.iter().find(|w| w.address.starts_with(axis.letter())) {
+                    self.local[axis.index()] = self.length(word, axis);
+                }
+            }
+        }
+        if gs.iter().any(|g| matches!(g, 434 | 2340)) {
+            (self.tool_on, self.tool_mm) = (true, self.stored_mm);
+            let moves = |axis: &AxisName| {
+                self.target(words, vm)[axis.index()].is_some_and(|to| (to - vm.at.get(*axis)).abs() > 1e-6)
+            };
+            if AxisName::ALL.iter().any(moves) {
+                return Err("the block that switches the transformation on moves".to_owned());
+            }
+        }
+        if let Some(f) = words.iter().find(|w| w.address == "F") {
+            if f.value <= 0.0 {
+                return Err(format!("the feed is {}", f.value));
+            }
+            self.feed = f.value * if self.inch { mm_from_inch(1.0) } else { 1.0 };
+        }
+        let Some(motion) = motion else { return Ok(if over { Next::End } else { Next::On }) };
+        self.may_move()?;
+        let to = self.target(words, vm);
+        if motion == 310 {
+            if self.feed_mode != 94.0 || self.feed <= 0.0 {
+                return Err("G31 needs a feed, in mm per minute".to_owned());
+            }
+            return Ok(Next::Probe(Probe {
+                from: vm.at,
+                to: vm.target(&to)?,
+                feed: self.feed,
+                toward: true,
+                known: vm.known,
+                overridden: (self.holds as u32) & 2 == 0,
+                strict: false,
+            }));
+        }
+        let rate = match motion {
+            0 => Rate::Rapid,
+            _ if self.feed_mode != 94.0 || self.feed <= 0.0 => {
+                return Err("G1 needs a feed, in mm per minute".to_owned());
+            }
+            _ => Rate::Feed(self.feed),
+        };
+        vm.go(&to, rate, true)?;
+        Ok(Next::On)
+    }
+
+    fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
+        match var {
+            Var::Number(n) if *n < 1000 => own(&self.own, var),
+            Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
+            Var::Name(_) => Err(format!("{var} is no variable")),
+        }
+    }
+
+    fn exists(&self, var: &Var) -> bool {
+        self.own.contains_key(var)
+    }
+
+    fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {
+        match var {
+            Var::Number(3001) => self.seconds = value / 1000.0,
+            Var::Number(3004) => self.holds = value,
+            Var::Number(1..=33) => {
+                self.own.insert(var.clone(), value);
+            }
+            _ => return Err(format!("{var} is not the program's own: only #1 to #33 are")),
+        }
+        Ok(())
+    }
+
+    fn probed(&mut self, _probe: &Probe, _outcome: Outcome, stands: &Position) {
+        for axis in AxisName::ALL {
+            self.skipped[axis.index()] = stands.get(axis) - self.shift(axis);
+        }
+    }
+
+    fn settings(&self) -> BTreeMap<String, String> {
+        let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
+        BTreeMap::from([
+            ("units".to_owned(), if self.inch { "G20" } else { "G21" }.to_owned()),
+            ("distance".to_owned(), if self.incremental { "G91" } else { "G90" }.to_owned()),
+            ("plane".to_owned(), format!("G{}", self.plane)),
+            ("feed mode".to_owned(), format!("G{}", self.feed_mode)),
+            ("work offset".to_owned(), format!("G{} P{}", self.system, self.system_p)),
+            ("cutter compensation".to_owned(), if self.cutter { "on" } else { "off" }.to_owned()),
+            ("rotation".to_owned(), if self.rotated { "on" } else { "off" }.to_owned()),
+            ("tool length".to_owned(), if self.tool_on { numbers(&[self.tool_mm]) } else { "off".to_owned() }),
+            ("local coordinate system".to_owned(), numbers(&self.local)),
+            ("#3004".to_owned(), numbers(&[self.holds])),
+            ("look-ahead".to_owned(), numbers(&[self.lookahead])),
+        ])
+    }
+
+    fn spell(&self, value: f64, decimals: usize, _width: usize) -> String {
+        let text = format!("{value:.decimals$}");
+        let zero = text.starts_with('-') && !text.bytes().any(|b| (b'1'..=b'9').contains(&b));
+        if zero { text[1..].to_owned() } else { text }
+    }
+}

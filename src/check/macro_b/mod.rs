@@ -1,0 +1,7 @@
+//! Custom macro B of Fanuc, and the macros of Haas, as far as our programs use them.
+
+mod control;
+mod parse;
+
+pub use control::MacroB;
+pub use parse::parse;

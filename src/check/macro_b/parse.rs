@@ -1,0 +1,367 @@
+//! The grammar: sequence numbers, IF GOTO, variables, DPRNT, messages. What it does not know is an error.
+//!
+//! Sources: Fanuc B-63324EN/03 (15i) for blocks and G31; a clone's manual (NCT, pp. 158, 193) and Haas 96-8000 Rev AC
+//! (p. 116) for DPRNT; the rest as the postprocessor files say, unverified where they say so.
+
+use crate::check::code::{Code, Expr, Function, Op, Piece, Text, Var, What, Word};
+use crate::check::lines::{Line, blanks, lines, number, unsigned};
+use crate::check::run::Fault;
+use nom::branch::alt;
+use nom::bytes::complete::{tag, take_till, take_while};
+use nom::character::complete::{char, digit1, one_of};
+use nom::combinator::cut;
+use nom::sequence::{delimited, preceded};
+use nom::{IResult, Parser};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The letters that a block may hold.
+const ADDRESSES: [&str; 12] = ["G", "M", "X", "Y", "Z", "A", "B", "C", "F", "P", "R", "H"];
+
+type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
+
+/// Reads a program.
+///
+/// # Errors
+/// The first place that is not of this grammar.
+pub fn parse(text: &str) -> Result<Code, Fault> {
+    let mut reader = Reader::default();
+    for line in lines(text) {
+        reader.line(&line)?;
+    }
+    reader.finish(text.len())
+}
+
+#[derive(Default)]
+struct Reader {
+    code: Code,
+    labels: BTreeMap<u32, usize>,
+    jumps: Vec<(usize, u32, Range<usize>)>,
+    percents: usize,
+    number: bool,
+    ended: bool,
+}
+
+impl Reader {
+    fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
+        let rest = line.text;
+        if rest.is_empty() {
+            return Ok(());
+        }
+        if self.percents > 1 {
+            return Err(line.fault(rest, "something stands behind the second % that ends the program"));
+        }
+        if let Some(after) = rest.strip_prefix('%') {
+            if !after.is_empty() {
+                return Err(line.not_understood(after, "nothing else in a line with %"));
+            }
+            if self.percents == 0 && !self.code.statements.is_empty() {
+                return Err(line.fault(rest, "the first % does not stand at the beginning of the program"));
+            }
+            self.percents += 1;
+            return Ok(());
+        }
+        if self.percents == 0 {
+            return Err(line.fault(rest, "the program does not begin with %"));
+        }
+        if !self.number {
+            let (after, _) = preceded(char('O'), digit1)
+                .parse(rest)
+                .map_err(|e: Failed<'_>| line.unread(&e, "the program's number, O1234"))?;
+            self.number = true;
+            return self.comments(line, after);
+        }
+        let mut rest = rest;
+        if let Ok((after, digits)) = preceded(char('N'), digit1::<_, nom::error::Error<&str>>).parse(rest) {
+            let label = sequence_number(line, rest, digits)?;
+            if self.labels.insert(label, self.code.statements.len()).is_some() {
+                return Err(line.fault(rest, format!("N{label} stands twice")));
+            }
+            rest = blanks(after).map_err(|e| line.unread(&e, "a block"))?.0;
+        }
+        let left = self.statement(line, rest)?;
+        self.comments(line, left)
+    }
+
+    fn statement<'a>(&mut self, line: &Line<'a>, rest: &'a str) -> Result<&'a str, Fault> {
+        let at = line.rest(rest);
+        if let Some(after) = rest.strip_prefix("IF[") {
+            let (after, condition) = (expression, char(']'))
+                .map(|(e, _)| e)
+                .parse(after)
+                .map_err(|e: Failed<'_>| line.unread(&e, "a condition"))?;
+            let over = self.code.push(at.clone(), What::JumpUnless(condition, 0));
+            let left = self.goto(line, after, at)?;
+            let here = self.code.statements.len();
+            self.aim(over, here);
+            return Ok(left);
+        }
+        if rest.starts_with("GOTO") {
+            return self.goto(line, rest, at);
+        }
+        if let Some(after) = rest.strip_prefix("POPEN") {
+            self.code.push(at, What::LogOpen { name: Vec::new(), append: true });
+            return Ok(after);
+        }
+        if let Some(after) = rest.strip_prefix("PCLOS") {
+            self.code.push(at, What::LogClose);
+            return Ok(after);
+        }
+        if let Some(after) = rest.strip_prefix("DPRNT[") {
+            let (left, text) = printed(line, after)?;
+            self.code.push(at, What::LogLine(text));
+            return Ok(left);
+        }
+        if rest.starts_with('#') {
+            return self.assignment(line, rest, at);
+        }
+        self.block(line, rest)
+    }
+
+    fn goto<'a>(&mut self, line: &Line<'a>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        let (after, digits) = preceded(tag("GOTO"), cut(digit1))
+            .parse(rest)
+            .map_err(|e: Failed<'_>| line.unread(&e, "GOTO and a sequence number"))?;
+        let label = sequence_number(line, rest, digits)?;
+        let jump = self.code.push(at.clone(), What::Jump(0));
+        self.jumps.push((jump, label, at));
+        Ok(after)
+    }
+
+    fn assignment<'a>(&mut self, line: &Line<'a>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        let (after, n) =
+            preceded(char('#'), digit1).parse(rest).map_err(|e: Failed<'_>| line.unread(&e, "a variable"))?;
+        let variable = sequence_number(line, rest, n)?;
+        let (after, value) = preceded(char('='), cut(expression))
+            .parse(after)
+            .map_err(|e: Failed<'_>| line.unread(&e, "= and a value"))?;
+        if matches!(variable, 3000 | 3006) {
+            let (left, body) = delimited(char('('), comment_text, char(')'))
+                .parse(after)
+                .map_err(|e: Failed<'_>| line.unread(&e, "a message in parentheses"))?;
+            if value != Expr::Number(1.0) {
+                return Err(line.fault(rest, format!("#{variable} is known with the value 1 only")));
+            }
+            let text = vec![Piece::Text(Arc::from(body))];
+            self.code.push(at, if variable == 3000 { What::Abort(text) } else { What::Wait(text) });
+            return Ok(left);
+        }
+        self.code.push(at, What::Set(Var::Number(variable), value));
+        Ok(after)
+    }
+
+    fn block<'a>(&mut self, line: &Line<'a>, rest: &'a str) -> Result<&'a str, Fault> {
+        let mut words: Vec<Word> = Vec::new();
+        let mut left = rest;
+        while left.starts_with(|c: char| c.is_ascii_uppercase()) {
+            let Some(address) = ADDRESSES.into_iter().find(|a| left.starts_with(a)) else {
+                return Err(line.not_understood(left, "a word that axiscal knows"));
+            };
+            let (after, (value, point)) =
+                cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of a word"))?;
+            if words.iter().any(|w| w.address == address) && address != "G" {
+                return Err(line.fault(left, format!("two {address} words stand in one block")));
+            }
+            words.push(Word { address, value, point });
+            left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;
+        }
+        if !words.is_empty() {
+            self.ended |= words.iter().any(|w| w.address == "M" && w.value == Expr::Number(30.0));
+            self.code.push(line.rest(rest), What::Block(words));
+        }
+        Ok(left)
+    }
+
+    fn comments(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let mut rest = rest;
+        loop {
+            let (after, _) = blanks(rest).map_err(|e| line.unread(&e, "a comment"))?;
+            if after.is_empty() {
+                return Ok(());
+            }
+            let (next, _) = delimited(char('('), comment_text, char(')'))
+                .parse(after)
+                .map_err(|e: Failed<'_>| line.unread(&e, "a word, a comment or the block's end"))?;
+            rest = next;
+        }
+    }
+
+    fn aim(&mut self, jump: usize, to: usize) {
+        if let Some(statement) = self.code.statements.get_mut(jump)
+            && let What::Jump(place) | What::JumpUnless(_, place) = &mut statement.what
+        {
+            *place = to;
+        }
+    }
+
+    fn finish(mut self, end: usize) -> Result<Code, Fault> {
+        if self.percents != 2 {
+            return Err(Fault { at: end..end, says: "the program ends without its second %".to_owned() });
+        }
+        if !self.ended {
+            return Err(Fault { at: end..end, says: "the program has no M30".to_owned() });
+        }
+        for (jump, label, at) in std::mem::take(&mut self.jumps) {
+            let Some(to) = self.labels.get(&label).copied() else {
+                return Err(Fault { at, says: format!("there is no N{label}") });
+            };
+            self.aim(jump, to);
+        }
+        Ok(self.code)
+    }
+}
+
+fn sequence_number(line: &Line<'_>, rest: &str, digits: &str) -> Result<u32, Fault> {
+    digits.parse().map_err(|_| line.fault(rest, format!("{digits} is too large a number")))
+}
+
+fn comment_text(input: &str) -> IResult<&str, &str> {
+    take_till(|c| c == '(' || c == ')').parse(input)
+}
+
+/// What stands in DPRNT: `*` is a blank, `#21[44]` a variable with four whole digits and four after the point.
+fn printed<'a>(line: &Line<'a>, input: &'a str) -> Result<(&'a str, Text), Fault> {
+    let mut text = Text::new();
+    let mut rest = input;
+    loop {
+        if let Some(after) = rest.strip_prefix(']') {
+            return Ok((after, text));
+        }
+        if rest.starts_with('#') {
+            let (after, (n, whole, decimals)) = (
+                preceded(char('#'), digit1),
+                preceded(char('['), one_of("0123456789")),
+                (one_of("0123456789"), char(']')).map(|(d, _)| d),
+            )
+                .parse(rest)
+                .map_err(|e: Failed<'_>| line.unread(&e, "a variable with its places, #21[44]"))?;
+            let digit = |c: char| c.to_digit(10).unwrap_or(0) as usize;
+            let value = Expr::Var(Var::Number(sequence_number(line, rest, n)?));
+            text.push(Piece::Fixed { decimals: digit(decimals), width: digit(whole), value });
+            rest = after;
+            continue;
+        }
+        let plain = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || "*-+/.,".contains(c);
+        let (after, words) = take_while(plain).parse(rest).map_err(|e: Failed<'_>| line.unread(&e, "text"))?;
+        if words.is_empty() {
+            return Err(line.not_understood(rest, "text, a variable or ]"));
+        }
+        text.push(Piece::Text(Arc::from(words.replace('*', " "))));
+        rest = after;
+    }
+}
+
+fn variable(input: &str) -> IResult<&str, Expr> {
+    let plain = digit1.map(|d: &str| d.parse().map_or(Expr::Number(f64::NAN), |n| Expr::Var(Var::Number(n))));
+    preceded(char('#'), plain).parse(input)
+}
+
+fn bracketed(input: &str) -> IResult<&str, Expr> {
+    delimited(char('['), expression, char(']')).parse(input)
+}
+
+/// The value of a word: a number, a variable, or something in brackets.
+fn word_value(input: &str) -> IResult<&str, (Expr, bool)> {
+    let computed = alt((bracketed, variable)).map(|e| (e, true));
+    alt((number.map(|(n, point)| (Expr::Number(n), point)), computed)).parse(input)
+}
+
+fn value(input: &str) -> IResult<&str, Expr> {
+    let call = |name: &'static str, function: Function| {
+        preceded(tag(name), cut(bracketed)).map(move |e| Expr::Call(function, Box::new(e)))
+    };
+    alt((
+        unsigned.map(|(n, _)| Expr::Number(n)),
+        variable,
+        bracketed,
+        call("ABS", Function::Abs),
+        call("SQRT", Function::Sqrt),
+        call("ROUND", Function::Round),
+        call("FIX", Function::Floor),
+        call("FUP", Function::Ceil),
+        preceded(char('-'), value).map(|e| Expr::Call(Function::Minus, Box::new(e))),
+    ))
+    .parse(input)
+}
+
+fn expression(input: &str) -> IResult<&str, Expr> {
+    level(input, 0)
+}
+
+fn level(input: &str, depth: usize) -> IResult<&str, Expr> {
+    let Some(parse) = LEVELS.get(depth) else { return value(input) };
+    let (mut rest, mut left) = level(input, depth + 1)?;
+    while let Ok((after, op)) = parse(rest) {
+        let (after, right) = cut(|i| level(i, depth + 1)).parse(after)?;
+        left = Expr::Two(op, Box::new(left), Box::new(right));
+        rest = after;
+    }
+    Ok((rest, left))
+}
+
+type OpParser = fn(&str) -> IResult<&str, Op>;
+
+const LEVELS: [OpParser; 3] = [
+    |i| {
+        alt((
+            tag("EQ").map(|_| Op::Eq),
+            tag("NE").map(|_| Op::Ne),
+            tag("GT").map(|_| Op::Gt),
+            tag("GE").map(|_| Op::Ge),
+            tag("LT").map(|_| Op::Lt),
+            tag("LE").map(|_| Op::Le),
+        ))
+        .parse(i)
+    },
+    |i| {
+        alt((
+            char('+').map(|_| Op::Add),
+            char('-').map(|_| Op::Sub),
+            tag("XOR").map(|_| Op::Xor),
+            tag("OR").map(|_| Op::Or),
+        ))
+        .parse(i)
+    },
+    |i| {
+        alt((
+            char('*').map(|_| Op::Mul),
+            char('/').map(|_| Op::Div),
+            tag("MOD").map(|_| Op::Mod),
+            tag("AND").map(|_| Op::And),
+        ))
+        .parse(i)
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_is_an_error_with_its_place() {
+        for (text, place) in [
+            ("G0 X1.\n", 0),
+            ("%\nG0 X1.\n", 2),
+            ("%\nO1\nG0 X1..5\n%\n", 12),
+            ("%\nO1\nG0 K1\n%\n", 8),
+            ("%\nO1\nIF[#1GT]GOTO1\n%\n", 13),
+            ("%\nO1\nGOTO1\nM30\n%\n", 5),
+            ("%\nO1\nN1\nN1\n", 8),
+            ("%\nO1\nDPRNT[P*N#1]\n", 15),
+            ("%\nO1\n#3006=1\n", 12),
+            ("%\nO1\n(A(B)\n", 7),
+            ("%\nO1\nX1.\n%\n", 11),
+        ] {
+            let fault = parse(text).unwrap_err();
+            assert_eq!(fault.at.start, place, "{text:?}: {}", fault.says);
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn rubbish_never_panics(text in "%\nO1\n[ -~\n]{0,300}") {
+            let _ = parse(&text);
+        }
+    }
+}

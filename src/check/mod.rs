@@ -1,0 +1,262 @@
+//! An NC program is read back, run on the virtual machine with everything that may happen, and judged.
+//!
+//! ```text
+//! text → ngc, macro_b, sinumerik, klartext (grammar of a dialect) → code → run (one machine) → explore (what may happen)
+//!      → judge, touches (limits, shapes, plan, stops, settings), proof (does it still do what was written?)
+//! ```
+//!
+//! The grammars are strict: what they do not know is an error with its place, never skipped. Nothing here knows how a
+//! program was made; shapes and the proof of a single move come from [`crate::program`], contacts from
+//! [`crate::simulate`].
+
+mod code;
+mod explore;
+mod judge;
+mod lines;
+mod macro_b;
+mod ngc;
+mod proof;
+mod run;
+mod runs;
+mod seconds;
+mod touches;
+mod world;
+
+use crate::diag::{Failure, Finding, Result, Source};
+use crate::machine::{Machine, Mounting};
+use crate::post::Postprocessor;
+use crate::program::plan::{ControllerFrame, Plan, Proof};
+use crate::program::scene::Scene;
+use crate::simulate::Errorless;
+use judge::Case;
+use run::Event;
+use std::sync::Arc;
+use world::World;
+
+/// What a program is checked against.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Against<'a> {
+    /// The plan of its touches.
+    pub plan: Option<&'a Plan>,
+    /// Name of the mounting, where there is no plan; `None`: the one on which most touches are made.
+    pub mounting: Option<&'a str>,
+    /// The set-up at which it is meant to begin.
+    pub from: u32,
+}
+
+/// What came out.
+#[derive(Debug, Clone)]
+pub struct Checked {
+    /// What is wrong: the program is safe and what the plan asks for when there is no error among them.
+    pub findings: Vec<Finding>,
+    /// What the program does.
+    pub proof: Proof,
+    /// The mountings, in the order in which they are up.
+    pub mountings: Vec<String>,
+    /// Touches that it makes.
+    pub touches: usize,
+    /// Moves of the whole program.
+    pub moves: usize,
+    /// Times that it waits for a person.
+    pub stops: usize,
+    /// Set-ups at which it can begin.
+    pub setups: u32,
+    /// Ways on which something happens otherwise that were followed.
+    pub branches: usize,
+    /// Run time without the stops, s.
+    pub seconds: f64,
+}
+
+/// A part of a program: what is mounted, and the machine with its stylus.
+struct Part {
+    machine: Machine,
+    mounting: Mounting,
+}
+
+/// Checks a program.
+///
+/// # Errors
+/// When the text is not of the dialect's grammar, or plan and machine do not belong together.
+pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
+    let rule = post.check.as_ref().ok_or_else(|| {
+        Failure::new(
+            "check::no_dialect",
+            format!("controller {} does not say how its programs are read back", post.name),
+        )
+        .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
+    })?;
+    let text = source.inner();
+    if let Some(line) = lines::lines(text).find(|l| l.text.chars().count() > post.line_length) {
+        let says = format!("the line is longer than the {} characters that the control takes", post.line_length);
+        return Err(Finding::error("check::line_length", says).at(source, line.all()).into());
+    }
+    let program = runs::Program::parse(rule, text).map_err(|fault| {
+        Finding::error("check::not_understood", fault.says)
+            .help("axiscal does not know this; whether it is safe cannot be said")
+            .at(source, fault.at)
+    })?;
+    match against.plan {
+        Some(plan) => with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?),
+        None => without_plan(machine, post, source, against, &program),
+    }
+}
+
+/// Tries each mounting of the machine and takes the one on which most touches are made.
+fn without_plan(
+    machine: &Machine,
+    post: &Postprocessor,
+    source: &Source,
+    against: &Against<'_>,
+    program: &runs::Program,
+) -> Result<Checked> {
+    let named = against.mounting.map(|name| {
+        machine.mounting(name).ok_or_else(|| {
+            let there: Vec<&str> = machine.mountings.iter().map(|m| m.name.as_str()).collect();
+            Failure::new("check::mounting", format!("{} has no mounting {name:?}", machine.name))
+                .help(format!("there are: {}", there.join(", ")))
+        })
+    });
+    let candidates: Vec<&Mounting> = match named {
+        Some(mounting) => vec![mounting?],
+        None => machine.mountings.iter().collect(),
+    };
+    let mut best: Option<Checked> = None;
+    for mounting in candidates {
+        let part = Part { machine: machine.clone(), mounting: mounting.clone() };
+        let checked = with_parts(machine, post, source, against, program, vec![part])?;
+        let better = |b: &Checked| (checked.touches, b.findings.len()) > (b.touches, checked.findings.len());
+        if best.as_ref().is_none_or(better) {
+            best = Some(checked);
+        }
+    }
+    best.ok_or_else(|| {
+        Failure::new("check::mounting", format!("{} has no mounting to run the program on", machine.name))
+            .help("describe the blocks in the machine's file")
+    })
+}
+
+/// What is mounted in each part of a plan's program.
+fn parts_of_plan(machine: &Machine, plan: &Plan) -> Result<Vec<Part>> {
+    if plan.machine != machine.name {
+        return Err(Failure::new(
+            "check::machine",
+            format!("the plan was made for machine {:?}, not for {:?}", plan.machine, machine.name),
+        )
+        .help("name the plan's machine with --machine, or make the plan again"));
+    }
+    let mut keys: Vec<(&str, f64, f64)> = Vec::new();
+    for touch in &plan.touches {
+        let key = (
+            touch.mounting.as_deref().unwrap_or(&plan.mounting),
+            touch.tool_length_mm.unwrap_or(plan.tool_length_mm),
+            touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm),
+        );
+        if keys.last() != Some(&key) {
+            keys.push(key);
+        }
+    }
+    keys.into_iter()
+        .map(|(name, length_mm, radius_mm)| {
+            let lacks = |what: String| {
+                Failure::new("check::plan", format!("the plan is for {what}, which {} lacks", machine.name))
+                    .help("plan and machine belong together: make the plan again")
+            };
+            Ok(Part {
+                machine: machine
+                    .with_stylus_of(length_mm, radius_mm)
+                    .ok_or_else(|| lacks(format!("a stylus of {length_mm} mm with a ball of radius {radius_mm} mm")))?,
+                mounting: machine.mounting(name).ok_or_else(|| lacks(format!("mounting {name:?}")))?.clone(),
+            })
+        })
+        .collect()
+}
+
+fn with_parts(
+    machine: &Machine,
+    post: &Postprocessor,
+    source: &Source,
+    against: &Against<'_>,
+    program: &runs::Program,
+    parts: Vec<Part>,
+) -> Result<Checked> {
+    let tcp = against.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
+    let scenes: Vec<Scene<'_>> = parts.iter().map(|p| Scene::new(&p.machine, &p.mounting)).collect::<Result<_>>()?;
+    let bodies = parts.iter().map(|p| Errorless::new(&p.machine, Some(&p.mounting))).collect();
+    let world = Arc::new(World::new(bodies, &machine.origin, tcp));
+    let told = runs::all(machine, post, against.plan, program, &world, &scenes);
+    let first = told.runs.first();
+    // what the control rounds, and under a transformation what the rounding of three words does
+    let same = 0.51 * 10f64.powi(-(post.number.decimals as i32)) + 1e-6 + if tcp { 1e-4 } else { 0.0 };
+    let case = Case {
+        machine,
+        post,
+        plan: against.plan,
+        scenes: &scenes,
+        mountings: &parts.iter().map(|p| &p.mounting).collect::<Vec<_>>(),
+        world: &world,
+        source,
+        same,
+        clear_from_anywhere: told.clear_from_anywhere,
+    };
+    let mut findings = judge::judge(&case, &told.runs);
+    findings.extend(
+        told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
+    );
+    if let Some(begins) = program.begins_at().filter(|b| *b != against.from.max(1)) {
+        findings.push(
+            Finding::error("check::begins_later", format!("the program begins at set-up {begins}"))
+                .help(format!("write 1 back, or say that it is meant so with --from {begins}"))
+                .at(source, program.begins_in()),
+        );
+    }
+    let proof = proof::proof(&told.runs);
+    if let Some(plan) = against.plan {
+        findings.extend(as_written(plan, post, &proof, first.map(|t| &t.trunk), source));
+    }
+    let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
+    Ok(Checked {
+        mountings: parts.iter().map(|p| p.mounting.name.clone()).collect(),
+        touches: trunk.iter().filter(|h| matches!(&h.event, Event::Log(t) if t.starts_with('P'))).count(),
+        moves: trunk.iter().filter(|h| matches!(h.event, Event::Move { .. } | Event::Probe { .. })).count(),
+        stops: told.stops,
+        setups: told.setups,
+        branches: told.runs.iter().map(|t| t.branches.len()).sum(),
+        seconds: seconds::seconds(trunk),
+        findings,
+        proof,
+    })
+}
+
+/// Does the program still do what `generate` wrote?
+fn as_written(
+    plan: &Plan,
+    post: &Postprocessor,
+    proof: &Proof,
+    trunk: Option<&Vec<run::Happened>>,
+    source: &Source,
+) -> Option<Finding> {
+    let written = plan.programs.get(&post.name)?;
+    if written.sha256 == proof.sha256 {
+        return None;
+    }
+    let same = proof::same_lines(written, proof);
+    let lines = trunk.into_iter().flatten().filter(|h| matches!(h.event, Event::Log(_)));
+    let places: Vec<_> = lines.map(|h| h.at.clone()).collect();
+    let before = same.checked_sub(1).and_then(|i| places.get(i)).map_or(0, |at| at.end);
+    let all_the_same = same == written.lines.len() && same == proof.lines.len();
+    let (at, says) = if all_the_same {
+        let says = "the program does otherwise than the one that axiscal wrote: when it starts again at a set-up, in the settings that it leaves, or after its last line";
+        (before..before, says)
+    } else {
+        let end = places.get(same).map_or(before, |at| at.end);
+        (
+            before..end,
+            "here the program does otherwise than the one that axiscal wrote (moves, log, messages, or what it does when something goes wrong)",
+        )
+    };
+    Some(
+        Finding::error("check::changed", says)
+            .help("was it edited? `axiscal generate` writes it anew; change the postprocessor file rather than the program")
+            .at(source, at),
+    )
+}

@@ -1,0 +1,7 @@
+//! LinuxCNC's RS274/NGC, as far as our programs use it.
+
+mod control;
+mod parse;
+
+pub use control::Ngc;
+pub use parse::parse;

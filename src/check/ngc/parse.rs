@@ -1,0 +1,484 @@
+//! The grammar: O-words, parameters, expressions, active comments. What it does not know is an error.
+//!
+//! Source: LinuxCNC 2.9 manual, chapters 11.3 (lines, words, expressions), 11.4 (comments), 11.7 (O-codes).
+
+use crate::check::code::{Code, Expr, Function, Op, Piece, Text, Var, What, Word};
+use crate::check::lines::{Line, blanks, lines, number, unsigned};
+use crate::check::run::Fault;
+use nom::branch::alt;
+use nom::bytes::complete::{tag, tag_no_case, take_till, take_while1};
+use nom::character::complete::{char, digit1, one_of};
+use nom::combinator::{cut, opt};
+use nom::sequence::{delimited, preceded};
+use nom::{IResult, Parser};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The letters that a block may hold.
+const ADDRESSES: [&str; 16] = ["G", "M", "X", "Y", "Z", "A", "B", "C", "F", "S", "P", "L", "R", "E", "D", "Q"];
+
+/// Words that make a comment do something that our programs do not use.
+const OTHER_ACTIVE: [&str; 6] = ["PRINT", "PROBEOPEN", "PROBECLOSE", "PY", "PYRUN", "PYRELOAD"];
+
+/// Reads a program.
+///
+/// # Errors
+/// The first place that is not of this grammar.
+pub fn parse(text: &str) -> Result<Code, Fault> {
+    let mut reader = Reader::default();
+    for line in lines(text) {
+        reader.line(&line)?;
+    }
+    reader.finish(text.len())
+}
+
+#[derive(Default)]
+struct Reader {
+    code: Code,
+    open: Vec<Open>,
+    used: BTreeSet<String>,
+    subs: BTreeMap<String, usize>,
+    calls: Vec<(usize, String, Range<usize>)>,
+    percents: usize,
+}
+
+/// A structure that is not closed yet.
+struct Open {
+    label: String,
+    at: Range<usize>,
+    kind: Kind,
+}
+
+enum Kind {
+    /// The jump past the present branch, the jumps to the end, whether `else` has come.
+    If { past: Option<usize>, ends: Vec<usize>, other: bool },
+    /// The jump over the subroutine.
+    Sub { over: usize },
+}
+
+impl Reader {
+    fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
+        let (rest, _) = blanks(line.text).map_err(|e| line.unread(&e, "a line"))?;
+        if rest.is_empty() {
+            return Ok(());
+        }
+        if self.percents > 1 {
+            return Err(line.fault(rest, "something stands behind the second % that ends the program"));
+        }
+        if let Some(after) = rest.strip_prefix('%') {
+            if !after.trim().is_empty() {
+                return Err(line.not_understood(after, "nothing else in a line with %"));
+            }
+            if self.percents == 0 && !self.code.statements.is_empty() {
+                return Err(line.fault(rest, "the first % does not stand at the beginning of the program"));
+            }
+            self.percents += 1;
+            if self.percents == 2 {
+                self.code.push(line.all(), What::End);
+            }
+            return Ok(());
+        }
+        if rest.starts_with(['o', 'O']) {
+            return self.o_word(line, rest);
+        }
+        let rest = if rest.starts_with('#') { self.assignment(line, rest)? } else { self.block(line, rest)? };
+        self.comments(line, rest)
+    }
+
+    /// The comments that end a line.
+    fn comments(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let mut rest = rest;
+        loop {
+            let (after, _) = blanks(rest).map_err(|e| line.unread(&e, "a comment"))?;
+            if after.is_empty() {
+                return Ok(());
+            }
+            let (next, body) =
+                delimited(char('('), take_till(|c| c == '(' || c == ')'), char(')')).parse(after).map_err(
+                    |e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "a word, a comment or the line's end"),
+                )?;
+            self.comment(line, after, body)?;
+            rest = next;
+        }
+    }
+
+    fn comment(&mut self, line: &Line<'_>, place: &str, body: &str) -> Result<(), Fault> {
+        let (head, tail) = body.split_once(',').map_or((body, None), |(h, t)| (h, Some(t)));
+        let word: String = head.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_ascii_uppercase();
+        let at = line.rest(place);
+        let text = |fixed: bool| -> Result<Text, Fault> {
+            let tail = tail.ok_or_else(|| line.fault(place, format!("({word}) needs a comma and a text")))?;
+            if fixed { Ok(vec![Piece::Text(Arc::from(tail))]) } else { expanded(line, tail) }
+        };
+        let what = match word.as_str() {
+            "MSG" => What::Message(text(true)?),
+            "DEBUG" => What::Message(text(false)?),
+            "ABORT" => What::Abort(text(false)?),
+            "LOG" => What::LogLine(text(false)?),
+            "LOGOPEN" => What::LogOpen { name: text(true)?, append: false },
+            "LOGAPPEND" => What::LogOpen { name: text(true)?, append: true },
+            "LOGCLOSE" => What::LogClose,
+            other if OTHER_ACTIVE.contains(&other) => {
+                return Err(line.fault(place, format!("a comment that begins with {other} acts on the control")));
+            }
+            _ => return Ok(()),
+        };
+        self.code.push(at, what);
+        Ok(())
+    }
+
+    fn assignment<'a>(&mut self, line: &Line<'a>, rest: &'a str) -> Result<&'a str, Fault> {
+        let (after, target) = preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
+        let (after, value) = preceded((blanks, char('='), blanks), cut(value))
+            .parse(after)
+            .map_err(|e| line.unread(&e, "= and a value"))?;
+        let what = match target {
+            Expr::Var(var) => What::Set(var, value),
+            Expr::Indirect(number) => What::SetIndirect(*number, value),
+            _ => return Err(line.not_understood(rest, "a parameter")),
+        };
+        self.code.push(line.rest(rest), what);
+        Ok(after)
+    }
+
+    fn block<'a>(&mut self, line: &Line<'a>, rest: &'a str) -> Result<&'a str, Fault> {
+        let mut words: Vec<Word> = Vec::new();
+        let mut left = rest;
+        while left.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            let letter = left[..1].to_ascii_uppercase();
+            let Some(address) = ADDRESSES.into_iter().find(|a| *a == letter) else {
+                return Err(line.not_understood(left, "a word that axiscal knows"));
+            };
+            let (after, (value, point)) =
+                cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of a word"))?;
+            if words.iter().any(|w| w.address == address) && address != "G" && address != "M" {
+                return Err(line.fault(left, format!("two {address} words stand in one line")));
+            }
+            words.push(Word { address, value, point });
+            left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;
+        }
+        if !words.is_empty() {
+            self.code.push(line.rest(rest), What::Block(words));
+        }
+        Ok(left)
+    }
+
+    fn o_word(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let (after, label) = preceded(one_of("oO"), alt((bracketed_name, digit1)))
+            .parse(rest)
+            .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "an O-word"))?;
+        let label = label.trim_start_matches('0').to_ascii_lowercase();
+        let (after, keyword) = preceded(blanks, take_while1(|c: char| c.is_ascii_alphabetic()))
+            .parse(after)
+            .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "if, else, endif, sub, call, return"))?;
+        let condition = |after| {
+            preceded(blanks, cut(bracketed))
+                .parse(after)
+                .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "a condition in brackets"))
+        };
+        let at = line.rest(rest);
+        let left = match keyword.to_ascii_lowercase().as_str() {
+            "if" => {
+                let (left, test) = condition(after)?;
+                self.first_use(line, rest, &label)?;
+                let past = self.code.push(at.clone(), What::JumpUnless(test, 0));
+                self.open.push(Open { label, at, kind: Kind::If { past: Some(past), ends: Vec::new(), other: false } });
+                left
+            }
+            word @ ("else" | "elseif") => {
+                let (left, test) =
+                    if word == "elseif" { condition(after).map(|(l, t)| (l, Some(t)))? } else { (after, None) };
+                self.next_branch(line, rest, &label, test)?;
+                left
+            }
+            "endif" => {
+                let Some(Open { kind: Kind::If { past, ends, .. }, .. }) = self.close(&label, true) else {
+                    return Err(line.fault(rest, format!("o{label} endif closes nothing")));
+                };
+                let here = self.code.statements.len();
+                past.into_iter().chain(ends).for_each(|jump| self.aim(jump, here));
+                after
+            }
+            "sub" => {
+                if !self.open.is_empty() {
+                    return Err(line.fault(rest, "a subroutine begins inside of something else"));
+                }
+                self.first_use(line, rest, &label)?;
+                let over = self.code.push(at.clone(), What::Jump(0));
+                self.subs.insert(label.clone(), self.code.statements.len());
+                self.open.push(Open { label, at, kind: Kind::Sub { over } });
+                after
+            }
+            word @ ("endsub" | "return") => {
+                let (left, value) = opt(preceded(blanks, bracketed))
+                    .parse(after)
+                    .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "a value in brackets"))?;
+                let inside = |o: &Open| matches!(o.kind, Kind::Sub { .. }) && o.label == label;
+                if !self.open.iter().any(inside) {
+                    return Err(line.fault(rest, format!("{word} outside of a subroutine of that name")));
+                }
+                self.code.push(at, What::Return(value));
+                if word == "endsub" {
+                    let Some(Open { kind: Kind::Sub { over }, .. }) = self.close(&label, false) else {
+                        return Err(line.fault(rest, "the subroutine ends inside of something else"));
+                    };
+                    let here = self.code.statements.len();
+                    self.aim(over, here);
+                }
+                left
+            }
+            "call" => {
+                let call = self.code.push(at.clone(), What::Call(0));
+                self.calls.push((call, label, at));
+                after
+            }
+            other => return Err(line.fault(rest, format!("{other:?} is no O-word that axiscal knows"))),
+        };
+        self.comments(line, left)
+    }
+
+    fn first_use(&mut self, line: &Line<'_>, rest: &str, label: &str) -> Result<(), Fault> {
+        if self.used.insert(label.to_owned()) {
+            return Ok(());
+        }
+        Err(line.fault(rest, format!("o{label} is used twice")))
+    }
+
+    fn next_branch(&mut self, line: &Line<'_>, rest: &str, label: &str, test: Option<Expr>) -> Result<(), Fault> {
+        let wrong = |says: &str| Err(line.fault(rest, format!("o{label} {says}")));
+        let to_end = self.code.push(line.rest(rest), What::Jump(0));
+        let here = self.code.statements.len();
+        let Some(Open { label: open, kind: Kind::If { past, ends, other }, .. }) = self.open.last_mut() else {
+            return wrong("else belongs to no if");
+        };
+        if open != label {
+            return wrong("else belongs to no open if");
+        }
+        if *other {
+            return wrong("has a branch behind its else");
+        }
+        ends.push(to_end);
+        *other = test.is_none();
+        let before = past.take();
+        if let Some(test) = test {
+            *past = Some(here);
+            self.code.push(line.rest(rest), What::JumpUnless(test, 0));
+        }
+        if let Some(jump) = before {
+            self.aim(jump, here);
+        }
+        Ok(())
+    }
+
+    fn close(&mut self, label: &str, conditional: bool) -> Option<Open> {
+        let fits = |o: &Open| o.label == label && matches!(o.kind, Kind::If { .. }) == conditional;
+        if self.open.last().is_some_and(fits) { self.open.pop() } else { None }
+    }
+
+    fn aim(&mut self, jump: usize, to: usize) {
+        if let Some(statement) = self.code.statements.get_mut(jump) {
+            match &mut statement.what {
+                What::Jump(place) | What::JumpUnless(_, place) | What::Call(place) => *place = to,
+                _ => {}
+            }
+        }
+    }
+
+    fn finish(mut self, end: usize) -> Result<Code, Fault> {
+        if let Some(open) = self.open.last() {
+            return Err(Fault { at: open.at.clone(), says: format!("o{} is not closed", open.label) });
+        }
+        if self.percents == 1 {
+            return Err(Fault { at: end..end, says: "the program ends without its second %".to_owned() });
+        }
+        for (call, label, at) in std::mem::take(&mut self.calls) {
+            let Some(sub) = self.subs.get(&label).copied() else {
+                return Err(Fault { at, says: format!("there is no subroutine o<{label}>") });
+            };
+            self.aim(call, sub);
+        }
+        Ok(self.code)
+    }
+}
+
+/// Text with `%f`, `%.3f` and parameters in it.
+fn expanded(line: &Line<'_>, text: &str) -> Result<Text, Fault> {
+    const USUAL_DECIMALS: usize = 4;
+    let mut out = Text::new();
+    let (mut rest, mut decimals) = (text, USUAL_DECIMALS);
+    while !rest.is_empty() {
+        let plain = rest.find(['%', '#']).unwrap_or(rest.len());
+        if plain > 0 {
+            out.push(Piece::Text(Arc::from(&rest[..plain])));
+            rest = &rest[plain..];
+            continue;
+        }
+        if let Some(after) = rest.strip_prefix('%') {
+            let (after, new) = format(after).map_err(|e| line.unread(&e, "%f, %d or %.3f"))?;
+            (rest, decimals) = (after, new.unwrap_or(USUAL_DECIMALS));
+            continue;
+        }
+        let (after, value) = preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
+        out.push(Piece::Fixed { decimals, width: 0, value });
+        rest = after;
+    }
+    Ok(out)
+}
+
+fn format(input: &str) -> IResult<&str, Option<usize>> {
+    let digits = (char('.'), one_of("0123456789"), char('f')).map(|(_, d, _)| d.to_digit(10).map(|d| d as usize));
+    alt((digits, char('d').map(|_| Some(0)), char('f').map(|_| None))).parse(input)
+}
+
+fn bracketed_name(input: &str) -> IResult<&str, &str> {
+    delimited(char('<'), take_while1(|c: char| c.is_ascii_alphanumeric() || c == '_'), char('>')).parse(input)
+}
+
+/// What follows `#`.
+fn parameter(input: &str) -> IResult<&str, Expr> {
+    let name = bracketed_name.map(|n: &str| Expr::Var(Var::Name(Arc::from(n.to_ascii_lowercase()))));
+    let plain = digit1.map(|d: &str| d.parse().map_or(Expr::Number(f64::NAN), |n| Expr::Var(Var::Number(n))));
+    let computed = bracketed.map(|e| Expr::Indirect(Box::new(e)));
+    alt((name, plain, computed)).parse(input)
+}
+
+fn bracketed(input: &str) -> IResult<&str, Expr> {
+    delimited((char('['), blanks), expression, (blanks, char(']'))).parse(input)
+}
+
+/// The value of a word: a number or something in brackets.
+fn word_value(input: &str) -> IResult<&str, (Expr, bool)> {
+    let computed = alt((bracketed, preceded(char('#'), parameter))).map(|e| (e, true));
+    alt((number.map(|(n, point)| (Expr::Number(n), point)), computed)).parse(input)
+}
+
+fn value(input: &str) -> IResult<&str, Expr> {
+    alt((
+        unsigned.map(|(n, _)| Expr::Number(n)),
+        preceded(char('#'), parameter),
+        bracketed,
+        function,
+        preceded(char('-'), value).map(|e| Expr::Call(Function::Minus, Box::new(e))),
+    ))
+    .parse(input)
+}
+
+fn function(input: &str) -> IResult<&str, Expr> {
+    let exists = preceded(tag_no_case("EXISTS["), cut((char('#'), parameter, char(']')))).map(|(_, p, _)| match p {
+        Expr::Var(var) => Expr::Exists(var),
+        other => other,
+    });
+    let call = |name: &'static str, function: Function| {
+        preceded(tag_no_case(name), cut(bracketed)).map(move |e| Expr::Call(function, Box::new(e)))
+    };
+    alt((
+        exists,
+        call("ABS", Function::Abs),
+        call("SQRT", Function::Sqrt),
+        call("ROUND", Function::Round),
+        call("FIX", Function::Floor),
+        call("FUP", Function::Ceil),
+    ))
+    .parse(input)
+}
+
+/// The operators, from the loosest to the tightest (manual 11.3.9).
+fn expression(input: &str) -> IResult<&str, Expr> {
+    level(input, 0)
+}
+
+fn level(input: &str, depth: usize) -> IResult<&str, Expr> {
+    let Some(parse) = LEVELS.get(depth) else { return value(input) };
+    let (mut rest, mut left) = level(input, depth + 1)?;
+    while let Ok((after, op)) = delimited(blanks, *parse, blanks).parse(rest) {
+        let (after, right) = cut(|i| level(i, depth + 1)).parse(after)?;
+        left = Expr::Two(op, Box::new(left), Box::new(right));
+        rest = after;
+    }
+    Ok((rest, left))
+}
+
+type OpParser = fn(&str) -> IResult<&str, Op>;
+
+const LEVELS: [OpParser; 5] = [
+    |i| {
+        alt((
+            tag_no_case("AND").map(|_| Op::And),
+            tag_no_case("XOR").map(|_| Op::Xor),
+            tag_no_case("OR").map(|_| Op::Or),
+        ))
+        .parse(i)
+    },
+    |i| {
+        alt((
+            tag_no_case("EQ").map(|_| Op::Eq),
+            tag_no_case("NE").map(|_| Op::Ne),
+            tag_no_case("GT").map(|_| Op::Gt),
+            tag_no_case("GE").map(|_| Op::Ge),
+            tag_no_case("LT").map(|_| Op::Lt),
+            tag_no_case("LE").map(|_| Op::Le),
+        ))
+        .parse(i)
+    },
+    |i| alt((char('+').map(|_| Op::Add), char('-').map(|_| Op::Sub))).parse(i),
+    |i| {
+        if i.starts_with("**") {
+            return Err(nom::Err::Error(nom::error::Error::new(i, nom::error::ErrorKind::Tag)));
+        }
+        alt((char('*').map(|_| Op::Mul), char('/').map(|_| Op::Div), tag_no_case("MOD").map(|_| Op::Mod))).parse(i)
+    },
+    |i| tag("**").map(|_| Op::Pow).parse(i),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_keep_their_fractions() {
+        let code = parse("G92.2 X-1.5 Y.25 Z[1 + 2 * 3]\n").unwrap();
+        let What::Block(words) = &code.statements[0].what else { panic!() };
+        assert_eq!(words[0].value, Expr::Number(92.2), "{words:?}");
+        assert_eq!(words[1].value, Expr::Number(-1.5));
+        assert_eq!(words[2].value, Expr::Number(0.25));
+    }
+
+    #[test]
+    fn what_is_not_known_is_an_error_with_its_place() {
+        for (text, place) in [
+            ("G0 X1 K3\n", 6),
+            ("G0 X1..5\n", 6),
+            ("G0 X\n", 4),
+            ("(a (b))\n", 3),
+            ("o1 if [1 GT]\no1 endif\n", 11),
+            ("o1 if [1 GT 0]\n", 0),
+            ("o1 endif\n", 0),
+            ("o<a> call\n", 0),
+            ("#<a> = \n", 7),
+            ("G0 X1 X2\n", 6),
+            ("(PRINT,hello)\n", 0),
+            ("hello\n", 0),
+            ("%\nG0 X1\n", 8),
+            ("%\n%\nG0\n", 4),
+            ("(LOG,%x)\n", 0),
+            ("G0 X[1\n", 6),
+        ] {
+            let fault = parse(text).unwrap_err();
+            assert_eq!(fault.at.start, place, "{text:?}: {}", fault.says);
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn rubbish_never_panics(text in "[ -~\n]{0,300}") {
+            let _ = parse(&text);
+        }
+
+        #[test]
+        fn words_of_the_language_never_panic(words in proptest::collection::vec(
+            proptest::sample::select(vec!["G0 ", "X", "-1.5", "[", "]", "#", "<a>", "o1 ", "if ", "else", "endif", "sub", "\n", "(", ")", "LOG,", "%", "call", " = ", "5061"]), 0..80)) {
+            let _ = parse(&words.concat());
+        }
+    }
+}

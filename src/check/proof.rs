@@ -1,0 +1,102 @@
+//! What a program does, as a text and as a digest: two programs with one digest move identically.
+//!
+//! "Identically" means: in the run from the beginning and in the runs from each set-up, the same moves in the same order
+//! (targets to 0.001 µm, rapid or feed, stopping at contact or not), the same lines in the same logs, the same messages, stops,
+//! orientations and other functions; and the same, from each probing move on, when the probe triggers early, late, not at
+//! all, does not close again, or when the block stands off; and the same settings left to the user each time.
+
+use super::explore::{Branch, Told};
+use super::run::{Event, Happened, Rate};
+use crate::axes::Position;
+use crate::program::plan::Proof;
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+
+/// The proof of the runs of a program.
+pub fn proof(runs: &[Told]) -> Proof {
+    let mut all = Sha256::new();
+    let mut lines = Vec::new();
+    for (n, told) in runs.iter().enumerate() {
+        let mut text = String::new();
+        // writing into a String cannot fail
+        let _ = writeln!(text, "run {n} from {}", told.from);
+        let mut branches = told.branches.iter().peekable();
+        for (place, happened) in told.trunk.iter().enumerate() {
+            while let Some(branch) = branches.next_if(|b| b.leaves <= place) {
+                write_branch(&mut text, branch);
+            }
+            write_event(&mut text, happened);
+            if n == 0 && matches!(happened.event, Event::Log(_)) {
+                lines.push(hex(&Sha256::digest(text.as_bytes()))[..8].to_owned());
+                all.update(text.as_bytes());
+                text.clear();
+            }
+        }
+        branches.for_each(|b| write_branch(&mut text, b));
+        let _ = writeln!(
+            text,
+            "settings {:?} aborted {:?} fault {:?}",
+            told.settings,
+            told.aborted,
+            told.fault.as_ref().map(|f| &f.says)
+        );
+        all.update(text.as_bytes());
+    }
+    Proof { sha256: hex(&all.finalize()), lines }
+}
+
+/// The line of the log (from 0) up to which another program still does the same.
+pub fn same_lines(one: &Proof, other: &Proof) -> usize {
+    one.lines.iter().zip(&other.lines).take_while(|(a, b)| a == b).count()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut hex, byte| {
+        let _ = write!(hex, "{byte:02x}");
+        hex
+    })
+}
+
+fn place(at: &Position) -> String {
+    at.0.iter().fold(String::new(), |mut s, x| {
+        let _ = write!(s, " {:.6}", if x.abs() < 5e-7 { 0.0 } else { *x });
+        s
+    })
+}
+
+fn write_branch(text: &mut String, branch: &Branch) {
+    let fault = branch.fault.as_ref().map(|f| f.says.as_str());
+    let _ = writeln!(
+        text,
+        "branch {:?} over {} fault {fault:?} settings {:?}",
+        branch.deviation, branch.over, branch.settings
+    );
+    branch.trace.iter().for_each(|h| write_event(text, h));
+}
+
+/// One line for an event.
+pub fn write_event(text: &mut String, happened: &Happened) {
+    let _ = match &happened.event {
+        // an axis that is sent where it stands does not move, but it is known from then on
+        Event::Move { to, rate, exact, named, .. } => {
+            let rate = match rate {
+                Rate::Rapid => "rapid".to_owned(),
+                Rate::Feed(feed) => format!("F{feed:.6}"),
+            };
+            writeln!(text, "move{} {rate} {exact} {named:?}", place(to))
+        }
+        Event::Probe { probe, outcome } => writeln!(
+            text,
+            "probe{} to{} F{:.6} {} {} {} {} {:.9}",
+            place(&probe.from),
+            place(&probe.to),
+            probe.feed,
+            probe.toward,
+            probe.overridden,
+            probe.strict,
+            outcome.hit,
+            outcome.part
+        ),
+        other => writeln!(text, "{other:?}"),
+    };
+}

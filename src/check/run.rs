@@ -1,0 +1,483 @@
+//! The one machine that runs the programs of all dialects: statements, axes, what happened.
+//!
+//! It stops at every move that a probe may end ([`Pause::Probe`]); whoever runs it decides how that move ends. So one
+//! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
+
+use super::code::{Code, Piece, Statement, Values, Var, What, Word};
+use super::world::World;
+use crate::axes::{AxisName, Position};
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// How fast a move is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rate {
+    /// As fast as the machine can; each axis by itself unless the control says otherwise.
+    Rapid,
+    /// mm/min, or deg/min where only rotary axes move.
+    Feed(f64),
+}
+
+/// A move that the probe may end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Where it begins: the control's coordinates in machine coordinates.
+    pub from: Position,
+    /// Where it ends if nothing happens.
+    pub to: Position,
+    /// mm/min
+    pub feed: f64,
+    /// It ends at contact; `false`: it ends when contact is lost.
+    pub toward: bool,
+    /// The place from which each axis comes is known.
+    pub known: [bool; 6],
+    /// The operator's feed override acts on it.
+    pub overridden: bool,
+    /// A closed circuit of the control breaks the program off when the move ends the wrong way.
+    pub strict: bool,
+}
+
+/// How a move that the probe may end did end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// The event that it waited for came.
+    pub hit: bool,
+    /// Which part of the way was made, 0 to 1.
+    pub part: f64,
+}
+
+/// Something that a person or a machine would notice.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// A move that does not look at the probe.
+    Move {
+        /// From where.
+        from: Position,
+        /// To where.
+        to: Position,
+        /// How fast.
+        rate: Rate,
+        /// The place from which each axis comes is known.
+        known: [bool; 6],
+        /// Corners are driven to: the next move begins where this one ends.
+        exact: bool,
+        /// The axes that the block names.
+        named: [bool; 6],
+    },
+    /// A move that looked at the probe.
+    Probe {
+        /// As it was programmed.
+        probe: Probe,
+        /// How it ended.
+        outcome: Outcome,
+    },
+    /// A log was opened.
+    LogOpen {
+        /// Its name.
+        name: String,
+        /// What it held is kept.
+        append: bool,
+    },
+    /// A line went into the log.
+    Log(String),
+    /// The log was closed.
+    LogClose,
+    /// A message was shown.
+    Message(String),
+    /// The program waited for a person, with this text.
+    Wait(String),
+    /// The program was broken off.
+    Abort(String),
+    /// The spindle was turned to an angle, deg.
+    Orient(f64),
+    /// Something else that the machine does, by its word.
+    Other(String),
+    /// The program ended.
+    End,
+}
+
+/// An event with its place in the program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Happened {
+    /// Bytes of the text.
+    pub at: Range<usize>,
+    /// What.
+    pub event: Event,
+}
+
+/// The axes, the record of what happened, and what a dialect needs of both.
+#[derive(Debug, Clone)]
+pub struct Vm {
+    /// Machine coordinates.
+    pub at: Position,
+    /// Axes whose place the program knows because it has sent them there.
+    pub known: [bool; 6],
+    /// What happened.
+    pub trace: Vec<Happened>,
+    /// The statement that is being done.
+    pub place: Range<usize>,
+    /// Which axes the machine has.
+    pub axes: [bool; 6],
+    /// Where the blocks are.
+    pub world: Arc<World>,
+    /// What is mounted.
+    pub part: usize,
+    /// The first stop only says what must be mounted.
+    pub stop_is_reminder: bool,
+    /// The probe does not close any more.
+    pub stuck: bool,
+    /// How much further along X, Y, Z the blocks seem to stand, mm.
+    pub shift: [f64; 3],
+    /// Searches that found a face since the last line of the log.
+    pub hits: usize,
+    /// An axis has moved since the last stop.
+    pub moved: bool,
+}
+
+impl Vm {
+    /// Is the probe deflected here?
+    pub fn deflected(&self) -> bool {
+        self.stuck || self.world.touches(self.part, &self.at, &self.shift)
+    }
+
+    /// Notes an event.
+    pub fn note(&mut self, event: Event) {
+        match &event {
+            // several stops without a move between them are one
+            Event::Wait(_) if self.moved => {
+                self.moved = false;
+                if !std::mem::take(&mut self.stop_is_reminder) {
+                    self.part = (self.part + 1).min(self.world.last_part());
+                }
+            }
+            Event::Log(_) => self.hits = 0,
+            Event::Move { .. } => self.moved = true,
+            Event::Probe { probe, outcome } => {
+                self.moved = true;
+                self.hits += usize::from(probe.toward && outcome.hit);
+            }
+            _ => {}
+        }
+        self.trace.push(Happened { at: self.place.clone(), event });
+    }
+
+    /// A move that does not look at the probe.
+    pub fn go(&mut self, to: &[Option<f64>; 6], rate: Rate, exact: bool) -> Result<(), String> {
+        self.refuse_missing(to)?;
+        let from = self.at;
+        let known = self.known;
+        let mut end = from;
+        for axis in AxisName::ALL {
+            if let Some(value) = to[axis.index()] {
+                end.set(axis, value);
+                self.known[axis.index()] = true;
+            }
+        }
+        self.at = end;
+        self.note(Event::Move { from, to: end, rate, known, exact, named: to.map(|v| v.is_some()) });
+        Ok(())
+    }
+
+    /// No move has an axis that the machine lacks, or a number that is none.
+    pub fn refuse_missing(&self, to: &[Option<f64>; 6]) -> Result<(), String> {
+        for axis in AxisName::ALL {
+            let Some(value) = to[axis.index()] else { continue };
+            if !self.axes[axis.index()] {
+                return Err(format!("the machine has no axis {axis}"));
+            }
+            if !value.is_finite() || value.abs() > 1e6 {
+                return Err(format!("{axis} is sent to {value}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The end of a probing move.
+    pub fn target(&self, to: &[Option<f64>; 6]) -> Result<Position, String> {
+        self.refuse_missing(to)?;
+        let mut end = self.at;
+        for axis in AxisName::ALL {
+            if let Some(value) = to[axis.index()] {
+                end.set(axis, value);
+            }
+        }
+        Ok(end)
+    }
+}
+
+/// Where a run rests.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Pause {
+    /// At a move that the probe may end.
+    Probe(Probe),
+    /// At its end.
+    Done,
+}
+
+/// What a block asks the interpreter to do next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Next {
+    /// The next statement.
+    On,
+    /// How does this move end?
+    Probe(Probe),
+    /// The program is over.
+    End,
+}
+
+/// In what state a program finds the control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// As it is switched on.
+    Fresh,
+    /// Every mode otherwise than the program needs it, every offset set.
+    Awkward,
+}
+
+/// The language of a control: what words, variables and G numbers mean.
+pub trait Dialect: Clone + Send + Sync {
+    /// The control before the program.
+    fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self;
+    /// What outlives a program that is broken off by hand; `None`: nothing that a further run of the program could use.
+    fn after_abort(&self) -> Option<Self> {
+        None
+    }
+    /// A block of words with their values.
+    ///
+    /// # Errors
+    /// What the control would not do.
+    fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String>;
+    /// What a variable holds that is not the program's own.
+    ///
+    /// # Errors
+    /// When the control has no such variable.
+    fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String>;
+    /// Whether a variable exists.
+    fn exists(&self, var: &Var) -> bool;
+    /// A variable is written.
+    ///
+    /// # Errors
+    /// When it cannot be.
+    fn write(&mut self, var: &Var, value: f64) -> Result<(), String>;
+    /// A move ended: where its result is kept.
+    fn probed(&mut self, probe: &Probe, outcome: Outcome, stands: &Position);
+    /// A subroutine was entered.
+    fn entered(&mut self) {}
+    /// A subroutine was left, with its value.
+    fn left(&mut self, _value: Option<f64>, _vm: &Vm) {}
+    /// All that a user would have to find again, by name.
+    fn settings(&self) -> BTreeMap<String, String>;
+    /// How a number is written into a text.
+    fn spell(&self, value: f64, decimals: usize, width: usize) -> String {
+        let text = format!("{value:>width$.decimals$}", width = if width > 0 { width + decimals + 2 } else { 0 });
+        text
+    }
+}
+
+/// A word with its value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spoken {
+    /// Address.
+    pub address: &'static str,
+    /// Value.
+    pub value: f64,
+    /// It was computed, or written with a decimal point.
+    pub point: bool,
+}
+
+/// Why a run cannot go on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// Bytes of the text.
+    pub at: Range<usize>,
+    /// What is wrong.
+    pub says: String,
+}
+
+/// Statements after which a run that has not ended never will.
+const MOST_STATEMENTS: u64 = 3_000_000;
+
+/// A program on its way.
+#[derive(Debug, Clone)]
+pub struct Run<'p, D> {
+    code: &'p Code,
+    next: usize,
+    returns: Vec<usize>,
+    texts: BTreeMap<Var, String>,
+    done: u64,
+    pending: Option<Probe>,
+    over: bool,
+    /// The axes and the record.
+    pub vm: Vm,
+    /// The language.
+    pub dialect: D,
+}
+
+impl<'p, D: Dialect> Run<'p, D> {
+    /// A program that begins.
+    pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
+        let (returns, texts) = (Vec::new(), BTreeMap::new());
+        Self { code, next: 0, returns, texts, done: 0, pending: None, over: false, vm, dialect }
+    }
+
+    /// On to the next move that the probe may end, or to the end.
+    ///
+    /// # Errors
+    /// What the control would not do.
+    pub fn on(&mut self) -> Result<Pause, Fault> {
+        if let Some(probe) = &self.pending {
+            return Ok(Pause::Probe(probe.clone()));
+        }
+        while !self.over {
+            let code = self.code;
+            let Some(statement) = code.statements.get(self.next) else {
+                let end = code.statements.last().map_or(0..0, |s| s.at.clone());
+                return Err(Fault { at: end, says: "the program has no end".to_owned() });
+            };
+            self.done += 1;
+            if self.done > MOST_STATEMENTS {
+                return Err(Fault { at: statement.at.clone(), says: "the program runs in a circle".to_owned() });
+            }
+            self.next += 1;
+            self.vm.place = statement.at.clone();
+            let fault = |says: String| Fault { at: statement.at.clone(), says };
+            if let Some(probe) = self.statement(statement).map_err(fault)? {
+                self.pending = Some(probe.clone());
+                return Ok(Pause::Probe(probe));
+            }
+        }
+        Ok(Pause::Done)
+    }
+
+    /// The move at which it rests ended like this.
+    pub fn resolve(&mut self, outcome: Outcome) {
+        let Some(probe) = self.pending.take() else { return };
+        let mut stands = probe.from;
+        for (slot, end) in stands.0.iter_mut().zip(probe.to.0) {
+            *slot += (end - *slot) * outcome.part;
+        }
+        if outcome.part >= 1.0 {
+            stands = probe.to;
+        }
+        self.vm.at = stands;
+        self.vm.note(Event::Probe { probe: probe.clone(), outcome });
+        self.dialect.probed(&probe, outcome, &stands);
+        if probe.strict && !outcome.hit {
+            let says = if probe.toward { "the move ended without contact" } else { "the probe did not close" };
+            self.vm.note(Event::Abort(says.to_owned()));
+            self.over = true;
+        }
+    }
+
+    /// It has ended.
+    pub fn is_over(&self) -> bool {
+        self.over
+    }
+
+    fn value(&self, expr: &super::code::Expr) -> Result<f64, String> {
+        expr.value(&|var| self.dialect.read(var, &self.vm), &|var| self.dialect.exists(var))
+    }
+
+    fn text(&self, text: &[Piece]) -> Result<String, String> {
+        let mut out = String::new();
+        for piece in text {
+            match piece {
+                Piece::Text(t) => out.push_str(t),
+                Piece::Fixed { decimals, width, value } => {
+                    out.push_str(&self.dialect.spell(self.value(value)?, *decimals, *width));
+                }
+                Piece::Var(var) => {
+                    out.push_str(self.texts.get(var).ok_or_else(|| format!("{var} holds no text yet"))?);
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    fn statement(&mut self, statement: &Statement) -> Result<Option<Probe>, String> {
+        match &statement.what {
+            What::Block(words) => {
+                let spoken = self.spoken(words)?;
+                match self.dialect.block(&spoken, &mut self.vm)? {
+                    Next::On => {}
+                    Next::Probe(probe) => return Ok(Some(probe)),
+                    Next::End => self.end(Event::End),
+                }
+            }
+            What::Set(var, expr) => {
+                let value = self.value(expr)?;
+                self.dialect.write(var, value)?;
+            }
+            What::SetIndirect(number, expr) => {
+                let (number, value) = (self.value(number)?, self.value(expr)?);
+                self.dialect.write(&super::code::numbered(number)?, value)?;
+            }
+            What::SetText(var, text) => {
+                let text = self.text(text)?;
+                self.texts.insert(var.clone(), text);
+            }
+            What::Jump(to) => self.next = *to,
+            What::JumpUnless(condition, to) => {
+                if self.value(condition)? == 0.0 {
+                    self.next = *to;
+                }
+            }
+            What::Call(to) => {
+                const DEEPEST: usize = 10;
+                if self.returns.len() >= DEEPEST {
+                    return Err("subroutines call each other more than ten deep".to_owned());
+                }
+                self.returns.push(self.next);
+                self.next = *to;
+                self.dialect.entered();
+            }
+            What::Return(value) => {
+                let value = value.as_ref().map(|v| self.value(v)).transpose()?;
+                self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
+                self.dialect.left(value, &self.vm);
+            }
+            What::Message(text) => self.say(text, Event::Message)?,
+            What::Wait(text) => self.say(text, Event::Wait)?,
+            What::LogLine(text) => self.say(text, Event::Log)?,
+            What::LogOpen { name, append } => {
+                let name = self.text(name)?;
+                self.vm.note(Event::LogOpen { name, append: *append });
+            }
+            What::LogClose => self.vm.note(Event::LogClose),
+            What::Abort(text) => {
+                let text = self.text(text)?;
+                self.end(Event::Abort(text));
+            }
+            What::Sync => {}
+            What::End => self.end(Event::End),
+        }
+        Ok(None)
+    }
+
+    fn say(&mut self, text: &[Piece], event: fn(String) -> Event) -> Result<(), String> {
+        let text = self.text(text)?;
+        self.vm.note(event(text));
+        Ok(())
+    }
+
+    fn end(&mut self, event: Event) {
+        self.vm.note(event);
+        self.over = true;
+    }
+
+    fn spoken(&self, words: &[Word]) -> Result<Vec<Spoken>, String> {
+        let speak = |w: &Word| Ok(Spoken { address: w.address, value: self.value(&w.value)?, point: w.point });
+        words.iter().map(speak).collect()
+    }
+}
+
+/// Reads a variable of the program's own.
+///
+/// # Errors
+/// When it has no value yet.
+pub fn own(values: &Values, var: &Var) -> Result<f64, String> {
+    values.get(var).copied().ok_or_else(|| format!("{var} has no value"))
+}

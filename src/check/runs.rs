@@ -1,0 +1,408 @@
+//! Which runs of a program are made: from the beginning with the control in an awkward state and with everything that may
+//! happen, once more from elsewhere with the control fresh, and from each set-up.
+
+use super::code::{Code, Expr, Var, What};
+use super::explore::{Limits, Told, explore};
+use super::proof::write_event;
+use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
+use super::world::World;
+use super::{macro_b, ngc};
+use crate::axes::{AxisName, Position};
+use crate::machine::Machine;
+use crate::post::{CheckRule, DialectName, Postprocessor};
+use crate::program::plan::Plan;
+use crate::program::scene::Scene;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A program that was read.
+pub struct Program {
+    dialect: DialectName,
+    code: Code,
+    /// The variable that says at which set-up it begins, and the statement that sets it.
+    from: Option<(Var, usize)>,
+    setups: u32,
+}
+
+/// More set-ups than any program has: a number beyond comes from a damaged one.
+const MOST_SETUPS: f64 = 400.0;
+
+impl Program {
+    /// Reads a program.
+    ///
+    /// # Errors
+    /// The first place that is not of the dialect's grammar.
+    pub fn parse(rule: &CheckRule, text: &str) -> Result<Self, Fault> {
+        let code = match rule.dialect {
+            DialectName::Ngc => ngc::parse(text)?,
+            DialectName::MacroB => macro_b::parse(text)?,
+        };
+        let var = variable(&rule.from);
+        let set_at = code.statements.iter().position(|s| matches!(&s.what, What::Set(v, Expr::Number(_)) if *v == var));
+        let mut highest = 1.0_f64;
+        for statement in &code.statements {
+            if let What::JumpUnless(condition, _) = &statement.what {
+                compared(condition, &var, &mut |n| highest = highest.max(n));
+            }
+        }
+        let setups = highest.min(MOST_SETUPS) as u32;
+        Ok(Self { dialect: rule.dialect, code, from: set_at.map(|at| (var, at)), setups })
+    }
+
+    /// The set-up at which it is told to begin.
+    pub fn begins_at(&self) -> Option<u32> {
+        let (_, at) = self.from.as_ref()?;
+        match self.code.statements.get(*at)?.what {
+            // a number that is no set-up begins nowhere
+            What::Set(_, Expr::Number(n)) => Some(if n.fract() == 0.0 && n >= 0.0 { n as u32 } else { u32::MAX }),
+            _ => None,
+        }
+    }
+
+    /// Where that stands.
+    pub fn begins_in(&self) -> Range<usize> {
+        let at = self.from.as_ref().and_then(|(_, at)| self.code.statements.get(*at));
+        at.map_or(0..0, |s| s.at.clone())
+    }
+
+    /// The program told to begin at a set-up.
+    fn from(&self, setup: u32) -> Code {
+        let mut code = self.code.clone();
+        if let Some((var, at)) = &self.from
+            && let Some(statement) = code.statements.get_mut(*at)
+        {
+            statement.what = What::Set(var.clone(), Expr::Number(f64::from(setup)));
+        }
+        code
+    }
+}
+
+/// `#<_axiscal_from>`, `#100`, `Q1600`, `AXC_FROM` as a variable.
+fn variable(written: &str) -> Var {
+    let bare = written.trim_start_matches('#').trim_matches(['<', '>']);
+    let digits = bare.strip_prefix('Q').unwrap_or(bare);
+    digits.parse().map_or_else(|_| Var::Name(Arc::from(bare)), Var::Number)
+}
+
+/// The numbers with which a condition compares a variable.
+fn compared(condition: &Expr, var: &Var, found: &mut dyn FnMut(f64)) {
+    if let Expr::Two(_, left, right) = condition {
+        match (left.as_ref(), right.as_ref()) {
+            (Expr::Var(v), Expr::Number(n)) | (Expr::Number(n), Expr::Var(v)) if v == var => found(*n),
+            _ => {
+                compared(left, var, found);
+                compared(right, var, found);
+            }
+        }
+    }
+}
+
+/// All runs, and what they show together.
+pub struct All {
+    /// The first is that of the whole program.
+    pub runs: Vec<Told>,
+    /// What is wrong in the comparison of runs.
+    pub findings: Vec<(Range<usize>, String)>,
+    /// Set-ups at which it can begin.
+    pub setups: u32,
+    /// Stops of the whole program.
+    pub stops: usize,
+    /// Wherever the program consents to begin, its first moves are clear.
+    pub clear_from_anywhere: bool,
+}
+
+/// Makes all runs.
+pub fn all(
+    machine: &Machine,
+    post: &Postprocessor,
+    plan: Option<&Plan>,
+    program: &Program,
+    world: &Arc<World>,
+    scenes: &[Scene<'_>],
+) -> All {
+    match program.dialect {
+        DialectName::Ngc => Runs::<ngc::Ngc>::new(machine, post, plan, program, world, scenes).all(),
+        DialectName::MacroB => Runs::<macro_b::MacroB>::new(machine, post, plan, program, world, scenes).all(),
+    }
+}
+
+struct Runs<'a, D> {
+    machine: &'a Machine,
+    post: &'a Postprocessor,
+    plan: Option<&'a Plan>,
+    program: &'a Program,
+    world: &'a Arc<World>,
+    scenes: &'a [Scene<'a>],
+    codes: Vec<Code>,
+    dialect: std::marker::PhantomData<fn() -> D>,
+}
+
+impl<'a, D: Dialect> Runs<'a, D> {
+    fn new(
+        machine: &'a Machine,
+        post: &'a Postprocessor,
+        plan: Option<&'a Plan>,
+        program: &'a Program,
+        world: &'a Arc<World>,
+        scenes: &'a [Scene<'a>],
+    ) -> Self {
+        // 1 … the last set-up, and one more that only gives the settings back
+        let last = if program.from.is_some() { program.setups + 1 } else { 1 };
+        let codes = (1..=last).map(|k| program.from(k)).collect();
+        Self { machine, post, plan, program, world, scenes, codes, dialect: std::marker::PhantomData }
+    }
+
+    fn all(&self) -> All {
+        let (window, clear_from_anywhere) = self.windows();
+        let beginning = self.start(&window, 0.5, 0.3);
+        let limits =
+            Limits { placement_mm: self.machine.probe.placement_tolerance, back_off_mm: self.machine.probe.back_off };
+        let last = self.codes.len();
+        // the whole run, the same from elsewhere, and each set-up but the first
+        let numbers: Vec<(usize, Start, bool)> = [(1, Start::Awkward, true), (1, Start::Fresh, false)]
+            .into_iter()
+            .chain((2..=last).map(|k| (k, Start::Awkward, true)))
+            .collect();
+        let elsewhere = self.start(&window, 0.4, 0.8);
+        let mut runs: Vec<Told> = numbers
+            .par_iter()
+            .map(|(k, start, forks)| {
+                let at = if *start == Start::Fresh { elsewhere } else { beginning };
+                self.told(*k, *start, at, forks.then_some(limits))
+            })
+            .collect();
+        let mut findings = Vec::new();
+        let fresh = if runs.len() > 1 { Some(runs.remove(1)) } else { None };
+        let stops = runs.first().map_or(0, |t| stops(&t.trunk));
+        if let (Some(awkward), Some(fresh)) = (runs.first(), fresh) {
+            findings.extend(otherwise(awkward, &fresh));
+        }
+        All { runs, findings, setups: self.program.setups, stops, clear_from_anywhere }
+    }
+
+    /// A place at which the program may find the machine.
+    fn start(&self, window: &[[f64; 2]; 6], rotary: f64, linear: f64) -> Position {
+        let mut at = Position::default();
+        for axis in &self.machine.axes {
+            let i = axis.name.index();
+            let [low, high] = if axis.name.is_rotary() { window[i] } else { axis.range };
+            let share = if axis.name.is_rotary() { rotary } else { linear };
+            // a program under the control's own transformation wants 0, which is in the middle of its window
+            let value = low + (high - low) * share;
+            at.set(axis.name, value + self.machine.origin.get(axis.name).unwrap_or(0.0));
+        }
+        at
+    }
+
+    fn run<'c>(&self, code: &'c Code, start: Start, at: Position, part: usize, reminded: bool) -> Run<'c, D> {
+        let mut axes = [false; 6];
+        self.machine.axes.iter().for_each(|a| axes[a.name.index()] = true);
+        let vm = Vm {
+            at,
+            known: [false; 6],
+            trace: Vec::new(),
+            place: 0..0,
+            axes,
+            world: self.world.clone(),
+            part,
+            stop_is_reminder: reminded,
+            stuck: false,
+            shift: [0.0; 3],
+            hits: 0,
+            moved: true,
+        };
+        Run::new(code, D::begin(start, self.post, self.machine), vm)
+    }
+
+    fn told(&self, k: usize, start: Start, at: Position, limits: Option<Limits>) -> Told {
+        let from = k as u32;
+        let empty = Code::default();
+        let code = self.codes.get(k - 1).unwrap_or(&empty);
+        let gives_back = self.codes.last().filter(|_| self.codes.len() > 1);
+        let restart = |run: &Run<'_, D>| {
+            let dialect = run.dialect.after_abort()?;
+            let mut again = self.run(gives_back?, start, run.vm.at, run.vm.part, false);
+            again.dialect = dialect;
+            Some(again)
+        };
+        let parts = self.world.last_part() + 1;
+        let part = if k == 1 || parts == 1 { 0 } else { self.part_of(code, from, start, at, parts) };
+        let run = self.run(code, start, at, part, k > 1 && parts > 1);
+        explore(run, from, limits, &restart)
+    }
+
+    /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.
+    fn part_of(&self, code: &Code, from: u32, start: Start, at: Position, parts: usize) -> usize {
+        let fits = |part: &usize| {
+            let told = explore(self.run(code, start, at, *part, true), from, None, &|_| None);
+            let first = told.trunk.iter().find_map(|h| match &h.event {
+                Event::Log(text) if text.starts_with('P') => number_after_n(text),
+                _ => None,
+            });
+            first.is_some_and(|id| self.part_of_touch(id) == Some(*part))
+        };
+        (0..parts).find(fits).unwrap_or(0)
+    }
+
+    fn part_of_touch(&self, id: u64) -> Option<usize> {
+        let plan = self.plan?;
+        let key = |t: &crate::program::plan::PlanTouch| {
+            (
+                t.mounting.clone().unwrap_or_else(|| plan.mounting.clone()),
+                t.tool_length_mm.unwrap_or(plan.tool_length_mm).to_bits(),
+                t.ball_radius_mm.unwrap_or(plan.ball_radius_mm).to_bits(),
+            )
+        };
+        let mut part = 0;
+        let mut before = None;
+        for touch in &plan.touches {
+            let this = key(touch);
+            if before.as_ref().is_some_and(|b| *b != this) {
+                part += 1;
+            }
+            before = Some(this);
+            if touch.id == id {
+                return Some(part);
+            }
+        }
+        None
+    }
+
+    /// Where the rotary axes may stand when the program begins, and whether its first moves are clear from there.
+    ///
+    /// Where they are not clear from everywhere, the program is asked: it is begun with each axis at each whole step of
+    /// its range, and the angles at which it moves bound the window.
+    fn windows(&self) -> ([[f64; 2]; 6], bool) {
+        const STEP_DEG: f64 = 1.0;
+        let mut window = [[0.0; 2]; 6];
+        self.machine.axes.iter().for_each(|a| window[a.name.index()] = a.range);
+        let clear = |window: &[[f64; 2]; 6]| {
+            self.scenes
+                .iter()
+                .all(|s| s.lift().is_some_and(|lift| s.clear_from_anywhere(&lift, &|a| window[a.name.index()])))
+        };
+        let asks = self.plan.is_some_and(|p| p.controller_frame == crate::program::plan::ControllerFrame::Tcp);
+        if clear(&window) && !asks {
+            return (window, true);
+        }
+        let Some(code) = self.codes.first() else { return (window, false) };
+        // other axes stand where the program may want them: at the first angle at which it moves at all
+        let rotary: Vec<AxisName> = self.machine.rotary().map(|a| a.name).collect();
+        let steps = |[low, high]: [f64; 2]| {
+            let n = ((high - low) / STEP_DEG).ceil().clamp(1.0, 800.0);
+            (0..=n as u32).map(move |k| low + (high - low) * f64::from(k) / n).collect::<Vec<_>>()
+        };
+        let mut stands = self.start(&window, 0.5, 0.5);
+        let consents = |at: &Position| {
+            let mut run = self.run(code, Start::Fresh, *at, 0, false);
+            loop {
+                let paused = run.on();
+                if run.vm.trace.iter().any(|h| matches!(h.event, Event::Move { .. })) {
+                    return true;
+                }
+                match paused {
+                    Ok(Pause::Probe(probe)) => {
+                        let outcome = run.vm.world.outcome(&run.vm, &probe);
+                        run.resolve(outcome);
+                    }
+                    _ => return false,
+                }
+            }
+        };
+        let origin = |axis: AxisName| self.machine.origin.get(axis).unwrap_or(0.0);
+        if !consents(&stands) {
+            // both axes at once, coarsely; then each by itself
+            let range = |i: usize| rotary.get(i).map_or([0.0; 2], |a| window[a.index()]);
+            'search: for a in steps(range(0)) {
+                for b in [0.0].into_iter().chain(steps(range(1)).into_iter().step_by(15)) {
+                    for (axis, value) in rotary.iter().zip([a, b]) {
+                        stands.set(*axis, value + origin(*axis));
+                    }
+                    if consents(&stands) {
+                        break 'search;
+                    }
+                }
+            }
+        }
+        for axis in &rotary {
+            let angles = steps(window[axis.index()]);
+            let at = |angle: f64| {
+                let mut p = stands;
+                p.set(*axis, angle + origin(*axis));
+                p
+            };
+            let own = stands.get(*axis) - origin(*axis);
+            let good: Vec<f64> = angles.into_iter().filter(|a| consents(&at(*a))).chain([own]).collect();
+            let low = good.iter().copied().fold(f64::MAX, f64::min);
+            let high = good.iter().copied().fold(f64::MIN, f64::max);
+            let [least, most] = window[axis.index()];
+            window[axis.index()] = [(low - STEP_DEG).max(least), (high + STEP_DEG).min(most)];
+        }
+        let is_clear = clear(&window);
+        // the program is begun well inside of its window
+        (window, is_clear)
+    }
+}
+
+/// Stops of a run: several without a move between them are one.
+fn stops(trunk: &[Happened]) -> usize {
+    let (mut stops, mut moved) = (0, true);
+    for happened in trunk {
+        match happened.event {
+            Event::Wait(_) if moved => {
+                stops += 1;
+                moved = false;
+            }
+            Event::Move { .. } | Event::Probe { .. } => moved = true,
+            _ => {}
+        }
+    }
+    stops
+}
+
+/// The number behind the first N of a line of the log.
+fn number_after_n(text: &str) -> Option<u64> {
+    let (_, rest) = text.split_once('N')?;
+    let digits: String = rest.trim_start().chars().take_while(char::is_ascii_digit).collect();
+    digits.parse().ok()
+}
+
+/// Where a run from elsewhere, with the control in another state, does otherwise.
+fn otherwise(one: &Told, other: &Told) -> Option<(Range<usize>, String)> {
+    let spelled = |told: &Told| -> Vec<(Range<usize>, String)> {
+        let mut out = Vec::new();
+        for happened in &told.trunk {
+            let mut text = String::new();
+            match &happened.event {
+                Event::Move { to, rate, exact, named, .. } => {
+                    let to: Vec<String> = AxisName::ALL
+                        .into_iter()
+                        .filter(|a| named[a.index()])
+                        .map(|a| format!("{a}{:.6}", to.get(a) + 0.0))
+                        .collect();
+                    text = format!("{to:?} {rate:?} {exact}");
+                }
+                Event::Probe { probe, .. } if probe.known != one_known(told) => continue,
+                _ => write_event(&mut text, happened),
+            }
+            out.push((happened.at.clone(), text));
+        }
+        out
+    };
+    let (a, b) = (spelled(one), spelled(other));
+    let first = a.iter().zip(&b).find(|(x, y)| x.1 != y.1).map(|(x, _)| x.0.clone());
+    let shorter = (a.len() != b.len()).then(|| a.get(b.len()).or(a.last()).map_or(0..0, |x| x.0.clone()));
+    let place = first.or(shorter)?;
+    let says = "the program does otherwise when it finds the control in another state (units, G91, offsets, feed mode) or the axes elsewhere: something that it needs is not set in its head";
+    Some((place, says.to_owned()))
+}
+
+/// The axes of the machine, all known.
+fn one_known(told: &Told) -> [bool; 6] {
+    let known = told.trunk.iter().rev().find_map(|h| match &h.event {
+        Event::Probe { probe, .. } => Some(probe.known),
+        _ => None,
+    });
+    known.unwrap_or([true; 6])
+}

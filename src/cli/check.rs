@@ -1,0 +1,115 @@
+//! `axiscal check`: an NC program read back, run on the virtual machine, and judged.
+
+use super::common::MachineArgs;
+use super::load::load_plan;
+use super::{Answer, Io};
+use crate::check::{self, Against, Checked};
+use crate::diag::{Finding, Result, Severity, source};
+use crate::files;
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use crate::program;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Arguments of `check`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The NC program
+    file: PathBuf,
+    #[command(flatten)]
+    machine: MachineArgs,
+    /// Whose program it is: a controller's name, or a postprocessor file
+    #[arg(long, short)]
+    controller: String,
+    /// The plan that `generate` wrote with it: the touches are compared with it
+    #[arg(long)]
+    plan: Option<PathBuf>,
+    /// Without a plan: what is mounted (default: the mounting on which most touches are made)
+    #[arg(long, value_name = "NAME", conflicts_with = "plan")]
+    mounting: Option<String>,
+    /// The program is meant to begin at this set-up
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    from: u32,
+}
+
+/// Runs `check`.
+///
+/// # Errors
+/// When an input is unusable, or the program holds something that axiscal does not know.
+pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    let machine = args.machine.load(io)?;
+    let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
+    io.report(&findings);
+    let plan = args.plan.as_ref().map(|file| load_plan(file, &machine, io)).transpose()?;
+    let text = source(args.file.display().to_string(), files::read_text(&args.file)?);
+    let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from };
+    let checked = check::check(&machine, &post, &text, &against)?;
+    io.report(&checked.findings);
+    say(&machine, args, &checked, io);
+    answer(&machine, &post, args, &checked, io);
+    Ok(if good(&checked) { Answer::Done } else { Answer::No })
+}
+
+fn good(checked: &Checked) -> bool {
+    !checked.findings.iter().any(|f| f.severity == Severity::Error)
+}
+
+fn say(machine: &Machine, args: &Args, checked: &Checked, io: &Io) {
+    let stops = match checked.stops {
+        0 => String::new(),
+        1 => ", 1 stop".to_owned(),
+        n => format!(", {n} stops"),
+    };
+    io.say(format!(
+        "{} on {}, mounting {}: {} touches, {} moves, {} set-ups{stops}, about {} without the stops",
+        args.file.display(),
+        machine.name,
+        checked.mountings.join(", then "),
+        checked.touches,
+        checked.moves,
+        checked.setups,
+        program::duration(checked.seconds)
+    ));
+    io.say(format!("{} ways on which something goes wrong were followed", checked.branches));
+    if args.plan.is_none() {
+        io.say("without --plan: whether it makes the touches that were planned was not looked at");
+    }
+    io.say(if good(checked) { "nothing is wrong with it".to_owned() } else { refused(&checked.findings) });
+}
+
+fn refused(findings: &[Finding]) -> String {
+    let errors = findings.iter().filter(|f| f.severity == Severity::Error).count();
+    format!("do not run it: {errors} finding{} above", if errors == 1 { "" } else { "s" })
+}
+
+fn answer(machine: &Machine, post: &Postprocessor, args: &Args, checked: &Checked, io: &Io) {
+    let findings: Vec<serde_json::Value> = checked
+        .findings
+        .iter()
+        .map(|f| {
+            let place = f.place();
+            let mut parts = place.as_deref().unwrap_or("").rsplit(':');
+            let column = parts.next().and_then(|c| c.parse::<usize>().ok());
+            let line = parts.next().and_then(|l| l.parse::<usize>().ok());
+            json!({ "code": f.code, "says": f.message, "help": f.help, "line": line, "column": column })
+        })
+        .collect();
+    io.answer(&json!({
+        "format": "axiscal-check/1",
+        "file": args.file.display().to_string(),
+        "machine": machine.name,
+        "controller": post.name,
+        "mountings": checked.mountings,
+        "compared_with_plan": args.plan.is_some(),
+        "good": good(checked),
+        "touches": checked.touches,
+        "moves": checked.moves,
+        "setups": checked.setups,
+        "stops": checked.stops,
+        "followed": checked.branches,
+        "time_s": checked.seconds,
+        "moves_sha256": checked.proof.sha256,
+        "findings": findings,
+    }));
+}
