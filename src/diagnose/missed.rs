@@ -46,17 +46,19 @@ pub(super) fn hypotheses(subject: Subject, planned: &[Planned]) -> Vec<Gross> {
     let data = &subject.fit.data;
     let mut found: HashMap<(usize, u64), bool> = data.unusable.iter().map(|u| ((u.run, u.id), false)).collect();
     found.extend(data.observations.iter().map(|o| ((o.run, o.id), true)));
-    let agreement = |supposed: Option<usize>| -> f64 {
+    let agreement_with = |supposed: Option<usize>, own: bool| -> f64 {
         let (mut same, mut all) = (0usize, 0usize);
         for (run, p) in planned.iter().enumerate() {
             for touch in &p.plan.touches {
                 let Some(hit) = found.get(&(run, touch.id)) else { continue };
                 all += 1;
-                same += usize::from(*hit == hits(subject.machine, &p.plan, touch, effect, supposed));
+                same += usize::from(*hit == hits(subject.machine, &p.plan, touch, effect, (supposed, own)));
             }
         }
         same as f64 / all.max(1) as f64
     };
+    // other blocks may be met in place of the own one, if they are mounted by then
+    let agreement = |supposed| agreement_with(supposed, false).max(agreement_with(supposed, true));
     let right = agreement(None);
     let mut out: Vec<Gross> = (0..effect.parameters.len())
         .into_par_iter()
@@ -74,8 +76,14 @@ pub(super) fn hypotheses(subject: Subject, planned: &[Planned]) -> Vec<Gross> {
     out
 }
 
-/// Would the search meet a block, were the supposition true?
-fn hits(machine: &Machine, plan: &Plan, touch: &PlanTouch, effect: &Effect, supposed: Option<usize>) -> bool {
+/// Would the search meet a block (its own alone, or any), were the supposition true? A search that begins in a block is none.
+fn hits(
+    machine: &Machine,
+    plan: &Plan,
+    touch: &PlanTouch,
+    effect: &Effect,
+    (supposed, own): (Option<usize>, bool),
+) -> bool {
     let at = |p: &Position| turned(p, effect, supposed);
     let (from, to) = (at(&touch.start_position()), at(&touch.end_position()));
     let length_mm = touch.tool_length_mm.unwrap_or(plan.tool_length_mm);
@@ -83,10 +91,10 @@ fn hits(machine: &Machine, plan: &Plan, touch: &PlanTouch, effect: &Effect, supp
     let blocks: Vec<(Carrier, Vector3<f64>, Vector3<f64>)> = plan
         .blocks
         .iter()
-        .filter(|b| b.mounting == touch.mounting)
+        .filter(|b| b.mounting == touch.mounting && (!own || (b.name == touch.block && b.carrier == touch.carrier)))
         .filter_map(|b| Some((machine.carrier(&b.carrier)?, b.centre.into(), 0.5 * Vector3::from(b.size))))
         .collect();
-    (0..=PLACES).any(|k| {
+    let meets = |k: usize| {
         let share = k as f64 / PLACES as f64;
         let mut here = from;
         for name in AxisName::ALL {
@@ -98,7 +106,8 @@ fn hits(machine: &Machine, plan: &Plan, touch: &PlanTouch, effect: &Effect, supp
             let beyond = (inside.abs() - half).map(|x| x.max(0.0));
             beyond.norm() <= radius_mm
         })
-    })
+    };
+    !meets(0) && (1..=PLACES).any(meets)
 }
 
 /// Where the axes really stand, by the effect's own formulas: readings and commands are turned in the same way.
