@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;
+use axiscal::fit::Settings;
 use axiscal::fit::outcome::Status;
 use axiscal::log::{self, Touch, Writer};
 use axiscal::machine::Machine;
@@ -16,11 +17,14 @@ use common::*;
 use std::collections::BTreeMap;
 
 /// Machine, its programs, the effects of its rotary axes.
-const CASES: [(&str, &[&str], [&str; 2]); 8] = [
+type Case = (&'static str, &'static [&'static str], [&'static str; 2]);
+const SMALL: [Case; 4] = [
     ("swivel-head", &["head", "table"], ["location-b", "location-c"]),
     ("double-head", &["double-head"], ["location-b", "location-a"]),
     ("trunnion", &["basic"], ["location-a", "location-c"]),
     ("swivel-table-b", &["basic"], ["location-b", "location-c"]),
+];
+const FULL: [Case; 4] = [
     ("swivel-head", &["full"], ["location-b", "location-c"]),
     ("double-head", &["full"], ["location-b", "location-a"]),
     ("trunnion", &["full"], ["location-a", "location-c"]),
@@ -50,8 +54,7 @@ fn wrong(machine: &Machine, effects: [&str; 2]) -> (Scenario, BTreeMap<String, f
 }
 
 /// The touches as they come back from the log of this control.
-fn through_the_log(post: &Postprocessor, machine: &Machine, plan: &Plan, scenario: &Scenario) -> Vec<Touch> {
-    let (raw, _) = simulate::run(machine, plan, scenario, None).unwrap();
+fn through_the_log(post: &Postprocessor, machine: &Machine, plan: &Plan, raw: &[log::RawTouch]) -> Vec<Touch> {
     let record =
         |t: &log::RawTouch| LogRecord { id: t.id.unwrap(), status: t.status, position: t.position, time_s: t.time_s };
     let records: Vec<LogRecord> = raw.iter().map(record).collect();
@@ -61,7 +64,7 @@ fn through_the_log(post: &Postprocessor, machine: &Machine, plan: &Plan, scenari
     assert!(findings.0.is_empty(), "{}: {:?}", post.name, findings.0);
     assert!(read.complete && read.touches.len() == plan.touches.len(), "{}: {}", post.name, plan.program);
     let half = 0.5001 * 10f64.powi(-i32::try_from(post.log.decimals).unwrap());
-    for (touch, made) in read.touches.iter().zip(&raw) {
+    for (touch, made) in read.touches.iter().zip(raw) {
         assert!(touch.position.0.iter().zip(made.position.0).all(|(a, b)| (a - b).abs() <= half), "{touch:?} {made:?}");
         if post.log.time_word.is_some()
             && let (Some(read), Some(made)) = (touch.time_s, made.time_s)
@@ -76,10 +79,16 @@ fn through_the_log(post: &Postprocessor, machine: &Machine, plan: &Plan, scenari
 fn worst(machine: &Machine, programs: &[&str], effects: [&str; 2], posts: &[Postprocessor]) -> Vec<[f64; 2]> {
     let (scenario, truth) = wrong(machine, effects);
     let plans: Vec<Plan> = programs.iter().map(|p| plan(machine, p)).collect();
+    let made: Vec<_> = plans.iter().map(|p| simulate::run(machine, p, &scenario, None).unwrap().0).collect();
     let each = |post: &Postprocessor| {
-        let touches: Vec<_> = plans.iter().map(|p| through_the_log(post, machine, p, &scenario)).collect();
+        let touches: Vec<_> = plans.iter().zip(&made).map(|(p, raw)| through_the_log(post, machine, p, raw)).collect();
         let runs: Vec<_> = plans.iter().zip(&touches).map(|(p, t)| (p, &t[..])).collect();
-        let fit = identify(machine, &runs, &[effects[0], effects[1], "block-setup", "pretravel"]);
+        let fit = identify_with(
+            machine,
+            &runs,
+            &[effects[0], effects[1], "block-setup", "pretravel"],
+            Settings { quick: true, ..Settings::default() },
+        );
         assert!(fit.outcome.converged, "{} {}", machine.name, post.name);
         let mut worst = [0.0f64; 2];
         let mut n_identified = 0;
@@ -95,8 +104,7 @@ fn worst(machine: &Machine, programs: &[&str], effects: [&str; 2], posts: &[Post
     posts.iter().map(each).collect()
 }
 
-#[test]
-fn every_controllers_log_gives_back_what_was_planted_to_its_resolution() {
+fn resolution(cases: &[Case]) {
     let posts = Postprocessor::built_in().unwrap();
     assert_eq!(
         posts
@@ -107,8 +115,8 @@ fn every_controllers_log_gives_back_what_was_planted_to_its_resolution() {
         5
     );
     let mut all = vec![[0.0f64; 2]; posts.len()];
-    for (name, programs, effects) in CASES {
-        let found = worst(&machine(name), programs, effects, &posts);
+    for (name, programs, effects) in cases {
+        let found = worst(&machine(name), programs, *effects, &posts);
         for ((post, found), all) in posts.iter().zip(&found).zip(&mut all) {
             let digit = 10f64.powi(-i32::try_from(post.log.decimals).unwrap());
             println!("{name} {programs:?} {}: offsets {:.2e} um, tilts {:.2e} deg", post.name, found[0], found[1]);
@@ -123,4 +131,14 @@ fn every_controllers_log_gives_back_what_was_planted_to_its_resolution() {
             post.name, post.log.decimals, all[0], all[1]
         );
     }
+}
+
+#[test]
+fn every_controllers_log_gives_back_what_was_planted_to_its_resolution() {
+    resolution(&SMALL);
+}
+
+#[test]
+fn the_logs_of_the_full_programs_too() {
+    resolution(&FULL);
 }

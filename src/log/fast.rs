@@ -164,7 +164,7 @@ fn digits(bytes: &[u8]) -> Option<(u64, usize, &[u8])> {
     let low_half = ((word & 0x0f0f_0f0f_0f0f_0f0f) + 0x0606_0606_0606_0606) & 0x1010_1010_1010_1010;
     let other = high_half | low_half;
     // the high bit of every byte that is not zero, without a carry from one byte into the next
-    let marks = ((other & !HIGH) + !HIGH | other) & HIGH;
+    let marks = (((other & !HIGH) + !HIGH) | other) & HIGH;
     let count = (marks.trailing_zeros() / 8) as usize;
     if count == 0 {
         return Some((0, 0, bytes));
