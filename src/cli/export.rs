@@ -77,7 +77,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             .help("its old values and its unit are in the INI file: --ini"));
     }
     if post.is_some() && args.ini.is_some() {
-        return Err(Failure::new("export::options", "--ini is for linuxcnc only").help("give the control's own backup with --backup"));
+        return Err(Failure::new("export::options", "--ini is for linuxcnc only")
+            .help("give the control's own backup with --backup"));
     }
     if !(args.radius.is_finite() && args.radius > 0.0 && args.radius <= 1e5) {
         return Err(Failure::new(
@@ -141,8 +142,11 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
         }
         Verdict::Unexplained => ("unexplained", "the model fails, and no known effect explains it".to_owned()),
     };
-    let finding = Finding::error("export::verdict", format!("the diagnosis is {word}: {next}; the parameters of this model are then wrong"))
-        .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
+    let finding = Finding::error(
+        "export::verdict",
+        format!("the diagnosis is {word}: {next}; the parameters of this model are then wrong"),
+    )
+    .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
     if args.force {
         io.report(&[Finding { severity: crate::diag::Severity::Warning, help: None, ..finding }]);
         return Ok(());
@@ -195,8 +199,10 @@ fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
         };
         let (name, value) = word.rsplit_once('=').ok_or_else(|| bad("there is no ="))?;
         let plain = backup::plain_name(name);
-        let known = names.iter().find(|n| backup::plain_name(n) == plain).ok_or_else(|| bad("no such value is written"))?;
-        let value: f64 = value.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| bad("that is no number"))?;
+        let known =
+            names.iter().find(|n| backup::plain_name(n) == plain).ok_or_else(|| bad("no such value is written"))?;
+        let value: f64 =
+            value.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| bad("that is no number"))?;
         if old.values.insert(known.clone(), (value, Some(args.unit))).is_some() {
             return Err(bad("it is given twice"));
         }
@@ -205,7 +211,14 @@ fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
 }
 
 /// Tables of a control that is described by data.
-fn control(machine: &Machine, name: &str, tables: &Tables, correction: &Correction, args: &Args, io: &Io) -> Result<Answer> {
+fn control(
+    machine: &Machine,
+    name: &str,
+    tables: &Tables,
+    correction: &Correction,
+    args: &Args,
+    io: &Io,
+) -> Result<Answer> {
     let options = control::Options {
         radius_mm: args.radius,
         force: args.force,
@@ -232,7 +245,12 @@ fn control(machine: &Machine, name: &str, tables: &Tables, correction: &Correcti
         for grid in &record.grids {
             io.say(format!(
                 "position table {}: {} by the position of {}, {} points from {} to {}",
-                grid.number, grid.output, grid.input, grid.values.len(), grid.min, grid.max()
+                grid.number,
+                grid.output,
+                grid.input,
+                grid.values.len(),
+                grid.min,
+                grid.max()
             ));
         }
     }
@@ -241,7 +259,11 @@ fn control(machine: &Machine, name: &str, tables: &Tables, correction: &Correcti
         "rounding to the control's resolution leaves up to {} um; all constant errors together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
         significant(export.rounding_um), significant(export.rest_um), significant(export.longer_tool_um)
     ));
-    io.say(format!("{}: {} files; README.txt says how to load them and what must be set again", args.out.display(), export.files.len()));
+    io.say(format!(
+        "{}: {} files; README.txt says how to load them and what must be set again",
+        args.out.display(),
+        export.files.len()
+    ));
     io.answer(&json!({
         "controller": args.controller,
         "out": args.out.display().to_string(),

@@ -323,16 +323,21 @@ pub fn doubt(source: Option<&String>, unverified: Option<&String>) -> Option<Str
 pub(super) fn check(check: &mut Check, tables: &Tables) {
     let at = tables.step_mm.span();
     let mut wrong = |what: String, help: &str| check.error(&at, "post::tables", what, help);
-    for (name, step) in
-        [("step_mm", &tables.step_mm), ("step_inch", &tables.step_inch), ("step_deg", &tables.step_deg)]
+    for (name, step) in [("step_mm", &tables.step_mm), ("step_inch", &tables.step_inch), ("step_deg", &tables.step_deg)]
     {
         let step = *step.get_ref();
         if !(step >= 1e-12 && step <= 0.1) {
-            wrong(format!("{name} of [tables] is {step}"), "between 1e-12 and 0.1: the smallest step that the control stores");
+            wrong(
+                format!("{name} of [tables] is {step}"),
+                "between 1e-12 and 0.1: the smallest step that the control stores",
+            );
         }
     }
     if !(tables.limit_mm.is_finite() && tables.limit_mm > 0.0) || tables.direction_decimals > 15 {
-        wrong("limit_mm or direction_decimals of [tables] is no such number".to_owned(), "a length in mm; 0 to 15 digits");
+        wrong(
+            "limit_mm or direction_decimals of [tables] is no such number".to_owned(),
+            "a length in mm; 0 to 15 digits",
+        );
     }
     for kind in &tables.kind {
         let of = |what: &str| format!("[tables] kind {:?}: {what}", kind.name);
@@ -350,18 +355,27 @@ pub(super) fn check(check: &mut Check, tables: &Tables) {
             }
             let turns = [v.from.and_then(Point::turn), v.to.and_then(Point::turn), v.direction];
             if !turns.into_iter().flatten().all(here) {
-                wrong(of(&format!("vector {:?} names an axis that this kind has not", v.id)), "compare workpiece and tool");
+                wrong(
+                    of(&format!("vector {:?} names an axis that this kind has not", v.id)),
+                    "compare workpiece and tool",
+                );
             }
             if let (Some(from), Some(to)) = (v.from, v.to) {
                 let of_head = |p: Point| matches!(p, Point::Tool1 | Point::Tool2 | Point::ToolAdapter);
                 if of_head(from) != of_head(to) || to.turn().is_none() {
-                    wrong(of(&format!("vector {:?} leads from {from} to {to}", v.id)), "head and table are two chains; a vector leads to an axis");
+                    wrong(
+                        of(&format!("vector {:?} leads from {from} to {to}", v.id)),
+                        "head and table are two chains; a vector leads to an axis",
+                    );
                 }
             }
             for other in v.close.iter().flatten() {
                 let known = kind.vector.iter().any(|k| k.id == *other && k.from.is_some());
                 if !known {
-                    wrong(of(&format!("vector {:?} closes {other:?}, which is no vector between points", v.id)), "name vectors of this kind");
+                    wrong(
+                        of(&format!("vector {:?} closes {other:?}, which is no vector between points", v.id)),
+                        "name vectors of this kind",
+                    );
                 }
             }
             if kind.vector.iter().filter(|k| k.id == v.id).count() > 1 {
@@ -377,7 +391,8 @@ pub(super) fn check(check: &mut Check, tables: &Tables) {
     }
     for file in &tables.file {
         let good = |name: &str| {
-            name.starts_with("axiscal") || name.starts_with("restore")
+            name.starts_with("axiscal")
+                || name.starts_with("restore")
                 || name.strip_prefix("O").is_some_and(|n| n.chars().next().is_some_and(|c| c.is_ascii_digit()))
         };
         let plain = |name: &str| {
@@ -394,7 +409,12 @@ pub(super) fn check(check: &mut Check, tables: &Tables) {
             }
         }
         if let Err(e) = compile(file.template.get_ref()) {
-            check.error(&file.template.span(), "post::template", format!("template of {}: {e:#}", file.name), "minijinja's own manual says how templates are written");
+            check.error(
+                &file.template.span(),
+                "post::template",
+                format!("template of {}: {e:#}", file.name),
+                "minijinja's own manual says how templates are written",
+            );
         }
     }
 }

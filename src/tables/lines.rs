@@ -61,12 +61,18 @@ pub fn fits(machine: &Machine) -> Result<(), String> {
                 continue;
             }
             if turned {
-                return Err(format!("axis {} is carried by a rotary axis; the control's transformation knows it the other way round", axis.name));
+                return Err(format!(
+                    "axis {} is carried by a rotary axis; the control's transformation knows it the other way round",
+                    axis.name
+                ));
             }
             let mut own = Vector3::zeros();
             own[axis.name.index()] = 1.0;
             if (axis.direction.dot(&own) - 1.0).abs() > 1e-9 {
-                return Err(format!("axis {} is not along {} of the machine, as the control assumes", axis.name, axis.name));
+                return Err(format!(
+                    "axis {} is not along {} of the machine, as the control assumes",
+                    axis.name, axis.name
+                ));
             }
         }
     }
@@ -112,7 +118,8 @@ impl Seen {
         let ball = machine.tool.ball_at_zero(length_mm);
         let off = apply(&head, &ball) - ball;
         let pivot = machine.tool.pivot;
-        let origin = Vector3::from([AxisName::X, AxisName::Y, AxisName::Z].map(|a| machine.origin.get(a).unwrap_or(0.0)));
+        let origin =
+            Vector3::from([AxisName::X, AxisName::Y, AxisName::Z].map(|a| machine.origin.get(a).unwrap_or(0.0)));
         for line in &mut tool {
             line.point -= off + pivot;
         }
@@ -203,15 +210,24 @@ mod tests {
                         let parameter = String::new();
                         let (effect, unit) = (String::new(), dof.unit().to_owned());
                         terms.push(Term {
-                            axis: axis.name, place, dof, value: size, unit, parameter, effect,
-                            active_before: 0.0, identified: size, sigma: None,
+                            axis: axis.name,
+                            place,
+                            dof,
+                            value: size,
+                            unit,
+                            parameter,
+                            effect,
+                            active_before: 0.0,
+                            identified: size,
+                            sigma: None,
                         });
                     }
                 }
             }
             let errors = Errors::from_terms(&terms, [3.0, -4.0, -190.0]);
             let length = machine.tool.length_mm;
-            let (nominal, seen) = (Seen::of(&machine, &Errors::from_terms(&[], [0.0; 3]), length), Seen::of(&machine, &errors, length));
+            let (nominal, seen) =
+                (Seen::of(&machine, &Errors::from_terms(&[], [0.0; 3]), length), Seen::of(&machine, &errors, length));
             let kins = Kins::new(&machine, errors, length);
             let none = BTreeMap::new();
             let mut pose = Position::default();

@@ -33,7 +33,9 @@ pub fn tables(control: &str) -> Tables {
 pub type Planted<'a> = Vec<(&'a str, &'a str, f64)>;
 
 pub fn scenario(machine: &Machine, planted: &Planted) -> Scenario {
-    planted.iter().fold(Scenario::flawless(), |s, (effect, name, value)| s.with(machine, effect, &[(name, *value)]).unwrap())
+    planted
+        .iter()
+        .fold(Scenario::flawless(), |s, (effect, name, value)| s.with(machine, effect, &[(name, *value)]).unwrap())
 }
 
 pub fn correction(machine: &Machine, planted: &Planted, active: Option<&compensation::Compensation>) -> Correction {
@@ -45,7 +47,8 @@ pub fn correction(machine: &Machine, planted: &Planted, active: Option<&compensa
     let units: Vec<String> = planted.iter().map(|(e, n, _)| unit(e, n)).collect();
     let rows: Vec<_> =
         planted.iter().zip(&units).map(|((e, n, v), u)| (*n, *e, *v, u.as_str(), Status::Identified)).collect();
-    let provenance = Provenance { study: "study.toml".into(), study_sha256: "0123abcd".into(), data_date: "2026-11-20".into() };
+    let provenance =
+        Provenance { study: "study.toml".into(), study_sha256: "0123abcd".into(), data_date: "2026-11-20".into() };
     let mut outcome = crate::export::outcome(&machine.name, &rows);
     // where the virtual machine states its errors
     outcome.reference_mm = machine.reference.pivot.into();
@@ -69,7 +72,9 @@ pub fn text(export: &Export, name: &str) -> String {
 pub fn loaded(machine: &Machine, export: &Export, instead: Option<(&str, &str)>) -> Compensation {
     let json = text(export, "compensation.json");
     let json = instead.map_or(json.clone(), |(a, b)| json.replace(&format!("\"{a}\""), &format!("\"{b}\"")));
-    Compensation::parse_with(&source("compensation.json", json), machine, &|name| Ok(source(name, text(export, name)))).unwrap().0
+    Compensation::parse_with(&source("compensation.json", json), machine, &|name| Ok(source(name, text(export, name))))
+        .unwrap()
+        .0
 }
 
 /// Touches under the transformation at points and poses that no program has, blocks on what turns last.
@@ -134,7 +139,8 @@ fn foretold(machine: &Machine, planted: &Planted, export: &Export, plan: &Plan) 
     let terms = correction(machine, planted, None).terms;
     let errors = Errors::from_terms(&terms, machine.reference.pivot.into());
     let length = machine.tool.length_mm;
-    let (kins, nominal) = (Kins::new(machine, errors, length), Seen::of(machine, &Errors::from_terms(&[], [0.0; 3]), length));
+    let (kins, nominal) =
+        (Kins::new(machine, errors, length), Seen::of(machine, &Errors::from_terms(&[], [0.0; 3]), length));
     let zero = &export.compensation.tables.as_ref().unwrap().zero_deg;
     let reading = |t: &axiscal::program::plan::PlanTouch| {
         let n = Vector3::from(t.normal);
@@ -159,7 +165,12 @@ fn way(machine: &Machine, control: &str, planted: &Planted, plan: &Plan) -> (f64
     let read = readings(machine, plan, &scenario, Some(&applied));
     for (touch, (e, f)) in plan.touches.iter().zip(read.iter().zip(foretold(machine, planted, &export, plan))) {
         // the commanded and the real search differ by the tilt: second order, some 0.1 um for 0.1 deg
-        assert!((e - f).abs() < 3e-4, "{control} {} {planted:?}: touch {} reads {e} mm, foretold {f} mm", machine.name, touch.id);
+        assert!(
+            (e - f).abs() < 3e-4,
+            "{control} {} {planted:?}: touch {} reads {e} mm, foretold {f} mm",
+            machine.name,
+            touch.id
+        );
     }
     (before * 1e3, left(plan, &read) * 1e3, export)
 }
@@ -193,7 +204,11 @@ fn every_parameter(name: &str, at_least: usize) {
                 } else {
                     // a tilt is held as the offset that it makes at the workpiece's height; nothing gets worse
                     assert!(after < 1.05 * before + 1.5, "{of}: {before:.3} um, {after:.3} um");
-                    assert!(export.left.iter().all(|l| l.left_um.is_some() && !l.why.is_empty()), "{of}: {:?}", export.left);
+                    assert!(
+                        export.left.iter().all(|l| l.left_um.is_some() && !l.why.is_empty()),
+                        "{of}: {:?}",
+                        export.left
+                    );
                     *told.entry(control).or_insert(0) += 1;
                 }
             }
@@ -240,7 +255,10 @@ fn random_mixtures_come_back() {
                     continue;
                 }
                 let (before, after, export) = way(&machine, control, &planted, &plan);
-                println!("{control:<11} {name:<15} before {before:8.2} um, after {after:7.3} um, foretold {:7.3} um, rounding {:.3} um", export.rest_um, export.rounding_um);
+                println!(
+                    "{control:<11} {name:<15} before {before:8.2} um, after {after:7.3} um, foretold {:7.3} um, rounding {:.3} um",
+                    export.rest_um, export.rounding_um
+                );
                 assert!(before > 10.0, "{control} {name}");
                 // the figure is for a radius of 100 mm and the whole ranges: these blocks stand nearer
                 assert!(after <= export.rest_um + 0.3, "{control} {name}: {after} um, foretold {} um", export.rest_um);
@@ -256,22 +274,36 @@ fn random_mixtures_come_back() {
 /// The tool's own tilt has no place: the figure for a longer tool is what a longer stylus then shows.
 #[test]
 fn a_longer_tool_is_off_as_foretold() {
-    for (name, effect, parameter) in [("swivel-head", "location-b", "EA0B"), ("double-head", "location-a", "EC0A"), ("double-head", "location-b", "EC0B")] {
+    for (name, effect, parameter) in [
+        ("swivel-head", "location-b", "EA0B"),
+        ("double-head", "location-a", "EC0A"),
+        ("double-head", "location-b", "EC0B"),
+    ] {
         let machine = machine(name);
         let planted = vec![(effect, parameter, 0.02)];
         let export = export(&machine, "sinumerik", &planted, &accepting());
         let last = machine.side(Side::Workpiece).last().unwrap().name;
-        let mounting = machine.mountings.iter().find(|m| m.carrier == Carrier::Axis(last) || !last.is_rotary()).unwrap();
+        let mounting =
+            machine.mountings.iter().find(|m| m.carrier == Carrier::Axis(last) || !last.is_rotary()).unwrap();
         let mut plan = crate::random::random_plan(&machine, mounting, 200, &mut ChaCha8Rng::seed_from_u64(3));
         plan.controller_frame = ControllerFrame::Tcp;
         let control = loaded(&machine, &export, None);
         let all = readings(&machine, &plan, &scenario(&machine, &planted), Some(&control));
         let most = |longer: f64| {
-            let of = plan.touches.iter().zip(&all).filter(|(t, _)| (t.tool_length_mm.unwrap() - machine.tool.length_mm - longer).abs() < 1e-9);
+            let of = plan
+                .touches
+                .iter()
+                .zip(&all)
+                .filter(|(t, _)| (t.tool_length_mm.unwrap() - machine.tool.length_mm - longer).abs() < 1e-9);
             let (touches, readings): (Vec<_>, Vec<f64>) = of.map(|(t, e)| (t.clone(), *e)).unzip();
             left(&Plan { touches, ..plan.clone() }, &readings) * 1e3
         };
-        println!("{name} {parameter}: {:.3} um with the stylus, {:.3} um with one 60 mm longer, foretold for 100 mm {:.3} um", most(0.0), most(60.0), export.longer_tool_um);
+        println!(
+            "{name} {parameter}: {:.3} um with the stylus, {:.3} um with one 60 mm longer, foretold for 100 mm {:.3} um",
+            most(0.0),
+            most(60.0),
+            export.longer_tool_um
+        );
         assert!(most(0.0) < 0.1);
         assert!(most(60.0) < 0.6 * export.longer_tool_um + 0.1 && export.longer_tool_um < 200.0);
     }
@@ -284,8 +316,11 @@ fn swivel_data_do_what_machine_data_do() {
         let machine = machine(name);
         let catalogue = catalogue();
         let all = parameters(&catalogue, &machine);
-        let planted: Planted =
-            all.iter().enumerate().map(|(i, (e, p, mm))| (*e, p.as_str(), if *mm { 0.03 } else { -0.01 } * (1.0 + i as f64))).collect();
+        let planted: Planted = all
+            .iter()
+            .enumerate()
+            .map(|(i, (e, p, mm))| (*e, p.as_str(), if *mm { 0.03 } else { -0.01 } * (1.0 + i as f64)))
+            .collect();
         let export = export(&machine, "sinumerik", &planted, &accepting());
         let (plan, scenario) = (plan(&machine, 9), scenario(&machine, &planted));
         let with = |instead| readings(&machine, &plan, &scenario, Some(&loaded(&machine, &export, instead)));
@@ -348,7 +383,15 @@ fn fanuc_by_hand() {
     assert_eq!(text, expected);
     assert!(self::text(&export, "axiscal_g10.nc").contains("G10 L52\nN19700 R0.000\n"));
     // inch: the letter says it, and the control reads the same place
-    let inch = control::export(&machine, "fanuc", &tables("fanuc"), &correction(&machine, &planted, None), &Options { unit: LengthUnit::Inch, ..accepting() }).unwrap().0;
+    let inch = control::export(
+        &machine,
+        "fanuc",
+        &tables("fanuc"),
+        &correction(&machine, &planted, None),
+        &Options { unit: LengthUnit::Inch, ..accepting() },
+    )
+    .unwrap()
+    .0;
     assert!(self::text(&inch, "axiscal_parameters.txt").contains("N19702Q1I-9.8425;"));
 }
 
@@ -356,8 +399,27 @@ fn fanuc_by_hand() {
 #[test]
 fn run_out_and_positioning_become_position_tables() {
     for (name, planted, least) in [
-        ("swivel-head", vec![("radial-c-1", "EXC1c", 6.0), ("radial-c-1", "EXC1s", 2.0), ("radial-c-1", "EYC1c", 1.5), ("radial-c-1", "EYC1s", -4.0), ("positioning-x-2", "EXX2", 5.0)], 3),
-        ("trunnion", vec![("straightness-yx", "EYX2", 6.0), ("straightness-yx", "EYX3", 2.0), ("scale-z", "EZZ", 30.0), ("squareness-xy", "EC0Y", 40.0)], 3),
+        (
+            "swivel-head",
+            vec![
+                ("radial-c-1", "EXC1c", 6.0),
+                ("radial-c-1", "EXC1s", 2.0),
+                ("radial-c-1", "EYC1c", 1.5),
+                ("radial-c-1", "EYC1s", -4.0),
+                ("positioning-x-2", "EXX2", 5.0),
+            ],
+            3,
+        ),
+        (
+            "trunnion",
+            vec![
+                ("straightness-yx", "EYX2", 6.0),
+                ("straightness-yx", "EYX3", 2.0),
+                ("scale-z", "EZZ", 30.0),
+                ("squareness-xy", "EC0Y", 40.0),
+            ],
+            3,
+        ),
     ] {
         let machine = machine(name);
         let planted: Planted = planted;
@@ -367,7 +429,8 @@ fn run_out_and_positioning_become_position_tables() {
         assert!(export.left.is_empty(), "{:?}", export.left);
         let plan = plan(&machine, 5);
         let largest = |c: Option<&Compensation>| {
-            readings(&machine, &plan, &scenario(&machine, &planted), c).iter().fold(0.0_f64, |m, e| m.max(e.abs())) * 1e3
+            readings(&machine, &plan, &scenario(&machine, &planted), c).iter().fold(0.0_f64, |m, e| m.max(e.abs()))
+                * 1e3
         };
         let (before, after) = (largest(None), largest(Some(&loaded(&machine, &export, None))));
         println!("{name}: {before:.3} um before, {after:.3} um after, {} tables", grids.len());
@@ -388,13 +451,23 @@ fn points_of_a_position_table_by_hand() {
         for n in 0..11 {
             lines += &format!("$AN_CEC[{t},{n}]={}\n", (n as f64 - 5.0) * 0.001 * if t == 0 { 1.0 } else { -1.0 });
         }
-        for (what, value) in [("INPUT_AXIS", "(AX1)"), ("OUTPUT_AXIS", "(AX1)"), ("STEP", "58"), ("MIN", "-585"), ("MAX", "-5"), ("MULT_BY_TABLE", "0"), ("IS_MODULO", "0")] {
+        for (what, value) in [
+            ("INPUT_AXIS", "(AX1)"),
+            ("OUTPUT_AXIS", "(AX1)"),
+            ("STEP", "58"),
+            ("MIN", "-585"),
+            ("MAX", "-5"),
+            ("MULT_BY_TABLE", "0"),
+            ("IS_MODULO", "0"),
+        ] {
             lines += &format!("$AN_CEC_{what}[{t}]={value}\n");
         }
         lines += &format!("$AN_CEC_DIRECTION[{t}]={}\n", if t == 0 { 1 } else { -1 });
     }
-    let trafo = text(&export(&machine, "sinumerik", &vec![("location-c", "EX0C", 0.01)], &accepting()), "axiscal_trafo.ini");
-    let json = text(&export(&machine, "sinumerik", &vec![("location-c", "EX0C", 0.01)], &accepting()), "compensation.json");
+    let trafo =
+        text(&export(&machine, "sinumerik", &vec![("location-c", "EX0C", 0.01)], &accepting()), "axiscal_trafo.ini");
+    let json =
+        text(&export(&machine, "sinumerik", &vec![("location-c", "EX0C", 0.01)], &accepting()), "compensation.json");
     let json = json.replace("\"axiscal_trafo.ini\"", "\"axiscal_trafo.ini\", \"cec.ini\"");
     let read = |lines: &str| {
         let open = |name: &str| Ok(source(name, if name == "cec.ini" { lines.to_owned() } else { trafo.clone() }));
@@ -421,8 +494,12 @@ $MC_TRAFO5_AXIS2_1[0]=0\n$MC_TRAFO5_AXIS2_1[1]=0\n$MC_TRAFO5_AXIS2_1[2]=-1\n$MC_
     let sheet = tables("sinumerik");
     let old = backup::read(&source("backup.ini", text_of), &sheet.backup, &control::names(&machine, &sheet)).unwrap();
     let options = Options { old, ..accepting() };
-    let (export, findings) = control::export(&machine, "sinumerik", &sheet, &correction(&machine, &planted, None), &options).unwrap();
-    assert!(!findings.0.iter().any(|f| f.code == "tables::old_assumed" || f.code == "tables::open_chain"), "{findings:?}");
+    let (export, findings) =
+        control::export(&machine, "sinumerik", &sheet, &correction(&machine, &planted, None), &options).unwrap();
+    assert!(
+        !findings.0.iter().any(|f| f.code == "tables::old_assumed" || f.code == "tables::open_chain"),
+        "{findings:?}"
+    );
     let find = |name: &str| export.values.iter().find(|v| v.names.values().any(|n| n == name)).unwrap().clone();
     let y = find("$MC_TRAFO5_BASE_TOOL_1[1]");
     assert_eq!((y.old, y.new), (-0.2, -0.18));
@@ -431,7 +508,12 @@ $MC_TRAFO5_AXIS2_1[0]=0\n$MC_TRAFO5_AXIS2_1[1]=0\n$MC_TRAFO5_AXIS2_1[2]=-1\n$MC_
     let by_hand = 0.004 + 0.01 + 0.01_f64.to_radians() * 99.95;
     assert!((x.new - by_hand).abs() < 3e-6, "{} {by_hand}", x.new);
     // it closes
-    let sum = |k: &str| ["BASE_TOOL", "JOINT_OFFSET_PART", "PART_OFFSET"].map(|n| find(&format!("$MC_TRAFO5_{n}_1[{k}]")).new).iter().sum::<f64>();
+    let sum = |k: &str| {
+        ["BASE_TOOL", "JOINT_OFFSET_PART", "PART_OFFSET"]
+            .map(|n| find(&format!("$MC_TRAFO5_{n}_1[{k}]")).new)
+            .iter()
+            .sum::<f64>()
+    };
     assert!(["0", "1", "2"].iter().all(|k| sum(k).abs() < 1e-9));
     let restore = text(&export, "restore_trafo.ini");
     assert!(restore.contains("$MC_TRAFO5_BASE_TOOL_1[2]=-250.050000 "), "{restore}");
@@ -447,7 +529,11 @@ fn a_bad_backup_is_refused_with_its_place() {
     };
     for (t, text, expected) in [
         (&siemens, "; x\n$MC_TRAFO5_BASE_TOOL_1[0]=1,5\n", "b:2:1: $MC_TRAFO5_BASE_TOOL_1[0] is no number here"),
-        (&siemens, "$MC_TRAFO5_BASE_TOOL_1[0]=1\n$MC_TRAFO5_BASE_TOOL_1[0]=2\n", "b:2:1: $MC_TRAFO5_BASE_TOOL_1[0] stands twice"),
+        (
+            &siemens,
+            "$MC_TRAFO5_BASE_TOOL_1[0]=1\n$MC_TRAFO5_BASE_TOOL_1[0]=2\n",
+            "b:2:1: $MC_TRAFO5_BASE_TOOL_1[0] stands twice",
+        ),
         (&siemens, "$MC_TRAFO5_BASE_TOOL_1[0]=inf\n", "b:1:1: $MC_TRAFO5_BASE_TOOL_1[0] is no number"),
         (&siemens, "", "none of the values"),
         (&siemens, "\u{0}\u{1}garbage=\n==\n", "none of the values"),
@@ -458,7 +544,12 @@ fn a_bad_backup_is_refused_with_its_place() {
         let said = read(t, text);
         assert!(said.contains(expected), "{said}\n{expected}");
     }
-    let good = backup::read(&source("b", "%\nN01005Q1A1P10000001;\nN19700Q1I1.0;\nN19701Q1M2;\n%\n"), &fanuc.backup, &control::names(&machine, &fanuc)).unwrap();
+    let good = backup::read(
+        &source("b", "%\nN01005Q1A1P10000001;\nN19700Q1I1.0;\nN19701Q1M2;\n%\n"),
+        &fanuc.backup,
+        &control::names(&machine, &fanuc),
+    )
+    .unwrap();
     assert_eq!(good.values["N19700"], (1.0, Some(LengthUnit::Inch)));
     assert_eq!(good.values["N19701"], (2.0, Some(LengthUnit::Mm)));
 }
@@ -478,18 +569,39 @@ fn what_is_doubtful_is_refused() {
     // the head's kinds of SINUMERIK are documented throughout
     let t = tables("sinumerik");
     let head = machine("double-head");
-    assert!(control::export(&head, "sinumerik", &t, &correction(&head, &vec![("location-b", "EX0B", 0.01)], None), &Options::default()).is_ok());
-    assert!(refused(&trunnion, "sinumerik", &vec![("location-c", "EX0C", 0.6)], &accepting()).contains(&"tables::too_large"));
+    assert!(
+        control::export(
+            &head,
+            "sinumerik",
+            &t,
+            &correction(&head, &vec![("location-b", "EX0B", 0.01)], None),
+            &Options::default()
+        )
+        .is_ok()
+    );
+    assert!(
+        refused(&trunnion, "sinumerik", &vec![("location-c", "EX0C", 0.6)], &accepting())
+            .contains(&"tables::too_large")
+    );
     assert!(refused(&head, "haas", &vec![("location-b", "EX0B", 0.01)], &accepting()).contains(&"tables::kind"));
     // another machine's backup: the other sense, another place
     let names = ["$MC_TRAFO5_AXIS2_1[0]", "$MC_TRAFO5_AXIS2_1[1]", "$MC_TRAFO5_AXIS2_1[2]"];
     let values = names.iter().zip([0.0, 0.0, 1.0]).map(|(n, v)| ((*n).to_owned(), (v, None))).collect();
-    assert!(refused(&trunnion, "sinumerik", &small, &Options { old: Old { values }, ..accepting() }).contains(&"tables::other_direction"));
+    assert!(
+        refused(&trunnion, "sinumerik", &small, &Options { old: Old { values }, ..accepting() })
+            .contains(&"tables::other_direction")
+    );
     let values = [("$MC_TRAFO5_BASE_TOOL_1[1]".to_owned(), (3.0, None))].into();
     let old = Old { values };
-    assert!(refused(&trunnion, "sinumerik", &small, &Options { old: old.clone(), ..accepting() }).contains(&"tables::other_place"));
+    assert!(
+        refused(&trunnion, "sinumerik", &small, &Options { old: old.clone(), ..accepting() })
+            .contains(&"tables::other_place")
+    );
     let forced = Options { old, force: true, ..accepting() };
-    assert!(control::export(&trunnion, "sinumerik", &tables("sinumerik"), &correction(&trunnion, &small, None), &forced).is_ok());
+    assert!(
+        control::export(&trunnion, "sinumerik", &tables("sinumerik"), &correction(&trunnion, &small, None), &forced)
+            .is_ok()
+    );
 }
 
 /// What was active is added to; the position tables too.
@@ -497,18 +609,23 @@ fn what_is_doubtful_is_refused() {
 fn a_second_export_adds_to_the_first() {
     for control in CONTROLS {
         let machine = machine("trunnion");
-        let first = export(&machine, control, &vec![("location-c", "EX0C", 0.03), ("scale-x", "EXX", 20.0)], &accepting());
+        let first =
+            export(&machine, control, &vec![("location-c", "EX0C", 0.03), ("scale-x", "EXX", 20.0)], &accepting());
         let active = compensation::Compensation::read(&source("c", text(&first, "compensation.json"))).unwrap();
         assert_eq!(active, first.compensation, "{control}");
         let found = vec![("location-c", "EX0C", -0.01), ("scale-x", "EXX", 5.0)];
         let correction = correction(&machine, &found, Some(&active));
         let second = control::export(&machine, control, &tables(control), &correction, &accepting()).unwrap().0;
-        let both = export(&machine, control, &vec![("location-c", "EX0C", 0.02), ("scale-x", "EXX", 25.0)], &accepting());
+        let both =
+            export(&machine, control, &vec![("location-c", "EX0C", 0.02), ("scale-x", "EXX", 25.0)], &accepting());
         let numbers = |e: &Export| e.values.iter().map(|v| v.new).collect::<Vec<_>>();
         assert_eq!(numbers(&second), numbers(&both), "{control}");
         let (a, b) = (second.compensation.tables.unwrap().grids, both.compensation.tables.unwrap().grids);
         assert_eq!(a.len(), b.len());
-        assert!(a.iter().zip(&b).all(|(a, b)| a.values.iter().zip(&b.values).all(|(a, b)| (a - b).abs() < 2e-6)), "{a:?} {b:?}");
+        assert!(
+            a.iter().zip(&b).all(|(a, b)| a.values.iter().zip(&b.values).all(|(a, b)| (a - b).abs() < 2e-6)),
+            "{a:?} {b:?}"
+        );
         assert_eq!(second.compensation.terms.iter().find(|t| t.axis == AxisName::C).unwrap().active_before, 0.03);
     }
 }

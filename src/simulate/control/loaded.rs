@@ -42,7 +42,11 @@ impl Cross {
         }
         let at = q + self.origin;
         // outside the range the end value holds
-        let at = if self.modulo { self.min + (at - self.min).rem_euclid(self.max - self.min) } else { at.max(self.min).min(self.max) };
+        let at = if self.modulo {
+            self.min + (at - self.min).rem_euclid(self.max - self.min)
+        } else {
+            at.max(self.min).min(self.max)
+        };
         let n = ((at - self.min) / self.step) as usize;
         let (low, high) = (self.values.get(n), self.values.get(n + 1));
         match (low, high) {
@@ -95,7 +99,10 @@ pub fn sinumerik(files: &[Source], machine: &Machine, findings: &mut Findings) -
         let mut at = 0;
         for raw in source.inner().split_inclusive('\n') {
             let line = raw.split(';').next().unwrap_or("").trim();
-            let skip = line.is_empty() || line.starts_with('%') || line.starts_with("CHANDATA") || matches!(line, "M17" | "M30" | "NEWCONF");
+            let skip = line.is_empty()
+                || line.starts_with('%')
+                || line.starts_with("CHANDATA")
+                || matches!(line, "M17" | "M30" | "NEWCONF");
             match line.split_once('=') {
                 _ if skip => {}
                 Some((name, value)) if name.trim().starts_with('$') => {
@@ -191,7 +198,8 @@ impl Texts<'_> {
 
     fn cross(&mut self, source: &Source, data: &BTreeMap<String, String>) -> Vec<Cross> {
         let mut tables = Vec::new();
-        let numbered = data.keys().filter_map(|k| k.strip_prefix("$AN_CEC_INPUT_AXIS[")?.strip_suffix(']')).map(str::to_owned);
+        let numbered =
+            data.keys().filter_map(|k| k.strip_prefix("$AN_CEC_INPUT_AXIS[")?.strip_suffix(']')).map(str::to_owned);
         for t in numbered.collect::<Vec<_>>() {
             let axis = |what: &str| -> Option<AxisName> {
                 let text = data.get(&format!("$AN_CEC_{what}_AXIS[{t}]"))?;

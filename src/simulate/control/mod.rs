@@ -51,8 +51,10 @@ impl Compensation {
         match (&self.kinematics, tcp) {
             (Kinematics::TiltingTable(_), false) => Err("the pins of the control's own kinematics act only under its \
                 transformation: without it home offsets and axis tables are all that shows"),
-            (Kinematics::Vectors(_), false) => Err("the vectors of the control's own transformation act only under it: \
-                without it zero positions and position tables are all that shows"),
+            (Kinematics::Vectors(_), false) => {
+                Err("the vectors of the control's own transformation act only under it: \
+                without it zero positions and position tables are all that shows")
+            }
             (Kinematics::Component(_), true) => {
                 Err("the kinematics component knows axis positions only, no tool centre point")
             }
@@ -78,7 +80,13 @@ impl Compensation {
             Kinematics::Vectors(vectors) if tcp => vectors.linear(nominal, start, stylus),
             Kinematics::Identity | Kinematics::TiltingTable(_) | Kinematics::Vectors(_) => Linear::SAME,
         };
-        let mut out = Mapping { linear, told_less_deg: self.told_less_deg, tables: &self.tables, cross: &self.cross, up: [false; 6] };
+        let mut out = Mapping {
+            linear,
+            told_less_deg: self.told_less_deg,
+            tables: &self.tables,
+            cross: &self.cross,
+            up: [false; 6],
+        };
         let (from, to) = (out.kinematic(start), out.kinematic(end));
         for name in AxisName::ALL {
             let i = name.index();

@@ -1,11 +1,11 @@
 //! `compensation.json` as it is written → [`Compensation`].
 
 use super::component::Component;
+use super::loaded::{self, Loaded};
 use super::stock::TiltingTable;
 use super::table::Table;
 use super::{Compensation, Kinematics};
 use crate::axes::AxisName;
-use super::loaded::{self, Loaded};
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_json};
 use crate::machine::{self, Machine};
 use crate::simulate::chain::Chain;
@@ -276,7 +276,9 @@ impl Reader<'_> {
                 let direction = given.map_or(nominal, |v| if v.against { v.value.map(|x| -x) } else { v.value });
                 match points.get(name.as_str()) {
                     Some(point) => out.push((axis.name, direction, *point)),
-                    None => self.findings.push(Finding::error("compensation::tables", format!("no vector leads to {name}")).help(UNCHANGED)),
+                    None => self.findings.push(
+                        Finding::error("compensation::tables", format!("no vector leads to {name}")).help(UNCHANGED),
+                    ),
                 }
             }
             out

@@ -43,7 +43,8 @@ pub fn read(source: &Source, form: &BackupForm, wanted: &BTreeSet<String>) -> Re
         match value.filter(|v| v.is_finite()) {
             None => wrong(&mut findings, source, span, format!("{known} is no number here: {:?}", line.trim())),
             Some(value) => {
-                if let Some(before) = old.values.insert((*known).clone(), (value, unit)).filter(|b| *b != (value, unit)) {
+                if let Some(before) = old.values.insert((*known).clone(), (value, unit)).filter(|b| *b != (value, unit))
+                {
                     wrong(&mut findings, source, span, format!("{known} stands twice: {} and {value}", before.0));
                 }
             }

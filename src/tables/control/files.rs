@@ -15,7 +15,11 @@ const README: &str = include_str!("../templates/control/readme.txt.j2");
 /// A number with so many digits; a minus before zero is none.
 fn digits(value: f64, decimals: usize, always_mark: bool) -> String {
     let text = format!("{value:.decimals$}");
-    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text };
+    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text
+    };
     if always_mark && !text.contains('.') { text + "." } else { text }
 }
 
@@ -35,7 +39,8 @@ fn entry(value: &Entry, spelling: Option<&str>, restore: bool, always_mark: bool
 
 fn grid(machine: &Machine, tables: &Tables, grid: &Grid, restore: Option<&Grid>) -> Value {
     let name = |axis| {
-        let number = machine.axes.iter().map(|a| a.name.index()).filter(|i| *i <= crate::axes::AxisName::index(axis)).count();
+        let number =
+            machine.axes.iter().map(|a| a.name.index()).filter(|i| *i <= crate::axes::AxisName::index(axis)).count();
         tables.grid.as_ref().map_or_else(String::new, |form| form.axis_name(axis, number))
     };
     let output_step = if grid.output.is_rotary() { tables.step_deg.get_ref() } else { tables.step_mm.get_ref() };
@@ -66,8 +71,12 @@ pub(super) fn write(
     export: &mut Export,
     findings: &mut Findings,
 ) -> Result<()> {
-    let doubts: Vec<String> =
-        findings.0.iter().filter(|f| f.code == "tables::unverified").map(|f| one_line(&f.message.replace(": not verified: ", ": "))).collect();
+    let doubts: Vec<String> = findings
+        .0
+        .iter()
+        .filter(|f| f.code == "tables::unverified")
+        .map(|f| one_line(&f.message.replace(": not verified: ", ": ")))
+        .collect();
     let head = head(machine, correction);
     let record = export.compensation.tables.clone();
     let grids = record.map(|r| r.grids).unwrap_or_default();
@@ -124,21 +133,29 @@ pub(super) fn write(
         .collect();
     let shift = export.compensation.tables.as_ref().map_or([0.0; 3], |t| t.workpiece_shift_mm);
     let shape = |s: &crate::tables::correction::AxisShape| format!("{} ({})", s.parameter, s.effect);
-    let in_grids: Vec<String> = if tables.grid.is_some() { correction.shapes.iter().chain(&correction.across).map(shape).collect() } else { Vec::new() };
-    let text = render("readme", README, &context! {
-        ..common(false, None), ..context! {
-            says => tables.says.clone(), worksheet => tables.worksheet, load => tables.load.clone(), cannot => tables.cannot.clone(),
-            files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
-            variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
-            reads => tables.reads.is_some(),
-            left, omitted => not, in_grids, radius => format!("{}", options.radius_mm),
-            rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
-            longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
-            shift => shift.map(|v| format!("{v:+.4}")).to_vec(), tool => correction.tool_length_mm.map(|v| format!("{v:+.4}")),
-            measured => correction.of_measurement.keys().cloned().collect::<Vec<_>>(),
-            step => format!("{}", tables.step_mm.get_ref()),
-        }
-    })?;
+    let in_grids: Vec<String> = if tables.grid.is_some() {
+        correction.shapes.iter().chain(&correction.across).map(shape).collect()
+    } else {
+        Vec::new()
+    };
+    let text = render(
+        "readme",
+        README,
+        &context! {
+            ..common(false, None), ..context! {
+                says => tables.says.clone(), worksheet => tables.worksheet, load => tables.load.clone(), cannot => tables.cannot.clone(),
+                files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
+                variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
+                reads => tables.reads.is_some(),
+                left, omitted => not, in_grids, radius => format!("{}", options.radius_mm),
+                rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
+                longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
+                shift => shift.map(|v| format!("{v:+.4}")).to_vec(), tool => correction.tool_length_mm.map(|v| format!("{v:+.4}")),
+                measured => correction.of_measurement.keys().cloned().collect::<Vec<_>>(),
+                step => format!("{}", tables.step_mm.get_ref()),
+            }
+        },
+    )?;
     files.push(("README.txt".to_owned(), (text.trim_end().to_owned() + "\n").into_bytes()));
     files.push(("compensation.json".to_owned(), export.compensation.to_json()?.into_bytes()));
     export.files = files;

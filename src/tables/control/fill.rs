@@ -141,8 +141,9 @@ impl Question<'_> {
     fn described(&self, form: &VectorForm, seen: &Seen) -> Vector3<f64> {
         match (form.from, form.to, form.direction) {
             (Some(from), Some(to), _) => point_of(seen, to) - point_of(seen, from),
-            (_, _, Some(turn)) => line_of(seen, turn)
-                .map_or_else(Vector3::zeros, |(_, _, line)| line.direction.into_inner() * sign(form)),
+            (_, _, Some(turn)) => {
+                line_of(seen, turn).map_or_else(Vector3::zeros, |(_, _, line)| line.direction.into_inner() * sign(form))
+            }
             _ => {
                 let parts = self.kind.vector.iter().filter(|v| form.close.iter().flatten().any(|id| *id == v.id));
                 -parts.map(|v| self.described(v, seen)).sum::<Vector3<f64>>()
@@ -171,8 +172,13 @@ impl Question<'_> {
                     turned.insert(turn, (old.try_normalize(1e-9).unwrap_or(described) - described) * sign(form));
                 }
                 _ => {
-                    let sum: Vector3<f64> =
-                        form.close.iter().flatten().filter_map(|id| self.kind.vector.iter().find(|v| v.id == *id)).map(|v| self.old_vector(v, self.described(v, self.before)).0).sum();
+                    let sum: Vector3<f64> = form
+                        .close
+                        .iter()
+                        .flatten()
+                        .filter_map(|id| self.kind.vector.iter().find(|v| v.id == *id))
+                        .map(|v| self.old_vector(v, self.described(v, self.before)).0)
+                        .sum();
                     if (sum + old).amax() > 2.5 * self.step_mm() {
                         findings.push(Finding::warning(
                             "tables::open_chain",
@@ -186,7 +192,10 @@ impl Question<'_> {
         let (mut seen, mut target) = (self.now.clone(), self.now.clone());
         for (point, by) in &off {
             let Some((side, place)) = point.turn().map(Turn::place) else { continue };
-            let (Some(was), Some(line)) = (self.before.side(side).get(place), target.side_mut(side).get_mut(place)) else { continue };
+            let (Some(was), Some(line)) = (self.before.side(side).get(place), target.side_mut(side).get_mut(place))
+            else {
+                continue;
+            };
             // further along a line that has tilted, its points have moved further
             let along = by.dot(&was.direction);
             line.point += by + along * (line.direction.into_inner() - was.direction.into_inner());
@@ -208,7 +217,9 @@ impl Question<'_> {
             let step = if direction { direction_step } else { step };
             let exact = match &form.close {
                 // of the written ones, so that they close to the last digit
-                Some(ids) => -vectors.iter().filter(|(f, _)| ids.contains(&f.id)).map(|(_, v)| *v).sum::<Vector3<f64>>(),
+                Some(ids) => {
+                    -vectors.iter().filter(|(f, _)| ids.contains(&f.id)).map(|(_, v)| *v).sum::<Vector3<f64>>()
+                }
                 None => self.described(form, &target),
             };
             let new = exact.map(|v| (v / step).round() * step);
@@ -223,7 +234,19 @@ impl Question<'_> {
                     continue;
                 }
                 if !direction && new[k].abs() > self.tables.limit_mm {
-                    findings.push(Finding::error("tables::range", format!("{} of {} is {:.4} mm, the control takes up to {} mm", ["X", "Y", "Z"][k], form.id, new[k], self.tables.limit_mm)).help("check `origin` in machines.toml"));
+                    findings.push(
+                        Finding::error(
+                            "tables::range",
+                            format!(
+                                "{} of {} is {:.4} mm, the control takes up to {} mm",
+                                ["X", "Y", "Z"][k],
+                                form.id,
+                                new[k],
+                                self.tables.limit_mm
+                            ),
+                        )
+                        .help("check `origin` in machines.toml"),
+                    );
                 }
                 let shown = |v: f64| if direction { v } else { self.in_unit(v) };
                 values.push(Value {
@@ -242,9 +265,12 @@ impl Question<'_> {
                 });
             }
             // components that the control has no place for stay as they are described
-            let held = Vector3::from_fn(|k, _| {
-                if form.names.values().all(|n| n[k].is_empty()) { described[k] } else { new[k] }
-            });
+            let held =
+                Vector3::from_fn(
+                    |k, _| {
+                        if form.names.values().all(|n| n[k].is_empty()) { described[k] } else { new[k] }
+                    },
+                );
             vectors.push((form.clone(), held));
         }
         self.as_written(&vectors, &off, &turned, &mut seen);
@@ -284,7 +310,12 @@ impl Question<'_> {
     }
 
     /// Do the user's numbers describe the machine that was measured?
-    fn compare(&self, off: &BTreeMap<Point, Vector3<f64>>, turned: &BTreeMap<Turn, Vector3<f64>>, findings: &mut Findings) {
+    fn compare(
+        &self,
+        off: &BTreeMap<Point, Vector3<f64>>,
+        turned: &BTreeMap<Turn, Vector3<f64>>,
+        findings: &mut Findings,
+    ) {
         for (point, by) in off {
             let Some((_, _, line)) = point.turn().and_then(|t| line_of(self.before, t)) else { continue };
             let across = by - line.direction.into_inner() * by.dot(&line.direction);

@@ -43,7 +43,8 @@ pub fn grids(
             && high - low >= 360.0
             && (0..98).all(|i| {
                 let at = probe(i).rem_euclid(360.0);
-                (value(at, 1.0) - value(probe(i), 1.0)).abs() < 1e-9 && (value(at, -1.0) - value(probe(i), -1.0)).abs() < 1e-9
+                (value(at, 1.0) - value(probe(i), 1.0)).abs() < 1e-9
+                    && (value(at, -1.0) - value(probe(i), -1.0)).abs() < 1e-9
             });
         let range = if turns { [0.0, 360.0] } else { [low, high] };
         let smallest = step[usize::from(output.is_rotary())];

@@ -32,7 +32,8 @@ impl Pieces<'_> {
         let mut poses = vec![Position::default()];
         for axis in self.machine.rotary() {
             let [low, high] = axis.range;
-            let steps: Vec<f64> = (0..7).map(|i| low.max(-180.0) + (high.min(180.0) - low.max(-180.0)) * f64::from(i) / 6.0).collect();
+            let steps: Vec<f64> =
+                (0..7).map(|i| low.max(-180.0) + (high.min(180.0) - low.max(-180.0)) * f64::from(i) / 6.0).collect();
             poses = poses
                 .iter()
                 .flat_map(|p| {
@@ -67,7 +68,10 @@ impl Pieces<'_> {
         let kins = Kins::new(self.machine, errors, length + longer);
         let (poses, places) = (self.poses(), self.places());
         let off = |pose: &Position| {
-            places.iter().map(|place| control.ball_off((&nominal, &kins), place, pose, longer, told_deg).norm()).fold(0.0, f64::max)
+            places
+                .iter()
+                .map(|place| control.ball_off((&nominal, &kins), place, pose, longer, told_deg).norm())
+                .fold(0.0, f64::max)
         };
         um_from_mm(poses.iter().map(off).fold(0.0, f64::max))
     }
@@ -92,10 +96,18 @@ impl Pieces<'_> {
         for (term, why) in self.carried.not.iter().filter(|(t, _)| t.value != 0.0) {
             let um = self.worst(&nominal, self.errors(std::slice::from_ref(term)), 0.0, &BTreeMap::new());
             let um = if um < NOTHING_UM { 0.0 } else { um };
-            out.push(row(&term.parameter, &term.effect, (term.value, &term.unit), self.lever(term.axis), Some(um), why.clone()));
+            out.push(row(
+                &term.parameter,
+                &term.effect,
+                (term.value, &term.unit),
+                self.lever(term.axis),
+                Some(um),
+                why.clone(),
+            ));
         }
         for l in self.correction.left_out.iter().filter(|l| l.known) {
-            let mended = |s: &&crate::tables::correction::AxisShape| (&s.parameter, &s.effect) == (&l.parameter, &l.effect);
+            let mended =
+                |s: &&crate::tables::correction::AxisShape| (&s.parameter, &s.effect) == (&l.parameter, &l.effect);
             let shape = self.correction.across.iter().find(mended);
             if shape.is_some() && self.has_grids {
                 continue;
@@ -109,7 +121,10 @@ impl Pieces<'_> {
         if !self.has_grids {
             for shape in &self.correction.shapes {
                 let um = grids::largest_um(self.machine, shape, self.radius_mm);
-                let why = format!("it depends on the position of {}: this program knows no table of this control for that", shape.input);
+                let why = format!(
+                    "it depends on the position of {}: this program knows no table of this control for that",
+                    shape.input
+                );
                 out.push(row(&shape.parameter, &shape.effect, (um, "um"), self.radius_mm, Some(um), why));
             }
         }
@@ -120,7 +135,8 @@ impl Pieces<'_> {
     pub(super) fn figures(&self, exact: &Seen) -> (f64, f64, f64) {
         let held = self.errors(&self.carried.terms);
         let none = BTreeMap::new();
-        let rounding = self.worst(&self.filled.seen, held.clone(), 0.0, &none) - self.worst(exact, held.clone(), 0.0, &none);
+        let rounding =
+            self.worst(&self.filled.seen, held.clone(), 0.0, &none) - self.worst(exact, held.clone(), 0.0, &none);
         let mut all = self.carried.terms.clone();
         all.extend(self.carried.zero.iter().cloned());
         all.extend(self.carried.not.iter().map(|(t, _)| t.clone()));
@@ -131,6 +147,21 @@ impl Pieces<'_> {
     }
 }
 
-fn row(parameter: &str, effect: &str, (value, unit): (f64, &str), lever_mm: f64, left_um: Option<f64>, why: String) -> Left {
-    Left { parameter: parameter.to_owned(), effect: effect.to_owned(), value, unit: unit.to_owned(), lever_mm, left_um, why }
+fn row(
+    parameter: &str,
+    effect: &str,
+    (value, unit): (f64, &str),
+    lever_mm: f64,
+    left_um: Option<f64>,
+    why: String,
+) -> Left {
+    Left {
+        parameter: parameter.to_owned(),
+        effect: effect.to_owned(),
+        value,
+        unit: unit.to_owned(),
+        lever_mm,
+        left_um,
+        why,
+    }
 }

@@ -92,8 +92,11 @@ pub fn kind_of<'a>(machine: &Machine, tables: &'a Tables) -> Result<&'a Kind> {
     let count = |side: Side| machine.side(side).filter(|a| a.name.is_rotary()).count();
     let (workpiece, tool) = (count(Side::Workpiece), count(Side::Tool));
     let refuse = |why: String| {
-        Failure::new("tables::kind", format!("the tables of this control do not describe machine {:?}: {why}", machine.name))
-            .help("`axiscal controllers show` prints what its [tables] hold; another kind can be added there")
+        Failure::new(
+            "tables::kind",
+            format!("the tables of this control do not describe machine {:?}: {why}", machine.name),
+        )
+        .help("`axiscal controllers show` prints what its [tables] hold; another kind can be added there")
     };
     lines::fits(machine).map_err(refuse)?;
     let found = tables.kind.iter().find(|k| (k.workpiece, k.tool) == (workpiece, tool));
@@ -143,11 +146,17 @@ fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
         if own && angles.contains(&term.axis) {
             out.zero.push(term);
         } else if own && Some(term.axis) == last_work {
-            let why = format!("a turn of {} about itself turns the workpiece with it: set the work offset of {} again", term.axis, term.axis);
+            let why = format!(
+                "a turn of {} about itself turns the workpiece with it: set the work offset of {} again",
+                term.axis, term.axis
+            );
             out.not.push((term, why));
         } else if term.dof.is_angle() && !tilts {
             let why = if own {
-                format!("the control's tables have no place for the zero position of {}: it belongs into the reference point of that axis", term.axis)
+                format!(
+                    "the control's tables have no place for the zero position of {}: it belongs into the reference point of that axis",
+                    term.axis
+                )
             } else {
                 "the control's tables hold places of rotary axes, no directions".to_owned()
             };
@@ -179,7 +188,13 @@ fn zero_deg(machine: &Machine, terms: &[Term]) -> BTreeMap<AxisName, f64> {
 /// # Errors
 /// When the control's tables do not describe the machine, a value is beyond the limits (and `force` is not set), an entry
 /// is not verified (and `accept_unverified` is not set), or the old values do not belong to this machine.
-pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: &Correction, options: &Options) -> Result<(Export, Findings)> {
+pub fn export(
+    machine: &Machine,
+    controller: &str,
+    tables: &Tables,
+    correction: &Correction,
+    options: &Options,
+) -> Result<(Export, Findings)> {
     let mut findings = Findings::default();
     let kind = kind_of(machine, tables)?;
     findings.0.extend(correction.beyond(&options.limits));
@@ -194,7 +209,16 @@ pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: 
     let length = machine.tool.length_mm;
     let seen = |terms: &[Term]| Seen::of(machine, &Errors::from_terms(terms, carried.reference_mm), length);
     let (before, now) = (seen(&with_active(&carried.terms)), seen(&carried.terms));
-    let question = Question { machine, tables, kind, before: &before, now: &now, old: &options.old, unit: options.unit, limits: options.limits };
+    let question = Question {
+        machine,
+        tables,
+        kind,
+        before: &before,
+        now: &now,
+        old: &options.old,
+        unit: options.unit,
+        limits: options.limits,
+    };
     let (mut filled, more) = question.fill();
     findings.0.extend(more.0);
     let zero = add_angles(machine, tables, kind, &carried, options, &mut filled);
@@ -204,11 +228,17 @@ pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: 
     if let Some(form) = &tables.grid {
         match grids::grids(machine, correction, form, old_grids, [unit_step, *tables.step_deg.get_ref()]) {
             Ok(found) => grid_list = found,
-            Err(why) => findings.push(Finding::error("tables::grids", why).help("take the smallest effects out of the study's model, one by one")),
+            Err(why) => findings.push(
+                Finding::error("tables::grids", why)
+                    .help("take the smallest effects out of the study's model, one by one"),
+            ),
         }
     }
     if grid_list.iter().any(|_| options.unit == LengthUnit::Inch) {
-        findings.push(Finding::error("tables::inch", "position tables are written for metric controls only").help("leave the position-dependent effects out, or export with --unit mm"));
+        findings.push(
+            Finding::error("tables::inch", "position tables are written for metric controls only")
+                .help("leave the position-dependent effects out, or export with --unit mm"),
+        );
     }
     if options.force {
         for finding in findings.0.iter_mut().filter(|f| f.severity == Severity::Error) {
@@ -224,10 +254,24 @@ pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: 
         );
     }
     if carried.terms.is_empty() && carried.zero.is_empty() && grid_list.is_empty() {
-        findings.push(Finding::warning("tables::nothing", "no parameter of status \"identified\" that a table of this control can hold").help("`axiscal identify` says what the data cannot tell"));
+        findings.push(
+            Finding::warning(
+                "tables::nothing",
+                "no parameter of status \"identified\" that a table of this control can hold",
+            )
+            .help("`axiscal identify` says what the data cannot tell"),
+        );
     }
     let ((), mut findings) = findings.finish(())?;
-    let pieces = left::Pieces { machine, correction, carried: &carried, filled: &filled, zero: &zero, has_grids: tables.grid.is_some(), radius_mm: options.radius_mm };
+    let pieces = left::Pieces {
+        machine,
+        correction,
+        carried: &carried,
+        filled: &filled,
+        zero: &zero,
+        has_grids: tables.grid.is_some(),
+        radius_mm: options.radius_mm,
+    };
     let left = pieces.left();
     let (rounding_um, rest_um, longer_tool_um) = pieces.figures(&now);
     let mut terms = carried.terms.clone();
@@ -239,7 +283,12 @@ pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: 
         kind: kind.name.clone(),
         unit: options.unit,
         reads: tables.reads.clone(),
-        files: tables.file.iter().filter(|f| !f.variant && (!f.grids || !grid_list.is_empty())).map(|f| f.name.clone()).collect(),
+        files: tables
+            .file
+            .iter()
+            .filter(|f| !f.variant && (!f.grids || !grid_list.is_empty()))
+            .map(|f| f.name.clone())
+            .collect(),
         vectors: filled
             .vectors
             .iter()
@@ -269,13 +318,29 @@ pub fn export(machine: &Machine, controller: &str, tables: &Tables, correction: 
         program: program(),
         provenance: correction.provenance.clone(),
     };
-    let mut export = Export { files: Vec::new(), compensation, seen: filled.seen, left, values: filled.values, rounding_um, rest_um, longer_tool_um };
+    let mut export = Export {
+        files: Vec::new(),
+        compensation,
+        seen: filled.seen,
+        left,
+        values: filled.values,
+        rounding_um,
+        rest_um,
+        longer_tool_um,
+    };
     files::write(machine, tables, kind, correction, options, filled.known, &mut export, &mut findings)?;
     Ok((export, findings))
 }
 
 /// Zero positions of rotary axes; gives what the control is to hold beyond its old values, deg by axis.
-fn add_angles(machine: &Machine, tables: &Tables, kind: &Kind, carried: &Carried, options: &Options, filled: &mut Filled) -> BTreeMap<AxisName, f64> {
+fn add_angles(
+    machine: &Machine,
+    tables: &Tables,
+    kind: &Kind,
+    carried: &Carried,
+    options: &Options,
+    filled: &mut Filled,
+) -> BTreeMap<AxisName, f64> {
     let (now, before) = (zero_deg(machine, &carried.zero), zero_deg(machine, &with_active(&carried.zero)));
     let step = *tables.step_deg.get_ref();
     let mut out = BTreeMap::new();
@@ -304,7 +369,14 @@ fn add_angles(machine: &Machine, tables: &Tables, kind: &Kind, carried: &Carried
 }
 
 /// Entries that nobody has verified: refused, or said.
-fn say_unverified(tables: &Tables, kind: &Kind, filled: &Filled, grids: bool, options: &Options, findings: &mut Findings) {
+fn say_unverified(
+    tables: &Tables,
+    kind: &Kind,
+    filled: &Filled,
+    grids: bool,
+    options: &Options,
+    findings: &mut Findings,
+) {
     let mut doubts: Vec<(String, String)> = Vec::new();
     let mut add = |what: String, why: Option<String>| {
         if let Some(why) = why {
@@ -329,9 +401,11 @@ fn say_unverified(tables: &Tables, kind: &Kind, filled: &Filled, grids: bool, op
     for (what, why) in doubts {
         let message = format!("{what}: not verified: {why}");
         findings.push(if options.accept_unverified {
-            Finding::warning("tables::unverified", message).help("compare it with the control's manual and its own backup before you load it")
+            Finding::warning("tables::unverified", message)
+                .help("compare it with the control's manual and its own backup before you load it")
         } else {
-            Finding::error("tables::unverified", message).help("compare it with the control's manual and backup; --accept-unverified writes it all the same")
+            Finding::error("tables::unverified", message)
+                .help("compare it with the control's manual and backup; --accept-unverified writes it all the same")
         });
     }
 }
