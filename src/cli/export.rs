@@ -241,7 +241,8 @@ fn control(
     let mut t = table(&["value", "old", "new", "change", "unit"]);
     for v in &export.values {
         let show = |x: f64| number(format!("{x:.*}", v.decimals));
-        let shown = v.names.values().next().cloned().unwrap_or_default();
+        let spelling = tables.file.first().and_then(|f| f.spelling.as_ref());
+        let shown = spelling.and_then(|s| v.names.get(s)).or(v.names.values().next()).cloned().unwrap_or_default();
         t.add_row(vec![Cell::new(shown), show(v.old), show(v.new), show(v.new - v.old), Cell::new(v.unit)]);
     }
     io.say(format!("{}\n{t}", tables.says));

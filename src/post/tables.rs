@@ -326,7 +326,7 @@ pub(super) fn check(check: &mut Check, tables: &Tables) {
     for (name, step) in [("step_mm", &tables.step_mm), ("step_inch", &tables.step_inch), ("step_deg", &tables.step_deg)]
     {
         let step = *step.get_ref();
-        if !(step >= 1e-12 && step <= 0.1) {
+        if !(1e-12..=0.1).contains(&step) {
             wrong(
                 format!("{name} of [tables] is {step}"),
                 "between 1e-12 and 0.1: the smallest step that the control stores",

@@ -80,7 +80,7 @@ pub fn bench<'a>(
         let finding = if tcp {
             Finding::error("simulate::frame", why).help("make the plan without --tcp")
         } else {
-            Finding::warning("simulate::frame", why).help("make the plan with --tcp to see the pins at work")
+            Finding::warning("simulate::frame", why).help("make the plan with --tcp to see it at work")
         };
         findings.push(finding);
     }

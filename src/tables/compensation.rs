@@ -139,7 +139,7 @@ pub struct Tables {
     /// Tables of one axis's correction by another's position.
     #[serde(default)]
     pub grids: Vec<Grid>,
-    /// How far the workpiece stands off in the control's coordinates until it is touched off again, mm.
+    /// How far the workpiece stands off in the control's coordinates, at the ball's place at zero, mm.
     pub workpiece_shift_mm: [f64; 3],
 }
 

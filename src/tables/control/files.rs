@@ -71,8 +71,12 @@ pub(super) fn write(
     export: &mut Export,
     findings: &mut Findings,
 ) -> Result<()> {
-    let doubts: Vec<String> =
-        findings.0.iter().filter(|f| f.code == "tables::unverified").map(|f| one_line(&f.message)).collect();
+    let doubts: Vec<String> = findings
+        .0
+        .iter()
+        .filter(|f| f.code == "tables::unverified")
+        .map(|f| one_line(&f.message.replace(": not verified: ", ": ")))
+        .collect();
     let head = head(machine, correction);
     let record = export.compensation.tables.clone();
     let grids = record.map(|r| r.grids).unwrap_or_default();
@@ -83,7 +87,7 @@ pub(super) fn write(
         LengthUnit::Inch => context! { name => "inch", letter => "I" },
     };
     let common = |restore: bool, form: Option<&FileForm>| {
-        let spelling = form.and_then(|f| f.spelling.as_deref());
+        let spelling = form.or(tables.file.first()).and_then(|f| f.spelling.as_deref());
         let entries: Vec<Value> =
             export.values.iter().filter_map(|v| entry(v, spelling, restore, tables.always_mark)).collect();
         let shown: Vec<Value> = grids
@@ -152,7 +156,7 @@ pub(super) fn write(
             }
         },
     )?;
-    files.push(("README.txt".to_owned(), text.into_bytes()));
+    files.push(("README.txt".to_owned(), (text.trim_end().to_owned() + "\n").into_bytes()));
     files.push(("compensation.json".to_owned(), export.compensation.to_json()?.into_bytes()));
     export.files = files;
     Ok(())

@@ -78,8 +78,8 @@ fn points(
             [0.25, 0.5, 0.75].iter().all(|s| (exact(n, i as f64 + s) - a - s * (b - a)).abs() <= CLOSE_ENOUGH)
         })
     };
-    let fitting = counts.iter().copied().filter(|n| *n <= most);
-    let n = fitting.clone().find(|n| follows(*n)).or(fitting.last()).unwrap_or(2);
+    let mut fitting = counts.iter().copied().filter(|n| *n <= most);
+    let n = fitting.clone().find(|n| follows(*n)).or(fitting.next_back()).unwrap_or(2);
     let mut values: Vec<f64> = (0..n).map(|i| rounded((exact(n, i as f64) / smallest).round() * smallest)).collect();
     if turns && let Some(first) = values.first().copied() {
         values[n - 1] = first;

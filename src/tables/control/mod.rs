@@ -277,7 +277,8 @@ pub fn export(
     let mut terms = carried.terms.clone();
     terms.extend(carried.zero.iter().cloned());
     terms.sort_by_key(Term::spot);
-    let shift = now.workpiece_off.inverse().translation.vector.map(rounded);
+    let ball = machine.reference.ball;
+    let shift = (crate::geometry::apply(&now.workpiece_off, &ball) - ball).map(rounded);
     let record = Record {
         kind: kind.name.clone(),
         unit: options.unit,
