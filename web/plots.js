@@ -162,7 +162,7 @@ globalThis.axiscalPlots = (() => {
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
     const wide = Math.max(...all) / Math.min(...all) > 12;
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.12, x: 0 }, margin: { l: 8, r: 30, t: 40, b: 8 },
+      showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
       xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], title: { text: 'model, step by step' } },
       yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
@@ -435,7 +435,7 @@ globalThis.axiscalPlots = (() => {
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.28, x: 0 }, margin: { l: 8, r: 16, t: 50, b: 44 },
+      showlegend: true, legend: { orientation: 'h', y: 1.12, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 16, t: 50, b: 44 },
       xaxis: { title: { text: 'error left (RMS), µm' }, range: [0, 1.12 * top] }, yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [line(view.diagnosis.rms_um, 'solid'), line(view.errors.noise_um, 'dash')],
       annotations: [

@@ -311,7 +311,7 @@
     input.addEventListener('input', () => { filter = input.value; page = 0; show(); });
     s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest misses first; the source line is the touch's place in the log.`),
       make('div.controls.noprint', {}, make('label', { for: 'filter' }, 'show only'), input, previous, next, count),
-      make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
+      make('div.scroll', { id: 'touches-table', tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
     show();
   }
 
