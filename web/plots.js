@@ -97,7 +97,7 @@ globalThis.axiscalPlots = (() => {
     }
     const lay = layout(el, {
       margin: { l: 8, r: 14, t: 26, b: 44 },
-      xaxis: { title: { text: 'how far the touches miss (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
+      xaxis: { title: { text: 'the touches miss by (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
       yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [{ type: 'line', x0: noise, x1: noise, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: noise, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: noise > 0.6 * top ? 'right' : 'left', showarrow: false, text: `probe's noise ${digits(noise)} µm`, font: { size: 11 } }],
