@@ -12,23 +12,25 @@ fn axiscal(folder: &Path) -> Command {
     command
 }
 
-/// The paper's programs on a machine whose turntable wanders twice per turn.
-const HIDDEN: &str = "seed = 4\n[effects.location-c]\nEX0C = 0.012\n[effects.radial-c-2]\nEXC2c = 6.0\nEYC2s = -5.0\n[noise]\ntouch_um = 0.5\n";
+/// A machine whose turntable wanders once per turn, and does not stand where it should.
+const HIDDEN: &str = "seed = 20\n[effects.location-c]\nEX0C = -0.017\n[effects.radial-c-1]\nEXC1c = 3.0\nEXC1s = 0.0\nEYC1c = 0.0\nEYC1s = -3.0\n[noise]\ntouch_um = 0.5\nvisit_um = 0.2\n";
 
 const EVIL: &str = "</script><script>document.title='broken'</script><!-- <b>";
 
-fn folder() -> tempfile::TempDir {
+fn folder(program: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.toml"), HIDDEN).unwrap();
     let common = ["--machine", "swivel-head", "--controller", "linuxcnc", "--out"];
-    let mut new = vec!["new", "--machine", "swivel-head", "--controller", "linuxcnc", "--out", "study.toml"];
-    for (program, plan, log) in [("head", "head.plan.json", "head.log"), ("table", "table.plan.json", "table.log")] {
-        axiscal(folder.path()).args(["generate", "--program", program]).args(common).arg(".").assert().success();
-        let simulate = ["simulate", "--plan", plan, "--scenario", "s.toml"];
-        axiscal(folder.path()).args(simulate).args(common).arg(log).assert().success();
-        new.extend(["--plan", plan, "--log", log]);
-    }
-    axiscal(folder.path()).args(new).assert().success();
+    let plan = format!("{program}.plan.json");
+    axiscal(folder.path()).args(["generate", "--program", program]).args(common).arg(".").assert().success();
+    let simulate = ["simulate", "--plan", &plan, "--scenario", "s.toml"];
+    axiscal(folder.path()).args(simulate).args(common).arg("run.log").assert().success();
+    axiscal(folder.path())
+        .args(["new", "--plan", &plan, "--log", "run.log"])
+        .args(common)
+        .arg("study.toml")
+        .assert()
+        .success();
     folder
 }
 
@@ -40,7 +42,7 @@ fn data(page: &str) -> serde_json::Value {
 
 #[test]
 fn one_page_holds_everything_and_fetches_nothing() {
-    let folder = folder();
+    let folder = folder("full");
     // a user's effect whose words would end the script, in the model and so on the page
     let own = format!(
         "[[effect]]\nid = \"mine\"\nname = \"{EVIL}\"\nsays = \"{EVIL}\"\nlook = \"{EVIL}\"\nat = \"B\"\nterms = [{{ parameter = \"mine\", unit = \"um\", dof = \"dz\", formula = \"1 - cos(B)\" }}]\n"
@@ -83,34 +85,37 @@ fn the_view_says_what_the_verbs_say(folder: &Path, view: &serde_json::Value) {
     let (compared, diagnosed) = (ask("compare"), ask("diagnose"));
     assert_eq!(view["diagnosis"]["verdict"], diagnosed["verdict"]);
     assert_eq!(view["diagnosis"]["verdict"], "missing-effect");
-    assert_eq!(view["diagnosis"]["candidates"][0]["effect"], "radial-c-2");
+    assert_eq!(view["diagnosis"]["candidates"][0]["effect"], "radial-c-1");
     assert_eq!(view["headline"]["level"], "act");
     let ladder = view["ladder"].as_array().unwrap();
     let kinds: Vec<&str> = ladder.iter().map(|r| r["kind"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["uncorrected", "current", "proposed"]);
     let rms = |i: usize| ladder[i]["rms_um"].as_f64().unwrap();
     assert!((rms(1) - compared["rms_um"].as_f64().unwrap()).abs() < 1e-9);
-    assert!(rms(0) > rms(1) && rms(1) > 2.0 * rms(2), "{} {} {}", rms(0), rms(1), rms(2));
+    assert!(rms(0) > rms(1) && rms(1) > 1.5 * rms(2), "{} {} {}", rms(0), rms(1), rms(2));
     // the residuals of the touches are those of compare, and their RMS that of the ladder
     let (t, points) = (&view["touches"], compared["points"].as_array().unwrap());
     assert_eq!(t["n"], points.len());
-    let mut sum = 0.0;
+    let (mut sum, mut used) = (0.0, 0);
     for (i, p) in points.iter().enumerate() {
         let r = t["residual_um"][1][i].as_f64().unwrap();
-        assert!((r - p["residual_um"].as_f64().unwrap()).abs() < 1e-4);
+        assert!((r - p["residual_um"].as_f64().unwrap()).abs() < 1e-3);
         assert_eq!((&t["id"][i], &t["line"][i]), (&p["id"], &p["line"]));
-        sum += r * r;
+        assert_eq!(t["rejected"][i].is_null(), p["used"].as_bool().unwrap());
+        if p["used"] == true {
+            sum += r * r;
+            used += 1;
+        }
     }
-    let all_used = t["rejected"].as_array().unwrap().iter().all(serde_json::Value::is_null);
-    assert!(all_used && ((sum / points.len() as f64).sqrt() - rms(1)).abs() < 1e-3);
-    // the curve of what is proposed against C is a wave twice per turn of about the planted size
+    assert!(used > 700 && ((sum / f64::from(used)).sqrt() - rms(1)).abs() < 1e-3);
+    // the curve of what is proposed against C is a wave once per turn of about the planted size
     let curve = view["curves"]
         .as_array()
         .unwrap()
         .iter()
         .find(|c| c["variable"] == "C" && c["direction"] == "X" && c["from"] == 1 && c["to"] == 2);
     let y: Vec<f64> = curve.unwrap()["y_um"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
-    assert!(y.iter().any(|v| *v > 2.0) && y.iter().any(|v| *v < -2.0), "{y:?}");
+    assert!(y.iter().any(|v| *v > 0.5) && y.iter().any(|v| *v < -0.5), "{y:?}");
     // the tolerance of the study, as millimetres and as an angle at 100 mm
     let of = |name: &str| view["parameters"].as_array().unwrap().iter().find(|p| p["name"] == name).unwrap();
     assert!((of("EX0C")["tolerance"].as_f64().unwrap() - 0.004).abs() < 1e-12);
@@ -131,17 +136,17 @@ fn every_plot_has_its_files(folder: &Path, answer: &serde_json::Value, view: &se
         } else {
             let text = String::from_utf8(bytes).unwrap();
             assert!(name.ends_with(".csv") && text.lines().count() > 1 || text.starts_with("<svg"), "{name}");
-            assert!(!text.contains("<script"), "{name}");
+            assert!(name.ends_with(".csv") || !text.contains("<script"), "{name}");
         }
     }
     let csv = std::fs::read_to_string(folder.join("plots/residual-c.csv")).unwrap();
     assert!(csv.starts_with("series,\"angle of axis C, deg\",\"miss, µm\",note\n"), "{}", &csv[..80]);
-    assert!(csv.contains("head.log:"), "the source line of a touch is behind each point");
+    assert!(csv.contains("run.log:"), "the source line of a touch is behind each point");
 }
 
 #[test]
 fn rubbish_is_refused_with_a_place() {
-    let folder = folder();
+    let folder = folder("head");
     let study = std::fs::read_to_string(folder.path().join("study.toml")).unwrap();
     std::fs::write(folder.path().join("bad.toml"), format!("{study}\n[tolerance]\nerror_um = -1\n")).unwrap();
     axiscal(folder.path())

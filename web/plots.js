@@ -47,11 +47,13 @@ globalThis.axiscalPlots = (() => {
     const out = {
       paper_bgcolor: 'rgba(0,0,0,0)', plot_bgcolor: 'rgba(0,0,0,0)',
       font: { family: 'system-ui, sans-serif', size: 12, color: c.ink },
-      margin: { l: 8, r: 12, t: 8, b: 8 }, showlegend: false, hoverlabel: { font: { family: 'system-ui, sans-serif' } },
-      dragmode: 'zoom', ...more,
+      margin: { l: 8, r: 12, t: 8, b: 44 }, showlegend: false, hoverlabel: { font: { family: 'system-ui, sans-serif' } },
+      // stated, so that a page which is made ready for the printer is drawn in its new size at once
+      dragmode: 'zoom', width: el.clientWidth || undefined, height: el.clientHeight || undefined, ...more,
     };
     for (const name of ['xaxis', 'yaxis']) {
-      out[name] = { ...axis, ...more[name] };
+      // below, the margin is given: names that need more room ask for it
+      out[name] = { ...axis, automargin: name === 'yaxis' || Boolean(more[name]?.ticktext), ...more[name] };
       if (out[name].title) out[name].title = { standoff: 8, ...out[name].title };
     }
     return out;
@@ -94,8 +96,8 @@ globalThis.axiscalPlots = (() => {
       });
     }
     const lay = layout(el, {
-      margin: { l: 8, r: 14, t: 26, b: 8 },
-      xaxis: { title: { text: 'how far the touches miss (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
+      margin: { l: 8, r: 14, t: 26, b: 44 },
+      xaxis: { title: { text: 'the touches miss by (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
       yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [{ type: 'line', x0: noise, x1: noise, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: noise, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: noise > 0.6 * top ? 'right' : 'left', showarrow: false, text: `probe's noise ${digits(noise)} µm`, font: { size: 11 } }],
@@ -139,7 +141,7 @@ globalThis.axiscalPlots = (() => {
     }] : []));
     const reach = 1.08 * Math.max(view.tolerance.error_um * 1.15, ...shown.map((p) => Math.abs(p.at_radius_um) + (p.at_radius_expanded_um || 0)));
     const lay = layout(el, {
-      margin: { l: 8, r: 12, t: 8, b: 8 }, shapes,
+      margin: { l: 8, r: 12, t: 8, b: 44 }, shapes,
       xaxis: { title: { text: `error at ${view.tolerance.radius_mm} mm, µm (bar: 95 %)` }, range: [-reach, reach], zeroline: true },
       yaxis: { autorange: 'reversed', ticks: '', gridcolor: 'rgba(0,0,0,0)', tickfont: { size: 11 } },
     });
@@ -160,7 +162,7 @@ globalThis.axiscalPlots = (() => {
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
     const wide = Math.max(...all) / Math.min(...all) > 12;
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.12, x: 0 }, margin: { l: 8, r: 30, t: 40, b: 8 },
+      showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
       xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], title: { text: 'model, step by step' } },
       yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
@@ -351,7 +353,7 @@ globalThis.axiscalPlots = (() => {
     const c = colours(el);
     const rung = options.rung ?? view.errors.before;
     const parts = machineParts(view, rung);
-    const flat = options.flat ?? !hasWebgl();
+    const flat = options.flat || !hasWebgl();
     // seen from the front, right, above: X to the right, Z up
     const [ca, sa, ce, se] = [Math.cos(-0.6), Math.sin(-0.6), Math.cos(0.5), Math.sin(0.5)];
     const map = flat ? (p) => [ca * p[0] - sa * p[1], ce * p[2] + se * (sa * p[0] + ca * p[1])] : (p) => p;
@@ -417,7 +419,7 @@ globalThis.axiscalPlots = (() => {
       text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2)))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
       hovertemplate: '%{y} and %{x}: %{z:.2f}<extra></extra>',
     }];
-    const lay = layout(el, { margin: { l: 8, r: 10, t: 10, b: 8 }, yaxis: { autorange: 'reversed', ticks: '' }, xaxis: { ticks: '', tickangle: -45 } });
+    const lay = layout(el, { margin: { l: 8, r: 10, t: 10, b: 8 }, yaxis: { autorange: 'reversed', ticks: '' }, xaxis: { ticks: '', tickangle: -45, automargin: true } });
     return draw(el, traces, lay, `Correlation of the results, from −1 to 1: ${names.join(', ')}.`);
   }
 
@@ -433,7 +435,7 @@ globalThis.axiscalPlots = (() => {
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.28, x: 0 }, margin: { l: 8, r: 16, t: 50, b: 8 },
+      showlegend: true, legend: { orientation: 'h', y: 1.12, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 16, t: 50, b: 44 },
       xaxis: { title: { text: 'error left (RMS), µm' }, range: [0, 1.12 * top] }, yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [line(view.diagnosis.rms_um, 'solid'), line(view.errors.noise_um, 'dash')],
       annotations: [

@@ -53,6 +53,9 @@
     return [make('figure', {}, div, caption ? make('figcaption', {}, caption) : null), div];
   };
 
+  const e = view.errors;
+  const state = { from: e.before, to: e.after, directions: new Set(['X', 'Y', 'Z']), rung: e.before, flat: false };
+
   // ---------------------------------------------------------------- theme
   const dark = () => document.documentElement.dataset.theme === 'dark'
     || (!document.documentElement.dataset.theme && matchMedia('(prefers-color-scheme: dark)').matches);
@@ -71,17 +74,20 @@
   addEventListener('beforeprint', () => {
     before = document.documentElement.dataset.theme ?? '';
     document.documentElement.dataset.theme = 'light';
+    document.documentElement.classList.add('printing');
+    state.flat = true;
     [...waiting.keys()].forEach(drawNow);
     redraw.forEach((job) => job());
   });
   addEventListener('afterprint', () => {
     if (before) document.documentElement.dataset.theme = before;
     else delete document.documentElement.dataset.theme;
+    document.documentElement.classList.remove('printing');
+    state.flat = false;
     redraw.forEach((job) => job());
   });
 
   // ---------------------------------------------------------------- the first screen
-  const e = view.errors;
   const proposed = view.proposed.length > 0;
   plot(id('errors'), () => P.errors(id('errors'), view), true);
   id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: touches that had no part in the fit' : ''}. Touches cannot miss by less than about the probe's noise.`;
@@ -161,7 +167,6 @@
   }
 
   // ---------------------------------------------------------------- residuals
-  const state = { from: e.before, to: e.after, directions: new Set(['X', 'Y', 'Z']), rung: e.before };
   const select = (label, value, change) => {
     const el = make('select', { 'aria-label': label }, ...view.ladder.map((r, k) => make('option', { value: k, selected: k === value }, `${k}: ${r.label}`)));
     el.addEventListener('change', () => change(Number(el.value)));
@@ -306,7 +311,7 @@
     input.addEventListener('input', () => { filter = input.value; page = 0; show(); });
     s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest misses first; the source line is the touch's place in the log.`),
       make('div.controls.noprint', {}, make('label', { for: 'filter' }, 'show only'), input, previous, next, count),
-      make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
+      make('div.scroll', { id: 'touches-table', tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
     show();
   }
 

@@ -250,7 +250,10 @@ fn ladder(view: &View) -> Chart {
     c
 }
 
-const LETTERS: [(&str, Colour, Shape, Option<(f64, f64)>); 3] = [
+/// A direction of R: its letter, and how its points and its line look.
+type Direction = (&'static str, Colour, Shape, Option<(f64, f64)>);
+
+const LETTERS: [Direction; 3] = [
     ("X", BLUE, Shape::Circle, None),
     ("Y", RED, Shape::Square, DASH),
     ("Z", GREEN, Shape::Triangle, Some((3.0, 4.0))),
@@ -297,8 +300,7 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
         let log = view.study.runs.get(t.run[i] - 1).map_or("log", |r| r.log.as_str());
         format!("run {} touch {} {log}:{}", t.run[i], t.id[i], t.line[i])
     };
-    let kinds: Vec<(&str, Colour, Shape, Option<(f64, f64)>)> =
-        if along { vec![("normal", PURPLE, Shape::Diamond, None)] } else { LETTERS.to_vec() };
+    let kinds: Vec<Direction> = if along { vec![("normal", PURPLE, Shape::Diamond, None)] } else { LETTERS.to_vec() };
     for (k, (direction, colour, shape, dash)) in kinds.iter().enumerate() {
         let mut add = |rung: usize, word: &str, filled: bool, opacity: f64| {
             let points: Vec<Point> = used
@@ -345,7 +347,7 @@ fn candidates(view: &View) -> Chart {
             } else {
                 format!("cannot be told from {}", k.same_as.join(" "))
             };
-            (k.proposed == proposed).then(|| Point { x: k.rms_after_um, y: i as f64, note })
+            (k.proposed == proposed).then_some(Point { x: k.rms_after_um, y: i as f64, note })
         };
         let points: Vec<Point> = d.candidates.iter().enumerate().filter_map(of).collect();
         if !points.is_empty() {

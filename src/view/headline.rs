@@ -5,6 +5,7 @@ use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::fit::outcome::Status;
+use crate::model::catalogue::Place;
 use crate::units::um_from_mm;
 use serde::Serialize;
 
@@ -92,6 +93,14 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
+        Verdict::Unexplained if only_a_trace(m) => (
+            Level::Unknown,
+            format!(
+                "The model fits within the probe's noise (the touches miss by {}, the noise is {}), but a weak pattern is left that may be chance: more touches would tell.",
+                um(d.rms_um),
+                um(d.noise_um)
+            ),
+        ),
         Verdict::Unexplained => (
             Level::Act,
             format!(
@@ -114,6 +123,13 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
         _ => d.says.clone(),
     };
     Headline { level, sentence, detail }
+}
+
+/// Something passed a test and was not borne out, while the noise explains all that is left: no reason to take the machine
+/// apart.
+fn only_a_trace(m: &Material) -> bool {
+    let d = m.diagnosis;
+    d.verdict == Verdict::Unexplained && m.comparison.explained_by_noise && d.rms_um <= 1.2 * d.noise_um
 }
 
 fn missing(m: &Material, c: &Candidate) -> String {
@@ -140,7 +156,21 @@ fn missing(m: &Material, c: &Candidate) -> String {
         several => format!("{}, or one of {} others that these touches cannot tell from it", c.name, several.len()),
     };
     let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
-    format!("The machine has an error that is not in the model yet: {what}. {falls}{rest}")
+    let (whose, has) = whose(m, &c.effect);
+    format!("{whose} {has} an error that is not in the model yet: {what}. {falls}{rest}")
+}
+
+/// Whose error an effect is: a probe that triggers late is no fault of the machine.
+fn whose(m: &Material, id: &str) -> (&'static str, &'static str) {
+    let Some(effect) = m.catalogue.get(id, m.machine) else { return ("The machine", "has") };
+    let all = |of: fn(Place) -> bool| !effect.terms.is_empty() && effect.terms.iter().all(|t| of(t.place));
+    if all(|p| p == Place::Trigger) {
+        ("The probe", "has")
+    } else if all(|p| p == Place::Block) {
+        ("The blocks", "have")
+    } else {
+        ("The machine", "has")
+    }
 }
 
 fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (Level, String) {
@@ -228,10 +258,18 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, &mut out);
             }
         }
+        Verdict::Unexplained if only_a_trace(m) => out.push(Next::new(
+            "Measure more touches",
+            "Repeats and further poses say whether the weak pattern is there at all.",
+            plan_next.clone(),
+        )),
         Verdict::Unexplained => unexplained(m, &mut out),
         Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
     }
-    if d.verdict != Verdict::TooLittleData && !m.fit.outcome.undetermined.is_empty() && d.verdict == Verdict::Adequate {
+    if d.verdict != Verdict::TooLittleData
+        && !m.fit.outcome.undetermined.is_empty()
+        && (d.verdict == Verdict::Adequate || only_a_trace(m))
+    {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
         let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);
         out.push(Next::new("Measure what is not told yet", capital(&how), plan_next));
@@ -292,8 +330,13 @@ fn settled(
         return;
     }
     let beyond: Vec<&ParameterRecord> = parameters.iter().filter(|p| p.judgement == Judgement::Beyond).collect();
-    let carried =
-        |p: &&&ParameterRecord| !c.left.iter().any(|l| l.known && crate::symbols::same(&l.parameter, &p.name));
+    // what the probe or the blocks do is no error of the machine, and no table holds it
+    let carried = |p: &&&ParameterRecord| {
+        let left = c.left.iter().any(|l| l.known && crate::symbols::same(&l.parameter, &p.name));
+        let term = c.terms.iter().any(|t| t.effect.split('+').any(|e| e == p.effect));
+        let shape = c.shapes.iter().any(|s| s.parameter == p.name);
+        !left && (term || shape || (c.tool_length_mm.is_some() && p.effect == "tool-length"))
+    };
     if beyond.iter().any(|p| carried(&p)) {
         out.push(Next::new(
             "Load the compensation",
@@ -327,8 +370,13 @@ fn settled(
 
 /// Touches that do not belong to the rest are a finding of their own.
 fn odd_touches(m: &Material, out: &mut Vec<Next>) {
+    // touches that fit once the missing effect is in the model are no fault of theirs
+    let back = |i: usize| {
+        let o = &m.fit.data.observations[i];
+        m.diagnosis.outliers.iter().any(|x| x.comes_back && x.id == o.id && x.run == o.run + 1)
+    };
     let odd: Vec<(&usize, &String)> =
-        m.fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).collect();
+        m.fit.rejected.iter().filter(|(i, reason)| !reason.starts_with("taken out") && !back(**i)).collect();
     if odd.is_empty() {
         return;
     }
@@ -358,7 +406,11 @@ fn odd_touches(m: &Material, out: &mut Vec<Next>) {
             if odd.len() == 1 { "touch" } else { "touches" }
         )
         .replace("1 touch that do not belong", "1 touch that does not belong"),
-        format!("Chips, dirt, a false trigger? {}{rest}. They are not used.", named.join(", ")),
+        format!(
+            "Chips, dirt, a false trigger? {}{rest}. {} not used.",
+            named.join(", "),
+            if odd.len() == 1 { "It is" } else { "They are" }
+        ),
         "",
     ));
 }

@@ -5,7 +5,12 @@ use super::record::{RungRecord, Touches, UnusableRecord, Variable};
 use crate::compare::rungs::{self, Curve, Kind, direction};
 use std::collections::{BTreeMap, HashMap};
 
-/// A tenth of a nanometre: what is shown needs no more, and a page with ten thousand touches stays small.
+/// µm, to a nanometre: a probe sees no less.
+fn nanometre(x: f64) -> f64 {
+    (x * 1e3).round() / 1e3 + 0.0
+}
+
+/// Four decimals: what is shown needs no more, and a page with ten thousand touches stays small.
 fn short(x: f64) -> f64 {
     (x * 1e4).round() / 1e4 + 0.0
 }
@@ -50,7 +55,7 @@ pub(super) fn touches(m: &Material) -> Touches {
         normal_r: points.iter().map(|p| p.normal.map(short)).collect(),
         towards: points.iter().map(|p| direction(&p.normal).0).collect(),
         sign: points.iter().map(|p| if direction(&p.normal).1 < 0.0 { -1 } else { 1 }).collect(),
-        residual_um: m.ladder.rungs.iter().map(|r| r.residual_um.iter().map(|x| short(*x)).collect()).collect(),
+        residual_um: m.ladder.rungs.iter().map(|r| r.residual_um.iter().map(|x| nanometre(*x)).collect()).collect(),
         standardised: points.iter().map(|p| short(p.standardised)).collect(),
         rejected: (0..points.len()).map(|i| fit.rejected.get(&i).cloned()).collect(),
     }
