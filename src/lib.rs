@@ -30,5 +30,5 @@ pub mod search;
 pub mod simulate;
 pub mod study;
 pub mod tables;
-pub mod workbench;
 pub mod view;
+pub mod workbench;

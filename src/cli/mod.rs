@@ -27,8 +27,8 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
-mod workbench;
 pub mod view;
+mod workbench;
 
 pub use common::{Answer, Io};
 

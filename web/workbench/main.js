@@ -37,11 +37,11 @@ function verdict() {
   const { live, behind } = state;
   const found = behind?.version === live.version ? behind.diagnosis : null;
   const at = byId("verdict");
-  const bad = found ? ["missing-effect", "unexplained"].includes(found.verdict) : !live.explained_by_noise;
+  const bad = found ? ["missing-effect", "unexplained"].includes(found.verdict) : live.explained_by_noise !== true;
   at.className = bad ? "bad" : "good";
   at.dataset.verdict = found?.verdict ?? "";
   const ratio = significant(Math.sqrt(live.chi2_per_dof), 2);
-  show("verdict", found?.says ?? (bad ? `The model misses the touches by ${ratio} times their noise.` : "What the model leaves is what noise leaves."));
+  show("verdict", found?.says ?? (live.explained_by_noise === null ? "As many unknowns as touches: nothing is left over to judge the model by." : bad ? `The model misses the touches by ${ratio} times their noise.` : "What the model leaves is what noise leaves."));
   const first = found?.candidates[0];
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${first.same_as.join(", ")}: a further program would.` : ""}`
