@@ -292,16 +292,13 @@ async fn events(State(shared): State<Arc<Shared>>) -> Response {
         if let Some(hello) = hello {
             return Some((Ok::<_, std::convert::Infallible>(Event::default().data(hello)), (heard, None)));
         }
-        loop {
-            match heard.recv().await {
-                Ok(text) => return Some((Ok(Event::default().data(text)), (heard, None))),
-                // who was too slow looks at everything again
-                Err(broadcast::error::RecvError::Lagged(_)) => {
-                    return Some((Ok(Event::default().data("{\"what\":\"lagged\"}")), (heard, None)));
-                }
-                Err(broadcast::error::RecvError::Closed) => return None,
-            }
-        }
+        let text = match heard.recv().await {
+            Ok(text) => text,
+            // who was too slow looks at everything again
+            Err(broadcast::error::RecvError::Lagged(_)) => "{\"what\":\"lagged\"}".to_owned(),
+            Err(broadcast::error::RecvError::Closed) => return None,
+        };
+        Some((Ok(Event::default().data(text)), (heard, None)))
     });
     Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))).into_response()
 }
