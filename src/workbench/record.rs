@@ -101,7 +101,8 @@ struct Live<'a> {
     noise_says: &'a str,
     visit_um: f64,
     chi2_per_dof: f64,
-    explained_by_noise: bool,
+    /// Null where nothing is left over to judge by.
+    explained_by_noise: Option<bool>,
     converged: bool,
     touches: usize,
     used: usize,
@@ -138,7 +139,7 @@ fn bytes(record: &impl Serialize) -> Vec<u8> {
 pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
     let (fit, o) = (&*now.fit, &now.fit.outcome);
     let masks = &now.opened.study.masked;
-    let taken_out = |run: usize, id: u64| masks.iter().any(|m| m.run == run && m.id == id);
+    let masked: std::collections::HashSet<(usize, u64)> = masks.iter().map(|m| (m.run, m.id)).collect();
     let observations = &fit.data.observations;
     let nuisance: Vec<bool> = fit.model.unknowns.iter().map(|u| u.nuisance).collect();
     bytes(&Live {
@@ -157,7 +158,7 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         noise_says: &o.noise_says,
         visit_um: o.visit_um,
         chi2_per_dof: o.chi2_per_dof,
-        explained_by_noise: fit.dof == 0 || o.chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof),
+        explained_by_noise: (fit.dof > 0).then(|| o.chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof)),
         converged: o.converged,
         touches: o.touches,
         used: fit.n_used(),
@@ -170,7 +171,9 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         residual_um: fit.residual_mm.iter().map(|r| short(um_from_mm(*r), 1e4)).collect(),
         standardised: fit.studentised.iter().map(|s| short(*s, 1e3)).collect(),
         rejected: fit.rejected.iter().map(|(i, why)| (*i, why.as_str())).collect(),
-        masked: (0..observations.len()).filter(|&i| taken_out(observations[i].run, observations[i].id)).collect(),
+        masked: (0..observations.len())
+            .filter(|&i| masked.contains(&(observations[i].run, observations[i].id)))
+            .collect(),
         ladder: &now.opened.history,
         job,
     })

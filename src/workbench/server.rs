@@ -232,6 +232,11 @@ async fn with_token(State(shared): State<Arc<Shared>>, request: Request, next: N
     if let Err(d) = shared.guard.check_token(request.headers()) {
         return denied(d);
     }
+    // a body that is promised too long is not waited for
+    let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
+    if promised.is_some_and(|n| n > LONGEST_BODY as u64) {
+        return refusal(StatusCode::PAYLOAD_TOO_LARGE, "length", "the request is too long", None);
+    }
     let json = |h: &HeaderMap| {
         let kind = h.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
         kind.split(';').next().is_some_and(|k| k.trim().eq_ignore_ascii_case("application/json"))
@@ -287,16 +292,13 @@ async fn events(State(shared): State<Arc<Shared>>) -> Response {
         if let Some(hello) = hello {
             return Some((Ok::<_, std::convert::Infallible>(Event::default().data(hello)), (heard, None)));
         }
-        loop {
-            match heard.recv().await {
-                Ok(text) => return Some((Ok(Event::default().data(text)), (heard, None))),
-                // who was too slow looks at everything again
-                Err(broadcast::error::RecvError::Lagged(_)) => {
-                    return Some((Ok(Event::default().data("{\"what\":\"lagged\"}")), (heard, None)));
-                }
-                Err(broadcast::error::RecvError::Closed) => return None,
-            }
-        }
+        let text = match heard.recv().await {
+            Ok(text) => text,
+            // who was too slow looks at everything again
+            Err(broadcast::error::RecvError::Lagged(_)) => "{\"what\":\"lagged\"}".to_owned(),
+            Err(broadcast::error::RecvError::Closed) => return None,
+        };
+        Some((Ok(Event::default().data(text)), (heard, None)))
     });
     Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))).into_response()
 }
@@ -482,6 +484,7 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
         }
         done = now.version;
         let current = || lock(&shared.session).snapshot().version == now.version;
+        lock(&shared.session).write_ladder(now.version);
         let work = || {
             let began = std::time::Instant::now();
             let mut behind = Behind { version: now.version, ..Behind::default() };
@@ -493,7 +496,8 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
                 return;
             }
             let held_out = crate::fit::held_out::by_visit(&now.fit).map(|h| h.rms_um);
-            lock(&shared.session).enter_held_out(now.version, held_out);
+            let later = crate::fit::held_out::later_run(&now.fit).map(|h| h.rms_um);
+            lock(&shared.session).enter_held_out(now.version, held_out, later);
             behind.held_out_rms_um = held_out;
             if !current() {
                 return;

@@ -7,7 +7,7 @@
 use super::draft::{self, Draft, Mistake};
 use super::{Host, Opened, Place};
 use crate::diag::{Failure, Result, source};
-use crate::fit::{self, Fit, held_out};
+use crate::fit::{self, Fit};
 use crate::study::history::Step as Rung;
 use crate::study::{Study, edit, mask};
 use std::sync::Arc;
@@ -204,20 +204,29 @@ impl Session {
         true
     }
 
-    /// Puts the error on touches left out into the ladder, once it is known.
-    pub fn enter_held_out(&mut self, version: u64, rms_um: Option<f64>) {
+    /// Puts the errors on touches left out (by index visit, and of the last run) into the ladder, once they are known.
+    pub fn enter_held_out(&mut self, version: u64, by_visit: Option<f64>, later_run: Option<f64>) {
         if version != self.state.version || self.state.fault.is_some() {
             return;
         }
         let mut opened = Opened::clone(&self.state.opened);
-        let step = Rung { held_out_rms_um: rms_um, ..rung(&opened, &self.state.fit) };
+        let step = Rung { held_out_rms_um: by_visit, later_run_rms_um: later_run, ..rung(&opened, &self.state.fit) };
         opened.history.push(step);
+        self.state.opened = Arc::new(opened);
+        self.write_ladder(version);
+    }
+
+    /// Writes the ladder beside the study. Not within a step, whose answer need not wait for it: a ladder that lacks its
+    /// last model is no damage, and the next one puts it there.
+    pub fn write_ladder(&self, version: u64) {
         // who only looks leaves no file
-        if let (true, Ok(text)) = (version > 1, opened.history.to_json()) {
-            // a ladder that cannot be written is no reason to stop: it is written again with the next step
+        if version != self.state.version || version == 1 || self.state.fault.is_some() {
+            return;
+        }
+        if let Ok(text) = self.state.opened.history.to_json() {
+            // one that cannot be written is no reason to stop
             let _ = self.host.write(Place::History, Some(text.as_bytes()));
         }
-        self.state.opened = Arc::new(opened);
     }
 
     fn text(&self) -> Result<String> {
@@ -248,6 +257,7 @@ impl Session {
             }
             Ask::Mask { touches, reason } => {
                 every_touch_exists(opened, touches)?;
+                some_are_left(opened, touches)?;
                 Ok((
                     mask::mask(&text, touches, reason)?,
                     format!("{} taken out: {}", count(touches.len()), reason.trim()),
@@ -370,8 +380,6 @@ impl Session {
             }
         };
         opened.history.push(rung(&opened, &fit));
-        let history = opened.history.to_json()?;
-        self.host.write(Place::History, Some(history.as_bytes()))?;
         self.mark = self.host.mark(&opened.study);
         self.state = Snapshot {
             version: self.state.version + 1,
@@ -435,13 +443,13 @@ fn fit(opened: &Opened) -> Result<(Fit, f64)> {
     Ok((fit, began.elapsed().as_secs_f64() * 1e3))
 }
 
-/// A fit as a step of the ladder; the error on touches left out follows.
+/// A fit as a step of the ladder; the errors on touches left out follow.
 fn rung(opened: &Opened, fit: &Fit) -> Rung {
     Rung {
         effects: opened.study.effects.clone(),
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: None,
-        later_run_rms_um: held_out::later_run(fit).map(|h| h.rms_um),
+        later_run_rms_um: None,
         chi2_per_dof: fit.outcome.chi2_per_dof,
         unknowns: fit.outcome.unknowns,
         data_sha256: opened.data_sha256.clone(),
@@ -465,6 +473,17 @@ fn nothing_said_of(opened: &Opened, id: &str) -> Result<()> {
         Some(name) => Err(Failure::new("study::still_said", format!("the study says something of {name}"))
             .help(format!("take [model.parameters.{name}] out of the study first"))),
     }
+}
+
+/// Without any touch a fit says that everything is zero.
+fn some_are_left(opened: &Opened, touches: &[(usize, u64)]) -> Result<()> {
+    let out: std::collections::HashSet<(usize, u64)> =
+        touches.iter().copied().chain(opened.study.masked.iter().map(|m| (m.run, m.id))).collect();
+    if opened.data.observations.iter().any(|o| !out.contains(&(o.run, o.id))) {
+        return Ok(());
+    }
+    Err(Failure::new("workbench::all_touches", "these are all the touches that there are")
+        .help("a fit needs touches: take out those with which something was wrong"))
 }
 
 fn every_touch_exists(opened: &Opened, touches: &[(usize, u64)]) -> Result<()> {

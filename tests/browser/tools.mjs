@@ -58,6 +58,49 @@ export function measured(dir, name) {
   return folder;
 }
 
+/** The same touches again and again with fresh noise, until there are ten thousand: for times. */
+export function many(dir) {
+  const folder = measured(dir, "many");
+  const at = (file) => join(folder, file);
+  // a generator of its own, so that every run is the same
+  let seed = 12345;
+  const uniform = () => { seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0; return (seed + 0.5) / 2 ** 32; };
+  const normal = () => Math.sqrt(-2 * Math.log(uniform())) * Math.cos(2 * Math.PI * uniform());
+  for (const program of ["head", "table"]) {
+    axiscal("parse", at(`${program}.log`), "--controller", "linuxcnc", "--plan", at(`${program}.plan.json`), "--out", at(`${program}.csv`));
+    const plan = JSON.parse(readFileSync(at(`${program}.plan.json`), "utf8"));
+    const [head, ...rows] = readFileSync(at(`${program}.csv`), "utf8").trim().split("\n");
+    const names = head.split(",");
+    const id = names.indexOf("id");
+    const time = names.indexOf("time_s");
+    const n = plan.touches.length;
+    const duration = 1 + Math.max(...plan.touches.map((t) => t.time_s ?? 0));
+    const touches = [], lines = [head];
+    const byId = new Map(plan.touches.map((t) => [String(t.id), t]));
+    for (let k = 0; touches.length < 5000; k += 1) {
+      for (const row of rows) {
+        const cells = row.split(",");
+        const t = byId.get(cells[id]);
+        const own = { ...t, id: t.id + k * 1000, time_s: (t.time_s ?? 0) + k * duration };
+        if (t.visit !== undefined) own.visit = t.visit + k * 1000;
+        touches.push(own);
+        cells[id] = String(own.id);
+        if (time >= 0 && cells[time]) cells[time] = String(Number(cells[time]) + k * duration);
+        if (k > 0) for (const axis of ["X", "Y", "Z"]) {
+          const column = names.indexOf(axis);
+          cells[column] = (Number(cells[column]) + normal() * 1e-3).toFixed(6);
+        }
+        lines.push(cells.join(","));
+      }
+    }
+    holds(n > 0, "an empty plan");
+    writeFileSync(at(`${program}.plan.json`), JSON.stringify({ ...plan, touches }));
+    writeFileSync(at(`${program}.csv`), `${lines.join("\n")}\n`);
+  }
+  axiscal("new", "--machine", "swivel-head", "--plan", at("head.plan.json"), "--log", at("head.csv"), "--plan", at("table.plan.json"), "--log", at("table.csv"), "--controller", "csv", "--out", at("many.toml"));
+  return at("many.toml");
+}
+
 /** A workbench of its own; ends with the case. */
 export async function workbench(study, atEnd) {
   const child = spawn(process.env.AXISCAL, ["--json", "workbench", study, "--no-open"], { stdio: ["ignore", "pipe", "inherit"] });

@@ -1,8 +1,8 @@
 // The workbench: the whole loop on a machine with a hidden effect, and everything that a page may do to a study.
 
-import { existsSync, readFileSync, writeFileSync } from "node:fs";
+import { appendFileSync, existsSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { accessible, equal, holds, measured, watched, workbench } from "./tools.mjs";
+import { accessible, axiscal, equal, holds, many, measured, watched, workbench } from "./tools.mjs";
 
 const number = async (page, id) => Number(await page.textContent(`#${id}`));
 const text = (folder) => readFileSync(join(folder, "study.toml"), "utf8");
@@ -69,7 +69,10 @@ async function wholeLoop(t) {
   holds(narrow.um < 0.4 * wide.um, `the largest mark falls from ${wide.um} to ${narrow.um} µm`);
   holds(narrow.px < 0.4 * wide.px, `on the screen the marks fall from ${wide.px} to ${narrow.px} px`);
   equal(await page.locator("#in-model [data-switch=squareness-xy]").getAttribute("aria-checked"), "true", "the switch");
+  await page.locator("#ladder").scrollIntoViewIfNeeded();
   await page.waitForFunction(() => document.querySelector("#ladder").data?.[0].x.length === 2);
+  await page.screenshot({ path: join(t.out, "workbench-ladder.png") });
+  await page.evaluate(() => window.scrollTo(0, 0));
   holds(text(folder).includes('"squareness-xy"'), "the study on the disk does not follow");
   await told(page);
   equal(await page.getAttribute("#verdict", "data-verdict"), "adequate", "verdict after");
@@ -240,20 +243,43 @@ async function byKeyboardAndByEar(t) {
 }
 
 /** From the click to the new plots; printed, and judged by people: machines differ. */
-async function times(t) {
-  const { page } = await opened(t, "times");
-  await told(page);
+async function timed(t, study, what) {
+  const address = await workbench(study, t.atEnd);
+  const [page, seen] = await watched(t.context);
+  await page.goto(address);
+  await page.waitForSelector("body[data-version]", { timeout: 300_000 });
+  await page.waitForSelector("#candidates [data-switch=squareness-xy]", { timeout: 300_000 });
   const all = [];
-  for (let k = 0; k < 8; k += 1) {
-    await page.waitForTimeout(600);
+  for (let k = 0; k < 9; k += 1) {
+    // the evidence behind the last click is ready, as for a person who looks before the next one
+    await page.waitForSelector("#candidates[data-complete=true]", { state: "attached", timeout: 300_000 });
+    await page.waitForTimeout(200);
     await page.evaluate(() => { window.axiscalTimes = null; });
     await page.evaluate(() => document.querySelector("[data-switch=squareness-xy]").click());
-    await page.waitForFunction(() => window.axiscalTimes?.painted);
+    await page.waitForFunction(() => window.axiscalTimes?.painted, undefined, { timeout: 60_000 });
     all.push(await page.evaluate(() => window.axiscalTimes));
   }
+  const touches = await page.textContent("#used");
+  const plots = await page.evaluate(() => [...document.querySelectorAll("#residuals .plot")].filter((p) => p.getBoundingClientRect().top < innerHeight).length);
   const middle = (key) => all.map((a) => a[key]).sort((a, b) => a - b)[all.length >> 1].toFixed(0);
-  console.log(`  356 touches, milliseconds from the click, median of ${all.length}: fit ${middle("fit")}, answered ${middle("answered")}, drawn ${middle("drawn")}, painted ${middle("painted")}`);
+  const says = `${what}: ${touches} touches, ${plots} plots in sight, ms from the click, median of ${all.length}: fit ${middle("fit")}, answered ${middle("answered")}, drawn ${middle("drawn")}, painted ${middle("painted")}`;
+  console.log(`  ${says}`);
+  appendFileSync(join(t.out, "times.txt"), `${says}\n`);
+  await page.screenshot({ path: join(t.out, `times-${what}.png`) });
   holds(all.every((a) => a.painted > 0), "no times");
+  equal(seen.errors, [], "errors in the console");
+}
+
+async function times(t) {
+  const folder = measured(t.dir, "times");
+  const head = join(folder, "head.toml");
+  axiscal("new", "--machine", "swivel-head", "--plan", join(folder, "head.plan.json"), "--log", join(folder, "head.log"), "--out", head);
+  await timed(t, head, "head");
+  await timed(t, join(folder, "study.toml"), "head-and-table");
+}
+
+async function timesOfMany(t) {
+  await timed(t, many(t.dir), "many");
 }
 
 async function withoutToken(t) {
@@ -282,4 +308,5 @@ export const workbenchCases = [
   ["workbench_by_keyboard_and_by_ear", byKeyboardAndByEar],
   ["workbench_without_token", withoutToken],
   ["workbench_times", times],
+  ["workbench_times_of_ten_thousand", timesOfMany],
 ];

@@ -37,11 +37,16 @@ function verdict() {
   const { live, behind } = state;
   const found = behind?.version === live.version ? behind.diagnosis : null;
   const at = byId("verdict");
-  const bad = found ? ["missing-effect", "unexplained"].includes(found.verdict) : !live.explained_by_noise;
-  at.className = bad ? "bad" : "good";
+  const noise = live.explained_by_noise;
+  const bad = found ? ["missing-effect", "unexplained"].includes(found.verdict) : noise === false;
+  // good is said only once it is known: what is small may still depend on something
+  at.className = bad ? "bad" : found?.verdict === "adequate" ? "good" : "";
   at.dataset.verdict = found?.verdict ?? "";
   const ratio = significant(Math.sqrt(live.chi2_per_dof), 2);
-  show("verdict", found?.says ?? (bad ? `The model misses the touches by ${ratio} times their noise.` : "What the model leaves is what noise leaves."));
+  const soFar = noise === null ? "As many unknowns as touches: nothing is left over to judge the model by."
+    : noise ? "What is left is as small as noise; whether it depends on something is being worked out …"
+    : `The model misses the touches by ${ratio} times their noise; what is missing is being worked out …`;
+  show("verdict", found?.says ?? soFar);
   const first = found?.candidates[0];
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${first.same_as.join(", ")}: a further program would.` : ""}`

@@ -5,10 +5,7 @@ import { byId, colour, element, significant } from "./words.js";
 
 const DIRECTIONS = ["X", "Y", "Z"];
 const SYMBOLS = ["circle", "square", "triangle-up"];
-/** Traces of a plot: three directions, the three curves of a preview, the touches that are not used. */
-const CURVES = 3;
-const OUT = 6;
-/** Above so many touches marks are drawn small and plain. */
+/** Above so many touches the graphics card draws the marks, small and plain: elements of the page would take seconds. */
 const MANY = 2500;
 
 const cells = [];
@@ -73,7 +70,7 @@ function cellsOrder(n) {
 
 export function layoutOf(more) {
   const ink = colour("ink");
-  const axis = { gridcolor: colour("line"), zerolinecolor: colour("soft"), linecolor: colour("soft"), automargin: true };
+  const axis = { gridcolor: colour("line"), zerolinecolor: colour("soft"), linecolor: colour("soft") };
   return {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
     margin: { l: 50, r: 10, t: 8, b: 40 }, showlegend: false, hovermode: "closest", ...more,
@@ -105,10 +102,19 @@ function grid() {
 const watcher = new IntersectionObserver((entries) => {
   for (const entry of entries) {
     const cell = cells.find((c) => c.plot === entry.target);
-    if (cell) cell.seen = entry.isIntersecting;
+    if (!cell) continue;
+    cell.seen = entry.isIntersecting;
+    // a browser has few places for drawings by the graphics card: what is out of sight gives its own back
+    if (!cell.seen && cell.made && isMany()) {
+      Plotly.purge(cell.plot);
+      cell.made = false;
+      cell.stale = true;
+    }
   }
   drawSeen();
 }, { rootMargin: "40px" });
+
+const isMany = () => (state.inputs?.touches.n ?? 0) > MANY;
 
 /** Only what is on the screen is drawn; the rest when it comes into sight. */
 function drawSeen() {
@@ -119,34 +125,37 @@ function drawSeen() {
 function traces(cell) {
   const { live, preview } = state;
   const x = values(cell.variable.id);
-  const many = live.residual_um.length > MANY;
+  const many = isMany();
+  const marks = many ? "scattergl" : "scatter";
   const out = new Map(live.rejected);
   const shown = [];
   for (const [d, name] of DIRECTIONS.entries()) {
     const own = members[d].filter((i) => !out.has(i));
     const selected = picked.size ? own.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null;
     shown.push({
-      type: "scatter", mode: "markers", name, customdata: own, selectedpoints: selected,
+      type: marks, mode: "markers", name, customdata: own, selectedpoints: selected,
       x: own.map((i) => x[i]), y: own.map((i) => live.residual_um[i] * sides[i].sign),
       marker: { color: colour(name.toLowerCase()), symbol: many ? "circle" : SYMBOLS[d], size: many ? 3 : 6, opacity: many ? 0.6 : 0.8 },
       hovertemplate: `%{y:.2f} µm in ${name}<extra></extra>`,
     });
   }
-  for (const [d, name] of DIRECTIONS.entries()) {
-    const points = preview ? curve(members[d].filter((i) => !out.has(i)), x, preview.curve_um) : { x: [], y: [] };
+  for (const [d, name] of preview ? DIRECTIONS.entries() : []) {
     shown.push({
-      type: "scatter", mode: "lines", name: `${name} with it`, ...points, hoverinfo: "skip",
+      type: marks, mode: "lines", name: `${name} with it`, hoverinfo: "skip",
+      ...curve(members[d].filter((i) => !out.has(i)), x, preview.curve_um),
       line: { color: colour(name.toLowerCase()), width: 2.5, dash: ["solid", "dash", "dot"][d] },
     });
   }
   const gone = [...out.keys()];
-  shown.push({
-    type: "scatter", mode: "markers", name: "not used", customdata: gone,
-    selectedpoints: picked.size ? gone.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null,
-    x: gone.map((i) => x[i]), y: gone.map((i) => live.residual_um[i] * sides[i].sign),
-    marker: { color: colour("soft"), symbol: "x-thin-open", size: 8 },
-    hovertemplate: "%{y:.2f} µm, not used<extra></extra>",
-  });
+  if (gone.length) {
+    shown.push({
+      type: marks, mode: "markers", name: "not used", customdata: gone,
+      selectedpoints: picked.size ? gone.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null,
+      x: gone.map((i) => x[i]), y: gone.map((i) => live.residual_um[i] * sides[i].sign),
+      marker: { color: colour("soft"), symbol: "x-thin-open", size: 8 },
+      hovertemplate: "%{y:.2f} µm, not used<extra></extra>",
+    });
+  }
   return shown;
 }
 
@@ -235,8 +244,23 @@ on("live", (live, newer, first) => {
     drawSeen();
     hover(null);
   }
-  ladder(live);
+  showLadder();
 });
+
+/** The ladder is drawn when it is in sight and has changed. */
+let ladderSeen = false;
+let ladderDrawn = "";
+function showLadder(again = false) {
+  if (!state.live || !ladderSeen) return;
+  const now = JSON.stringify(state.live.ladder);
+  if (now === ladderDrawn && !again) return;
+  ladderDrawn = now;
+  ladder(state.live);
+}
+new IntersectionObserver((entries) => {
+  ladderSeen = entries[entries.length - 1].isIntersecting;
+  showLadder();
+}, { rootMargin: "200px" }).observe(byId("ladder"));
 on("preview", () => {
   cells.forEach((cell) => { cell.stale = true; });
   drawSeen();
@@ -244,7 +268,7 @@ on("preview", () => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   cells.forEach((cell) => { cell.stale = true; });
   drawSeen();
-  if (state.live) ladder(state.live);
+  showLadder(true);
 });
 document.addEventListener("keydown", (e) => {
   if (e.key === "Escape" && state.preview) setPreview(null);
@@ -263,7 +287,7 @@ function ladder(live) {
   });
   const layout = layoutOf({
     showlegend: true, legend: { orientation: "h", y: 1.2 },
-    xaxis: { tickangle: -20, type: "category" },
+    xaxis: { tickangle: -20, type: "category", automargin: true },
     yaxis: { title: { text: "µm RMS" }, type: "log" },
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: live.noise_um, y1: live.noise_um, line: { dash: "dot", color: colour("soft") } }],
     annotations: [{ xref: "paper", x: 1, xanchor: "right", y: Math.log10(live.noise_um), yanchor: "bottom", text: "noise of a touch", showarrow: false }],

@@ -91,10 +91,17 @@ function draw() {
       text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
     { type: "scatter3d", mode: "markers", name: "the touch", x: [null], y: [null], z: [null], marker: { size: 8, color: colour("ink"), symbol: "circle-open" }, hoverinfo: "skip" },
   ];
-  const axis = (title) => ({ title: { text: title }, color: colour("ink"), gridcolor: colour("line"), backgroundcolor: colour("paper") });
+  // the touches fill the picture; the table may be cut
+  const half = 0.75 * Math.max(...spread, 1);
+  const middle = [0, 1, 2].map((k) => {
+    let low = Infinity, high = -Infinity;
+    for (const p of t.point) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
+    return (low + high) / 2;
+  });
+  const axis = (title, k) => ({ range: [middle[k] - half, middle[k] + half], title: { text: title }, color: colour("ink"), gridcolor: colour("line"), backgroundcolor: colour("paper") });
   const layout = layoutOf({
     uirevision: "keep", margin: { l: 0, r: 0, t: 0, b: 0 },
-    scene: { aspectmode: "data", xaxis: axis("X, mm"), yaxis: axis("Y, mm"), zaxis: axis("Z, mm") },
+    scene: { aspectmode: "cube", xaxis: axis("X, mm", 0), yaxis: axis("Y, mm", 1), zaxis: axis("Z, mm", 2) },
   });
   delete layout.xaxis;
   delete layout.yaxis;
@@ -107,6 +114,10 @@ onHover((i) => {
   const t = state.inputs.touches;
   const p = i === null ? [null, null, null] : t.point[i];
   Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [3]);
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  stale = true;
+  draw();
 });
 on("live", (live, newer) => {
   if (!newer) return;

@@ -46,5 +46,11 @@ export function show(id, text) {
   if (at.textContent !== text) at.textContent = text;
 }
 
-/** A style variable of the page: light and dark have their own. */
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const colours = new Map();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
+
+/** A style variable of the page: light and dark have their own. Asked once, because each question stops the page. */
+export function colour(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return colours.get(name);
+}
