@@ -2,6 +2,8 @@
 
 use super::{Answer, Io};
 use crate::diag::Result;
+use crate::log::Reader;
+use crate::log::points::PointsForm;
 use crate::post::Postprocessor;
 
 /// Arguments of `controllers`.
@@ -33,13 +35,31 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 table.add_row([&post.name, &post.says]);
             }
             io.say(table.to_string());
+            let forms = PointsForm::built_in()?;
+            let mut table = crate::report::fit::table(&["log form", "what it is"]);
+            for form in &forms {
+                table.add_row([&form.name, &form.says]);
+            }
+            io.say(table.to_string());
             io.say("`axiscal controllers show NAME > mine.toml` gives a file to change; use it with --controller mine.toml");
             io.answer(&serde_json::json!({
                 "format": "axiscal-controllers/1",
                 "controllers": all.iter().map(facts).collect::<Vec<_>>(),
+                "log_forms": forms.iter().map(form_facts).collect::<Vec<_>>(),
             }));
         }
         Some(What::Show { name }) => {
+            // `csv` is no file
+            let shown = match Reader::load(name, crate::files::read_text) {
+                Ok((Reader::Points(form), findings)) => Some((form, findings)),
+                _ => None,
+            };
+            if let Some((form, findings)) = shown {
+                io.report(&findings);
+                io.say(form.text.trim_end());
+                io.answer(&form_facts(&form));
+                return Ok(Answer::Done);
+            }
             let (post, findings) = Postprocessor::load_built_in_or_file(name)?;
             io.report(&findings);
             io.say(post.text.trim_end());
@@ -47,6 +67,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         }
     }
     Ok(Answer::Done)
+}
+
+fn form_facts(form: &PointsForm) -> serde_json::Value {
+    serde_json::json!({ "name": form.name, "says": form.says, "source": form.source, "unverified": form.unverified })
 }
 
 fn facts(post: &Postprocessor) -> serde_json::Value {

@@ -8,7 +8,6 @@ use crate::log::{self, Touch};
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
-use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::study::Study;
 use crate::tables::compensation::Compensation;
@@ -195,7 +194,11 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
             hash.update(plan.to_json().as_bytes());
             hash.update(&bytes);
         }
-        let touches = read_log(&bytes, &log_path, &controller_path(&entry.controller, &folder), &machine, &plan, io)?;
+        let controller = controller_path(&entry.controller, &folder);
+        let mut touches = read_log(&bytes, &log_path, (&controller, entry.run), &machine, &plan, io)?;
+        if controller != "csv" {
+            on_the_study_clock(&mut touches, &plan, entry.started_s);
+        }
         runs.push(LoadedRun {
             plan,
             touches,
@@ -261,27 +264,33 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
     Ok(plan)
 }
 
-/// Reads a log (or touches CSV) and matches it to its plan.
+/// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.
+/// Without `started` the runs follow one another, by the plan's times.
+fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>) {
+    let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
+    for touch in touches {
+        touch.time_s = match (started_s, first, touch.time_s) {
+            (Some(started), Some((first_s, planned_s)), Some(time_s)) => Some(started + planned_s + time_s - first_s),
+            _ => None,
+        };
+    }
+}
+
+/// Reads a log (or touches CSV), the run of this number or the last complete one, and matches it to its plan.
 ///
 /// # Errors
 /// When nothing in it can be used.
 pub fn read_log(
     bytes: &[u8],
     path: &Path,
-    controller: &str,
+    (controller, run): (&str, Option<usize>),
     machine: &Machine,
     plan: &Plan,
     io: &Io,
 ) -> Result<Vec<Touch>> {
-    let post = if controller == "csv" {
-        None
-    } else {
-        let (post, findings) = Postprocessor::load_built_in_or_file(controller)?;
-        io.report(&findings);
-        Some(post)
-    };
-    let writer = post.as_ref().map_or(log::Writer::Csv, log::Writer::Controller);
-    let (read, findings) = log::read(bytes, &path.display().to_string(), writer, machine, plan)?;
+    let (reader, findings) = log::Reader::load(controller, files::read_text)?;
+    io.report(&findings);
+    let (read, findings) = log::read_run(bytes, &path.display().to_string(), reader.writer(), machine, plan, run)?;
     io.report(&findings.0);
     Ok(read.touches)
 }

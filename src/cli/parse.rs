@@ -5,9 +5,8 @@ use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::{Result, source};
 use crate::files;
-use crate::log::{self, Ending, MatchedLog, Status, Touch, Writer};
+use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch};
 use crate::machine::Machine;
-use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use comfy_table::CellAlignment;
 use serde::Serialize;
@@ -18,7 +17,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// The log that the probing program wrote
     pub log: PathBuf,
-    /// Controller that wrote it: a name (`axiscal controllers` lists them), a postprocessor FILE.toml, or `csv`
+    /// Controller that wrote it: a name (`axiscal controllers` lists them), a FILE.toml of your own, `msr` (inspection results), or `csv`
     #[arg(long, value_name = "NAME|FILE")]
     pub controller: String,
     /// The plan that `generate` wrote together with the program
@@ -27,6 +26,9 @@ pub struct Args {
     /// A machines.toml of your own (default: the one built in)
     #[arg(long, value_name = "FILE")]
     pub machines: Option<PathBuf>,
+    /// Which run, where the log holds several (default: the last complete one)
+    #[arg(long, value_name = "N")]
+    pub run: Option<usize>,
     /// Where to write the touches (CSV)
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -42,6 +44,8 @@ struct Parsed<'a> {
     complete: bool,
     end: String,
     runs: usize,
+    run: Option<usize>,
+    run_list: Vec<serde_json::Value>,
     planned: usize,
     hits: usize,
     misses: usize,
@@ -58,17 +62,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let (plan, findings) = Plan::parse(&plan_source)?;
     io.report(&findings.0);
     let machine = load_machine(&plan.machine, args.machines.as_deref(), io)?;
-    let post = match args.controller.as_str() {
-        "csv" => None,
-        word => {
-            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
-            io.report(&findings);
-            Some(post)
-        }
-    };
-    let writer = post.as_ref().map_or(Writer::Csv, Writer::Controller);
+    let (reader, findings) = log::Reader::load(&args.controller, files::read_text)?;
+    io.report(&findings);
     let bytes = files::read_bytes(&args.log)?;
-    let (read, findings) = log::read(&bytes, &args.log.display().to_string(), writer, &machine, &plan)?;
+    let (read, findings) =
+        log::read_run(&bytes, &args.log.display().to_string(), reader.writer(), &machine, &plan, args.run)?;
     io.report(&findings.0);
     if let Some(out) = &args.out {
         files::write_whole(out, log::csv::write(&machine, &read.touches).as_bytes())?;
@@ -79,6 +77,15 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     io.answer(&answer(&machine, &plan, &read));
     Ok(Answer::Done)
+}
+
+/// A run as it is offered.
+fn run_record(run: &RunFound) -> serde_json::Value {
+    let RunFound { number, first_line, last_line, touches, complete, taken } = *run;
+    serde_json::json!({
+        "run": number, "first_line": first_line, "last_line": last_line, "touches": touches, "complete": complete,
+        "taken": taken,
+    })
 }
 
 fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a> {
@@ -103,7 +110,9 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
         program: &plan.program,
         complete: read.complete,
         end: end_says(read),
-        runs: read.runs,
+        runs: read.runs.len().max(1),
+        run: read.runs.iter().find(|r| r.taken).map(|r| r.number),
+        run_list: read.runs.iter().map(run_record).collect(),
         planned: plan.touches.len(),
         hits,
         misses: read.touches.len() - hits,

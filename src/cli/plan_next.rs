@@ -441,7 +441,7 @@ fn entry(plan: &str, log: &str, controller: &str, label: Option<&str>) -> String
 /// Puts the log of the program into the study.
 fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> Result<Answer> {
     let plan = super::load::load_plan(plan_file, &loaded.machine, io)?;
-    let touches = read_log(&files::read_bytes(log)?, log, &args.controller, &loaded.machine, &plan, io)?;
+    let touches = read_log(&files::read_bytes(log)?, log, (&args.controller, None), &loaded.machine, &plan, io)?;
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let mut runs: Vec<Planned> = Vec::new();
     for r in &loaded.runs {

@@ -143,7 +143,7 @@ fn numbered(touches: &[RawTouch]) -> Vec<Touch> {
 }
 
 fn log_text(post: &Postprocessor, machine: &Machine, plan: &Plan, touches: &[RawTouch]) -> String {
-    let record = |t: &RawTouch| Some(LogRecord { id: t.id?, status: t.status, position: t.position });
+    let record = |t: &RawTouch| Some(LogRecord { id: t.id?, status: t.status, position: t.position, time_s: t.time_s });
     let records: Vec<LogRecord> = touches.iter().filter_map(record).collect();
     post.log_text(machine, plan, &records)
 }

@@ -59,7 +59,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<(Vec<RawTouch>, Findings)> {
         match touch(line.bytes, line.number, &columns, separator, mark) {
             Ok(touch) => touches.push(touch),
             Err((range, message)) => faults.push(|| {
-                let cut = if line.ended { "" } else { " (the file is cut off here)" };
+                let cut = if line.ended() { "" } else { " (the file is cut off here)" };
                 let finding = Finding::warning("log::not_understood", format!("{message}{cut}; the line is not used"));
                 places.at(finding, line.start + range.start..line.start + range.end)
             }),

@@ -1,16 +1,8 @@
-//! Lines of a log: bytes between line ends of any kind, with number and place. No allocation.
+//! Lines of a log: bytes between line ends of any kind, mixed too, with number and place. No allocation.
 
-use nom::bytes::complete::{take_till, take_until};
+use crate::post::as_written::EndOfLine;
+use nom::bytes::complete::take_till;
 use nom::{IResult, Parser};
-
-/// How the lines of a log end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LineEnds {
-    /// LF, also where some lines end with CR LF: the CR is taken off.
-    Lf,
-    /// CR alone.
-    Cr,
-}
 
 /// One line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,17 +13,22 @@ pub struct Line<'a> {
     pub start: usize,
     /// Without its end.
     pub bytes: &'a [u8],
+    /// What ends it; `None` for a last line without an end.
+    pub end: Option<EndOfLine>,
+}
+
+impl Line<'_> {
     /// False for a last line without an end.
-    pub ended: bool,
-    /// It ended with CR LF.
-    pub crlf: bool,
+    #[must_use]
+    pub fn ended(&self) -> bool {
+        self.end.is_some()
+    }
 }
 
 /// Iterator over the lines of a log.
 #[derive(Debug, Clone)]
 pub struct Lines<'a> {
     rest: &'a [u8],
-    ends: LineEnds,
     start: usize,
     number: usize,
 }
@@ -40,22 +37,31 @@ impl<'a> Lines<'a> {
     /// Lines of `bytes`, whose first byte stands at `start` of the file.
     #[must_use]
     pub fn new(bytes: &'a [u8], start: usize) -> Self {
-        // a file without any LF that has CRs was written with CR alone
-        let has = |byte: u8| until(byte, bytes).is_ok();
-        let ends = if !has(b'\n') && has(b'\r') { LineEnds::Cr } else { LineEnds::Lf };
-        Self { rest: bytes, ends, start, number: 0 }
-    }
-
-    /// How the lines end.
-    #[must_use]
-    pub fn ends(&self) -> LineEnds {
-        self.ends
+        Self { rest: bytes, start, number: 0 }
     }
 }
 
-fn until(byte: u8, bytes: &[u8]) -> IResult<&[u8], &[u8]> {
-    // a one-byte pattern is searched with memchr
-    take_until(&[byte][..]).parse(bytes)
+/// The first line of `bytes`, what ends it, and how many bytes both take.
+#[must_use]
+pub fn first(bytes: &[u8]) -> (&[u8], Option<EndOfLine>, usize) {
+    match memchr::memchr2(b'\n', b'\r', bytes) {
+        None => (bytes, None, bytes.len()),
+        Some(at) => {
+            let (end, length) = line_end(&bytes[at..]).unwrap_or((EndOfLine::Lf, 1));
+            (&bytes[..at], Some(end), at + length)
+        }
+    }
+}
+
+/// The line end with which `bytes` begin, and its length.
+#[must_use]
+pub fn line_end(bytes: &[u8]) -> Option<(EndOfLine, usize)> {
+    match bytes {
+        [b'\n', ..] => Some((EndOfLine::Lf, 1)),
+        [b'\r', b'\n', ..] => Some((EndOfLine::Crlf, 2)),
+        [b'\r', ..] => Some((EndOfLine::Cr, 1)),
+        _ => None,
+    }
 }
 
 impl<'a> Iterator for Lines<'a> {
@@ -65,22 +71,11 @@ impl<'a> Iterator for Lines<'a> {
         if self.rest.is_empty() {
             return None;
         }
-        let end = match self.ends {
-            LineEnds::Lf => b'\n',
-            LineEnds::Cr => b'\r',
-        };
-        let (mut bytes, consumed, ended) = match until(end, self.rest) {
-            Ok((_, line)) => (line, line.len() + 1, true),
-            Err(_) => (self.rest, self.rest.len(), false),
-        };
-        let crlf = self.ends == LineEnds::Lf && bytes.last() == Some(&b'\r');
-        if crlf {
-            bytes = &bytes[..bytes.len() - 1];
-        }
+        let (bytes, end, used) = first(self.rest);
         self.number += 1;
-        let line = Line { number: self.number, start: self.start, bytes, ended, crlf };
-        self.rest = &self.rest[consumed..];
-        self.start += consumed;
+        let line = Line { number: self.number, start: self.start, bytes, end };
+        self.rest = &self.rest[used..];
+        self.start += used;
         Some(line)
     }
 }
@@ -91,21 +86,60 @@ pub fn blanks(input: &[u8]) -> &[u8] {
     parsed.map_or(input, |(rest, _)| rest)
 }
 
+/// What a punch, a serial line or an old system puts around text: NUL, STX, ETX, EOT, DC1 to DC4, SUB, rub-out.
+#[must_use]
+pub fn is_tape(byte: u8) -> bool {
+    matches!(byte, 0 | 2..=4 | 0x11..=0x14 | 0x1a | 0x7f)
+}
+
+/// Without such bytes, and blanks, at its end.
+#[must_use]
+pub fn without_trailer(line: &[u8]) -> &[u8] {
+    // the common line has none: one look
+    match line.last() {
+        Some(last) if is_tape(*last) => {
+            let kept = line.iter().rposition(|b| !is_tape(*b) && *b != b' ').map_or(0, |at| at + 1);
+            &line[..kept]
+        }
+        _ => line,
+    }
+}
+
+/// Without such bytes, and blanks, at its beginning.
+#[must_use]
+pub fn without_leader(line: &[u8]) -> &[u8] {
+    let parsed: IResult<&[u8], &[u8]> = take_till(|b| b != b' ' && b != b'\t' && !is_tape(b)).parse(line);
+    parsed.map_or(line, |(rest, _)| rest)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn all(text: &[u8]) -> Vec<(usize, usize, &[u8], bool)> {
-        Lines::new(text, 0).map(|l| (l.number, l.start, l.bytes, l.ended)).collect()
+    fn all(text: &[u8]) -> Vec<(usize, usize, &[u8], Option<EndOfLine>)> {
+        Lines::new(text, 0).map(|l| (l.number, l.start, l.bytes, l.end)).collect()
     }
 
     #[test]
     fn every_kind_of_line_end_is_read() {
-        let expected: Vec<(usize, usize, &[u8], bool)> =
-            vec![(1, 0, b"a", true), (2, 2, b"", true), (3, 3, b"b", false)];
-        assert_eq!(all(b"a\n\nb"), expected);
-        assert_eq!(all(b"a\r\rb"), expected);
-        assert_eq!(all(b"a\r\nb\r\n"), vec![(1, 0, &b"a"[..], true), (2, 3, &b"b"[..], true)]);
+        let expected = |end| -> Vec<(usize, usize, &[u8], Option<EndOfLine>)> {
+            vec![(1, 0, b"a", Some(end)), (2, 2, b"", Some(end)), (3, 3, b"b", None)]
+        };
+        assert_eq!(all(b"a\n\nb"), expected(EndOfLine::Lf));
+        assert_eq!(all(b"a\r\rb"), expected(EndOfLine::Cr));
+        let mixed: Vec<(usize, usize, &[u8], Option<EndOfLine>)> = vec![
+            (1, 0, b"a", Some(EndOfLine::Crlf)),
+            (2, 3, b"b", Some(EndOfLine::Cr)),
+            (3, 5, b"c", Some(EndOfLine::Lf)),
+        ];
+        assert_eq!(all(b"a\r\nb\rc\n"), mixed);
         assert!(all(b"").is_empty());
+    }
+
+    #[test]
+    fn what_a_punch_puts_around_a_line_is_taken_off() {
+        assert_eq!(without_leader(without_trailer(b"\0\0\x7f P N1 \x14\0")), b"P N1");
+        assert_eq!(without_trailer(b"\0\0"), b"");
+        assert_eq!(without_trailer(b"P\0N1 "), b"P\0N1 ");
     }
 }

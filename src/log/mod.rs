@@ -5,19 +5,26 @@
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
 pub mod csv;
+mod fast;
 mod lines;
 mod matching;
 mod parse;
 mod place;
+pub mod points;
+mod reader;
 mod record;
 mod rows;
+mod runs;
+mod stretch;
 mod swaps;
 pub mod touch;
 mod words;
 
 pub use matching::match_to_plan;
-pub use parse::{Ending, ParsedLog, Rejected, parse};
+pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
+pub use reader::Reader;
 pub use record::LogHeader;
+pub use runs::RunFound;
 pub use touch::{RawTouch, Status, Touch};
 
 use crate::axes::{AxisMap, AxisName};
@@ -32,6 +39,8 @@ use place::Places;
 pub enum Writer<'a> {
     /// A control, with its postprocessor.
     Controller(&'a Postprocessor),
+    /// Inspection results of another program.
+    Points(&'a points::PointsForm),
     /// The project's own form, `controller = "csv"`.
     Csv,
 }
@@ -45,8 +54,8 @@ pub struct MatchedLog {
     pub complete: bool,
     /// How the log ends.
     pub ending: Ending,
-    /// How many runs the log holds.
-    pub runs: usize,
+    /// The runs that the log holds.
+    pub runs: Vec<RunFound>,
 }
 
 /// Reads a log and matches it to its plan.
@@ -60,16 +69,44 @@ pub fn read(
     machine: &Machine,
     plan: &Plan,
 ) -> Result<(MatchedLog, Findings)> {
+    read_run(bytes, name, writer, machine, plan, None)
+}
+
+/// The same for the run of this number, from 1, in a log that holds several.
+///
+/// # Errors
+/// As [`read`], and when there is no such run.
+pub fn read_run(
+    bytes: &[u8],
+    name: &str,
+    writer: Writer<'_>,
+    machine: &Machine,
+    plan: &Plan,
+    run: Option<usize>,
+) -> Result<(MatchedLog, Findings)> {
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
-        Writer::Controller(post) => parse(bytes, name, post)?,
+        Writer::Controller(post) => parse_run(bytes, name, post, run)?,
+        Writer::Points(form) => {
+            let (read, findings) = points::parse(bytes, name, form, run)?;
+            let (touches, unclear, more) = points::touches(machine, plan, &read, form, &places)
+                .map_err(|f| Failure([findings.0.clone(), f.0].concat()))?;
+            let ending = if read.ended { Ending::Line } else { Ending::CutOff };
+            let rejected = Rejected { ids: unclear, unnamed: false };
+            let findings = Findings([findings.0, more.0].concat());
+            let (per_touch, runs) = (Vec::new(), read.runs);
+            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs }, findings)
+        }
         Writer::Csv => {
             let (touches, findings) = csv::read(bytes, name)?;
             let per_touch = Vec::new();
             let unnamed = findings.0.iter().any(|f| f.code == "log::not_understood");
             let rejected = Rejected { ids: Vec::new(), unnamed };
             let ending = Ending::Unmarked;
-            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: 1 }, findings)
+            (
+                ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: Vec::new() },
+                findings,
+            )
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());

@@ -1,15 +1,19 @@
 //! A whole log: which form it has, where its runs begin and end, which of them counts.
 
-use super::lines::{Line, LineEnds, Lines, blanks};
+use super::lines::{Line, Lines, is_tape};
 use super::place::{Capped, Places};
-use super::record::{LogHeader, Record, named, record, row};
+use super::record::{LogHeader, begin, named};
+use super::runs::{self, RunFound};
+use super::stretch::{Reader, What, looks_like_columns};
 use super::touch::RawTouch;
 use super::words::Fault;
 use crate::diag::{Failure, Finding, Findings, Result};
-use crate::post::Postprocessor;
-use crate::post::as_written::{EndOfLine, Role};
+use crate::post::as_written::{EndOfLine, LengthUnit, Role};
+use crate::post::{LogRule, Postprocessor, log_word};
+use crate::units::mm_from_inch;
+use std::borrow::Cow;
 
-/// What a log holds. Positions are the control's own coordinates: [`super::to_axes`] makes axis positions of them.
+/// What a log holds. Positions are the control's own coordinates, mm and deg: [`super::to_axes`] makes axis positions of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParsedLog {
     /// The touches of the run that counts, in the order of the log.
@@ -24,8 +28,8 @@ pub struct ParsedLog {
     pub columns: bool,
     /// The rows of one touch, in order, in a log of columns.
     pub per_touch: Vec<Role>,
-    /// How many runs the log holds.
-    pub runs: usize,
+    /// The runs that the log holds.
+    pub runs: Vec<RunFound>,
 }
 
 /// How a log ends.
@@ -50,80 +54,63 @@ pub struct Rejected {
     pub unnamed: bool,
 }
 
-/// One run in a log.
-#[derive(Debug, Default)]
-struct Run {
-    header: Option<LogHeader>,
-    touches: Vec<RawTouch>,
-    end: Option<(u64, usize)>,
-    last_line: usize,
-}
-
-/// Reads a log.
+/// Reads a log: the last complete run in it.
 ///
 /// Lines that are not understood are findings with line and column; the rest is used.
 ///
 /// # Errors
 /// When nothing of it can be used: empty, binary, UTF-16, or without one line that is understood.
 pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLog, Findings)> {
+    parse_run(bytes, name, post, None)
+}
+
+/// Reads a log: the run of this number, from 1, or the last complete one.
+///
+/// # Errors
+/// As [`parse`], and when there is no such run.
+pub fn parse_run(
+    bytes: &[u8],
+    name: &str,
+    post: &Postprocessor,
+    asked: Option<usize>,
+) -> Result<(ParsedLog, Findings)> {
     let places = Places::new(bytes, name);
     let mut findings = Findings::default();
     let start = sniff(bytes, &places, &mut findings)?;
-    let lines = Lines::new(&bytes[start..], start);
-    line_ends(&lines, post, &places, &mut findings);
-    let is_columns = post.log.columns.is_some() && looks_like_columns(lines.clone());
+    let rule = with_its_mark(bytes, &post.log, &places, &mut findings);
+    let columns = rule.columns.as_ref().filter(|_| looks_like_columns(&bytes[start..]));
+    let is_columns = columns.is_some();
+    let reader = Reader { rule: &rule, columns };
+    let read = reader.read(&bytes[start..], start);
+    line_ends(bytes, start, read.ends, post, &places, &mut findings);
     let mut faults = Capped::default();
-    let mut runs = vec![Run::default()];
-    let mut rejected: Vec<(Option<u64>, usize)> = Vec::new();
-    for line in lines {
-        let outcome = match post.log.columns.as_ref().filter(|_| is_columns) {
-            Some(columns) => {
-                row(line.bytes, line.number, columns, &post.log).map(|r| r.map_or(Record::Blank, Record::Touch))
-            }
-            None => record(line.bytes, line.number, &post.log),
-        };
-        let unusable = match &outcome {
-            Ok(Record::Touch(_)) => !line.ended && (is_columns || post.log.check_word.is_none()),
-            Ok(_) => false,
-            Err(_) => is_columns || blanks(line.bytes).first().is_some_and(|b| b.eq_ignore_ascii_case(&b'P')),
-        };
-        if unusable {
-            rejected.push((named(line.bytes), line.number));
-        }
-        match outcome {
-            // without a check word a number that was cut may look whole
-            Ok(Record::Touch(_)) if !line.ended && (is_columns || post.log.check_word.is_none()) => {
-                faults.push(|| {
-                    cut(
-                        &places,
-                        &line,
-                        &Fault::at(
-                            line.bytes,
-                            line.bytes,
-                            line.bytes.len(),
-                            "log::cut_line",
-                            "the last line has no end",
-                        ),
-                    )
-                });
-            }
-            Ok(record) => take(record, &line, &mut runs),
-            Err(fault) if !line.ended => faults.push(|| cut(&places, &line, &fault)),
-            Err(fault) => faults.push(|| {
-                let at = line.start + fault.at;
+    for event in read.events.iter().filter(|e| matches!(e.what, What::Fault)) {
+        faults.push(|| match reader.line(&event.line) {
+            Err(fault) if event.line.ended() => {
+                let at = event.line.start + fault.at;
                 let finding = Finding::warning(fault.code, format!("{}; the line is not used", fault.message));
                 places.at(finding, at..at + fault.length)
-            }),
-        }
+            }
+            Err(fault) => cut(&places, &event.line, &fault),
+            // only lines that are not understood are noted as such
+            Ok(_) => Finding::warning("log::not_understood", "the line is not used"),
+        });
     }
-    let fault_count = faults.len();
+    let n_faults = faults.len();
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
-    let count = runs.iter().filter(|r| r.header.is_some() || !r.touches.is_empty()).count();
-    let Some(run) = choose(runs, is_columns, &places, &mut findings) else {
-        let message = format!("no touch in the log; {fault_count} of its lines are not understood");
-        let finding = Finding::error("log::nothing", message)
-            .help("is this the log that the probing program wrote? is it of this controller?");
-        findings.push(places.at_line(finding, 1));
+    let runs = runs::split(&read.touches, &read.events);
+    let heads: Vec<String> = runs.iter().filter_map(|r| r.header.as_ref()).map(|h| h.controller.clone()).collect();
+    let chosen = runs::choose(runs, &read.touches, asked, is_columns, &places, &mut findings)
+        .map_err(|f| Failure([std::mem::take(&mut findings.0), f.0].concat()))?
+        .filter(|(run, _)| run.has_touches());
+    let Some((run, found)) = chosen else {
+        let message = format!("no touch in the log; {n_faults} of its lines are not understood");
+        let other = heads.iter().find(|c| **c != log_word(&post.name));
+        let help = match other {
+            Some(other) => format!("its head says that {other} wrote it: read it with that controller's file"),
+            None => "is this the log that the probing program wrote? is it of this controller?".to_owned(),
+        };
+        findings.push(places.at_line(Finding::error("log::nothing", message).help(help), 1));
         return Err(Failure(findings.0));
     };
     let ending = match (&run.header, &run.end) {
@@ -134,20 +121,60 @@ pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLo
     };
     let first = run.header.as_ref().map_or(0, |h| h.line);
     let last = run.end.map_or(usize::MAX, |(_, line)| line);
-    rejected.retain(|(_, line)| (first..=last).contains(line));
-    let unnamed = rejected.iter().any(|(id, _)| id.is_none());
-    let rejected = Rejected { ids: rejected.into_iter().filter_map(|(id, _)| id).collect(), unnamed };
+    let lost = read.events.iter().filter(|e| matches!(e.what, What::Fault) && (first..=last).contains(&e.line.number));
+    let lost: Vec<Option<u64>> =
+        lost.filter(|e| reader.may_be_touch(&e.line)).map(|e| named(e.line.bytes, &rule)).collect();
+    let unnamed = lost.iter().any(Option::is_none);
+    let rejected = Rejected { ids: lost.into_iter().flatten().collect(), unnamed };
+    let mut touches = run.take(read.touches);
+    if let Some(header) = &run.header {
+        other_controller(header, post, &places, &mut findings);
+        if header.unit == LengthUnit::Inch {
+            touches.iter_mut().for_each(|t| t.position = t.position.with_xyz_mm(t.position.xyz_mm().map(mm_from_inch)));
+        }
+    }
     let per_touch = post.log.columns.as_ref().map(|c| c.per_touch.clone()).unwrap_or_default();
-    let parsed = ParsedLog {
-        touches: run.touches,
-        header: run.header,
-        ending,
-        rejected,
-        columns: is_columns,
-        per_touch,
-        runs: count,
-    };
+    let parsed =
+        ParsedLog { touches, header: run.header, ending, rejected, columns: is_columns, per_touch, runs: found };
     findings.finish(parsed)
+}
+
+/// The log was written by another controller than the one that is named.
+fn other_controller(header: &LogHeader, post: &Postprocessor, places: &Places<'_>, findings: &mut Findings) {
+    if header.controller != log_word(&post.name) {
+        let message =
+            format!("the head says that {} wrote this log, it is read as one of {}", header.controller, post.name);
+        let finding = Finding::warning("log::other_controller", message)
+            .help("positions mean the same on all of them; spelling and rounding may differ");
+        findings.push(places.at_line(finding, header.line));
+    }
+}
+
+/// The rule with the decimal mark that the log has, where a setting of the control chooses between the two.
+fn with_its_mark<'r>(
+    bytes: &[u8],
+    rule: &'r LogRule,
+    places: &Places<'_>,
+    findings: &mut Findings,
+) -> Cow<'r, LogRule> {
+    let Some(other) = rule.other_mark else { return Cow::Borrowed(rule) };
+    let has = |mark: u8| {
+        let touch = |l: &Line<'_>| begin(l.bytes, rule).first() == Some(&b'P');
+        Lines::new(bytes, 0)
+            .filter(touch)
+            .take(16)
+            .find_map(|l| l.bytes.iter().position(|b| *b == mark).map(|i| l.start + i))
+    };
+    match (has(rule.mark), has(other)) {
+        (None, Some(at)) => {
+            let message = format!("the numbers of this log have the decimal mark '{}'", other as char);
+            let finding = Finding::info("log::other_decimal_mark", message)
+                .help("a setting of the control chooses it; the log is read with it");
+            findings.push(places.at(finding, at..at + 1));
+            Cow::Owned(LogRule { mark: other, other_mark: None, ..rule.clone() })
+        }
+        _ => Cow::Borrowed(rule),
+    }
 }
 
 /// A last line without an end: what cut the log cut it too.
@@ -160,7 +187,7 @@ fn cut(places: &Places<'_>, line: &Line<'_>, fault: &Fault) -> Finding {
 /// Refuses what is no text; gives the offset where the text begins.
 pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) -> Result<usize> {
     let name = places.name();
-    if bytes.iter().all(u8::is_ascii_whitespace) {
+    if bytes.iter().all(|b| b.is_ascii_whitespace() || is_tape(*b)) {
         return Err(Failure::new("log::empty", format!("{name}:1:1: the log is empty"))
             .help("did the program run, and is the log closed? LinuxCNC writes it beside its INI file"));
     }
@@ -169,9 +196,13 @@ pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) 
             .help("an editor has saved it like this: take the file that the control wrote, or save it as UTF-8"));
     }
     let head = &bytes[..bytes.len().min(4096)];
+    // what a punch writes around lines is no sign of a binary file
     let odd = |b: &u8| *b == 0 || *b >= 0x80 || (*b < b' ' && !matches!(*b, b'\n' | b'\r' | b'\t'));
-    let count = head.iter().filter(|b| odd(b)).count();
-    if head.contains(&0) || count * 10 > head.len() {
+    let line = |l: Line<'_>| -> usize {
+        super::lines::without_leader(super::lines::without_trailer(l.bytes)).iter().filter(|b| odd(b)).count()
+    };
+    let count: usize = Lines::new(head, 0).map(line).sum();
+    if count * 10 > head.len() {
         let at = head.iter().position(odd).unwrap_or(0);
         let finding = Finding::error("log::binary", format!("byte {} is no text: this is a binary file", at + 1))
             .help("take the log that the probing program wrote, unpacked");
@@ -187,112 +218,23 @@ pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) 
     Ok(0)
 }
 
-/// Says so when the lines end otherwise than this controller ends them.
-fn line_ends(lines: &Lines<'_>, post: &Postprocessor, places: &Places<'_>, findings: &mut Findings) {
-    let Some(first) = lines.clone().find(|l| l.ended) else { return };
-    let (found, says) = match (lines.ends(), first.crlf) {
-        (LineEnds::Cr, _) => (EndOfLine::Cr, "CR alone"),
-        (LineEnds::Lf, true) => (EndOfLine::Crlf, "CR LF, as Windows writes them"),
-        (LineEnds::Lf, false) => (EndOfLine::Lf, "LF"),
-    };
-    if !post.log.end_of_line.contains(&found) {
-        let at = first.start + first.bytes.len();
-        let finding =
-            Finding::warning("log::line_ends", format!("the lines end with {says}; {} writes others", post.name)).help(
-                "they are read all the same; was the log opened in an editor? prefer the file as the control wrote it",
-            );
-        findings.push(places.at(finding, at..at + 1));
-    }
-}
-
-/// A log of columns begins with numbers and holds no line of words near its beginning.
-fn looks_like_columns(lines: Lines<'_>) -> bool {
-    let firsts = lines.map(|l| blanks(l.bytes)).filter_map(|l| l.first().copied()).take(64);
-    let mut numbers = 0;
-    for first in firsts {
-        match first {
-            b'P' | b'H' | b'E' => return false,
-            b'0'..=b'9' | b'-' | b'+' | b'.' | b',' => numbers += 1,
-            _ => {}
-        }
-    }
-    numbers > 0
-}
-
-fn take(record: Record, line: &Line<'_>, runs: &mut Vec<Run>) {
-    let Some(run) = runs.last_mut() else { return };
-    match record {
-        Record::Blank => {}
-        Record::Touch(touch) => {
-            // touches after an end belong to a run whose head is lost
-            if run.end.is_some() {
-                runs.push(Run { touches: vec![touch], last_line: line.number, ..Run::default() });
-            } else {
-                run.touches.push(touch);
-                run.last_line = line.number;
-            }
-        }
-        Record::Head(header) => {
-            let goes_on = header.setup > 1
-                && run.end.is_none()
-                && run.header.as_ref().is_none_or(|h| h.digest == header.digest && h.program == header.program);
-            if goes_on && (run.header.is_some() || !run.touches.is_empty()) {
-                run.header.get_or_insert(header);
-                run.last_line = line.number;
-            } else {
-                runs.push(Run { header: Some(header), last_line: line.number, ..Run::default() });
-            }
-        }
-        Record::End(count) => {
-            if run.end.is_none() {
-                run.end = Some((count, line.number));
-                run.last_line = line.number;
-            }
-        }
-    }
-}
-
-/// The run that counts: the last complete one, else the last one that holds a touch.
-fn choose(runs: Vec<Run>, columns: bool, places: &Places<'_>, findings: &mut Findings) -> Option<Run> {
-    let runs: Vec<Run> = runs.into_iter().filter(|r| r.header.is_some() || !r.touches.is_empty()).collect();
-    let count = runs.len();
-    let whole = |r: &Run| r.end.is_some() && !r.touches.is_empty() && r.header.as_ref().is_none_or(|h| h.setup <= 1);
-    let index = runs.iter().rposition(whole).or_else(|| runs.iter().rposition(|r| !r.touches.is_empty()))?;
-    let run = runs.into_iter().nth(index)?;
-    let first = run.header.as_ref().map(|h| h.line).or_else(|| run.touches.first().map(|t| t.line)).unwrap_or(1);
-    if count > 1 {
-        let kind = if run.end.is_some() { "the last complete one" } else { "the last one; none is complete" };
-        let message = format!("the log holds {count} runs: run {} is taken, {kind}", index + 1);
-        let finding = Finding::warning("log::runs", message)
-            .help("to use another one, cut the log: a run begins with a line H and ends with a line E");
-        findings.push(places.at_line(finding, first));
-    }
-    if columns {
-        return Some(run);
-    }
-    let last = run.last_line;
-    match (&run.header, run.end) {
-        (_, None) => {
-            let of = run.header.as_ref().map(|h| format!(" of {}", h.touches)).unwrap_or_default();
-            let message = format!(
-                "the log ends after {} touches{of} without the line E of its end: it is cut off, or the program was stopped",
-                run.touches.len()
-            );
-            let finding = Finding::warning("log::truncated", message)
-                .help("what is there is used; start the program again at the set-up where it stopped");
-            findings.push(places.at_line(finding, last));
-        }
-        (Some(header), Some((end, line))) if end != header.touches => {
-            let message = format!("the run ends with E N{end}, but began with N{}", header.touches);
-            let finding = Finding::warning("log::end_count", message).help("was the log put together from two?");
-            findings.push(places.at_line(finding, line));
-        }
-        (None, Some(_)) => {
-            let finding = Finding::warning("log::no_head", "the run has no line H: the head of the log is missing")
-                .help("what is there is used; whether it belongs to this plan can only be told by its positions");
-            findings.push(places.at_line(finding, first));
-        }
-        _ => {}
-    }
-    Some(run)
+/// Says so when lines end otherwise than this controller ends them.
+fn line_ends(
+    bytes: &[u8],
+    start: usize,
+    ends: [bool; 3],
+    post: &Postprocessor,
+    places: &Places<'_>,
+    findings: &mut Findings,
+) {
+    let all = [EndOfLine::Lf, EndOfLine::Crlf, EndOfLine::Cr];
+    let strange = |end: EndOfLine| ends[end as usize] && !post.log.end_of_line.contains(&end);
+    let Some(found) = all.into_iter().find(|e| strange(*e)) else { return };
+    let Some(line) = Lines::new(&bytes[start..], start).find(|l| l.end == Some(found)) else { return };
+    let some = if ends.iter().filter(|e| **e).count() > 1 { "some" } else { "the" };
+    let at = line.start + line.bytes.len();
+    let message = format!("{some} lines end with {}; {} writes others", found.says(), post.name);
+    let finding = Finding::warning("log::line_ends", message)
+        .help("they are read all the same; was the log opened in an editor? prefer the file as the control wrote it");
+    findings.push(places.at(finding, at..at + 1));
 }

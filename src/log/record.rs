@@ -1,10 +1,17 @@
 //! One line of a log → header, touch or end; or a row of columns. Driven by the postprocessor's data.
 
-use super::lines::blanks;
+use super::lines::{blanks, without_leader};
 use super::touch::{RawTouch, Status};
 use super::words::{Fault, Number, number, whole};
 use crate::axes::{AxisName, Position};
+use crate::post::as_written::LengthUnit;
 use crate::post::{ColumnRule, LogRule};
+use nom::branch::alt;
+use nom::bytes::complete::{tag, take_till1};
+use nom::character::complete::space1;
+use nom::combinator::{opt, value as is};
+use nom::sequence::preceded;
+use nom::{IResult, Parser};
 
 /// What a line says.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +39,8 @@ pub struct LogHeader {
     pub digest: String,
     /// Touches of the plan.
     pub touches: u64,
+    /// What X, Y and Z are in; a head that does not say so means mm.
+    pub unit: LengthUnit,
     /// Set-up with which the run begins: 1, or where it was started again.
     pub setup: u64,
     /// Line in the log, from 1.
@@ -43,9 +52,12 @@ pub struct LogHeader {
 /// # Errors
 /// When the line is not understood as a whole.
 pub fn record(line: &[u8], line_number: usize, rule: &LogRule) -> Result<Record, Fault> {
-    let begin = blanks(line);
+    let begin = begin(line, rule);
     let Some((first, rest)) = begin.split_first() else { return Ok(Record::Blank) };
     match first {
+        // the mark between which a punch writes, alone in its line
+        b'%' if rest.is_empty() => Ok(Record::Blank),
+        _ if rule.skip.iter().any(|s| without_leader(line).starts_with(s.as_bytes())) => Ok(Record::Blank),
         b'P' => touch(line, rest, line_number, rule).map(Record::Touch),
         b'H' => head(line, rest, line_number).map(Record::Head),
         b'E' => end(line, rest).map(Record::End),
@@ -59,9 +71,18 @@ pub fn record(line: &[u8], line_number: usize, rule: &LogRule) -> Result<Record,
     }
 }
 
+/// Where the words of a line begin: behind blanks, what a punch writes, and what the control puts before each line.
+pub fn begin<'a>(line: &'a [u8], rule: &LogRule) -> &'a [u8] {
+    let begin = without_leader(line);
+    if rule.prefix.is_empty() {
+        return begin;
+    }
+    begin.strip_prefix(rule.prefix.as_bytes()).map_or(begin, blanks)
+}
+
 /// The touch that a line names which is not understood as a whole; the line may be damaged there too.
-pub fn named(line: &[u8]) -> Option<u64> {
-    let rest = blanks(line).strip_prefix(b"P")?;
+pub fn named(line: &[u8], rule: &LogRule) -> Option<u64> {
+    let rest = begin(line, rule).strip_prefix(b"P")?;
     let at = rest.iter().position(|b| *b == b'N')?;
     let (tail, n) = number(b'.')(&rest[at + 1..]).ok()?;
     whole(n).filter(|_| tail.first().is_none_or(|b| *b == b' ' || *b == b'\t'))
@@ -76,7 +97,7 @@ fn show(bytes: &[u8]) -> String {
 
 fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Result<RawTouch, Fault> {
     let mut seen = [false; 256];
-    let (mut id, mut status, mut check) = (None, None, None);
+    let (mut id, mut status, mut check, mut time_s) = (None, None, None, None);
     let mut position = Position::default();
     let mut present = [false; 6];
     let mut sum = 0.0;
@@ -85,7 +106,8 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
         let Some((letter, after)) = rest.split_first() else { break };
         let word = rest;
         let axis = axis_of(*letter);
-        if axis.is_none() && !matches!(letter, b'N' | b'S') && Some(*letter) != rule.check_word {
+        let own = [rule.check_word, rule.time_word].contains(&Some(*letter));
+        if axis.is_none() && !matches!(letter, b'N' | b'S') && !own {
             return Err(Fault::at(line, word, 1, "log::unknown_word", format!("unknown word {}", show(word))));
         }
         if std::mem::replace(&mut seen[usize::from(*letter)], true) {
@@ -114,6 +136,11 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
                 0.0 => Status::Miss,
                 _ => return Err(Fault::at(line, word, width, "log::status", "status S is 1 (hit) or 0 (miss)")),
             });
+        } else if Some(*letter) == rule.time_word {
+            // any clock, any zero
+            exact(line, word, width, value, rule)?;
+            time_s = Some(value.value);
+            sum += value.value;
         } else {
             exact(line, word, width, value, rule)?;
             check = Some((value.value, word, width));
@@ -131,15 +158,20 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
     }
     if let Some(letter) = rule.check_word {
         let (check, word, width) = check.ok_or_else(|| lacks(&format!("its sum {}", letter as char)))?;
-        let count = present.iter().filter(|p| **p).count() as f64;
-        // every value and the sum are rounded by at most half a digit, with a little room for the doubles themselves
-        let room = (count + 1.0) * 0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0)) + 1e-9;
-        if (check - sum).abs() > room {
+        if (check - sum).abs() > sum_room(rule, present.iter().filter(|p| **p).count()) {
             let message = format!("the numbers add up to {sum:.6}, the line says {check:.6}: it was damaged or edited");
             return Err(Fault::at(line, word, width, "log::sum", message));
         }
     }
-    Ok(RawTouch { id: Some(id), position, present, status, time_s: None, temperature_deg_c: None, line: line_number })
+    Ok(RawTouch { id: Some(id), position, present, status, time_s, temperature_deg_c: None, line: line_number })
+}
+
+/// How far the sum that a line gives may be from the sum of its numbers.
+///
+/// Every position, a time and the sum itself are rounded by at most half a digit; with a little room for the doubles.
+pub fn sum_room(rule: &LogRule, n_axes: usize) -> f64 {
+    let rounded = n_axes as f64 + 1.0 + if rule.time_word.is_some() { 1.0 } else { 0.0 };
+    rounded * (0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0))) + 1e-9
 }
 
 fn axis_of(letter: u8) -> Option<AxisName> {
@@ -209,30 +241,54 @@ fn end(line: &[u8], rest: &[u8]) -> Result<u64, Fault> {
 
 fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault> {
     let fault = |message: &str| Fault::at(line, rest, rest.len(), "log::head", message);
-    let text = std::str::from_utf8(rest).map_err(|_| fault("the head of a run holds characters that are not ASCII"))?;
-    let words: Vec<&str> = text.split_ascii_whitespace().collect();
-    let [mark, version, controller, machine, program, digest, touches, setup] = words[..] else {
-        return Err(fault("the head of a run is `H AXISCAL 1 controller machine program digest N touches U set-up`"));
-    };
-    if mark != "AXISCAL" || version != crate::post::LOG_VERSION.to_string() {
+    let form = "the head of a run is `H AXISCAL 1 controller machine program digest MM N touches U set-up`";
+    if !rest.is_ascii() {
+        return Err(fault("the head of a run holds characters that are not ASCII"));
+    }
+    let word =
+        |input| -> IResult<&[u8], &[u8]> { preceded(space1, take_till1(|b: u8| b == b' ' || b == b'\t')).parse(input) };
+    let mut words = (word, word, word, word, word, word);
+    let (tail, (mark, version, controller, machine, program, digest)) = words.parse(rest).map_err(|_| fault(form))?;
+    if digest.len() != 12 || !digest.iter().all(u8::is_ascii_hexdigit) {
+        return Err(fault(form));
+    }
+    if mark != b"AXISCAL" || version != crate::post::LOG_VERSION.to_string().as_bytes() {
         return Err(fault("this is not the head of a log of this version of axiscal"));
     }
-    let count = |word: &str, letter: char| {
-        let digits = word.strip_prefix(letter)?;
-        number(b'.')(digits.as_bytes()).ok().filter(|(tail, _)| tail.is_empty()).and_then(|(_, n)| whole(n))
+    let unit = alt((is(LengthUnit::Inch, tag(&b"INCH"[..])), is(LengthUnit::Mm, tag(&b"MM"[..]))));
+    let unit: IResult<&[u8], Option<LengthUnit>> = opt(preceded(space1, unit)).parse(tail);
+    let (tail, unit) = unit.unwrap_or((tail, None));
+    // a control may pad these numbers, and write them with a mark
+    let count = |input: &[u8], letter: u8| -> Option<(usize, u64)> {
+        let digits = blanks(input).strip_prefix(&[letter])?;
+        let (after, n) = number(b'.')(digits).ok()?;
+        Some((after.len(), whole(n)?))
     };
-    match (count(touches, 'N'), count(setup, 'U')) {
-        (Some(touches), Some(setup)) => Ok(LogHeader {
-            controller: controller.to_owned(),
-            machine: machine.to_owned(),
-            program: program.to_owned(),
-            digest: digest.to_owned(),
-            touches,
-            setup,
-            line: line_number,
-        }),
-        _ => Err(fault("the head of a run ends with N and the count of touches, U and the first set-up")),
-    }
+    let numbers = count(tail, b'N').and_then(|(left, touches)| {
+        let tail = &tail[tail.len() - left..];
+        let (left, setup) = count(tail, b'U')?;
+        blanks(&tail[tail.len() - left..]).is_empty().then_some((touches, setup))
+    });
+    let text = |word: &[u8]| String::from_utf8_lossy(word).into_owned();
+    let (touches, setup) = numbers.ok_or_else(|| {
+        Fault::at(
+            line,
+            tail,
+            tail.len(),
+            "log::head",
+            "the head of a run ends with its unit MM or INCH, N and the count of touches, U and the first set-up",
+        )
+    })?;
+    Ok(LogHeader {
+        controller: text(controller),
+        machine: text(machine),
+        program: text(program),
+        digest: text(digest),
+        unit: unit.unwrap_or_default(),
+        touches,
+        setup,
+        line: line_number,
+    })
 }
 
 /// Reads a row of columns: a touch without a number, hit for all that the row says. `None` for a blank line.
@@ -240,8 +296,8 @@ fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault
 /// # Errors
 /// When the line is not such a row.
 pub fn row(line: &[u8], line_number: usize, columns: &ColumnRule, rule: &LogRule) -> Result<Option<RawTouch>, Fault> {
-    let mut rest = blanks(line);
-    if rest.is_empty() {
+    let mut rest = without_leader(line);
+    if rest.is_empty() || rest == b"%" {
         return Ok(None);
     }
     let exact_rule = LogRule { decimals: columns.decimals, ..rule.clone() };

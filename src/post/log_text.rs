@@ -24,6 +24,8 @@ pub struct LogRecord {
     pub status: Status,
     /// Axis positions at the trigger (at the end of the search for a miss).
     pub position: Position,
+    /// When, s on any clock; written where the control's program writes times.
+    pub time_s: Option<f64>,
 }
 
 /// Version of the log's form.
@@ -105,9 +107,16 @@ impl Postprocessor {
                 // writing into a String cannot fail
                 let _ = write!(line, " {axis}{}", self.log.number(shown.get(*axis)));
             }
+            let time_s = record.time_s.filter(|_| self.log.time_word.is_some());
+            if let (Some(letter), Some(time)) = (self.log.time_word, time_s) {
+                let _ = write!(line, " {}{}", letter as char, self.log.number(time));
+            }
             if let Some(letter) = self.log.check_word {
                 // ids are small: a double holds them
-                let sum = record.id as f64 + f64::from(status) + axes.iter().map(|a| shown.get(*a)).sum::<f64>();
+                let sum = record.id as f64
+                    + f64::from(status)
+                    + axes.iter().map(|a| shown.get(*a)).sum::<f64>()
+                    + time_s.unwrap_or(0.0);
                 let _ = write!(line, " {}{}", letter as char, self.log.number(sum));
             }
             lines.push(line);

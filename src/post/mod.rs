@@ -15,9 +15,9 @@ mod opening;
 mod spelling;
 
 pub use as_written::DialectName;
-pub use inherit::parse_alone as parse;
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
+pub use inherit::parse_alone as parse;
 pub use log_text::{LogRecord, digest};
 pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
 pub use spelling::{CommentRule, NumberRule};

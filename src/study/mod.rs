@@ -75,6 +75,9 @@ pub struct DataAsWritten {
     /// When the run began, s on the study's one clock.
     #[schemars(with = "Option<f64>")]
     pub started: Option<Spanned<f64>>,
+    /// Which run, from 1, where the log holds several (default: the last complete one).
+    #[schemars(with = "Option<usize>")]
+    pub run: Option<usize>,
     /// Blocks of equal mounting, carrier and name share one set-up.
     pub mounting: Option<String>,
     /// The compensation that the control applied during this run: the directory or file that `export` wrote.
@@ -154,6 +157,8 @@ pub struct DataEntry {
     pub controller: String,
     /// When the run began, s.
     pub started_s: Option<f64>,
+    /// Which run of the log, from 1.
+    pub run: Option<usize>,
     /// Blocks of equal mounting, carrier and name share one set-up.
     pub mounting: Option<String>,
     /// The compensation that was active.
@@ -201,6 +206,7 @@ impl Study {
                 log: d.log.get_ref().clone(),
                 controller: d.controller.get_ref().clone(),
                 started_s: d.started.as_ref().map(|s| *s.get_ref()),
+                run: d.run,
                 mounting: d.mounting.clone(),
                 compensation: d.compensation.clone(),
             });
@@ -296,6 +302,9 @@ impl Study {
             run["plan"] = value(&entry.plan);
             run["log"] = value(&entry.log);
             run["controller"] = value(&entry.controller);
+            if let Some(n) = entry.run {
+                run["run"] = value(i64::try_from(n).unwrap_or(i64::MAX));
+            }
             if let Some(s) = entry.started_s {
                 run["started"] = value(s);
             }
@@ -352,6 +361,7 @@ mod tests {
                 log: "head \"1\".log".into(),
                 controller: "linuxcnc".into(),
                 started_s: Some(3.0),
+                run: None,
                 mounting: None,
                 compensation: None,
             }],

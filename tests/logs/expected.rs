@@ -44,7 +44,7 @@ const CASES: &[Case] = &[
     case("bad/probeopen-miss.log", Some("1 2! 3"), &["log::missed 4:1"], "touch 2 (block x+, face +Z) was missed: the probe did not trigger"),
     case("bad/probeopen-overwritten.log", Some("1 2 3"), &["log::in_number 5:12"], "expected a blank after the number, found \".000000 1.000000 8.002500"),
     case("bad/probeopen-too-many-rows.log", Some("2 3"), &["log::ambiguous 1:1", "log::missing"], "lines 1 to 6, touch 1: there are more rows than a touch has; they are"),
-    case("bad/program.log", None, &["log::not_understood 1:1", "log::not_understood 2:1", "log::not_understood 3:1", "log::not_understood 4:1", "log::nothing 1:1"], "\"%\" is not a line of this log: a touch begins with P, a run with H,"),
+    case("bad/program.log", None, &["log::not_understood 2:1", "log::not_understood 3:1", "log::not_understood 4:1", "log::nothing 1:1"], "\"(axiscal)\" is not a line of this log: a touch begins with P, a run with H,"),
     case("bad/second-run-appended.log", Some("1 2 3"), &["log::runs 6:1"], "the log holds 2 runs: run 2 is taken, the last complete one"),
     case("bad/second-run-stopped.log", Some("1 2 3"), &["log::runs 1:1"], "the log holds 2 runs: run 1 is taken, the last complete one"),
     case("bad/status-two.log", Some("1 3"), &["log::status 3:6", "log::missing"], "status S is 1 (hit) or 0 (miss); the line is not used"),

@@ -1,0 +1,221 @@
+//! Where the runs of a log begin and end, and which of them counts.
+
+use super::place::Places;
+use super::record::LogHeader;
+use super::stretch::{Event, What};
+use super::touch::RawTouch;
+use crate::diag::{Failure, Finding, Findings};
+use std::ops::Range;
+
+/// One run in a log, as it is offered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunFound {
+    /// From 1, in the order of the log.
+    pub number: usize,
+    /// First line, from 1.
+    pub first_line: usize,
+    /// Last line.
+    pub last_line: usize,
+    /// Lines of touches that are understood.
+    pub touches: usize,
+    /// The line of its end is there, and it began with the first set-up.
+    pub complete: bool,
+    /// It is the one that is taken.
+    pub taken: bool,
+}
+
+impl RunFound {
+    fn says(&self) -> String {
+        let Self { number, first_line, last_line, touches, .. } = self;
+        let how = if self.complete { "complete" } else { "not complete" };
+        format!("run {number}: lines {first_line} to {last_line}, {touches} touches, {how}")
+    }
+}
+
+/// One run.
+#[derive(Debug, Default)]
+pub struct Run {
+    /// With which it begins.
+    pub header: Option<LogHeader>,
+    /// Touches of the log, in order.
+    touches: Vec<Range<usize>>,
+    /// Count of touches of the plan, and line.
+    pub end: Option<(u64, usize)>,
+    last_line: usize,
+}
+
+impl Run {
+    /// Is there a touch in it?
+    pub fn has_touches(&self) -> bool {
+        self.count() > 0
+    }
+
+    fn count(&self) -> usize {
+        self.touches.iter().map(Range::len).sum()
+    }
+
+    fn first_line(&self, touches: &[RawTouch]) -> usize {
+        let first = self.touches.first().and_then(|t| touches.get(t.start)).map(|t| t.line);
+        self.header.as_ref().map(|h| h.line).or(first).unwrap_or(1)
+    }
+
+    fn complete(&self) -> bool {
+        self.end.is_some() && self.count() > 0 && self.header.as_ref().is_none_or(|h| h.setup <= 1)
+    }
+
+    /// The run's touches, out of all of the log.
+    pub fn take(&self, mut all: Vec<RawTouch>) -> Vec<RawTouch> {
+        if let [only] = &self.touches[..] {
+            // the usual log is not copied
+            all.truncate(only.end);
+            all.drain(..only.start);
+            return all;
+        }
+        self.touches.iter().flat_map(|range| all[range.clone()].iter().cloned()).collect()
+    }
+}
+
+/// The runs of a log.
+pub fn split(touches: &[RawTouch], events: &[Event<'_>]) -> Vec<Run> {
+    let mut runs = vec![Run::default()];
+    let mut done = 0;
+    for event in events {
+        add_touches(done..event.at, touches, &mut runs);
+        done = event.at;
+        let Some(run) = runs.last_mut() else { continue };
+        let number = event.line.number;
+        match &event.what {
+            What::Fault => {}
+            What::Head(header) => {
+                let goes_on = header.setup > 1
+                    && run.end.is_none()
+                    && run.header.as_ref().is_none_or(|h| {
+                        h.digest == header.digest && h.program == header.program && h.unit == header.unit
+                    });
+                if goes_on && (run.header.is_some() || run.count() > 0) {
+                    run.header.get_or_insert_with(|| (**header).clone());
+                    run.last_line = number;
+                } else {
+                    runs.push(Run { header: Some((**header).clone()), last_line: number, ..Run::default() });
+                }
+            }
+            What::End(count) => {
+                if run.end.is_none() {
+                    run.end = Some((*count, number));
+                    run.last_line = number;
+                }
+            }
+        }
+    }
+    add_touches(done..touches.len(), touches, &mut runs);
+    runs.retain(|r| r.header.is_some() || r.count() > 0);
+    runs
+}
+
+fn add_touches(range: Range<usize>, touches: &[RawTouch], runs: &mut Vec<Run>) {
+    let Some(last) = range.clone().next_back().and_then(|i| touches.get(i)) else { return };
+    // touches after an end belong to a run whose head is lost
+    if runs.last().is_none_or(|r| r.end.is_some()) {
+        runs.push(Run::default());
+    }
+    if let Some(run) = runs.last_mut() {
+        run.last_line = last.line;
+        match run.touches.last_mut() {
+            Some(before) if before.end == range.start => before.end = range.end,
+            _ => run.touches.push(range),
+        }
+    }
+}
+
+/// The run that counts: the one that is asked for, else the last complete one, else the last one that holds a touch;
+/// and all of them as they are offered.
+///
+/// # Errors
+/// When there is none of the number that is asked for, or it holds no touch.
+pub fn choose(
+    runs: Vec<Run>,
+    touches: &[RawTouch],
+    asked: Option<usize>,
+    columns: bool,
+    places: &Places<'_>,
+    findings: &mut Findings,
+) -> Result<Option<(Run, Vec<RunFound>)>, Failure> {
+    let index = match asked {
+        Some(number) => Some(number.wrapping_sub(1)),
+        None => runs.iter().rposition(Run::complete).or_else(|| runs.iter().rposition(|r| r.count() > 0)),
+    };
+    let found: Vec<RunFound> = runs
+        .iter()
+        .enumerate()
+        .map(|(i, run)| RunFound {
+            number: i + 1,
+            first_line: run.first_line(touches),
+            last_line: run.last_line,
+            touches: run.count(),
+            complete: run.complete(),
+            taken: Some(i) == index,
+        })
+        .collect();
+    let count = runs.len();
+    let Some(run) = index.and_then(|i| runs.into_iter().nth(i)) else {
+        if let Some(number) = asked.filter(|_| count > 0) {
+            let message = format!("there is no run {number}: {} holds {count} of them", places.name());
+            return Err(Failure::new("log::no_run", message).help(offer(&found)));
+        }
+        return Ok(None);
+    };
+    let first = run.first_line(touches);
+    if asked.is_some() && run.count() == 0 {
+        let message = format!("run {} holds no touch", index.unwrap_or(0) + 1);
+        return Err(places.at_line(Finding::error("log::no_run", message).help(offer(&found)), first).into());
+    }
+    if count > 1 {
+        let number = index.unwrap_or(0) + 1;
+        let message = format!("the log holds {count} runs: run {number} is taken, ");
+        let finding = match (asked, run.complete()) {
+            (Some(_), _) => Finding::info("log::runs", message + "as asked for"),
+            (None, true) => Finding::warning("log::runs", message + "the last complete one"),
+            (None, false) => Finding::warning("log::runs", message + "the last one; none is complete"),
+        };
+        findings.push(places.at_line(finding.help(offer(&found)), first));
+    }
+    if !columns {
+        shape(&run, first, places, findings);
+    }
+    Ok(Some((run, found)))
+}
+
+/// The runs, in a line.
+fn offer(found: &[RunFound]) -> String {
+    const SHOWN: usize = 6;
+    let shown: Vec<String> = found.iter().rev().take(SHOWN).rev().map(RunFound::says).collect();
+    let before = if found.len() > SHOWN { "… " } else { "" };
+    format!("another one is taken with --run N, in a study with run = N: {before}{}", shown.join("; "))
+}
+
+/// Is the beginning of the run there, and its end?
+fn shape(run: &Run, first: usize, places: &Places<'_>, findings: &mut Findings) {
+    match (&run.header, run.end) {
+        (_, None) => {
+            let of = run.header.as_ref().map(|h| format!(" of {}", h.touches)).unwrap_or_default();
+            let message = format!(
+                "the log ends after {} touches{of} without the line E of its end: it is cut off, or the program was stopped",
+                run.count()
+            );
+            let finding = Finding::warning("log::truncated", message)
+                .help("what is there is used; start the program again at the set-up where it stopped");
+            findings.push(places.at_line(finding, run.last_line));
+        }
+        (Some(header), Some((end, line))) if end != header.touches => {
+            let message = format!("the run ends with E N{end}, but began with N{}", header.touches);
+            let finding = Finding::warning("log::end_count", message).help("was the log put together from two?");
+            findings.push(places.at_line(finding, line));
+        }
+        (None, Some(_)) => {
+            let finding = Finding::warning("log::no_head", "the run has no line H: the head of the log is missing")
+                .help("what is there is used; whether it belongs to this plan can only be told by its positions");
+            findings.push(places.at_line(finding, first));
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,205 @@
+//! The lines of a log, read: touches at full speed, everything else as events between them.
+//!
+//! A long log is cut at line ends into stretches that are read at the same time; the result is the same as that of one.
+//! A line that is not understood is only noted here: what is wrong with it is found out for the few that are shown.
+
+use super::fast::{self, Table};
+use super::lines::{Line, blanks, first, without_trailer};
+use super::record::{LogHeader, Record, begin, record, row};
+use super::touch::RawTouch;
+use super::words::Fault;
+use crate::post::as_written::EndOfLine;
+use crate::post::{ColumnRule, LogRule};
+use rayon::prelude::*;
+
+/// A log that is shorter is read in one go, bytes: some milliseconds of work.
+const SHORT: usize = 1 << 20;
+
+/// What is read of a log, or of a part of it that begins and ends with a line.
+#[derive(Debug, Default)]
+pub struct Stretch<'a> {
+    /// In the order of the log.
+    pub touches: Vec<RawTouch>,
+    /// Everything else, in the order of the log.
+    pub events: Vec<Event<'a>>,
+    /// How many lines there are.
+    pub lines: usize,
+    /// Which kinds of line ends there are: LF, CR LF, CR.
+    pub ends: [bool; 3],
+}
+
+/// A line that is no touch.
+#[derive(Debug)]
+pub struct Event<'a> {
+    /// How many touches stand before it.
+    pub at: usize,
+    /// Where.
+    pub line: Line<'a>,
+    /// What.
+    pub what: What,
+}
+
+/// What such a line is.
+#[derive(Debug)]
+pub enum What {
+    /// A run begins.
+    Head(Box<LogHeader>),
+    /// A run has come to its end; number of touches of the plan.
+    End(u64),
+    /// Not understood, or the touch in it may be cut off.
+    Fault,
+}
+
+/// How the lines of one log are read.
+#[derive(Debug, Clone, Copy)]
+pub struct Reader<'r> {
+    /// Of the controller.
+    pub rule: &'r LogRule,
+    /// The log is nothing but columns.
+    pub columns: Option<&'r ColumnRule>,
+}
+
+impl Reader<'_> {
+    /// Reads a line by the grammar.
+    ///
+    /// # Errors
+    /// When it is not understood as a whole, or it is the last one, has no end, and may be cut off in a number.
+    pub fn line(&self, line: &Line<'_>) -> Result<Record, Fault> {
+        let bytes = without_trailer(line.bytes);
+        let record = match self.columns {
+            Some(columns) => {
+                row(bytes, line.number, columns, self.rule).map(|r| r.map_or(Record::Blank, Record::Touch))
+            }
+            None => record(bytes, line.number, self.rule),
+        };
+        match record {
+            // without a check word a number that was cut may look whole
+            Ok(Record::Touch(_)) if !line.ended() && (self.columns.is_some() || self.rule.check_word.is_none()) => {
+                Err(Fault::at(bytes, &bytes[bytes.len()..], 1, "log::cut_line", "the last line has no end"))
+            }
+            Err(fault) => Err(no_text(bytes, line.start).unwrap_or(fault)),
+            record => record,
+        }
+    }
+
+    /// Could a line that is not understood have been a touch?
+    pub fn may_be_touch(&self, line: &Line<'_>) -> bool {
+        self.columns.is_some() || begin(line.bytes, self.rule).first().is_some_and(|b| b.eq_ignore_ascii_case(&b'P'))
+    }
+
+    /// Reads lines, the first of which begins at `start` of the log.
+    pub fn read<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
+        let n_parts = if bytes.len() < SHORT { 1 } else { rayon::current_num_threads().max(1) };
+        if n_parts == 1 {
+            return self.stretch(bytes, start);
+        }
+        let mut cuts: Vec<usize> = (0..=n_parts).map(|i| line_start(bytes, bytes.len() / n_parts * i)).collect();
+        if let Some(last) = cuts.last_mut() {
+            *last = bytes.len();
+        }
+        let parts: Vec<Stretch<'a>> =
+            cuts.par_windows(2).map(|c| self.stretch(&bytes[c[0]..c[1]], start + c[0])).collect();
+        parts.into_iter().reduce(join).unwrap_or_default()
+    }
+
+    fn stretch<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
+        let table = Table::new(self.rule);
+        // lines of touches are some 60 bytes or longer
+        let mut out = Stretch { touches: Vec::with_capacity(bytes.len() / 60), ..Stretch::default() };
+        let mut at = 0;
+        while at < bytes.len() {
+            out.lines += 1;
+            if self.columns.is_none()
+                && let Some((touch, end, used)) = fast::touch(&bytes[at..], out.lines, &table)
+            {
+                out.ends[end as usize] = true;
+                out.touches.push(touch);
+                at += used;
+                continue;
+            }
+            let (line, end, used) = first(&bytes[at..]);
+            let line = Line { number: out.lines, start: start + at, bytes: line, end };
+            end.into_iter().for_each(|e| out.ends[e as usize] = true);
+            let what = match self.line(&line) {
+                Ok(Record::Touch(touch)) => {
+                    out.touches.push(touch);
+                    None
+                }
+                Ok(Record::Head(head)) => Some(What::Head(Box::new(head))),
+                Ok(Record::End(count)) => Some(What::End(count)),
+                Ok(Record::Blank) => None,
+                Err(_) => Some(What::Fault),
+            };
+            let n_touches = out.touches.len();
+            out.events.extend(what.map(|what| Event { at: n_touches, line, what }));
+            at += used;
+        }
+        out
+    }
+}
+
+/// A log begins with numbers and holds no line of words near its beginning: it is nothing but columns.
+#[must_use]
+pub fn looks_like_columns(bytes: &[u8]) -> bool {
+    let firsts = super::lines::Lines::new(bytes, 0).filter_map(|l| blanks(l.bytes).first().copied()).take(64);
+    let mut numbers = 0;
+    for first in firsts {
+        match first {
+            b'P' | b'H' | b'E' => return false,
+            b'0'..=b'9' | b'-' | b'+' | b'.' | b',' => numbers += 1,
+            _ => {}
+        }
+    }
+    numbers > 0
+}
+
+/// The first byte of a line that is no text says more than what the grammar makes of it.
+pub(super) fn no_text(line: &[u8], start: usize) -> Option<Fault> {
+    let at = line.iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?;
+    // what a punch writes may stand before the words
+    let at = if line[..at].iter().all(|b| *b == b' ') && super::lines::is_tape(line[at]) {
+        at + super::lines::without_leader(&line[at..]).iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?
+            + (line[at..].len() - super::lines::without_leader(&line[at..]).len())
+    } else {
+        at
+    };
+    let message = format!("byte 0x{:02X} at offset {} of the file is no text", line[at], start + at);
+    Some(Fault::at(line, &line[at..], 1, "log::no_text", message))
+}
+
+/// Where the line begins that holds the byte before `at`, or the next one.
+fn line_start(bytes: &[u8], at: usize) -> usize {
+    if at == 0 || at >= bytes.len() {
+        return at.min(bytes.len());
+    }
+    // one byte back: `at` may be a beginning itself, or stand between CR and LF
+    at - 1 + first(&bytes[at - 1..]).2
+}
+
+/// One stretch after the other.
+fn join<'a>(mut before: Stretch<'a>, after: Stretch<'a>) -> Stretch<'a> {
+    let (n_touches, n_lines) = (before.touches.len(), before.lines);
+    before.touches.extend(after.touches.into_iter().map(|t| RawTouch { line: t.line + n_lines, ..t }));
+    before.events.extend(after.events.into_iter().map(|e| {
+        let line = Line { number: e.line.number + n_lines, ..e.line };
+        let what = match e.what {
+            What::Head(head) => What::Head(Box::new(LogHeader { line: line.number, ..*head })),
+            what => what,
+        };
+        Event { at: e.at + n_touches, line, what }
+    }));
+    before.lines += after.lines;
+    before.ends.iter_mut().zip(after.ends).for_each(|(b, a)| *b |= a);
+    before
+}
+
+impl EndOfLine {
+    /// How a person calls it.
+    pub(super) fn says(self) -> &'static str {
+        match self {
+            Self::Lf => "LF",
+            Self::Crlf => "CR LF, as Windows writes them",
+            Self::Cr => "CR alone",
+        }
+    }
+}
