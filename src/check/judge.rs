@@ -12,7 +12,7 @@ use crate::diag::{Finding, Source};
 use crate::machine::{Machine, Mounting};
 use crate::post::Postprocessor;
 use crate::program::heights::Lift;
-use crate::program::plan::Plan;
+use crate::program::plan::{ControllerFrame, Plan};
 use crate::program::scene::Scene;
 use crate::program::sweep::Manner;
 use nalgebra::Vector3;
@@ -364,8 +364,13 @@ impl<'a, 'b> Walk<'a, 'b> {
 
     /// The axes that a move moves.
     fn moving(&self, from: &Position, to: &Position) -> Vec<AxisName> {
+        // under a transformation the rounded angle of a turn moves the linear axes by its arc over the lift's height
+        const TURNED_MM: f64 = 0.05;
         let far = |a: &AxisName| (to.get(*a) - from.get(*a)).abs() > self.case.same;
-        AxisName::ALL.into_iter().filter(far).collect()
+        let tcp = self.case.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
+        let turns = tcp && AxisName::ALL.iter().any(|a| a.is_rotary() && far(a));
+        let moved = |a: &AxisName| far(a) && (!turns || a.is_rotary() || (to.get(*a) - from.get(*a)).abs() > TURNED_MM);
+        AxisName::ALL.into_iter().filter(moved).collect()
     }
 
     /// The first moves, when nobody knows where the machine stands: up to the top, then whatever is clear from anywhere.

@@ -164,7 +164,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             .into_iter()
             .chain((2..=last).map(|k| (k, Start::Awkward, true)))
             .collect();
-        let elsewhere = self.start(&window, 0.4, 0.8);
+        let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
         let mut runs: Vec<Told> = numbers
             .par_iter()
             .map(|(k, start, forks)| {
@@ -179,6 +179,10 @@ impl<'a, D: Dialect> Runs<'a, D> {
             findings.extend(otherwise(awkward, &fresh));
         }
         All { runs, findings, setups: self.program.setups, stops, clear_from_anywhere }
+    }
+
+    fn tcp(&self) -> bool {
+        self.plan.is_some_and(|p| p.controller_frame == crate::program::plan::ControllerFrame::Tcp)
     }
 
     /// A place at which the program may find the machine.
@@ -198,9 +202,11 @@ impl<'a, D: Dialect> Runs<'a, D> {
     fn run<'c>(&self, code: &'c Code, start: Start, at: Position, part: usize, reminded: bool) -> Run<'c, D> {
         let mut axes = [false; 6];
         self.machine.axes.iter().for_each(|a| axes[a.name.index()] = true);
+        // under the control's own transformation a program sees to it that the rotary axes stand at 0 when it begins
+        let known = AxisName::ALL.map(|a| self.tcp() && a.is_rotary());
         let vm = Vm {
             at,
-            known: [false; 6],
+            known,
             trace: Vec::new(),
             place: 0..0,
             axes,
@@ -282,8 +288,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
                 .iter()
                 .all(|s| s.lift().is_some_and(|lift| s.clear_from_anywhere(&lift, &|a| window[a.name.index()])))
         };
-        let asks = self.plan.is_some_and(|p| p.controller_frame == crate::program::plan::ControllerFrame::Tcp);
-        if clear(&window) && !asks {
+        if clear(&window) && !self.tcp() {
             return (window, true);
         }
         let Some(code) = self.codes.first() else { return (window, false) };

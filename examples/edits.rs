@@ -1,0 +1,36 @@
+//! Thousands of random edits of a program for each control: how many are not read, refused by what they do, refused only
+//! because the program does otherwise than what was written, how many move identically, and whether one escaped.
+//!
+//! `cargo run --release --example edits -- [COUNT] [CONTROLLER …]`
+
+#[path = "../tests/check/edits.rs"]
+mod edits;
+
+use edits::{Fate, original};
+
+fn main() {
+    let mut words = std::env::args().skip(1);
+    let count: u64 = words.next().and_then(|w| w.parse().ok()).unwrap_or(2000);
+    let named: Vec<String> = words.collect();
+    let controllers = if named.is_empty() { vec!["linuxcnc".into(), "fanuc".into(), "haas".into()] } else { named };
+    println!("| controller | edits | not read | refused by what it does | refused as changed only | moves identically | escaped | s |");
+    println!("|---|---|---|---|---|---|---|---|");
+    for controller in &controllers {
+        let original = original(controller, None);
+        let begun = std::time::Instant::now();
+        let fates = original.fates(count, 7);
+        let number = |fate: Fate| fates.iter().filter(|(_, f)| *f == fate).count();
+        println!(
+            "| {controller} | {count} | {} | {} | {} | {} | {} | {:.0} |",
+            number(Fate::NotRead),
+            number(Fate::Refused),
+            number(Fate::Changed),
+            number(Fate::Same),
+            number(Fate::Escaped),
+            begun.elapsed().as_secs_f64()
+        );
+        for (what, _) in fates.iter().filter(|(_, f)| *f == Fate::Escaped) {
+            println!("escaped: {what}");
+        }
+    }
+}

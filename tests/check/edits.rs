@@ -1,0 +1,208 @@
+//! Programs that somebody edited: what is done to them, and what "moves identically" means when it is looked at from
+//! outside.
+
+use axiscal::check::{Against, check};
+use axiscal::diag::{Severity, source};
+use axiscal::machine::{self, Machine};
+use axiscal::post::Postprocessor;
+use axiscal::program::plan::Plan;
+use axiscal::program::{self, Options};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// A program as it was generated.
+pub struct Original {
+    pub machine: Machine,
+    pub post: Postprocessor,
+    pub plan: Plan,
+    pub text: String,
+    pub sha256: String,
+}
+
+/// A program of a few touches of one block at two angles: all kinds of moves, small enough for thousands of edits.
+const SMALL: &str = r#"
+format = "axiscal-programs/1"
+name = "small"
+machine = "swivel-head"
+says = "a few touches"
+mounting = "head"
+faces_in = "machine"
+
+[[grid]]
+name = "one"
+u = [0.0]
+v = [0.0]
+
+[[grid]]
+name = "side"
+u = [0.0]
+depth = [3.5]
+
+[[stage]]
+name = "small"
+
+[[stage.setup]]
+pose = { B = 0.0 }
+blocks = ["x-"]
+touch = [{ faces = ["+Z"], grid = "one" }, { faces = ["-X"], grid = "side" }]
+
+[[stage.setup]]
+pose = { B = -30.0, C = 90.0 }
+from = { B = 1 }
+blocks = ["x-"]
+touch = [{ faces = ["+Z"], grid = "one" }]
+"#;
+
+/// The small program for a control, or a built-in one.
+pub fn original(controller: &str, built_in: Option<&str>) -> Original {
+    let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
+    let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
+    let (post, _) = Postprocessor::load_built_in_or_file(controller).unwrap();
+    let spec = match built_in {
+        Some(name) => program::choose(program::built_in().unwrap(), name, &machine).unwrap(),
+        None => program::load(&source("small.toml", SMALL)).unwrap().0,
+    };
+    let (generated, _) = program::generate(&machine, &spec, &Options::default()).unwrap();
+    let mut plan = generated.plan;
+    let text = post.program(&machine, &plan, &generated.path).unwrap().text;
+    let against = Against { plan: Some(&plan), ..Against::default() };
+    let checked = check(&machine, &post, &source("original", text.as_str()), &against).unwrap();
+    let wrong: Vec<String> = checked.findings.iter().map(ToString::to_string).collect();
+    assert!(wrong.is_empty(), "{controller}: {wrong:#?}");
+    assert_eq!(checked.touches, plan.touches.len());
+    let sha256 = checked.proof.sha256.clone();
+    plan.programs.insert(post.name.clone(), checked.proof);
+    Original { machine, post, plan, text, sha256 }
+}
+
+/// What became of an edited program.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fate {
+    /// Not of the grammar.
+    NotRead,
+    /// Refused by what it does.
+    Refused,
+    /// Refused only because it does otherwise than what was written.
+    Changed,
+    /// It moves identically.
+    Same,
+    /// Neither refused nor the same: what must not be.
+    Escaped,
+}
+
+impl Original {
+    /// Looks at an edited text.
+    pub fn fate(&self, text: &str) -> Fate {
+        let against = Against { plan: Some(&self.plan), ..Against::default() };
+        match check(&self.machine, &self.post, &source("edited", text), &against) {
+            Err(_) => Fate::NotRead,
+            Ok(checked) => {
+                let errors: Vec<&str> =
+                    checked.findings.iter().filter(|f| f.severity == Severity::Error).map(|f| f.code).collect();
+                if errors.is_empty() {
+                    return if checked.proof.sha256 == self.sha256 { Fate::Same } else { Fate::Escaped };
+                }
+                if errors.iter().all(|c| *c == "check::changed") { Fate::Changed } else { Fate::Refused }
+            }
+        }
+    }
+
+    /// Findings of an edited text, by code.
+    pub fn codes(&self, text: &str) -> Vec<&'static str> {
+        let against = Against { plan: Some(&self.plan), ..Against::default() };
+        match check(&self.machine, &self.post, &source("edited", text), &against) {
+            Err(failure) => failure.0.iter().map(|f| f.code).collect(),
+            Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
+        }
+    }
+
+    /// The fates of many random edits, with what was done.
+    pub fn fates(&self, count: u64, seed: u64) -> Vec<(String, Fate)> {
+        (0..count)
+            .into_par_iter()
+            .map(|n| {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(n));
+                let (what, text) = edit(&self.text, &mut rng);
+                let fate = self.fate(&text);
+                (what, fate)
+            })
+            .collect()
+    }
+}
+
+/// One random edit: a line deleted, doubled or swapped with the next, a digit, a sign, a point, a word, a character.
+pub fn edit(text: &str, rng: &mut ChaCha8Rng) -> (String, String) {
+    loop {
+        let mut lines: Vec<String> = text.split_inclusive('\n').map(str::to_owned).collect();
+        let i = rng.random_range(0..lines.len());
+        let line = lines[i].clone();
+        let what = rng.random_range(0..8);
+        let pick = |rng: &mut ChaCha8Rng, good: &dyn Fn(u8) -> bool| -> Option<usize> {
+            let places: Vec<usize> = line.bytes().enumerate().filter(|(_, b)| good(*b)).map(|(p, _)| p).collect();
+            if places.is_empty() { None } else { Some(places[rng.random_range(0..places.len())]) }
+        };
+        let says = match what {
+            0 => {
+                lines.remove(i);
+                "deleted"
+            }
+            1 => {
+                lines.insert(i, line.clone());
+                "doubled"
+            }
+            2 => {
+                if i + 1 >= lines.len() || lines[i] == lines[i + 1] {
+                    continue;
+                }
+                lines.swap(i, i + 1);
+                "swapped with the next"
+            }
+            3 => {
+                let Some(p) = pick(rng, &|b| b.is_ascii_digit()) else { continue };
+                let new = b'0' + (line.as_bytes()[p] - b'0' + rng.random_range(1..10)) % 10;
+                lines[i].replace_range(p..=p, &(new as char).to_string());
+                "another digit"
+            }
+            4 => {
+                // a sign lost, or put before a number
+                if let Some(p) = pick(rng, &|b| b == b'-').filter(|_| rng.random_bool(0.5)) {
+                    lines[i].replace_range(p..=p, "");
+                } else {
+                    let starts: Vec<usize> = (1..line.len())
+                        .filter(|p| line.as_bytes()[*p].is_ascii_digit() && line.as_bytes()[p - 1].is_ascii_uppercase())
+                        .collect();
+                    if starts.is_empty() {
+                        continue;
+                    }
+                    lines[i].insert(starts[rng.random_range(0..starts.len())], '-');
+                }
+                "another sign"
+            }
+            5 => {
+                let Some(p) = pick(rng, &|b| b == b'.') else { continue };
+                lines[i].replace_range(p..=p, "");
+                "a point lost"
+            }
+            6 => {
+                let words: Vec<&str> = line.trim_end().split(' ').collect();
+                if words.len() < 2 {
+                    continue;
+                }
+                let gone = rng.random_range(0..words.len());
+                let kept: Vec<&str> = words.iter().enumerate().filter(|(k, _)| *k != gone).map(|(_, w)| *w).collect();
+                lines[i] = format!("{}\n", kept.join(" "));
+                "a word lost"
+            }
+            _ => {
+                let Some(p) = pick(rng, &|b| b.is_ascii_graphic()) else { continue };
+                lines[i].replace_range(p..=p, "");
+                "a character lost"
+            }
+        };
+        let edited = lines.concat();
+        if edited != text {
+            return (format!("line {}, {says}: {:?} is now {:?}", i + 1, line.trim_end(), lines.get(i).map_or("", |l| l.trim_end())), edited);
+        }
+    }
+}
