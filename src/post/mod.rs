@@ -12,6 +12,7 @@ mod inherit;
 mod log_text;
 mod moves;
 mod opening;
+mod render;
 mod spelling;
 pub mod tables;
 
