@@ -1,7 +1,7 @@
 //! The crate beside its peers on the same touches and unknowns, in one run: answers compared, times as ratios.
 //!
 //! `cargo bench --bench peers` prints the table; `-- --write` puts it into `docs/performance.md` as well, and words such as
-//! `10000x60` choose sizes (touches x unknowns); `-- --answers` compares the answers only, at small
+//! `10000x60` choose sizes (touches x unknowns); `-- score` runs the score tests only; `-- --answers` compares the answers only, at small
 //! size, as does a call without `--bench` (`cargo test`). Peers are what `benches/peers/run` finds; `AXISCAL_PEERS_REQUIRED=1`
 //! makes a missing one an error.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a benchmark that cannot run says where
@@ -32,6 +32,10 @@ fn main() {
     if !has("--bench") || has("--answers") {
         return;
     }
+    if has("score") {
+        println!("{}", score_tests());
+        return;
+    }
     let mut text = machine();
     text.push_str(&whole_process(&peers, folder.path()));
     let sizes = [356, 10_000, 100_000].into_iter().flat_map(|n| [15, 60, 120].map(|p| (n, p)));
@@ -40,10 +44,39 @@ fn main() {
     let results: Vec<Size> = sizes.map(|(n, p)| measure(&peers, folder.path(), n, p)).collect();
     text.push_str(&table(&results));
     text.push_str(&solvers(&results));
+    if !chosen {
+        text.push_str(&score_tests());
+    }
     println!("\n{text}");
     if has("--write") {
         insert(&text);
     }
+}
+
+/// The score tests of the diagnosis against a refit with each candidate.
+fn score_tests() -> String {
+    let mut out = "\n## Score tests of the whole catalogue\n\n\
+        Milliseconds on one thread, fastest run; in brackets how many times as long as the tests. \"Bare fits\": the model solved \
+        again with each effect that leaves a trace; \"refits\": all of `identify --quick` with each effect.\n\n\
+        | touches x unknowns | effects (columns) | tests | their columns | bare fits | refits |\n|---|---|---|---|---|---|\n"
+        .to_owned();
+    for n_touches in [356, 10_000] {
+        let t = comparison::search::score_tests(n_touches, 60);
+        let ratio = |s: f64| format!("{:.0} ({:.0})", 1e3 * s, s / t.tests_s);
+        let _ = writeln!(
+            out,
+            "| {} x {} | {} ({}) | {:.2} | {:.1} | {} | {} |",
+            t.n_touches,
+            t.n_unknowns,
+            t.candidates,
+            t.columns,
+            1e3 * t.tests_s,
+            1e3 * t.columns_s,
+            ratio(t.solves_s),
+            ratio(t.refits_s)
+        );
+    }
+    out
 }
 
 /// All answers agree, without noise and with it; panics where they do not.

@@ -17,8 +17,8 @@ fn main() {
         let begun = std::time::Instant::now();
         let summary = coverage::run(case, runs, n_virtual, 20);
         println!(
-            "\n{} {}, {} um per touch, {} um per visit: {} runs, chi2/dof {:.4} ({} degrees of freedom), \
-             {:.2} touches of 1000 rejected, tau^2 {:.3} of the true one, {:.1} s",
+            "\n{} {}, {} um per touch, {} um per visit: {} runs, chi2/dof {:.4} ({} degrees of freedom; \
+             {:.2} % below and {:.2} % above its 95 %), {:.2} touches of 1000 rejected, tau^2 {:.3} of the true one, {:.1} s",
             case.machine,
             case.programs.join(" + "),
             1e3 * case.sigma_mm,
@@ -26,6 +26,8 @@ fn main() {
             runs,
             summary.chi2_per_dof,
             summary.dof,
+            100.0 * summary.tails[0],
+            100.0 * summary.tails[1],
             summary.rejected_per_mille,
             summary.tau2_ratio,
             begun.elapsed().as_secs_f64()

@@ -1,5 +1,7 @@
 //! Runs the peers and the crate on one problem, and compares their answers.
 
+pub mod search;
+
 use crate::problems::{MOUNTING, Problem, SIGMA_MM, matched, solve, swivel_head};
 use axiscal::fit;
 use axiscal::log;

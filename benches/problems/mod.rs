@@ -100,16 +100,21 @@ impl Problem {
 /// Rank on the nominal touches, fit and covariance, as `identify` does them, without what it does around them: the same
 /// work as the peers do. White noise of [`SIGMA_MM`].
 pub fn solve(model: &Model, data: &Data) -> Solution {
+    let solution = try_solve(model, data).expect("every unknown is seen");
+    assert!(solution.converged, "{}", solution.stopped);
+    solution
+}
+
+/// The same; `None` where the touches do not show every unknown.
+pub fn try_solve(model: &Model, data: &Data) -> Option<Solution> {
     let free: Vec<usize> = (0..model.n_unknowns()).collect();
     let start = DVector::from_vec(model.start());
     let nominal = model.prepare(&data.nominal);
     let touches = |batch| Touches::new(batch, &data.visits, model.start(), &free, &[], (SIGMA_MM, 0.0));
     let gram = touches(&nominal).normal(&start, true).gram;
-    let seen = solve::observe_gram(&gram).expect("every unknown is seen");
+    let seen = solve::observe_gram(&gram)?;
     let batch = model.prepare(&data.observations);
-    let solution = solve::minimise(&touches(&batch), start, &seen);
-    assert!(solution.converged, "{}", solution.stopped);
-    solution
+    Some(solve::minimise(&touches(&batch), start, &seen))
 }
 
 /// The machine of all benchmarks.

@@ -39,6 +39,9 @@ pub struct EffectAsWritten {
     pub at: Spanned<String>,
     /// Applies where its axes stand on this side only.
     pub side: Option<SideAsWritten>,
+    /// `ball`: rotations of an axis that bears the workpiece are stated about the machine's ball point (the ball's centre
+    /// at zero), not about the reference point or the origin of R.
+    pub about: Option<About>,
     /// Letters of further axes that the machine must have (on that side).
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
@@ -76,6 +79,14 @@ pub struct EffectAsWritten {
 pub enum SideAsWritten {
     Workpiece,
     Tool,
+}
+
+/// Point about which rotations are stated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum About {
+    /// The ball's centre at zero.
+    Ball,
 }
 
 /// What an effect has a set of parameters for.

@@ -91,6 +91,8 @@ pub struct Effect {
     pub family: String,
     /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
     pub discrete: bool,
+    /// Rotations of an axis that bears the workpiece are stated about the ball's centre at zero.
+    pub about_ball: bool,
     /// One set of parameters for each block.
     pub per_block: bool,
     /// Solved for, but no result.

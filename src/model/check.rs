@@ -124,6 +124,7 @@ impl<'a> Check<'a> {
             unless,
             family: if w.family.is_empty() { "own".to_owned() } else { w.family.clone() },
             discrete: w.discrete,
+            about_ball: w.about.is_some(),
             per_block: w.per == Some(Per::Block),
             nuisance: w.nuisance,
             paper: w.paper,

@@ -127,6 +127,21 @@ pub(super) struct Link {
     pub after: Option<usize>,
 }
 
+/// What a turn about the ball's point is besides the same turn about the centre of its place, `lever` from the ball's point
+/// to that centre: displacements ω × lever, as (component, mm per rad).
+fn lever_of(machine: &Machine, effect: &Effect, term: &Term, lever: &Vector3<f64>) -> Vec<(usize, f64)> {
+    let bears = |axis| machine.axis(axis).is_some_and(|a| a.side == Side::Workpiece);
+    match term.place {
+        Place::Before(axis) | Place::After(axis) if effect.about_ball && term.component >= 3 && bears(axis) => {
+            let mut turn = Vector3::zeros();
+            turn[term.component - 3] = 1.0;
+            let moved = turn.cross(lever);
+            (0..3).map(|k| (k, moved[k])).filter(|(_, amount)| *amount != 0.0).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
 /// Machine and effects, ready to predict.
 #[derive(Debug, Clone)]
 pub struct Model {
@@ -214,6 +229,7 @@ impl Model {
         for (i, p) in effect.parameters.iter().enumerate() {
             let at_reference = effect.terms.iter().any(|t| {
                 t.parameter == i
+                    && !(effect.about_ball && t.component >= 3)
                     && matches!(t.place, Place::Before(a) if a.is_rotary() && machine.axis(a).is_some_and(|x| x.side == Side::Workpiece))
             });
             let list = match set_up {
@@ -247,16 +263,24 @@ impl Model {
                 (Some(_), None) => Changes::Never,
             };
             self.slots[slot].changes = self.slots[slot].changes.max(changes);
-            self.active.push(Active {
-                unknown: first + term.parameter,
-                first,
-                count: effect.parameters.len(),
-                slot,
-                component: term.component,
-                factor: effect.parameters[term.parameter].factor,
-                term: term.clone(),
-                set_up,
-            });
+            let factor = effect.parameters[term.parameter].factor;
+            let mut act = |component: usize, factor: f64| {
+                self.active.push(Active {
+                    unknown: first + term.parameter,
+                    first,
+                    count: effect.parameters.len(),
+                    slot,
+                    component,
+                    factor,
+                    term: term.clone(),
+                    set_up,
+                });
+            };
+            act(term.component, factor);
+            let lever = self.slots[slot].centre - machine.reference.ball;
+            for (component, amount) in lever_of(machine, effect, term, &lever) {
+                act(component, factor * amount);
+            }
         }
     }
 

@@ -216,8 +216,7 @@ impl Check<'_> {
             (*places.get_ref()).min(12)
         });
         let mark = if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' };
-        let other_mark =
-            log.other_decimal_mark.as_ref().map(|other| if self.mark(other) == ',' { b',' } else { b'.' });
+        let other_mark = log.other_decimal_mark.as_ref().map(|other| if self.mark(other) == ',' { b',' } else { b'.' });
         if let Some(word) = log.other_decimal_mark.as_ref().filter(|_| other_mark == Some(mark)) {
             let help = "leave it out, or name the mark that decimal_mark does not name";
             self.error(&word.span(), "post::word", "other_decimal_mark is decimal_mark".into(), help);

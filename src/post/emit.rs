@@ -1,6 +1,6 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
-use super::as_written::{EndOfLine, LengthUnit};
+use super::as_written::LengthUnit;
 use super::opening::Opening;
 use super::spelling::name_of;
 use super::{Frame, Postprocessor, log_text};
@@ -531,61 +531,4 @@ fn map(pairs: impl IntoIterator<Item = (String, String)>) -> Value {
 
 fn xyz(v: &nalgebra::Vector3<f64>) -> AxisMap {
     AxisMap::xyz(v.x, v.y, v.z)
-}
-
-impl Postprocessor {
-    /// Whether a template names labels; numbers are scarce on some controls, so only those take any.
-    fn uses_labels(&self, template: &str) -> bool {
-        let names = |text: &str| text.contains("label") || text.contains("include");
-        self.templates.get_template(template).is_ok_and(|t| names(t.source()))
-    }
-
-    /// A name as the control takes it.
-    fn nc_name(&self, name: &str) -> String {
-        let (allowed, other) = &self.name_characters;
-        let spelled = |c: char| if allowed.contains(c) { c.to_string() } else { other.clone() };
-        name.to_ascii_uppercase().chars().map(spelled).collect()
-    }
-
-    /// The text with the control's line ends.
-    fn ended(&self, text: String) -> String {
-        match self.end_of_line {
-            EndOfLine::Lf => text,
-            EndOfLine::Crlf => text.replace('\n', "\r\n"),
-            EndOfLine::Cr => text.replace('\n', "\r"),
-        }
-    }
-
-    /// The text with or without its empty lines, numbered where the control wants it.
-    fn lines(&self, text: &str) -> String {
-        let kept = text.lines().filter(|line| self.blank_lines || !line.trim().is_empty());
-        let mut out = String::with_capacity(text.len());
-        for (index, line) in kept.enumerate() {
-            if let Some(rule) = &self.block_numbers {
-                out.push_str(&rule.word.replace("{n}", &(rule.first + index * rule.step).to_string()));
-            }
-            out.push_str(line);
-            out.push('\n');
-        }
-        out
-    }
-
-    /// Renders one template; a failure names the template and its line.
-    pub(super) fn render(&self, template: &str, context: Value) -> Result<String> {
-        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|outer| {
-            // an error in an included part stands behind the one that says which part
-            let mut e = &outer;
-            while let Some(inner) = std::error::Error::source(e).and_then(|s| s.downcast_ref::<minijinja::Error>()) {
-                e = inner;
-            }
-            let template = e.name().unwrap_or(template);
-            let line = e.line().map(|l| format!(", line {l}")).unwrap_or_default();
-            let mut detail = e.detail().map_or_else(|| e.kind().to_string(), str::to_owned);
-            if e.kind() == minijinja::ErrorKind::UndefinedError {
-                detail = format!("a name is not known here ({detail})");
-            }
-            Failure::new("post::template", format!("controller {}: template {template}{line}: {detail}", self.name))
-                .help("docs/guide/controllers.md lists what each template is given")
-        })
-    }
 }

@@ -32,10 +32,7 @@ pub fn parse_alone(source: &Source) -> Result<(Postprocessor, Findings)> {
 ///
 /// # Errors
 /// As [`parse_alone`], and when the base is not found or unusable.
-pub(super) fn parse(
-    source: &Source,
-    read: &dyn Fn(&Path) -> Result<String>,
-) -> Result<(Postprocessor, Findings)> {
+pub(super) fn parse(source: &Source, read: &dyn Fn(&Path) -> Result<String>) -> Result<(Postprocessor, Findings)> {
     let Some(whole) = completed(source, read, 0)? else { return check::parse(source) };
     let (post, findings) = check::parse(&whole)?;
     Ok((Postprocessor { text: source.inner().clone(), ..post }, findings))
@@ -63,8 +60,8 @@ fn completed(text: &Source, read: &dyn Fn(&Path) -> Result<String>, depth: usize
         source(format!("postprocessors/{file} (built in)"), *text)
     };
     let base = completed(&base, read, depth + 1)?.unwrap_or(base);
-    let mut whole: Table =
-        toml::from_str(base.inner()).map_err(|e| from_toml(&e, &base, "post::not_toml").help("the base is unusable"))?;
+    let mut whole: Table = toml::from_str(base.inner())
+        .map_err(|e| from_toml(&e, &base, "post::not_toml").help("the base is unusable"))?;
     merge(&mut whole, own);
     let written = toml::to_string_pretty(&whole).map_err(|e| {
         Failure::new("post::base", format!("{} cannot be completed from {word:?}: {e}", text.name()))
@@ -118,7 +115,10 @@ unverified = "the builder's sheet"
     fn a_change_needs_a_source_of_its_own() {
         let silent = VARIANT.replace("unverified = \"the builder's sheet\"\n", "");
         let failure = parse_alone(&source("mine.toml", silent)).unwrap_err();
-        assert!(failure.0.iter().any(|f| f.code == "post::no_source" && f.message.contains("write.rapid")), "{failure}");
+        assert!(
+            failure.0.iter().any(|f| f.code == "post::no_source" && f.message.contains("write.rapid")),
+            "{failure}"
+        );
     }
 
     #[test]

@@ -12,12 +12,13 @@ mod inherit;
 mod log_text;
 mod moves;
 mod opening;
+mod render;
 mod spelling;
 pub mod tables;
 
-pub use inherit::parse_alone as parse;
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
+pub use inherit::parse_alone as parse;
 pub use log_text::{LogRecord, digest};
 pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
 pub use spelling::{CommentRule, NumberRule};

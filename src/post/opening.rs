@@ -76,7 +76,10 @@ impl Writer<'_> {
         }
         let changes = stop.tool_length_mm.to_bits() != self.frame.length_mm().to_bits();
         if self.frame.is_tcp() && changes && self.post.tcp.as_ref().is_some_and(|tcp| !tcp.other_stylus) {
-            let message = format!("under its transformation controller {} cannot take up another stylus in the middle of a program", self.post.name);
+            let message = format!(
+                "under its transformation controller {} cannot take up another stylus in the middle of a program",
+                self.post.name
+            );
             return Err(Failure::new("post::other_stylus", message)
                 .help("make a program for each stylus, or generate without --tcp"));
         }

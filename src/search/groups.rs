@@ -18,8 +18,8 @@ pub const ADDS_NOTHING: f64 = 0.05;
 /// Expected sizes above this many typical sizes are implausible.
 pub const PLAUSIBLE: f64 = 5.0;
 
-/// Logarithms of p-values closer than this make no difference (a factor of 20).
-const AS_LIKELY: f64 = 3.0;
+/// Logarithms of p-values closer than this make no difference (a factor of 3).
+const AS_LIKELY: f64 = 1.0;
 
 /// A candidate in a group.
 #[derive(Debug, Clone, PartialEq)]

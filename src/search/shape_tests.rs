@@ -2,7 +2,6 @@
 
 use super::dependence::{Dependence, dependences, serial};
 use super::generic::{Direction, Features, Generics, Kind, Variable, generics};
-use super::held_out::{Choice, held_out};
 use super::testing::{noise, noise_matrix, rng};
 use super::tests::{ask, correlated_library, mixtures};
 use super::*;
@@ -147,63 +146,6 @@ fn named_effects_and_shapes_share_one_level() {
     println!("clean data: any proposal in {any} of {runs}, generic in {generic}");
     // 5 % and two standard errors
     assert!(any * 1000 < 78 * runs, "{any}");
-}
-
-/// Milliseconds of one sweep: `cargo test --release --lib search::shape_tests::speed -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement, not a check"]
-fn speed() {
-    let mut rng = rng(30);
-    for rows in [356, 10_000] {
-        let a = noise_matrix(&mut rng, rows, 60);
-        let mut library = Library::new(rows);
-        for i in 0..100 {
-            library.push(format!("c{i}"), Origin::Catalogue, &noise_matrix(&mut rng, rows, 2 + i % 2));
-        }
-        let r = noise(&mut rng, rows);
-        let mut times = [Vec::new(), Vec::new(), Vec::new()];
-        for _ in 0..15 {
-            let start = std::time::Instant::now();
-            let base = Basis::new(&a);
-            times[0].push(start.elapsed().as_secs_f64() * 1e3);
-            let start = std::time::Instant::now();
-            let search = Search::new(ask(&r, &base), &library);
-            times[1].push(start.elapsed().as_secs_f64() * 1e3);
-            let start = std::time::Instant::now();
-            assert!(!search.groups(3).is_empty());
-            times[2].push(start.elapsed().as_secs_f64() * 1e3);
-        }
-        let [base, score, groups] = times.map(|t| t.into_iter().fold(f64::INFINITY, f64::min));
-        let n = library.n_columns();
-        println!("{rows} x 60, {n} columns: base {base:.2} ms, score {score:.2} ms, groups {groups:.2} ms");
-    }
-    let rows = 700;
-    let base = Basis::new(&noise_matrix(&mut rng, rows, 60));
-    let library = mixtures(&mut rng, rows, 125, 4.0);
-    let r = noise(&mut rng, rows) - library.columns(4, 0).column(0) * 0.3;
-    let groups: Vec<usize> = (0..rows).map(|i| i / 24).collect();
-    let start = std::time::Instant::now();
-    let result = held_out(ask(&r, &base), &library, &groups, Choice::Redone);
-    let seconds = start.elapsed().as_secs_f64();
-    println!(
-        "nested hold-out, {rows} x 60, {} columns, {} groups: {seconds:.3} s",
-        library.n_columns(),
-        result.folds.len()
-    );
-    let f = table_of_touches(&mut rng);
-    let base = location_base(&f);
-    let r = noise(&mut rng, f.block.len());
-    let start = std::time::Instant::now();
-    let g = generics(&f, |raw| raw);
-    let built = start.elapsed().as_secs_f64();
-    let _ = found(&f, &g, &base, &r);
-    println!(
-        "generic shapes, {} touches, {} candidates, {} columns: built {built:.3} s, all {:.3} s",
-        r.len(),
-        g.shapes.len(),
-        g.library.n_columns(),
-        start.elapsed().as_secs_f64()
-    );
 }
 
 #[test]

@@ -21,9 +21,8 @@ pub const KINDS: [(&str, &[&str], bool); 6] = [
     ("chips on three faces", &["face"], false),
 ];
 
-/// A known effect of noncentrality 25 is found nearly always; among two thousand shapes that share a hundredth of the
-/// level it takes twice that.
-const SEEN: f64 = 50.0;
+/// Smaller ones do not count.
+const SEEN: f64 = 25.0;
 
 /// What came of one.
 #[derive(Debug, Clone)]

@@ -6,9 +6,9 @@
 //! the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
 use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
-use super::{Parameter, Refusal, Settings, across, along, axis_here, axis_of, dof_letter};
+use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
-use crate::machine::Machine;
+use crate::machine::{Machine, Side};
 use crate::simulate::terms::{Shape, Target};
 
 /// The travel at which polynomial errors have their stated size, mm.
@@ -81,7 +81,11 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         }
         ("angular", pair) => {
             let (dof, axis) = pair_in(pair, machine)?;
-            if dof < 3 { Err(Refusal::Unknown) } else { Ok(vec![polynomial(axis, dof, 1, false)]) }
+            if dof < 3 {
+                Err(Refusal::Unknown)
+            } else {
+                Ok(vec![at_the_ball(polynomial(axis, dof, 1, false), machine)])
+            }
         }
         _ => Err(Refusal::Unknown),
     }
@@ -107,6 +111,32 @@ fn pair_in(pair: &str, machine: &Machine) -> Result<(usize, AxisName), Refusal> 
     }
     let (dof, axis) = pair.split_at(1);
     Ok((axis_in(dof)?.index(), linear_in(axis, machine)?))
+}
+
+/// A lean of what bears the workpiece, such that the place of the ball's centre at zero stays where it is: the chain leans
+/// it about the reference point (rotary axes) or the origin of R (linear ones), and a shift brings it back.
+fn at_the_ball(mut parameter: Parameter, machine: &Machine) -> Parameter {
+    if let Role::Amount(acts) = &mut parameter.role
+        && let Some(&(target, shape, factor)) = acts.first()
+    {
+        acts.extend(back_to_the_ball(target, machine).into_iter().map(|(at, amount)| (at, shape, factor * amount)));
+    }
+    parameter
+}
+
+/// The shifts, mm per rad, that bring the place of the ball's centre at zero back where a lean has moved it; none where the
+/// axis does not bear the workpiece.
+pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)> {
+    let Target::Axis { axis, after, dof } = target else { return Vec::new() };
+    if dof < 3 || !axis_here(axis, machine).is_ok_and(|a| a.side == Side::Workpiece) {
+        return Vec::new();
+    }
+    let (pivot, ball) = (&machine.reference.pivot, &machine.reference.ball);
+    let leans_at = if axis.is_rotary() { [pivot.x, pivot.y, pivot.z] } else { [0.0; 3] };
+    let arm = [ball.x - leans_at[0], ball.y - leans_at[1], ball.z - leans_at[2]];
+    // a small turn about axis d moves the ball's place by -arm[n] towards m and by arm[m] towards n (d, m, n right-handed)
+    let (m, n) = ((dof - 2) % 3, (dof - 1) % 3);
+    vec![(Target::Axis { axis, after, dof: m }, arm[n]), (Target::Axis { axis, after, dof: n }, -arm[m])]
 }
 
 fn moved(axis: AxisName, dof: usize) -> Target {
@@ -172,7 +202,10 @@ fn harmonic(family: &str, axis: AxisName, k: &str, machine: &Machine) -> Result<
     axis_here(axis, machine)?;
     let row = |dof: usize, letter: char, shape: Shape| {
         let unit = if dof < 3 { Um } else { Urad };
-        Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape)
+        at_the_ball(
+            Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape),
+            machine,
+        )
     };
     let pair = |dof: usize| [row(dof, 'c', Shape::Cosine(axis, order)), row(dof, 's', Shape::Sine(axis, order))];
     Ok(dofs.into_iter().flat_map(pair).collect())

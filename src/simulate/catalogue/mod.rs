@@ -3,7 +3,7 @@
 //!
 //! The physics is written down here once more, apart from the catalogue that the fit uses: that the two agree is a test.
 
-mod axes;
+pub mod axes;
 mod body;
 mod location;
 mod probe;

@@ -30,6 +30,7 @@ struct OwnEffect {
     id: Spanned<String>,
     at: Spanned<String>,
     side: Option<OwnSide>,
+    about: Option<OwnAbout>,
     #[serde(default)]
     needs: Vec<Spanned<String>>,
     #[serde(default)]
@@ -56,6 +57,13 @@ struct OwnEffect {
     _discrete: Option<bool>,
     #[serde(rename = "paper")]
     _paper: Option<bool>,
+}
+
+/// Rotations of an axis that bears the workpiece leave the place of the ball's centre at zero where it is.
+#[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "lowercase")]
+enum OwnAbout {
+    Ball,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -107,8 +115,8 @@ pub struct Own {
     pub id: String,
     /// Its parameters.
     pub parameters: Vec<OwnParameter>,
-    /// Which parameter acts where, and how.
-    acts: Vec<(usize, Target, Formula)>,
+    /// Which parameter acts where, how, and by how much.
+    acts: Vec<(usize, Target, Formula, f64)>,
     /// Why the machine does not have it.
     pub not_here: Option<String>,
 }
@@ -122,8 +130,8 @@ impl Own {
         }
         let given = self.acts.iter().filter(|(i, ..)| values.iter().any(|(v, _)| v == i));
         let (mut terms, mut formulas) = (Vec::new(), Vec::new());
-        for (parameter, target, formula) in given {
-            let amount = inside(self.parameters[*parameter].unit) * all[*parameter];
+        for (parameter, target, formula, by) in given {
+            let amount = by * inside(self.parameters[*parameter].unit) * all[*parameter];
             terms.push(Term { target: *target, shape: Shape::Formula(first + formulas.len()), amount });
             formulas.push(formula.with(&all, only));
         }
@@ -247,7 +255,11 @@ impl Reader<'_> {
             };
             let parameter = names.iter().position(|n| n == term.parameter.get_ref());
             if let (Some(parameter), Some(target), Some(formula)) = (parameter, target, formula) {
-                acts.push((parameter, target, formula));
+                if let Some(OwnAbout::Ball) = row.about {
+                    let back = super::catalogue::axes::back_to_the_ball(target, self.machine);
+                    acts.extend(back.into_iter().map(|(target, by)| (parameter, target, formula.clone(), by)));
+                }
+                acts.push((parameter, target, formula, 1.0));
             }
         }
         if self.findings.0.len() > before {

@@ -1,0 +1,63 @@
+//! One template → text, and the text as the control takes it: lines, block numbers, line ends, names.
+
+use super::Postprocessor;
+use super::as_written::EndOfLine;
+use crate::diag::{Failure, Result};
+use minijinja::Value;
+
+impl Postprocessor {
+    /// Whether a template names labels; numbers are scarce on some controls, so only those take any.
+    pub(super) fn uses_labels(&self, template: &str) -> bool {
+        let names = |text: &str| text.contains("label") || text.contains("include");
+        self.templates.get_template(template).is_ok_and(|t| names(t.source()))
+    }
+
+    /// A name as the control takes it.
+    pub(super) fn nc_name(&self, name: &str) -> String {
+        let (allowed, other) = &self.name_characters;
+        let spelled = |c: char| if allowed.contains(c) { c.to_string() } else { other.clone() };
+        name.to_ascii_uppercase().chars().map(spelled).collect()
+    }
+
+    /// The text with the control's line ends.
+    pub(super) fn ended(&self, text: String) -> String {
+        match self.end_of_line {
+            EndOfLine::Lf => text,
+            EndOfLine::Crlf => text.replace('\n', "\r\n"),
+            EndOfLine::Cr => text.replace('\n', "\r"),
+        }
+    }
+
+    /// The text with or without its empty lines, numbered where the control wants it.
+    pub(super) fn lines(&self, text: &str) -> String {
+        let kept = text.lines().filter(|line| self.blank_lines || !line.trim().is_empty());
+        let mut out = String::with_capacity(text.len());
+        for (index, line) in kept.enumerate() {
+            if let Some(rule) = &self.block_numbers {
+                out.push_str(&rule.word.replace("{n}", &(rule.first + index * rule.step).to_string()));
+            }
+            out.push_str(line);
+            out.push('\n');
+        }
+        out
+    }
+
+    /// Renders one template; a failure names the template and its line.
+    pub(super) fn render(&self, template: &str, context: Value) -> Result<String> {
+        self.templates.get_template(template).and_then(|t| t.render(context)).map_err(|outer| {
+            // an error in an included part stands behind the one that says which part
+            let mut e = &outer;
+            while let Some(inner) = std::error::Error::source(e).and_then(|s| s.downcast_ref::<minijinja::Error>()) {
+                e = inner;
+            }
+            let template = e.name().unwrap_or(template);
+            let line = e.line().map(|l| format!(", line {l}")).unwrap_or_default();
+            let mut detail = e.detail().map_or_else(|| e.kind().to_string(), str::to_owned);
+            if e.kind() == minijinja::ErrorKind::UndefinedError {
+                detail = format!("a name is not known here ({detail})");
+            }
+            Failure::new("post::template", format!("controller {}: template {template}{line}: {detail}", self.name))
+                .help("docs/guide/controllers.md lists what each template is given")
+        })
+    }
+}
