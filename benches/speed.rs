@@ -124,8 +124,10 @@ fn parse(c: &mut Criterion) {
             return; // a log knows no unknowns
         }
         let Problem { machine, plan, touches, .. } = &problem;
-        let records: Vec<LogRecord> =
-            touches.iter().map(|t| LogRecord { id: t.id, status: t.status, position: t.position, time_s: None }).collect();
+        let records: Vec<LogRecord> = touches
+            .iter()
+            .map(|t| LogRecord { id: t.id, status: t.status, position: t.position, time_s: None })
+            .collect();
         let text = post.log_text(machine, plan, &records);
         group.throughput(Throughput::Bytes(text.len() as u64));
         group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {

@@ -13,8 +13,8 @@ pub mod geometry;
 pub mod symbols;
 pub mod units;
 
-pub mod cli;
 pub mod check;
+pub mod cli;
 pub mod compare;
 pub mod design;
 pub mod diagnose;

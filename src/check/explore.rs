@@ -239,12 +239,5 @@ fn follow<D: Dialect>(
             }
         }
     }
-    Branch {
-        leaves,
-        deviation,
-        over: run.is_over(),
-        fault,
-        settings: run.dialect.settings(),
-        trace: run.vm.trace,
-    }
+    Branch { leaves, deviation, over: run.is_over(), fault, settings: run.dialect.settings(), trace: run.vm.trace }
 }

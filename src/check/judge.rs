@@ -182,12 +182,7 @@ struct Walk<'a, 'b> {
 }
 
 impl<'a, 'b> Walk<'a, 'b> {
-    fn new(
-        case: &'a Case<'a>,
-        told: &'a Told,
-        said: &'b mut Said,
-        proofs: &'b mut BTreeMap<Key, Proof>,
-    ) -> Self {
+    fn new(case: &'a Case<'a>, told: &'a Told, said: &'b mut Said, proofs: &'b mut BTreeMap<Key, Proof>) -> Self {
         let lift = case.scenes.first().and_then(Scene::lift);
         Self {
             case,
@@ -223,7 +218,12 @@ impl<'a, 'b> Walk<'a, 'b> {
             self.say("check::ends_in_contact", &end, "the program ends with the ball at a block".into(), "");
         }
         if let Some(fault) = &told.fault {
-            self.say("check::not_run", &fault.at, fault.says.clone(), "the control would stop here, or do something that axiscal does not know");
+            self.say(
+                "check::not_run",
+                &fault.at,
+                fault.says.clone(),
+                "the control would stop here, or do something that axiscal does not know",
+            );
         } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
             let shown = told.trunk.iter().rev().find_map(|h| match &h.event {
                 Event::Abort(text) | Event::Message(text) if !text.is_empty() => Some(text.as_str()),
@@ -324,7 +324,12 @@ impl<'a, 'b> Walk<'a, 'b> {
             && self.all_known(known)
         {
             let most = self.case.machine.probe.position_feed;
-            self.say("check::feed", at, format!("the feed is {feed} mm/min, the machine's position_feed is {most}"), "");
+            self.say(
+                "check::feed",
+                at,
+                format!("the feed is {feed} mm/min, the machine's position_feed is {most}"),
+                "",
+            );
         }
         let rotary: Vec<AxisName> = moving.iter().copied().filter(|a| a.is_rotary()).collect();
         if !self.all_known(known) {
@@ -464,7 +469,8 @@ impl<'a, 'b> Walk<'a, 'b> {
         let mut bounded = [false; 6];
         moving.iter().for_each(|a| bounded[a.index()] = true);
         if probe.feed > machine.position_feed + self.case.same {
-            let says = format!("it probes at {} mm/min, the machine's position_feed is {}", probe.feed, machine.position_feed);
+            let says =
+                format!("it probes at {} mm/min, the machine's position_feed is {}", probe.feed, machine.position_feed);
             self.say("check::feed", at, says, "");
         }
         if moving.iter().any(|a| a.is_rotary()) {
@@ -539,7 +545,8 @@ impl<'a, 'b> Walk<'a, 'b> {
             self.prove(at, part, *reached, *to, How::Straight(Manner::PastContact(b)));
         }
         if !self.came_guarded {
-            let says = "the ball did not come to the beginning of the search by a move that stops at contact".to_owned();
+            let says =
+                "the ball did not come to the beginning of the search by a move that stops at contact".to_owned();
             self.say("check::unguarded", at, says, "");
         }
         self.came_guarded = false;
@@ -577,7 +584,9 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
     let moves = branch.trace.iter().skip(1).find(|h| match &h.event {
         Event::Move { from, to, .. } => !(stuck && goes_back(branch, from, to)),
         // with the probe deflected a search ends where it begins
-        Event::Probe { probe, outcome } => !(stuck && (outcome.part == 0.0 || goes_back(branch, &probe.from, &probe.to))),
+        Event::Probe { probe, outcome } => {
+            !(stuck && (outcome.part == 0.0 || goes_back(branch, &probe.from, &probe.to)))
+        }
         _ => false,
     });
     if let Some(moves) = moves {
@@ -588,7 +597,8 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
         complain(&first.at, "the program goes on");
         return;
     }
-    let shows = |h: &Happened| matches!(&h.event, Event::Message(t) | Event::Wait(t) | Event::Abort(t) if !t.is_empty());
+    let shows =
+        |h: &Happened| matches!(&h.event, Event::Message(t) | Event::Wait(t) | Event::Abort(t) if !t.is_empty());
     if !branch.trace.iter().any(shows) {
         complain(&first.at, "no message is shown");
     }
@@ -614,7 +624,9 @@ fn goes_back(branch: &Branch, from: &Position, to: &Position) -> bool {
     let along = probe.to.xyz_mm() - probe.from.xyz_mm();
     let way = to.xyz_mm() - from.xyz_mm();
     let turned = from.0[3..] != to.0[3..];
-    !turned && way.dot(&along) <= 0.0 && (way.norm() < 1e-9 || way.cross(&along).norm() < 1e-3 * way.norm() * along.norm())
+    !turned
+        && way.dot(&along) <= 0.0
+        && (way.norm() < 1e-9 || way.cross(&along).norm() < 1e-3 * way.norm() * along.norm())
 }
 
 // ------------------------------------------------------------------------------------------------------ settings

@@ -79,8 +79,11 @@ struct Part {
 /// When the text is not of the dialect's grammar, or plan and machine do not belong together.
 pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
     let rule = post.check.as_ref().ok_or_else(|| {
-        Failure::new("check::no_dialect", format!("controller {} does not say how its programs are read back", post.name))
-            .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
+        Failure::new(
+            "check::no_dialect",
+            format!("controller {} does not say how its programs are read back", post.name),
+        )
+        .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
     })?;
     let text = source.inner();
     if let Some(line) = lines::lines(text).find(|l| l.text.chars().count() > post.line_length) {
@@ -159,9 +162,9 @@ fn parts_of_plan(machine: &Machine, plan: &Plan) -> Result<Vec<Part>> {
                     .help("plan and machine belong together: make the plan again")
             };
             Ok(Part {
-                machine: machine.with_stylus_of(length_mm, radius_mm).ok_or_else(|| {
-                    lacks(format!("a stylus of {length_mm} mm with a ball of radius {radius_mm} mm"))
-                })?,
+                machine: machine
+                    .with_stylus_of(length_mm, radius_mm)
+                    .ok_or_else(|| lacks(format!("a stylus of {length_mm} mm with a ball of radius {radius_mm} mm")))?,
                 mounting: machine.mounting(name).ok_or_else(|| lacks(format!("mounting {name:?}")))?.clone(),
             })
         })
@@ -177,8 +180,7 @@ fn with_parts(
     parts: Vec<Part>,
 ) -> Result<Checked> {
     let tcp = against.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
-    let scenes: Vec<Scene<'_>> =
-        parts.iter().map(|p| Scene::new(&p.machine, &p.mounting)).collect::<Result<_>>()?;
+    let scenes: Vec<Scene<'_>> = parts.iter().map(|p| Scene::new(&p.machine, &p.mounting)).collect::<Result<_>>()?;
     let bodies = parts.iter().map(|p| Errorless::new(&p.machine, Some(&p.mounting))).collect();
     let world = Arc::new(World::new(bodies, &machine.origin, tcp));
     let told = runs::all(machine, post, against.plan, program, &world, &scenes);
@@ -197,9 +199,9 @@ fn with_parts(
         clear_from_anywhere: told.clear_from_anywhere,
     };
     let mut findings = judge::judge(&case, &told.runs);
-    findings.extend(told.findings.iter().map(|(at, says)| {
-        Finding::error("check::start", says.clone()).at(source, at.clone())
-    }));
+    findings.extend(
+        told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
+    );
     if let Some(begins) = program.begins_at().filter(|b| *b != against.from.max(1)) {
         findings.push(
             Finding::error("check::begins_later", format!("the program begins at set-up {begins}"))
@@ -247,7 +249,10 @@ fn as_written(
         (before..before, says)
     } else {
         let end = places.get(same).map_or(before, |at| at.end);
-        (before..end, "here the program does otherwise than the one that axiscal wrote (moves, log, messages, or what it does when something goes wrong)")
+        (
+            before..end,
+            "here the program does otherwise than the one that axiscal wrote (moves, log, messages, or what it does when something goes wrong)",
+        )
     };
     Some(
         Finding::error("check::changed", says)

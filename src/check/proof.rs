@@ -14,30 +14,36 @@ use std::fmt::Write;
 
 /// The proof of the runs of a program.
 pub fn proof(runs: &[Told]) -> Proof {
-        let mut all = Sha256::new();
-        let mut lines = Vec::new();
-        for (n, told) in runs.iter().enumerate() {
-            let mut text = String::new();
-            // writing into a String cannot fail
-            let _ = writeln!(text, "run {n} from {}", told.from);
-            let mut branches = told.branches.iter().peekable();
-            for (place, happened) in told.trunk.iter().enumerate() {
-                while let Some(branch) = branches.next_if(|b| b.leaves <= place) {
-                    write_branch(&mut text, branch);
-                }
-                write_event(&mut text, happened);
-                if n == 0 && matches!(happened.event, Event::Log(_)) {
-                    lines.push(hex(&Sha256::digest(text.as_bytes()))[..8].to_owned());
-                    all.update(text.as_bytes());
-                    text.clear();
-                }
+    let mut all = Sha256::new();
+    let mut lines = Vec::new();
+    for (n, told) in runs.iter().enumerate() {
+        let mut text = String::new();
+        // writing into a String cannot fail
+        let _ = writeln!(text, "run {n} from {}", told.from);
+        let mut branches = told.branches.iter().peekable();
+        for (place, happened) in told.trunk.iter().enumerate() {
+            while let Some(branch) = branches.next_if(|b| b.leaves <= place) {
+                write_branch(&mut text, branch);
             }
-            branches.for_each(|b| write_branch(&mut text, b));
-            let _ = writeln!(text, "settings {:?} aborted {:?} fault {:?}", told.settings, told.aborted, told.fault.as_ref().map(|f| &f.says));
-            all.update(text.as_bytes());
+            write_event(&mut text, happened);
+            if n == 0 && matches!(happened.event, Event::Log(_)) {
+                lines.push(hex(&Sha256::digest(text.as_bytes()))[..8].to_owned());
+                all.update(text.as_bytes());
+                text.clear();
+            }
         }
-        Proof { sha256: hex(&all.finalize()), lines }
+        branches.for_each(|b| write_branch(&mut text, b));
+        let _ = writeln!(
+            text,
+            "settings {:?} aborted {:?} fault {:?}",
+            told.settings,
+            told.aborted,
+            told.fault.as_ref().map(|f| &f.says)
+        );
+        all.update(text.as_bytes());
     }
+    Proof { sha256: hex(&all.finalize()), lines }
+}
 
 /// The line of the log (from 0) up to which another program still does the same.
 pub fn same_lines(one: &Proof, other: &Proof) -> usize {
@@ -60,7 +66,11 @@ fn place(at: &Position) -> String {
 
 fn write_branch(text: &mut String, branch: &Branch) {
     let fault = branch.fault.as_ref().map(|f| f.says.as_str());
-    let _ = writeln!(text, "branch {:?} over {} fault {fault:?} settings {:?}", branch.deviation, branch.over, branch.settings);
+    let _ = writeln!(
+        text,
+        "branch {:?} over {} fault {fault:?} settings {:?}",
+        branch.deviation, branch.over, branch.settings
+    );
     branch.trace.iter().for_each(|h| write_event(text, h));
 }
 

@@ -3,10 +3,10 @@
 
 use super::code::{Code, Expr, Var, What};
 use super::explore::{Limits, Told, explore};
-use super::{macro_b, ngc};
 use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
 use super::world::World;
+use super::{macro_b, ngc};
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
@@ -156,10 +156,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
     fn all(&self) -> All {
         let (window, clear_from_anywhere) = self.windows();
         let beginning = self.start(&window, 0.5, 0.3);
-        let limits = Limits {
-            placement_mm: self.machine.probe.placement_tolerance,
-            back_off_mm: self.machine.probe.back_off,
-        };
+        let limits =
+            Limits { placement_mm: self.machine.probe.placement_tolerance, back_off_mm: self.machine.probe.back_off };
         let last = self.codes.len();
         // the whole run, the same from elsewhere, and each set-up but the first
         let numbers: Vec<(usize, Start, bool)> = [(1, Start::Awkward, true), (1, Start::Fresh, false)]
@@ -286,9 +284,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let mut window = [[0.0; 2]; 6];
         self.machine.axes.iter().for_each(|a| window[a.name.index()] = a.range);
         let clear = |window: &[[f64; 2]; 6]| {
-            self.scenes.iter().all(|s| {
-                s.lift().is_some_and(|lift| s.clear_from_anywhere(&lift, &|a| window[a.name.index()]))
-            })
+            self.scenes
+                .iter()
+                .all(|s| s.lift().is_some_and(|lift| s.clear_from_anywhere(&lift, &|a| window[a.name.index()])))
         };
         if clear(&window) && !self.tcp() {
             return (window, true);

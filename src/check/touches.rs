@@ -137,7 +137,9 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
             continue;
         };
         let step = 0.5 * 10f64.powi(-(case.post.log.decimals as i32));
-        let room = step + LOGGED + if plan.controller_frame == crate::program::plan::ControllerFrame::Tcp { 1e-4 } else { 0.0 };
+        let room = step
+            + LOGGED
+            + if plan.controller_frame == crate::program::plan::ControllerFrame::Tcp { 1e-4 } else { 0.0 };
         if made.contact().0.iter().zip(raw.position.0).any(|(a, b)| (a - b).abs() > room) {
             let says = format!("touch {id}: the log does not hold the place of the contact");
             said.say(case, "check::log", &place, says, "");
@@ -145,7 +147,10 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
         // a run that begins later searches slowly in its first set-up, which need not touch every block
         let first = met.insert((made.part, planned.block.as_str())) && told.from == 1;
         if first && made.search.1 > case.machine.probe.slow_feed + case.same {
-            let says = format!("touch {id}: the first touch of a block must search at slow_feed ({} mm/min)", case.machine.probe.slow_feed);
+            let says = format!(
+                "touch {id}: the first touch of a block must search at slow_feed ({} mm/min)",
+                case.machine.probe.slow_feed
+            );
             said.say(case, "check::feed", &place, says, "");
         }
         for says in differences(case, made, planned) {
@@ -193,7 +198,11 @@ fn log_is_open(case: &Case<'_>, told: &Told, said: &mut Said) {
                     said.say(case, "check::log", &happened.at, says, "");
                 }
                 if *append != (told.from > 1) {
-                    let says = if *append { "a run from the beginning goes on with an old log" } else { "a run that goes on writes over the log of its beginning" };
+                    let says = if *append {
+                        "a run from the beginning goes on with an old log"
+                    } else {
+                        "a run that goes on writes over the log of its beginning"
+                    };
                     said.say(case, "check::log", &happened.at, says.to_owned(), "");
                 }
             }
@@ -259,7 +268,10 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
     need(!turned, "the rotary axes do not stand at its pose".into());
     need(near(from, &planned.start_position()), "the search does not begin at the plan's start".into());
     need(near(to, &planned.end_position()), "the search does not end at the plan's end".into());
-    need(made.block.as_deref() == Some(planned.block.as_str()), format!("it meets block {}, the plan has block {}", made.block.as_deref().unwrap_or("?"), planned.block));
+    need(
+        made.block.as_deref() == Some(planned.block.as_str()),
+        format!("it meets block {}, the plan has block {}", made.block.as_deref().unwrap_or("?"), planned.block),
+    );
     const NOMINAL_MM: f64 = 2e-3;
     let nominal = planned.nominal_position();
     need(
@@ -273,13 +285,22 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
     );
     match &made.measured {
         Some((places, feed, overridden)) => {
-            need(near(&places[1], &planned.end_position()), "the measuring touch does not end at the plan's end".into());
+            need(
+                near(&places[1], &planned.end_position()),
+                "the measuring touch does not end at the plan's end".into(),
+            );
             need((feed - slow).abs() <= case.same, format!("it measures at {feed} mm/min, the plan has {slow}"));
             need(!overridden, "the feed override acts on the measuring touch".into());
             let back = (places[0].xyz_mm() - contact.xyz_mm()).norm();
-            need((back - probe.back_off).abs() <= 0.01 + case.same, format!("it moves off {back:.3} mm before it measures, the machine's back_off is {}", probe.back_off));
+            need(
+                (back - probe.back_off).abs() <= 0.01 + case.same,
+                format!("it moves off {back:.3} mm before it measures, the machine's back_off is {}", probe.back_off),
+            );
         }
-        None => need((made.search.1 - slow).abs() <= case.same, "it is not touched a second time at the measuring feed".into()),
+        None => need(
+            (made.search.1 - slow).abs() <= case.same,
+            "it is not touched a second time at the measuring feed".into(),
+        ),
     }
     for (axis, sense) in planned.from.iter() {
         need(made.senses.get(axis) == Some(sense), format!("axis {axis} came in another sense than planned"));

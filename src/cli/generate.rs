@@ -124,7 +124,10 @@ pub(super) fn prove(
     io: &Io,
 ) -> Result<Option<Proof>> {
     if post.check.is_none() {
-        let what = format!("controller {} does not say how its programs are read back: the program was not checked", post.name);
+        let what = format!(
+            "controller {} does not say how its programs are read back: the program was not checked",
+            post.name
+        );
         io.report(&[Finding::warning("check::no_dialect", what)
             .help("write [check] in the postprocessor file: docs/guide/check.md")]);
         return Ok(None);

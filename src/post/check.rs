@@ -43,7 +43,13 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     let reading = file.check.as_ref().map(|c| {
         check.origin("check", &c.source, &c.unverified, &c.from.span());
         check.word("from", &c.from, |f| !f.trim().is_empty(), "the variable that the program sets to 1 near its top");
-        CheckRule { dialect: c.dialect, from: c.from.get_ref().clone(), leaves: c.leaves.clone(), after_abort: c.after_abort.clone(), log_always_open: c.log_always_open }
+        CheckRule {
+            dialect: c.dialect,
+            from: c.from.get_ref().clone(),
+            leaves: c.leaves.clone(),
+            after_abort: c.after_abort.clone(),
+            log_always_open: c.log_always_open,
+        }
     });
     let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {

@@ -11,9 +11,9 @@
 
 pub mod catalogue;
 mod chain;
-mod errorless;
 mod contact;
 pub mod control;
+mod errorless;
 mod noise;
 mod own;
 mod prepare;

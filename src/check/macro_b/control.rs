@@ -159,9 +159,21 @@ impl MacroB {
             3001 => self.seconds * 1000.0,
             3004 => self.holds,
             4002 => self.plane,
-            4003 => if self.incremental { 91.0 } else { 90.0 },
+            4003 => {
+                if self.incremental {
+                    91.0
+                } else {
+                    90.0
+                }
+            }
             4005 => self.feed_mode,
-            4006 => if self.inch { 20.0 } else { 21.0 },
+            4006 => {
+                if self.inch {
+                    20.0
+                } else {
+                    21.0
+                }
+            }
             4012 | 4014 => self.system,
             4130 => self.system_p,
             5021..=5026 => {
@@ -292,7 +304,9 @@ impl Dialect for MacroB {
         }
         let rate = match motion {
             0 => Rate::Rapid,
-            _ if self.feed_mode != 94.0 || self.feed <= 0.0 => return Err("G1 needs a feed, in mm per minute".to_owned()),
+            _ if self.feed_mode != 94.0 || self.feed <= 0.0 => {
+                return Err("G1 needs a feed, in mm per minute".to_owned());
+            }
             _ => Rate::Feed(self.feed),
         };
         vm.go(&to, rate, true)?;

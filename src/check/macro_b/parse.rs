@@ -130,10 +130,12 @@ impl Reader {
     }
 
     fn assignment<'a>(&mut self, line: &Line<'a>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
-        let (after, n) = preceded(char('#'), digit1).parse(rest).map_err(|e: Failed<'_>| line.unread(&e, "a variable"))?;
+        let (after, n) =
+            preceded(char('#'), digit1).parse(rest).map_err(|e: Failed<'_>| line.unread(&e, "a variable"))?;
         let variable = sequence_number(line, rest, n)?;
-        let (after, value) =
-            preceded(char('='), cut(expression)).parse(after).map_err(|e: Failed<'_>| line.unread(&e, "= and a value"))?;
+        let (after, value) = preceded(char('='), cut(expression))
+            .parse(after)
+            .map_err(|e: Failed<'_>| line.unread(&e, "= and a value"))?;
         if matches!(variable, 3000 | 3006) {
             let (left, body) = delimited(char('('), comment_text, char(')'))
                 .parse(after)

@@ -210,7 +210,8 @@ impl Ngc {
             return Err("of G10 only L2 is known".to_owned());
         }
         let n = value("P").ok_or("G10 L2 needs P")?;
-        let system = (1..=SYSTEMS).find(|s| *s as f64 == n).ok_or_else(|| format!("there is no coordinate system P{n}"))? - 1;
+        let system =
+            (1..=SYSTEMS).find(|s| *s as f64 == n).ok_or_else(|| format!("there is no coordinate system P{n}"))? - 1;
         let mut offsets = self.systems[system];
         for axis in AxisName::ALL {
             if let Some(x) = words.iter().find(|w| w.address.starts_with(axis.letter())) {
@@ -326,8 +327,24 @@ const GROUPS: [&[i64]; 10] = [
 
 /// Predefined parameters (manual 11.3.5): they cannot be written.
 const READ_ONLY: [&str; 18] = [
-    "_task", "_metric", "_imperial", "_tool_offset", "_absolute", "_incremental", "_x", "_y", "_z", "_a", "_b", "_c",
-    "_abs_x", "_abs_y", "_abs_z", "_abs_a", "_abs_b", "_abs_c",
+    "_task",
+    "_metric",
+    "_imperial",
+    "_tool_offset",
+    "_absolute",
+    "_incremental",
+    "_x",
+    "_y",
+    "_z",
+    "_a",
+    "_b",
+    "_c",
+    "_abs_x",
+    "_abs_y",
+    "_abs_z",
+    "_abs_a",
+    "_abs_b",
+    "_abs_c",
 ];
 
 impl Dialect for Ngc {

@@ -11,7 +11,7 @@ use nom::character::complete::{char, digit1, one_of};
 use nom::combinator::{cut, opt};
 use nom::sequence::{delimited, preceded};
 use nom::{IResult, Parser};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -37,7 +37,6 @@ pub fn parse(text: &str) -> Result<Code, Fault> {
 struct Reader {
     code: Code,
     open: Vec<Open>,
-    used: BTreeSet<String>,
     subs: BTreeMap<String, usize>,
     calls: Vec<(usize, String, Range<usize>)>,
     percents: usize,
@@ -94,9 +93,10 @@ impl Reader {
             if after.is_empty() {
                 return Ok(());
             }
-            let (next, body) = delimited(char('('), take_till(|c| c == '(' || c == ')'), char(')'))
-                .parse(after)
-                .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "a word, a comment or the line's end"))?;
+            let (next, body) =
+                delimited(char('('), take_till(|c| c == '(' || c == ')'), char(')')).parse(after).map_err(
+                    |e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "a word, a comment or the line's end"),
+                )?;
             self.comment(line, after, body)?;
             rest = next;
         }
@@ -128,8 +128,7 @@ impl Reader {
     }
 
     fn assignment<'a>(&mut self, line: &Line<'a>, rest: &'a str) -> Result<&'a str, Fault> {
-        let (after, target) =
-            preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
+        let (after, target) = preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
         let (after, value) = preceded((blanks, char('='), blanks), cut(value))
             .parse(after)
             .map_err(|e| line.unread(&e, "= and a value"))?;
@@ -150,9 +149,8 @@ impl Reader {
             let Some(address) = ADDRESSES.into_iter().find(|a| *a == letter) else {
                 return Err(line.not_understood(left, "a word that axiscal knows"));
             };
-            let (after, (value, point)) = cut(word_value)
-                .parse(&left[1..])
-                .map_err(|e| line.unread(&e, "the value of a word"))?;
+            let (after, (value, point)) =
+                cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of a word"))?;
             if words.iter().any(|w| w.address == address) && address != "G" && address != "M" {
                 return Err(line.fault(left, format!("two {address} words stand in one line")));
             }
@@ -239,11 +237,13 @@ impl Reader {
         self.comments(line, left)
     }
 
+    /// A number may serve again where the structure before it is closed; a subroutine may not.
     fn first_use(&mut self, line: &Line<'_>, rest: &str, label: &str) -> Result<(), Fault> {
-        if self.used.insert(label.to_owned()) {
-            return Ok(());
+        let open = self.open.iter().any(|o| o.label == label);
+        if open || self.subs.contains_key(label) {
+            return Err(line.fault(rest, format!("o{label} is used twice")));
         }
-        Err(line.fault(rest, format!("o{label} is used twice")))
+        Ok(())
     }
 
     fn next_branch(&mut self, line: &Line<'_>, rest: &str, label: &str, test: Option<Expr>) -> Result<(), Fault> {
@@ -320,8 +320,7 @@ fn expanded(line: &Line<'_>, text: &str) -> Result<Text, Fault> {
             (rest, decimals) = (after, new.unwrap_or(USUAL_DECIMALS));
             continue;
         }
-        let (after, value) =
-            preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
+        let (after, value) = preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
         out.push(Piece::Fixed { decimals, width: 0, value });
         rest = after;
     }
