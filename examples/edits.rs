@@ -13,7 +13,9 @@ fn main() {
     let count: u64 = words.next().and_then(|w| w.parse().ok()).unwrap_or(2000);
     let named: Vec<String> = words.collect();
     let controllers = if named.is_empty() { vec!["linuxcnc".into(), "fanuc".into(), "haas".into()] } else { named };
-    println!("| controller | edits | not read | refused by what it does | refused as changed only | moves identically | escaped | s |");
+    println!(
+        "| controller | edits | not read | refused by what it does | refused as changed only | moves identically | escaped | s |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     for controller in &controllers {
         let original = original(controller, None);

@@ -55,9 +55,12 @@ fn edits_by_hand_are_caught() {
         let cases: Vec<(&str, String)> = vec![
             ("a sign changed", with(&t, "G0 X-", 1, &|l| l.replace("X-", "X"))),
             ("a lift by a tenth", with(&t, "G0 Z11.3", 1, &|l| l.replace("11.3", "1.13"))),
-            ("a rapid in place of a guarded move", with(&t, guarded, if linuxcnc { 2 } else { 1 }, &|l| {
-                format!("G0 {}\n", l.split(' ').nth(1).unwrap_or(""))
-            })),
+            (
+                "a rapid in place of a guarded move",
+                with(&t, guarded, if linuxcnc { 2 } else { 1 }, &|l| {
+                    format!("G0 {}\n", l.split(' ').nth(1).unwrap_or(""))
+                }),
+            ),
             ("a search beyond the block", with(&t, search, 1, &|l| l.replace("Z6", "Z-6"))),
             ("the search at ten times its feed", with(&t, search, 1, &|l| l.replace("F60", "F600"))),
             ("a retract removed", with(&t, retract, 1, &|_| String::new())),

@@ -72,10 +72,6 @@ pub enum Function {
     Ceil,
     /// Nearest whole number.
     Round,
-    /// Whole part.
-    Trunc,
-    /// Logical opposite.
-    Not,
     /// Sign changed.
     Minus,
 }
@@ -111,8 +107,6 @@ pub enum Piece {
         /// What is written.
         value: Expr,
     },
-    /// The text of a text variable.
-    Var(Var),
 }
 
 /// A text that the program writes.
@@ -138,8 +132,6 @@ pub enum What {
     Set(Var, Expr),
     /// A value is kept in a variable whose number is computed.
     SetIndirect(Expr, Expr),
-    /// A text is kept.
-    SetText(Var, Text),
     /// On at another statement.
     Jump(usize),
     /// On at another statement when the condition does not hold.
@@ -165,8 +157,6 @@ pub enum What {
     Wait(Text),
     /// The program is broken off with a message.
     Abort(Text),
-    /// Where execution is said to stand still until all moves are done.
-    Sync,
     /// The end.
     End,
 }
@@ -227,8 +217,6 @@ impl Expr {
                     Function::Floor => Ok(x.floor()),
                     Function::Ceil => Ok(x.ceil()),
                     Function::Round => Ok(x.round()),
-                    Function::Trunc => Ok(x.trunc()),
-                    Function::Not => Ok(truth(x == 0.0)),
                 }
             }
             Self::Two(op, left, right) => {

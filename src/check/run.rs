@@ -272,8 +272,8 @@ pub trait Dialect: Clone + Send + Sync {
     fn settings(&self) -> BTreeMap<String, String>;
     /// How a number is written into a text.
     fn spell(&self, value: f64, decimals: usize, width: usize) -> String {
-        let text = format!("{value:>width$.decimals$}", width = if width > 0 { width + decimals + 2 } else { 0 });
-        text
+        // room for the sign and the point beside the digits
+        format!("{value:>width$.decimals$}", width = if width > 0 { width + decimals + 2 } else { 0 })
     }
 }
 
@@ -306,7 +306,6 @@ pub struct Run<'p, D> {
     code: &'p Code,
     next: usize,
     returns: Vec<usize>,
-    texts: BTreeMap<Var, String>,
     done: u64,
     pending: Option<Probe>,
     over: bool,
@@ -319,8 +318,8 @@ pub struct Run<'p, D> {
 impl<'p, D: Dialect> Run<'p, D> {
     /// A program that begins.
     pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
-        let (returns, texts) = (Vec::new(), BTreeMap::new());
-        Self { code, next: 0, returns, texts, done: 0, pending: None, over: false, vm, dialect }
+        let returns = Vec::new();
+        Self { code, next: 0, returns, done: 0, pending: None, over: false, vm, dialect }
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -389,9 +388,6 @@ impl<'p, D: Dialect> Run<'p, D> {
                 Piece::Fixed { decimals, width, value } => {
                     out.push_str(&self.dialect.spell(self.value(value)?, *decimals, *width));
                 }
-                Piece::Var(var) => {
-                    out.push_str(self.texts.get(var).ok_or_else(|| format!("{var} holds no text yet"))?);
-                }
             }
         }
         Ok(out)
@@ -414,10 +410,6 @@ impl<'p, D: Dialect> Run<'p, D> {
             What::SetIndirect(number, expr) => {
                 let (number, value) = (self.value(number)?, self.value(expr)?);
                 self.dialect.write(&super::code::numbered(number)?, value)?;
-            }
-            What::SetText(var, text) => {
-                let text = self.text(text)?;
-                self.texts.insert(var.clone(), text);
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
@@ -451,7 +443,6 @@ impl<'p, D: Dialect> Run<'p, D> {
                 let text = self.text(text)?;
                 self.end(Event::Abort(text));
             }
-            What::Sync => {}
             What::End => self.end(Event::End),
         }
         Ok(None)

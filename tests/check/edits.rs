@@ -202,7 +202,15 @@ pub fn edit(text: &str, rng: &mut ChaCha8Rng) -> (String, String) {
         };
         let edited = lines.concat();
         if edited != text {
-            return (format!("line {}, {says}: {:?} is now {:?}", i + 1, line.trim_end(), lines.get(i).map_or("", |l| l.trim_end())), edited);
+            return (
+                format!(
+                    "line {}, {says}: {:?} is now {:?}",
+                    i + 1,
+                    line.trim_end(),
+                    lines.get(i).map_or("", |l| l.trim_end())
+                ),
+                edited,
+            );
         }
     }
 }

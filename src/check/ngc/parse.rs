@@ -11,7 +11,7 @@ use nom::character::complete::{char, digit1, one_of};
 use nom::combinator::{cut, opt};
 use nom::sequence::{delimited, preceded};
 use nom::{IResult, Parser};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -37,7 +37,6 @@ pub fn parse(text: &str) -> Result<Code, Fault> {
 struct Reader {
     code: Code,
     open: Vec<Open>,
-    used: BTreeSet<String>,
     subs: BTreeMap<String, usize>,
     calls: Vec<(usize, String, Range<usize>)>,
     percents: usize,
@@ -238,11 +237,13 @@ impl Reader {
         self.comments(line, left)
     }
 
+    /// A number may serve again where the structure before it is closed; a subroutine may not.
     fn first_use(&mut self, line: &Line<'_>, rest: &str, label: &str) -> Result<(), Fault> {
-        if self.used.insert(label.to_owned()) {
-            return Ok(());
+        let open = self.open.iter().any(|o| o.label == label);
+        if open || self.subs.contains_key(label) {
+            return Err(line.fault(rest, format!("o{label} is used twice")));
         }
-        Err(line.fault(rest, format!("o{label} is used twice")))
+        Ok(())
     }
 
     fn next_branch(&mut self, line: &Line<'_>, rest: &str, label: &str, test: Option<Expr>) -> Result<(), Fault> {
