@@ -137,7 +137,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
 fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io) -> Result<()> {
     let settings = Settings { quick: true, ..settings.clone() };
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit };
-    let options = diagnose::Options { at_most: 1, refit: false, power: false };
+    let options = diagnose::Options { at_most: 1, refit: false, power: false, ..diagnose::Options::default() };
     let found = diagnose::diagnose(subject, &options)?;
     let (word, next) = match found.verdict {
         Verdict::Adequate | Verdict::TooLittleData => return Ok(()),

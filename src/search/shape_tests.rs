@@ -2,8 +2,8 @@
 
 use super::dependence::{Dependence, dependences, serial};
 use super::generic::{Direction, Features, Generics, Kind, Variable, generics};
-use super::testing::{noise, noise_matrix, rng};
-use super::tests::{ask, correlated_library, mixtures};
+use super::testing::{noise, rng};
+use super::tests::{ask, correlated_library};
 use super::*;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::RngExt;

@@ -320,6 +320,9 @@ pub const MEANING: [(&str, &str); VARIABLES.len()] = [
     ("oy", "the same, y part"),
     ("oz", "the same, z part"),
     ("edge", "edge of the block along the touched face's normal, mm"),
+    ("wA", "where A stood before it came to this place, radians"),
+    ("wB", "the same of B"),
+    ("wC", "the same of C"),
 ];
 
 #[cfg(test)]
