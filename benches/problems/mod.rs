@@ -197,6 +197,7 @@ fn plan(machine: &Machine, blocks: Vec<PlanBlock>, n_touches: usize, rng: &mut C
         machine: machine.name.clone(),
         machine_sha256: String::new(),
         program: MOUNTING.into(),
+        programs: Default::default(),
         mounting: MOUNTING.into(),
         controller_frame: ControllerFrame::Axes,
         ball_radius_mm: machine.probe.ball_radius,

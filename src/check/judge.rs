@@ -333,7 +333,7 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
         let rotary: Vec<AxisName> = moving.iter().copied().filter(|a| a.is_rotary()).collect();
         if !self.all_known(known) {
-            self.from_unknown(at, &moving, to, known);
+            self.move_from_unknown(at, &moving, to, known);
             return;
         }
         if let Some(contact) = self.contact.take() {
@@ -374,7 +374,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// The first moves, when nobody knows where the machine stands: up to the top, then whatever is clear from anywhere.
-    fn from_unknown(&mut self, at: &Range<usize>, moving: &[AxisName], to: &Position, known: &[bool; 6]) {
+    fn move_from_unknown(&mut self, at: &Range<usize>, moving: &[AxisName], to: &Position, known: &[bool; 6]) {
         let Some(lift) = self.lift else { return };
         let at_top = known[lift.axis.index()] && (to.get(lift.axis) - lift.top).abs() <= self.case.same;
         let goes_up = moving == [lift.axis] && (to.get(lift.axis) - lift.top).abs() <= self.case.same;
