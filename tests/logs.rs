@@ -75,9 +75,8 @@ fn with_corpus<T>(with: impl FnOnce(&Machine, &Plan) -> T) -> T {
 #[test]
 fn every_log_of_the_corpus_gives_what_is_expected() {
     let post = Postprocessor::load_built_in_or_file("linuxcnc").expect("shipped").0;
-    let wrong: Vec<String> = with_corpus(|machine, plan| {
-        CASES.iter().filter_map(|c| check(c, machine, plan, &post).err()).collect()
-    });
+    let wrong: Vec<String> =
+        with_corpus(|machine, plan| CASES.iter().filter_map(|c| check(c, machine, plan, &post).err()).collect());
     assert!(wrong.is_empty(), "{} of {} files give something else:\n{}", wrong.len(), CASES.len(), wrong.join("\n"));
 }
 
@@ -153,13 +152,10 @@ fn every_file_of_the_corpus_that_says_what_it_gives_gives_it() {
             let bytes = std::fs::read(&entry).expect("a file");
             let reader = Reader::load(&expected.controller, axiscal::files::read_text).expect("shipped").0;
             let one = |t: &log::Touch| format!("{}{}", t.id, if t.status == Status::Miss { "!" } else { "" });
-            let (touches, findings) =
-                match log::read_run(&bytes, &file, reader.writer(), machine, plan, expected.run) {
-                    Ok((read, findings)) => {
-                        (Some(read.touches.iter().map(one).collect::<Vec<_>>().join(" ")), findings.0)
-                    }
-                    Err(failure) => (None, failure.0),
-                };
+            let (touches, findings) = match log::read_run(&bytes, &file, reader.writer(), machine, plan, expected.run) {
+                Ok((read, findings)) => (Some(read.touches.iter().map(one).collect::<Vec<_>>().join(" ")), findings.0),
+                Err(failure) => (None, failure.0),
+            };
             wrong.extend(expected.compare(touches, &findings, &file).err());
         }
     });
