@@ -333,11 +333,11 @@ impl<'a, 'b> Walk<'a, 'b> {
         }
         let rotary: Vec<AxisName> = moving.iter().copied().filter(|a| a.is_rotary()).collect();
         if !self.all_known(known) {
-            self.move_from_unknown(at, &moving, to, known);
+            self.unknown_start(at, &moving, to, known);
             return;
         }
         if let Some(contact) = self.contact.take() {
-            self.from_contact(at, part, contact, from, to, &rotary);
+            self.leave_face(at, part, contact, from, to, &rotary);
             return;
         }
         match rotary.as_slice() {
@@ -374,7 +374,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// The first moves, when nobody knows where the machine stands: up to the top, then whatever is clear from anywhere.
-    fn move_from_unknown(&mut self, at: &Range<usize>, moving: &[AxisName], to: &Position, known: &[bool; 6]) {
+    fn unknown_start(&mut self, at: &Range<usize>, moving: &[AxisName], to: &Position, known: &[bool; 6]) {
         let Some(lift) = self.lift else { return };
         let at_top = known[lift.axis.index()] && (to.get(lift.axis) - lift.top).abs() <= self.case.same;
         let goes_up = moving == [lift.axis] && (to.get(lift.axis) - lift.top).abs() <= self.case.same;
@@ -420,7 +420,7 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     /// A move that begins at a face: back along the approach, no further than the search began.
-    fn from_contact(
+    fn leave_face(
         &mut self,
         at: &Range<usize>,
         part: usize,
@@ -502,7 +502,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             let rotary = [];
             let released_on_the_way = !probe.toward && hit;
             let target = if released_on_the_way { &reached } else { to };
-            self.from_contact(at, part, contact, from, target, &rotary);
+            self.leave_face(at, part, contact, from, target, &rotary);
             // what the program would drive to without a release is proven as well
             return;
         }

@@ -109,6 +109,7 @@ impl Original {
     }
 
     /// Findings of an edited text, by code.
+    #[allow(dead_code)] // the example does not ask for it
     pub fn codes(&self, text: &str) -> Vec<&'static str> {
         let against = Against { plan: Some(&self.plan), ..Against::default() };
         match check(&self.machine, &self.post, &source("edited", text), &against) {
