@@ -2,6 +2,8 @@
 //! because the program does otherwise than what was written, how many move identically, and whether one escaped.
 //!
 //! `cargo run --release --example edits -- [COUNT] [CONTROLLER …]`
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
+#![allow(dead_code)] // it uses a part of what the tests use
 
 #[path = "../tests/check/edits.rs"]
 mod edits;

@@ -2,6 +2,7 @@
 //!
 //! LinuxCNC's own interpreter, `rs274`. Left out with a word where it is not installed; AXISCAL_LINUXCNC=required makes that
 //! a failure.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use axiscal::machine;
 use axiscal::post::Postprocessor;
