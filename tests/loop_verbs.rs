@@ -128,7 +128,7 @@ fn a_hidden_effect_is_compared_added_taken_out_and_kept_in_the_ladder() {
     assert_eq!(comparison["explained_by_noise"], false, "{}", comparison["says"]);
     assert_eq!(comparison["splits"][0]["by"], "pose.C", "{}", comparison["says"]);
     assert!(comparison["splits"][0]["share"].as_f64().unwrap() > 0.7, "{}", comparison["splits"][0]["share"]);
-    assert!(comparison["says"].as_str().unwrap().contains("goes with C"), "{}", comparison["says"]);
+    assert!(comparison["says"].as_str().unwrap().contains("changes with C"), "{}", comparison["says"]);
     assert_eq!(comparison["points"].as_array().unwrap().len(), 356);
     assert!(comparison["worst"][0]["line"].as_u64().unwrap() > 1);
     let csv = std::fs::read_to_string(at.join("points.csv")).unwrap();

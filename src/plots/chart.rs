@@ -140,7 +140,7 @@ impl Axis {
             let all = (first..=last).flat_map(|e| [1.0, 2.0, 5.0].map(|k| k * 10f64.powi(e)));
             return all.filter(|v| (low..=high).contains(v)).map(|v| (v, format!("{v}"))).collect();
         }
-        let step = nice((high - low) / 6.0);
+        let step = nice((high - low) / 8.0);
         let digits = (-step.log10().floor()).max(0.0) as usize;
         let from = (low / step).ceil() as i64;
         let to = (high / step).floor() as i64;

@@ -136,7 +136,8 @@ impl<'a> Writer<'a> {
             text: String::new(),
             findings: Findings::default(),
             index: 0,
-            label: LABELS_PER_STEP,
+            // the first ones are free for what a template numbers itself
+            label: 2 * LABELS_PER_STEP,
             at,
             loose: false,
             opening: Opening::default(),

@@ -343,7 +343,7 @@ mod tests {
         for (text, place) in [
             ("G0 X1.\n", 0),
             ("%\nG0 X1.\n", 2),
-            ("%\nO1\nG0 X1..5\n%\n", 12),
+            ("%\nO1\nG0 X1..5\n%\n", 11),
             ("%\nO1\nG0 K1\n%\n", 8),
             ("%\nO1\nIF[#1GT]GOTO1\n%\n", 13),
             ("%\nO1\nGOTO1\nM30\n%\n", 5),

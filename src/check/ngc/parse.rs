@@ -462,7 +462,7 @@ mod tests {
             ("hello\n", 0),
             ("%\nG0 X1\n", 8),
             ("%\n%\nG0\n", 4),
-            ("(LOG,%x)\n", 0),
+            ("(LOG,%x)\n", 7),
             ("G0 X[1\n", 6),
         ] {
             let fault = parse(text).unwrap_err();

@@ -202,10 +202,8 @@ fn harmonic(family: &str, axis: AxisName, k: &str, machine: &Machine) -> Result<
     axis_here(axis, machine)?;
     let row = |dof: usize, letter: char, shape: Shape| {
         let unit = if dof < 3 { Um } else { Urad };
-        at_the_ball(
-            Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape),
-            machine,
-        )
+        let row = Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape);
+        if family == "tilt" { at_the_ball(row, machine) } else { row }
     };
     let pair = |dof: usize| [row(dof, 'c', Shape::Cosine(axis, order)), row(dof, 's', Shape::Sine(axis, order))];
     Ok(dofs.into_iter().flat_map(pair).collect())

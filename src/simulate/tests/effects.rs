@@ -88,8 +88,8 @@ fn harmonics_of_the_turntable_stand_still_while_it_turns() {
     on_the_paper_machine("radial-c-1", &[("EXC1c", 4.9), ("EXC1s", 2.0)], (0.0, 90.0), "table", [0.0, 2.0, 0.0]);
     on_the_paper_machine("radial-c-2", &[("EYC2c", 5.0)], (0.0, 90.0), "table", [-5.0, 0.0, 0.0]);
     on_the_paper_machine("axial-c-3", &[("EZC3s", 5.0)], (0.0, 90.0), "table", [0.0, 0.0, -5.0]);
-    // 100 µrad about machine X lift what stands 30 mm out along +Y, and carry what is 200 mm down to +Y
-    on_the_paper_machine("tilt-c-1", &[("EAC1s", 100.0)], (0.0, 90.0), "table", [20.2684, 0.0, 3.0]);
+    // 100 µrad about machine X lift what stands 30 mm out along +Y; the block stands at the height where the lean is stated
+    on_the_paper_machine("tilt-c-1", &[("EAC1s", 100.0)], (0.0, 90.0), "table", [0.0, 0.0, 3.0]);
     // about its own axis: the tangential face, 30 mm out
     on_the_paper_machine("positioning-c-2", &[("ECC2c", 100.0)], (0.0, 0.0), "table", [0.0, -3.0, 0.0]);
 }
@@ -153,8 +153,8 @@ fn linear_axes_move_what_they_carry() {
         "head",
         [5.0 * (38.0 * std::f64::consts::TAU / 8.0).sin(), 0.0, 0.0],
     );
-    // lever arms count in the carriage's frame: the block stands at (30, 0, -202.684) there
-    on_the_paper_machine("angular-bx", &[("EBX", 300.0)], (0.0, 0.0), "head", [38.0 * mm_from_um(-L), 0.0, -0.9]);
+    // lever arms count in the carriage's frame from the ball's point: the block stands 30 mm out at its height
+    on_the_paper_machine("angular-bx", &[("EBX", 300.0)], (0.0, 0.0), "head", [0.0, 0.0, -0.9]);
     let scenario = Scenario::flawless().with(&machine, "table-sag", &[("table_sag", 100.0)]).unwrap();
     let found = three_faces(&machine, "head", "y+", pose(&[(AxisName::B, 0.0), (AxisName::C, 0.0)]), &scenario);
     close(found[2], -mm_from_um(100.0 * (30.0_f64 / 300.0).powi(2)), SECOND_ORDER);
