@@ -67,6 +67,15 @@ pub struct Told {
     pub aborted: Vec<(usize, BTreeMap<String, String>)>,
 }
 
+impl Told {
+    /// It was told to begin at a later set-up, and stopped before it moved or wrote anything: it says that it cannot.
+    pub fn declines(&self) -> bool {
+        let acts = |h: &Happened| matches!(h.event, Event::Move { .. } | Event::Probe { .. } | Event::Log(_));
+        let stops = |h: &Happened| matches!(h.event, Event::Abort(_));
+        self.from > 1 && self.fault.is_none() && !self.trunk.iter().any(acts) && self.trunk.iter().any(stops)
+    }
+}
+
 /// How far, in parts of their limits, things deviate.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
@@ -74,6 +83,14 @@ pub struct Limits {
     pub placement_mm: f64,
     /// Way back between search and measuring touch, mm.
     pub back_off_mm: f64,
+    /// Probing moves from the beginning at which branches are followed. A run from a later set-up differs from the whole one
+    /// at its beginning: after some set-ups what goes wrong there goes wrong in the whole run, or in the run from there, too.
+    pub probes: usize,
+}
+
+impl Limits {
+    /// Probing moves of a run that starts again at which branches are followed: those of several set-ups.
+    pub const PROBES_AFTER_RESTART: usize = 100;
 }
 
 /// Numbers of the probing moves at which a person breaks the program off.
@@ -115,7 +132,7 @@ pub fn explore<'p, D: Dialect>(
             Ok(Pause::Probe(probe)) => {
                 probes += 1;
                 let outcome = run.vm.world.outcome(&run.vm, &probe);
-                if let Some(limits) = limits {
+                if let Some(limits) = limits.filter(|l| probes <= l.probes) {
                     let leaves = run.vm.trace.len();
                     let trace = std::mem::take(&mut run.vm.trace);
                     for deviation in deviations(&run.vm, &probe, outcome, limits) {

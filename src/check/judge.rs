@@ -224,14 +224,18 @@ impl<'a, 'b> Walk<'a, 'b> {
                 fault.says.clone(),
                 "the control would stop here, or do something that axiscal does not know",
             );
-        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
-            let shown = told.trunk.iter().rev().find_map(|h| match &h.event {
+        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) && !told.declines() {
+            let texts = told.trunk.iter().rev().filter_map(|h| match &h.event {
                 Event::Abort(text) | Event::Message(text) if !text.is_empty() => Some(text.as_str()),
                 _ => None,
             });
+            // the last message may only say where; the one before it says what
+            let mut last: Vec<&str> = texts.take(2).collect();
+            last.reverse();
+            let shown = if last.is_empty() { "without a message".to_owned() } else { last.join(" / ") };
             let says = format!(
-                "the program stops by itself on a machine on which all is as it should be: {}",
-                shown.unwrap_or("without a message")
+                "begun at set-up {}, the program stops by itself on a machine on which all is as it should be: {shown}",
+                told.from
             );
             self.say("check::stops", &end, says, "");
         }

@@ -61,6 +61,8 @@ pub struct Checked {
     pub stops: usize,
     /// Set-ups at which it can begin.
     pub setups: u32,
+    /// Those at which it says that it cannot: the way there is not known.
+    pub declined: Vec<u32>,
     /// Ways on which something happens otherwise that were followed.
     pub branches: usize,
     /// Run time without the stops, s.
@@ -220,6 +222,7 @@ fn with_parts(
         moves: trunk.iter().filter(|h| matches!(h.event, Event::Move { .. } | Event::Probe { .. })).count(),
         stops: told.stops,
         setups: told.setups,
+        declined: told.runs.iter().filter(|t| t.declines()).map(|t| t.from).collect(),
         branches: told.runs.iter().map(|t| t.branches.len()).sum(),
         seconds: seconds::seconds(trunk),
         findings,

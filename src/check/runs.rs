@@ -156,8 +156,11 @@ impl<'a, D: Dialect> Runs<'a, D> {
     fn all(&self) -> All {
         let (window, clear_from_anywhere) = self.windows();
         let beginning = self.start(&window, 0.5, 0.3);
-        let limits =
-            Limits { placement_mm: self.machine.probe.placement_tolerance, back_off_mm: self.machine.probe.back_off };
+        let limits = Limits {
+            placement_mm: self.machine.probe.placement_tolerance,
+            back_off_mm: self.machine.probe.back_off,
+            probes: usize::MAX,
+        };
         let last = self.codes.len();
         // the whole run, the same from elsewhere, and each set-up but the first
         let numbers: Vec<(usize, Start, bool)> = [(1, Start::Awkward, true), (1, Start::Fresh, false)]
@@ -235,7 +238,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let parts = self.world.last_part() + 1;
         let part = if k == 1 || parts == 1 { 0 } else { self.part_of(code, from, start, at, parts) };
         let run = self.run(code, start, at, part, k > 1 && parts > 1);
-        explore(run, from, limits, &restart)
+        let probes = if k > 1 { Limits::PROBES_AFTER_RESTART } else { usize::MAX };
+        explore(run, from, limits.map(|l| Limits { probes, ..l }), &restart)
     }
 
     /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.

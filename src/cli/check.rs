@@ -72,6 +72,13 @@ fn say(machine: &Machine, args: &Args, checked: &Checked, io: &Io) {
         program::duration(checked.seconds)
     ));
     io.say(format!("{} ways on which something goes wrong were followed", checked.branches));
+    if !checked.declined.is_empty() {
+        let numbers: Vec<String> = checked.declined.iter().map(u32::to_string).collect();
+        io.say(format!(
+            "it cannot start again at set-up {}: the way there is not known, it says so and stops",
+            numbers.join(", ")
+        ));
+    }
     if args.plan.is_none() {
         io.say("without --plan: whether it makes the touches that were planned was not looked at");
     }
@@ -106,6 +113,7 @@ fn answer(machine: &Machine, post: &Postprocessor, args: &Args, checked: &Checke
         "touches": checked.touches,
         "moves": checked.moves,
         "setups": checked.setups,
+        "no_restart_at": checked.declined,
         "stops": checked.stops,
         "followed": checked.branches,
         "time_s": checked.seconds,

@@ -189,7 +189,7 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in &study.data {
         let plan_path = folder.join(&entry.plan);
-        let plan = load_plan(&plan_path, &machine, io)?;
+        let (plan, plan_digest) = load_plan_and_digest(&plan_path, &machine, io)?;
         let log_path = folder.join(&entry.log);
         let bytes = files::read_bytes(&log_path)?;
         let digest = Sha256::digest(&bytes).to_vec();
@@ -200,14 +200,14 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
             )
             .help("a log counted twice makes every uncertainty too small: name each run once")]);
         }
-        seen.push((log_path.clone(), digest));
+        seen.push((log_path.clone(), digest.clone()));
         if let Some(path) = &entry.compensation {
             let active = load_compensation(&folder.join(path), &machine)?;
             io.report(&beside_the_axis(&active, &machine, &plan).into_iter().collect::<Vec<_>>());
         }
-        for hash in [&mut hash, &mut data] {
-            hash.update(plan.to_json().as_bytes());
-            hash.update(&bytes);
+        for part in [&plan_digest[..], &digest, format!("{:?}", entry.run).as_bytes()] {
+            hash.update(part);
+            data.update(part);
         }
         let controller = controller_path(&entry.controller, &folder);
         let mut touches = read_log(&bytes, &log_path, (&controller, entry.run), &machine, &plan, io)?;
@@ -259,6 +259,11 @@ fn controller_path(word: &str, folder: &Path) -> String {
 /// # Errors
 /// When it is unusable or for another machine.
 pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
+    load_plan_and_digest(path, machine, io).map(|(plan, _)| plan)
+}
+
+/// The same, and the SHA-256 of the file.
+fn load_plan_and_digest(path: &Path, machine: &Machine, io: &Io) -> Result<(Plan, Vec<u8>)> {
     let src = source(path.display().to_string(), files::read_text(path)?);
     let (plan, findings) = Plan::parse(&src)?;
     io.report(&findings.0);
@@ -276,7 +281,7 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
         )
         .help("if the change moves the chain, the blocks or the probe, generate the plan again")]);
     }
-    Ok(plan)
+    Ok((plan, Sha256::digest(src.inner().as_bytes()).to_vec()))
 }
 
 /// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.

@@ -2,7 +2,7 @@
 
 use super::evidence::Evidence;
 use crate::fit::Fit;
-use crate::fit::candidates::columns;
+use crate::fit::candidates::{Columns, Variant, variants};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::formula::slot;
@@ -10,7 +10,6 @@ use crate::model::predict::Observation;
 use crate::search::{Library, Origin};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 /// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
 const LEAST_TRACE: f64 = 1e-6;
@@ -94,25 +93,23 @@ impl<'c> Named<'c> {
     #[must_use]
     pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
         let places = without_noise(fit);
-        let make = |effects: &[&Effect], shapes: Option<&[f64]>| {
-            columns(machine, effects, &fit.data, &places, fit.model.reference, shapes)
-        };
-        let fixed: Vec<&Effect> = effects.iter().copied().filter(|e| scan_of(e).is_none()).collect();
-        let together = make(&fixed, None);
-        let variants: Vec<(usize, f64, Vec<f64>)> = effects
-            .iter()
-            .enumerate()
-            .filter_map(|(i, e)| Some((i, scan_of(e)?, e)))
-            .flat_map(|(i, (which, values), e)| {
-                values.iter().map(move |&value| {
-                    let starts = e.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start));
-                    let shapes = starts.enumerate().map(|(k, s)| if k == which { value } else { s }).collect();
-                    (i, value, shapes)
-                })
-            })
-            .collect();
-        let scans: Vec<_> =
-            variants.par_iter().map(|(i, value, shapes)| (*i, *value, make(&[effects[*i]], Some(shapes)))).collect();
+        let fixed = (0..effects.len()).filter(|i| scan_of(effects[*i]).is_none()).collect();
+        let mut wanted = vec![Variant { effects: fixed, shapes: Vec::new() }];
+        let mut scanned_at = Vec::new();
+        for (i, effect) in effects.iter().enumerate() {
+            let Some((which, values)) = scan_of(effect) else { continue };
+            let starts: Vec<f64> =
+                effect.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect();
+            for &value in values {
+                let mut shapes = starts.clone();
+                shapes[which] = value;
+                wanted.push(Variant { effects: vec![i], shapes });
+                scanned_at.push((i, value));
+            }
+        }
+        let mut made = variants(machine, &effects, &fit.data, &places, fit.model.reference, &wanted).into_iter();
+        let together = made.next().unwrap_or_else(|| Columns::none(places.len()));
+        let scans: Vec<_> = scanned_at.into_iter().zip(made).map(|((i, value), columns)| (i, value, columns)).collect();
 
         // one matrix of all variants, whitened at once
         let mut parts: Vec<(usize, f64, DMatrix<f64>)> = Vec::new();
@@ -120,7 +117,7 @@ impl<'c> Named<'c> {
         let mut scanned = Vec::new();
         for (i, effect) in effects.iter().enumerate() {
             let scan = scan_of(effect);
-            let mut push = |made: &crate::fit::candidates::Columns, shape: f64| -> Vec<Column> {
+            let mut push = |made: &Columns, shape: f64| -> Vec<Column> {
                 let own = |c: &usize| made.unknowns[*c].effect == effect.id && !made.unknowns[*c].shape;
                 let of: Vec<usize> = (0..made.unknowns.len()).filter(own).collect();
                 let mut values = made.values.select_columns(&of);

@@ -176,6 +176,26 @@ impl Model {
     /// Prepares touches for many evaluations.
     #[must_use]
     pub fn prepare<'a>(&'a self, observations: &'a [Observation]) -> Batch<'a> {
+        let mut batch = self.prepare_places(observations);
+        let is = |i: &usize, shape: bool| {
+            let f = &self.active[*i].term.formula;
+            f.constant().is_none() && f.has_shape() == shape
+        };
+        batch.varying = (0..self.active.len()).filter(|i| is(i, false)).collect();
+        batch.shaped = (0..self.active.len()).filter(|i| is(i, true)).collect();
+        batch.coefficients.reserve_exact(batch.varying.len() * observations.len());
+        for o in observations {
+            for &i in &batch.varying {
+                let a = &self.active[i];
+                let here = a.set_up.is_none_or(|s| s == o.set_up);
+                batch.coefficients.push(if here { a.factor * a.term.formula.eval(&o.state, &[]) } else { 0.0 });
+            }
+        }
+        batch
+    }
+
+    /// The same without the values of formulas: enough where no effect has a size.
+    pub(super) fn prepare_places<'a>(&'a self, observations: &'a [Observation]) -> Batch<'a> {
         let mut seen: HashMap<[u64; 3], u32> = HashMap::new();
         let mut poses = Vec::new();
         let pose = observations
@@ -189,20 +209,6 @@ impl Model {
                 })
             })
             .collect();
-        let is = |i: &usize, shape: bool| {
-            let f = &self.active[*i].term.formula;
-            f.constant().is_none() && f.has_shape() == shape
-        };
-        let varying: Vec<usize> = (0..self.active.len()).filter(|i| is(i, false)).collect();
-        let shaped: Vec<usize> = (0..self.active.len()).filter(|i| is(i, true)).collect();
-        let mut coefficients = Vec::with_capacity(varying.len() * observations.len());
-        for o in observations {
-            for &i in &varying {
-                let a = &self.active[i];
-                let here = a.set_up.is_none_or(|s| s == o.set_up);
-                coefficients.push(if here { a.factor * a.term.formula.eval(&o.state, &[]) } else { 0.0 });
-            }
-        }
         let n_common = self.layout.common.len();
         let entry = |(i, a): (usize, &Active)| Entry {
             slot: a.slot as u32,
@@ -228,9 +234,9 @@ impl Model {
             observations,
             pose,
             poses,
-            varying,
-            coefficients,
-            shaped,
+            varying: Vec::new(),
+            coefficients: Vec::new(),
+            shaped: Vec::new(),
             moving,
             entries,
             n_rotary_workpiece,
@@ -352,10 +358,17 @@ impl At<'_> {
         gap
     }
 
+    /// d gap / d displacement at every place of the model (mm per mm, mm per rad), at a touch.
+    pub(super) fn slopes<'s>(&self, touch: usize, scratch: &'s mut Scratch) -> &'s [[f64; 6]] {
+        self.displace(touch, scratch);
+        self.evaluate(touch, scratch, true);
+        &scratch.gradient
+    }
+
     /// Displacements and transforms of the places that change from touch to touch.
     fn displace(&self, touch: usize, scratch: &mut Scratch) {
         let (batch, model) = (self.batch, self.batch.model);
-        if batch.varying.is_empty() && batch.shaped.is_empty() {
+        if batch.moving.is_empty() {
             return;
         }
         let o = &batch.observations[touch];

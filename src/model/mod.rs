@@ -7,3 +7,4 @@ mod check;
 pub mod data;
 pub mod formula;
 pub mod predict;
+pub mod traces;

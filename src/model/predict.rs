@@ -157,6 +157,8 @@ pub struct Model {
     pub reference: Vector3<f64>,
     /// Unknowns that every touch sees, and those of each block.
     pub(super) layout: Layout,
+    /// Unknowns of each effect, once for each block where it is of a block: (first, count).
+    instances: Vec<Vec<(usize, usize)>>,
 }
 
 /// Which unknowns the row of a touch holds: the common ones first, then those of its block. The rows of a large
@@ -207,13 +209,17 @@ impl Model {
             unknowns: Vec::new(),
             reference,
             layout: Layout { own: vec![Vec::new(); set_ups.len()], ..Layout::default() },
+            instances: Vec::new(),
         };
         for effect in effects {
             let instances: Vec<Option<usize>> =
                 if effect.per_block { (0..set_ups.len()).map(Some).collect() } else { vec![None] };
+            let mut own = Vec::new();
             for set_up in instances {
+                own.push((model.n_unknowns(), effect.parameters.len()));
                 model.put(machine, effect, set_up);
             }
+            model.instances.push(own);
         }
         let places: Vec<Place> = model.slots.iter().map(|s| s.place).collect();
         let find = |place: Place| places.iter().position(|p| *p == place);
@@ -302,6 +308,12 @@ impl Model {
         let changes = if place == Place::Block { Changes::WithSetUp } else { Changes::Never };
         self.slots.push(Slot { place, centre, changes });
         self.slots.len() - 1
+    }
+
+    /// Unknowns of an effect (its index among the effects), once for each block where it is of a block: (first, count).
+    #[must_use]
+    pub fn instances(&self, effect: usize) -> &[(usize, usize)] {
+        self.instances.get(effect).map_or(&[], Vec::as_slice)
     }
 
     /// Number of unknowns.

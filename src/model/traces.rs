@@ -1,0 +1,99 @@
+//! What effects of no size yet would do to every touch: d gap / d size, for many effects and many values of their shapes.
+//!
+//! Where nothing has a size, no shape moves the chain: how far the gap follows a displacement at each place is computed once per
+//! touch, and the column of a parameter is that times its formula. A formula that stands in many effects (the cosine of an axis
+//! in six directions) is evaluated once.
+
+use super::batch::Batch;
+use super::formula::Formula;
+use super::predict::{Active, Model, Observation};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// How the gap of each touch follows displacements at each place of a model.
+#[derive(Debug)]
+pub struct Traces<'a> {
+    batch: Batch<'a>,
+    /// d gap / d component: mm per mm, or mm per rad; touches of one component side by side, components of one place likewise.
+    slope: Vec<f64>,
+    /// Values of formulas without shape parameters at all touches.
+    plain: HashMap<&'a str, Vec<f64>>,
+}
+
+impl<'a> Traces<'a> {
+    /// The traces of a model's effects where none has a size.
+    #[must_use]
+    pub fn of(model: &'a Model, observations: &'a [Observation]) -> Self {
+        let batch = model.prepare_places(observations);
+        let n = batch.len();
+        let theta = model.start();
+        let at = batch.at(&theta);
+        let n_components = 6 * model.slots.len();
+        let mut rows = vec![0.0; n * n_components];
+        rows.par_chunks_mut(n_components.max(1)).enumerate().for_each_init(
+            || batch.scratch(),
+            |scratch, (i, row)| {
+                let slopes = at.slopes(i, scratch).iter().flatten();
+                row.iter_mut().zip(slopes).for_each(|(into, slope)| *into = *slope);
+            },
+        );
+        drop(at);
+        let mut slope = vec![0.0; n * n_components];
+        for (i, row) in rows.chunks_exact(n_components.max(1)).enumerate() {
+            for (c, value) in row.iter().enumerate() {
+                slope[c * n + i] = *value;
+            }
+        }
+        let formulas = model.active.iter().map(|a| &a.term.formula);
+        let plain: HashMap<&str, &Formula> =
+            formulas.filter(|f| f.constant().is_none() && !f.has_shape()).map(|f| (f.text(), f)).collect();
+        let plain = plain
+            .into_par_iter()
+            .map(|(text, formula)| (text, observations.iter().map(|o| formula.eval(&o.state, &[])).collect()))
+            .collect();
+        Self { batch, slope, plain }
+    }
+
+    /// The columns of the effect whose parameters are the unknowns `first .. first + count` of the model, mm per unit, one row
+    /// per touch; those of shape parameters are zero. `shapes` are the values of all its parameters, of which only those of
+    /// shape parameters are looked at.
+    #[must_use]
+    pub fn columns(&self, first: usize, count: usize, shapes: &[f64]) -> DMatrix<f64> {
+        let n = self.batch.len();
+        let mut values = DMatrix::zeros(n, count);
+        let mut shaped: HashMap<&str, Vec<f64>> = HashMap::new();
+        for active in self.batch.model().active.iter().filter(|a| a.first == first) {
+            let formula = &active.term.formula;
+            let mut column = values.column_mut(active.unknown - first);
+            let column = column.as_mut_slice();
+            let slope = &self.slope[(6 * active.slot + active.component) * n..][..n];
+            if let Some(constant) = formula.constant() {
+                self.add(column, active, slope.iter().map(|s| s * constant));
+                continue;
+            }
+            let coefficient = match self.plain.get(formula.text()) {
+                Some(values) => values,
+                None => shaped.entry(formula.text()).or_insert_with(|| {
+                    self.batch.observations().iter().map(|o| formula.eval(&o.state, shapes)).collect()
+                }),
+            };
+            self.add(column, active, slope.iter().zip(coefficient).map(|(s, c)| s * c));
+        }
+        values
+    }
+
+    fn add(&self, column: &mut [f64], active: &Active, amounts: impl Iterator<Item = f64>) {
+        match active.set_up {
+            None => column.iter_mut().zip(amounts).for_each(|(into, amount)| *into += active.factor * amount),
+            Some(own) => {
+                let touched = self.batch.observations().iter().map(|o| o.set_up == own);
+                for ((into, amount), here) in column.iter_mut().zip(amounts).zip(touched) {
+                    if here {
+                        *into += active.factor * amount;
+                    }
+                }
+            }
+        }
+    }
+}
