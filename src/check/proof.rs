@@ -97,6 +97,7 @@ pub fn write_event(text: &mut String, happened: &Happened) {
             outcome.hit,
             outcome.part
         ),
+        Event::Release { from, to } => writeln!(text, "release{} to{}", place(from), place(to)),
         other => writeln!(text, "{other:?}"),
     };
 }

@@ -2,7 +2,7 @@
 
 use super::as_written::LengthUnit;
 use crate::axes::{AxisMap, AxisName};
-use crate::units::inch_from_mm;
+use crate::units::{inch_from_mm, mm_from_inch};
 use std::collections::BTreeMap;
 
 /// How numbers and axis words are written.
@@ -50,6 +50,15 @@ impl NumberRule {
             text.insert(0, '+');
         }
         if self.mark == '.' { text } else { text.replace('.', &self.mark.to_string()) }
+    }
+
+    /// A length in mm, from the control's unit.
+    #[must_use]
+    pub fn mm(&self, length: f64) -> f64 {
+        match self.unit {
+            LengthUnit::Mm => length,
+            LengthUnit::Inch => mm_from_inch(length),
+        }
     }
 
     /// A length (or a feed) in the control's unit, from mm.
