@@ -82,6 +82,22 @@ impl NumberRule {
         self.names.get(&axis).cloned().unwrap_or_else(|| axis.to_string())
     }
 
+    /// What words may call the axes: names that were given before letters, longer ones first, each name once.
+    #[must_use]
+    pub fn spoken(&self) -> Vec<(String, AxisName)> {
+        let given = |a: &AxisName| self.names.contains_key(a);
+        let mut names: Vec<(String, AxisName)> = Vec::new();
+        let (own, letters): (Vec<AxisName>, Vec<AxisName>) = AxisName::ALL.into_iter().partition(given);
+        for axis in own.into_iter().chain(letters) {
+            let name = self.name(axis);
+            if !name.is_empty() && names.iter().all(|(n, _)| *n != name) {
+                names.push((name, axis));
+            }
+        }
+        names.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
+        names
+    }
+
     /// An axis word, e.g. `X-33.5`.
     #[must_use]
     pub fn axis_word(&self, axis: AxisName, value: f64) -> String {

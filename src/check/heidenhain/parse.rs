@@ -78,12 +78,10 @@ const STEPS: [&str; 6] = ["IX", "IY", "IZ", "IA", "IB", "IC"];
 
 impl<'a> Reader<'a> {
     fn new(post: &'a Postprocessor, masks: &'a Masks) -> Self {
-        let mut names: Vec<(String, AxisName)> = AxisName::ALL.map(|a| (post.number.name(a), a)).into();
-        names.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
         Self {
             post,
             masks,
-            names,
+            names: post.number.spoken(),
             code: Code::default(),
             labels: BTreeMap::new(),
             jumps: Vec::new(),
