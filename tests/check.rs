@@ -6,7 +6,7 @@ mod edits;
 
 use edits::{Fate, original};
 
-const CONTROLLERS: [&str; 4] = ["linuxcnc", "fanuc", "haas", "heidenhain"];
+const CONTROLLERS: [&str; 4] = ["heidenhain", "linuxcnc", "fanuc", "haas"];
 
 /// How many random edits CI makes for each dialect; `examples/edits.rs` makes thousands.
 const EDITS: u64 = 150;
@@ -193,4 +193,38 @@ fn masks_are_a_part_of_a_klartext_program() {
     }
     original.beside.clear();
     assert_eq!(original.codes(&original.text), ["check::not_understood"]);
+}
+
+#[test]
+fn a_run_that_starts_again_meets_each_block_slowly() {
+    for (controller, slow, fast) in [
+        ("linuxcnc", "_axiscal_from> GT 1] *", "_axiscal_from> GT 9] *"),
+        ("fanuc", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
+        ("haas", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
+        ("heidenhain", "FN 11: IF +Q1600 GT +1 GOTO LBL 245", "FN 11: IF +Q1600 GT +9 GOTO LBL 245"),
+    ] {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        assert_eq!(original.text.matches(slow).count(), 1, "{controller}");
+        let codes = original.codes(&original.text.replace(slow, fast));
+        assert!(codes.contains(&"check::feed"), "{controller}: {codes:?}");
+    }
+}
+
+#[test]
+fn a_probe_that_is_not_ready_is_found_before_the_first_move() {
+    for (controller, says) in
+        [("linuxcnc", "(DEBUG"), ("fanuc", "#3006=1(PROBE"), ("haas", "#3006=1(PROBE"), ("heidenhain", "STOP")]
+    {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        // the message and the stop behind it taken out: it would go on with the probe deflected
+        let text = original.without_numbers();
+        let lines: Vec<&str> = text.split_inclusive('\n').collect();
+        let message = lines.iter().position(|l| l.starts_with(says)).unwrap();
+        let to = message + if controller == "linuxcnc" { 2 } else { 3 };
+        let edited: String = lines[..message].iter().chain(&lines[to..]).copied().collect();
+        let codes = original.codes(&original.numbered(&edited));
+        assert!(codes.contains(&"check::goes_on"), "{controller}: {codes:?}");
+    }
 }
