@@ -22,7 +22,7 @@ pub struct Original {
 }
 
 /// A program of a few touches of one block at two angles: all kinds of moves, small enough for thousands of edits.
-const SMALL: &str = r#"
+pub const SMALL: &str = r#"
 format = "axiscal-programs/1"
 name = "small"
 machine = "swivel-head"
