@@ -1,7 +1,7 @@
 //! An NC program is read back, run on the virtual machine with everything that may happen, and judged.
 //!
 //! ```text
-//! text → ngc, macro_b, sinumerik, klartext (grammar of a dialect) → code → run (one machine) → explore (what may happen)
+//! text → ngc, macro_b, heidenhain (grammar of a dialect) → code → run (one machine) → explore (what may happen)
 //!      → judge, touches (limits, shapes, plan, stops, settings), proof (does it still do what was written?)
 //! ```
 //!
@@ -86,7 +86,7 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
             "check::no_dialect",
             format!("controller {} does not say how its programs are read back", post.name),
         )
-        .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
+        .help("write [check] dialect = \"ngc\" (macro-b, klartext) in the postprocessor file")
     })?;
     let text = source.inner();
     if let Some(line) = lines::lines(text).find(|l| l.text.chars().count() > post.line_length) {
