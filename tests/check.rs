@@ -6,16 +6,24 @@ mod edits;
 
 use edits::{Fate, original};
 
-const CONTROLLERS: [&str; 3] = ["linuxcnc", "fanuc", "haas"];
+const CONTROLLERS: [&str; 4] = ["heidenhain", "linuxcnc", "fanuc", "haas"];
 
 /// How many random edits CI makes for each dialect; `examples/edits.rs` makes thousands.
 const EDITS: u64 = 150;
+
+/// `AXISCAL_EDITS=2000` makes as many in the test.
+fn edits() -> u64 {
+    std::env::var("AXISCAL_EDITS").ok().and_then(|n| n.parse().ok()).unwrap_or(EDITS)
+}
 
 #[test]
 fn every_random_edit_is_refused_or_moves_identically() {
     for controller in CONTROLLERS {
         let original = original(controller, None);
-        let fates = original.fates(EDITS, 20260101);
+        let fates = original.fates(edits(), 20260101);
+        let number = |fate: Fate| fates.iter().filter(|(_, f)| *f == fate).count();
+        let each = [Fate::NotRead, Fate::Refused, Fate::Changed, Fate::Same, Fate::Escaped];
+        println!("{controller}: {:?}", each.map(|fate| (fate.clone(), number(fate))));
         let escaped: Vec<&String> = fates.iter().filter(|(_, f)| *f == Fate::Escaped).map(|(w, _)| w).collect();
         assert!(escaped.is_empty(), "{controller}: {escaped:#?}");
         // a check that refuses everything, or lets everything pass as the same, would show nothing
@@ -46,7 +54,7 @@ fn with(text: &str, begins: &str, nth: usize, instead: &dyn Fn(&str) -> String) 
 
 #[test]
 fn edits_by_hand_are_caught() {
-    for controller in CONTROLLERS {
+    for controller in ["linuxcnc", "fanuc", "haas"] {
         let mut original = original(controller, None);
         let linuxcnc = controller == "linuxcnc";
         let guarded = if linuxcnc { "G38.3 " } else { "G31 " };
@@ -85,5 +93,138 @@ fn edits_by_hand_are_caught() {
             let codes = original.codes(&text);
             assert!(!codes.is_empty(), "{controller}: {what} was not caught");
         }
+    }
+}
+
+/// Lines from the first that begins with one text up to and with the next that begins with another, taken out.
+fn without(text: &str, begins: &str, nth: usize, ends: &str) -> String {
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let first = lines.iter().enumerate().filter(|(_, l)| l.starts_with(begins)).nth(nth - 1).unwrap().0;
+    let last = first + lines[first..].iter().position(|l| l.starts_with(ends)).unwrap();
+    lines[..first].iter().chain(&lines[last + 1..]).copied().collect()
+}
+
+#[test]
+fn edits_by_hand_of_a_klartext_program_are_caught() {
+    let mut original = original("heidenhain", None);
+    let t = original.without_numbers();
+    let fast = with(&t, "L Z+10 R0 F1500", 1, &|l| l.replace("F1500", "FMAX"));
+    let not_oriented = with(&t, "M19", 1, &|_| String::new());
+    for text in [fast, not_oriented] {
+        assert_eq!(original.codes(&original.numbered(&text)), ["check::changed"]);
+    }
+    // all the others are refused for what they do, with nothing to compare with but the plan's touches
+    original.plan.programs.clear();
+    let probe = "TCH PROBE 4.0";
+    let turn = with(&t, "L B-35", 1, &|l| format!("L Z-20 R0 FMAX M91\r\n{l}"));
+    let mut wrong = Vec::new();
+    for (what, text, code) in [
+        ("a sign changed", with(&t, "L X-", 1, &|l| l.replace("X-", "X+")), "check::not_the_plan"),
+        ("a lift by a tenth", with(&t, "L Z+11.3", 1, &|l| l.replace("11.3", "1.13")), "check::collision"),
+        ("a point lost", with(&t, "TCH PROBE 4.3 DIST+1.3", 1, &|l| l.replace("1.3", "13")), "check::unguarded"),
+        (
+            "FMAX in a search",
+            with(&t, "TCH PROBE 4.3 DIST+4 F60", 1, &|l| l.replace("F60", "FMAX")),
+            "check::not_understood",
+        ),
+        (
+            "FMAX in a guarded move",
+            with(&t, "TCH PROBE 4.3 DIST+1.3", 1, &|l| l.replace("F1500", "FMAX")),
+            "check::not_understood",
+        ),
+        ("a guarded move without its cycle", without(&t, probe, 2, "TCH PROBE 4.3"), "check::unguarded"),
+        ("a block of a cycle lost", with(&t, "TCH PROBE 4.2", 3, &|_| String::new()), "check::not_understood"),
+        ("a search lost", without(&t, probe, 3, "TCH PROBE 4.3"), "check::touch_lacking"),
+        (
+            "a search beyond the block",
+            with(&t, "TCH PROBE 4.3 DIST+4", 1, &|l| l.replace("DIST+4", "DIST+40")),
+            "check::not_the_plan",
+        ),
+        (
+            "a search at ten times its feed",
+            with(&t, "TCH PROBE 4.3 DIST+4", 1, &|l| l.replace("F60", "F600")),
+            "check::feed",
+        ),
+        ("a retract removed", without(&t, "Q1614", 2, "L X"), "check::in_contact"),
+        (
+            "a line of the log removed",
+            with(&t, "FN 16: F-PRINT TNC:\\AXISCAL\\SMALL_P.A", 3, &|_| String::new()),
+            "check::touch_lacking",
+        ),
+        ("a stop removed", with(&t, "FN 9: IF +0 EQU +0 GOTO LBL 9\r", 2, &|_| String::new()), "check::goes_on"),
+        ("the tilted plane of before", with(&t, "PLANE RESET", 1, &|_| String::new()), "check::not_run"),
+        ("M128 of before", with(&t, "M129", 1, &|_| String::new()), "check::not_run"),
+        ("machine coordinates lost", with(&t, "L X-", 1, &|l| l.replace(" M91", "")), "check::start"),
+        ("a turn below the clearance", turn, "check::turn_not_clear"),
+    ] {
+        let codes = original.codes(&original.numbered(&text));
+        if !codes.contains(&code) {
+            wrong.push(format!("{what}: {codes:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    // a block number that is missing shows that a line is
+    assert_eq!(original.codes(&with(&original.text, "90 ", 1, &|_| String::new())), ["check::not_understood"]);
+}
+
+#[test]
+fn masks_are_a_part_of_a_klartext_program() {
+    let mut original = original("heidenhain", None);
+    let written = original.beside.clone();
+    for (what, mask, from, to, code) in [
+        ("two columns exchanged", "SMALL_P.A", "Q1621,Q1622", "Q1622,Q1621", "check::log"),
+        ("decimals", "SMALL_P.A", "X%10.4LF", "X%10.3LF", "check::log"),
+        ("it writes over the log", "SMALL_P.A", "M_APPEND", "M_TRUNCATE", "check::log"),
+        ("it keeps the log in memory", "SMALL_P.A", "M_CLOSE;", "", "check::not_understood"),
+        ("a form too few", "SMALL_P.A", " Y%10.4LF", "", "check::not_understood"),
+        ("no end of the log", "SMALL_E.A", "E N", "X N", "check::log"),
+        ("a message without its text", "AXISCAL_M.A", "%S", "%1.0LF", "check::not_understood"),
+    ] {
+        original.beside = written
+            .iter()
+            .map(|(name, text)| {
+                let edited = if name == mask { text.inner().replace(from, to) } else { text.inner().clone() };
+                assert!(name != mask || edited != *text.inner(), "{what}");
+                (name.clone(), axiscal::diag::source(name, edited))
+            })
+            .collect();
+        let codes = original.codes(&original.text);
+        assert!(codes.contains(&code), "{what}: {codes:?}");
+    }
+    original.beside.clear();
+    assert_eq!(original.codes(&original.text), ["check::not_understood"]);
+}
+
+#[test]
+fn a_run_that_starts_again_meets_each_block_slowly() {
+    for (controller, slow, fast) in [
+        ("linuxcnc", "_axiscal_from> GT 1] *", "_axiscal_from> GT 9] *"),
+        ("fanuc", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
+        ("haas", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
+        ("heidenhain", "FN 11: IF +Q1600 GT +1 GOTO LBL 245", "FN 11: IF +Q1600 GT +9 GOTO LBL 245"),
+    ] {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        assert_eq!(original.text.matches(slow).count(), 1, "{controller}");
+        let codes = original.codes(&original.text.replace(slow, fast));
+        assert!(codes.contains(&"check::feed"), "{controller}: {codes:?}");
+    }
+}
+
+#[test]
+fn a_probe_that_is_not_ready_is_found_before_the_first_move() {
+    for (controller, says) in
+        [("linuxcnc", "(DEBUG"), ("fanuc", "#3006=1(PROBE"), ("haas", "#3006=1(PROBE"), ("heidenhain", "STOP")]
+    {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        // the message and the stop behind it taken out: it would go on with the probe deflected
+        let text = original.without_numbers();
+        let lines: Vec<&str> = text.split_inclusive('\n').collect();
+        let message = lines.iter().position(|l| l.starts_with(says)).unwrap();
+        let to = message + if controller == "linuxcnc" { 2 } else { 3 };
+        let edited: String = lines[..message].iter().chain(&lines[to..]).copied().collect();
+        let codes = original.codes(&original.numbered(&edited));
+        assert!(codes.contains(&"check::goes_on"), "{controller}: {codes:?}");
     }
 }

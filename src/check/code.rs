@@ -74,6 +74,10 @@ pub enum Function {
     Round,
     /// Sign changed.
     Minus,
+    /// What stands behind the point is cut off.
+    Truncate,
+    /// 1, 0 or -1.
+    Sign,
 }
 
 /// An expression.
@@ -107,6 +111,8 @@ pub enum Piece {
         /// What is written.
         value: Expr,
     },
+    /// The text that a variable holds.
+    Held(Var),
 }
 
 /// A text that the program writes.
@@ -140,6 +146,8 @@ pub enum What {
     Call(usize),
     /// Back to where it was called.
     Return(Option<Expr>),
+    /// A text is kept in a variable.
+    Hold(Var, Text),
     /// A message to the operator.
     Message(Text),
     /// A log is opened; `append`: what it holds is kept.
@@ -217,6 +225,8 @@ impl Expr {
                     Function::Floor => Ok(x.floor()),
                     Function::Ceil => Ok(x.ceil()),
                     Function::Round => Ok(x.round()),
+                    Function::Truncate => Ok(x.trunc()),
+                    Function::Sign => Ok(if x == 0.0 { 0.0 } else { x.signum() }),
                 }
             }
             Self::Two(op, left, right) => {

@@ -260,6 +260,12 @@ impl<'a, 'b> Walk<'a, 'b> {
                 let (from, to) = (self.case.world.axes(part, &probe.from), self.case.world.axes(part, &probe.to));
                 self.probe(at, part, probe, &from, &to, outcome.hit, outcome.part);
             }
+            Event::Release { from, to } => {
+                let (from, to) = (self.case.world.axes(part, from), self.case.world.axes(part, to));
+                if let Some(contact) = self.contact.take() {
+                    self.leave_face(at, part, contact, &from, &to, &[]);
+                }
+            }
             Event::Log(text) => {
                 if let Some(mut contact) = self.contact.take() {
                     contact.made.log = Some(text.clone());
@@ -319,10 +325,10 @@ impl<'a, 'b> Walk<'a, 'b> {
         let mut bounded = [false; 6];
         moving.iter().for_each(|a| bounded[a.index()] = true);
         self.inside(at, to, &bounded);
-        self.came_guarded = false;
         if moving.is_empty() {
             return;
         }
+        self.came_guarded = false;
         if let Rate::Feed(feed) = rate
             && feed > self.case.machine.probe.position_feed + self.case.same
             && self.all_known(known)

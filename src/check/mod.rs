@@ -1,7 +1,7 @@
 //! An NC program is read back, run on the virtual machine with everything that may happen, and judged.
 //!
 //! ```text
-//! text → ngc, macro_b, sinumerik, klartext (grammar of a dialect) → code → run (one machine) → explore (what may happen)
+//! text → ngc, macro_b, heidenhain (grammar of a dialect) → code → run (one machine) → explore (what may happen)
 //!      → judge, touches (limits, shapes, plan, stops, settings), proof (does it still do what was written?)
 //! ```
 //!
@@ -11,6 +11,7 @@
 
 mod code;
 mod explore;
+mod heidenhain;
 mod judge;
 mod lines;
 mod macro_b;
@@ -42,6 +43,8 @@ pub struct Against<'a> {
     pub mounting: Option<&'a str>,
     /// The set-up at which it is meant to begin.
     pub from: u32,
+    /// Files that the control needs beside the program: name, contents.
+    pub beside: &'a [(String, Source)],
 }
 
 /// What came out.
@@ -85,14 +88,15 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
             "check::no_dialect",
             format!("controller {} does not say how its programs are read back", post.name),
         )
-        .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
+        .help("write [check] dialect = \"ngc\" (macro-b, klartext) in the postprocessor file")
     })?;
     let text = source.inner();
     if let Some(line) = lines::lines(text).find(|l| l.text.chars().count() > post.line_length) {
         let says = format!("the line is longer than the {} characters that the control takes", post.line_length);
         return Err(Finding::error("check::line_length", says).at(source, line.all()).into());
     }
-    let program = runs::Program::parse(rule, text).map_err(|fault| {
+    let masks = heidenhain::Masks::read(text, post, against.beside)?;
+    let program = runs::Program::parse(post, rule, text, &masks).map_err(|fault| {
         Finding::error("check::not_understood", fault.says)
             .help("axiscal does not know this; whether it is safe cannot be said")
             .at(source, fault.at)
@@ -101,6 +105,12 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
         Some(plan) => with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?),
         None => without_plan(machine, post, source, against, &program),
     }
+}
+
+/// The names of the files that a program needs beside it at the control and that say what it writes.
+#[must_use]
+pub fn wanted_beside(post: &Postprocessor, program: &Source) -> Vec<String> {
+    if post.companions.is_empty() { Vec::new() } else { heidenhain::wanted(program.inner(), post) }
 }
 
 /// Tries each mounting of the machine and takes the one on which most touches are made.
@@ -188,7 +198,10 @@ fn with_parts(
     let told = runs::all(machine, post, against.plan, program, &world, &scenes);
     let first = told.runs.first();
     // what the control rounds, and under a transformation what the rounding of three words does
-    let same = 0.51 * 10f64.powi(-(post.number.decimals as i32)) + 1e-6 + if tcp { 1e-4 } else { 0.0 };
+    // a search that is a way along a vector: begin, way and end are rounded each
+    let roundings = if program.is_relative() { 3.0 } else { 1.0 };
+    let step = post.number.mm(10f64.powi(-(post.number.decimals as i32)));
+    let same = 0.51 * roundings * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };
     let case = Case {
         machine,
         post,

@@ -106,6 +106,13 @@ pub fn write_event(text: &mut String, happened: &Happened) {
             let part = (outcome.part * 1e9).round() as i64;
             writeln!(text, " {} {} {} {} {part}", probe.toward, probe.overridden, probe.strict, outcome.hit)
         }
+        Event::Release { from, to } => {
+            text.push_str("release");
+            place(text, from);
+            text.push_str(" to");
+            place(text, to);
+            writeln!(text)
+        }
         other => writeln!(text, "{other:?}"),
     };
 }

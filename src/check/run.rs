@@ -74,6 +74,13 @@ pub enum Event {
         /// How it ended.
         outcome: Outcome,
     },
+    /// The control itself went back from where the probe had triggered, as a part of the same block.
+    Release {
+        /// From the contact.
+        from: Position,
+        /// To where it then stands.
+        to: Position,
+    },
     /// A log was opened.
     LogOpen {
         /// Its name.
@@ -154,7 +161,7 @@ impl Vm {
                 }
             }
             Event::Log(_) => self.hits = 0,
-            Event::Move { .. } => self.moved = true,
+            Event::Move { .. } | Event::Release { .. } => self.moved = true,
             Event::Probe { probe, outcome } => {
                 self.moved = true;
                 self.hits += usize::from(probe.toward && outcome.hit);
@@ -309,6 +316,8 @@ pub struct Run<'p, D> {
     done: u64,
     pending: Option<Probe>,
     over: bool,
+    /// Texts that variables hold.
+    texts: BTreeMap<Var, String>,
     /// The axes and the record.
     pub vm: Vm,
     /// The language.
@@ -318,8 +327,8 @@ pub struct Run<'p, D> {
 impl<'p, D: Dialect> Run<'p, D> {
     /// A program that begins.
     pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
-        let returns = Vec::new();
-        Self { code, next: 0, returns, done: 0, pending: None, over: false, vm, dialect }
+        let (returns, texts) = (Vec::new(), BTreeMap::new());
+        Self { code, next: 0, returns, done: 0, pending: None, over: false, texts, vm, dialect }
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -385,6 +394,9 @@ impl<'p, D: Dialect> Run<'p, D> {
         for piece in text {
             match piece {
                 Piece::Text(t) => out.push_str(t),
+                Piece::Held(var) => {
+                    out.push_str(self.texts.get(var).ok_or_else(|| format!("{var} holds no text"))?);
+                }
                 Piece::Fixed { decimals, width, value } => {
                     out.push_str(&self.dialect.spell(self.value(value)?, *decimals, *width));
                 }
@@ -430,6 +442,10 @@ impl<'p, D: Dialect> Run<'p, D> {
                 let value = value.as_ref().map(|v| self.value(v)).transpose()?;
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
                 self.dialect.left(value, &self.vm);
+            }
+            What::Hold(var, text) => {
+                let text = self.text(text)?;
+                self.texts.insert(var.clone(), text);
             }
             What::Message(text) => self.say(text, Event::Message)?,
             What::Wait(text) => self.say(text, Event::Wait)?,

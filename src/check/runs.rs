@@ -6,7 +6,7 @@ use super::explore::{Limits, Told, explore};
 use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
 use super::world::World;
-use super::{macro_b, ngc};
+use super::{heidenhain, macro_b, ngc};
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
@@ -33,10 +33,11 @@ impl Program {
     ///
     /// # Errors
     /// The first place that is not of the dialect's grammar.
-    pub fn parse(rule: &CheckRule, text: &str) -> Result<Self, Fault> {
+    pub fn parse(post: &Postprocessor, rule: &CheckRule, text: &str, masks: &heidenhain::Masks) -> Result<Self, Fault> {
         let code = match rule.dialect {
             DialectName::Ngc => ngc::parse(text)?,
-            DialectName::MacroB => macro_b::parse(text)?,
+            DialectName::MacroB => macro_b::parse(text, &post.number)?,
+            DialectName::Klartext => heidenhain::parse(text, post, masks)?,
         };
         let var = variable(&rule.from);
         let set_at = code.statements.iter().position(|s| matches!(&s.what, What::Set(v, Expr::Number(_)) if *v == var));
@@ -48,6 +49,11 @@ impl Program {
         }
         let setups = highest.min(MOST_SETUPS) as u32;
         Ok(Self { dialect: rule.dialect, code, from: set_at.map(|at| (var, at)), setups })
+    }
+
+    /// Probing moves are programmed by direction and length.
+    pub fn is_relative(&self) -> bool {
+        self.dialect == DialectName::Klartext
     }
 
     /// The set-up at which it is told to begin.
@@ -124,6 +130,7 @@ pub fn all(
     match program.dialect {
         DialectName::Ngc => Runs::<ngc::Ngc>::new(machine, post, plan, program, world, scenes).all(),
         DialectName::MacroB => Runs::<macro_b::MacroB>::new(machine, post, plan, program, world, scenes).all(),
+        DialectName::Klartext => Runs::<heidenhain::Heidenhain>::new(machine, post, plan, program, world, scenes).all(),
     }
 }
 

@@ -33,6 +33,7 @@ pub fn seconds(trunk: &[Happened]) -> f64 {
             Event::Probe { probe, outcome } => {
                 way(&probe.from, &probe.to) * outcome.part / probe.feed * PER_MINUTE + MOVE_S
             }
+            Event::Release { from, to } => way(from, to) / RAPID_MM_MIN * PER_MINUTE + MOVE_S,
             Event::Log(_) => LINE_S,
             _ => 0.0,
         };

@@ -136,7 +136,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
             said.say(case, "check::log", &place, format!("touch {id} is logged without having been made"), "");
             continue;
         };
-        let step = 0.5 * 10f64.powi(-(case.post.log.decimals as i32));
+        let step = 0.5 * 10f64.powi(-(case.post.log.decimals as i32)) * case.post.number.mm(1.0);
         let room = step
             + LOGGED
             + if plan.controller_frame == crate::program::plan::ControllerFrame::Tcp { 1e-4 } else { 0.0 };
@@ -144,8 +144,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
             let says = format!("touch {id}: the log does not hold the place of the contact");
             said.say(case, "check::log", &place, says, "");
         }
-        // a run that begins later searches slowly in its first set-up, which need not touch every block
-        let first = met.insert((made.part, planned.block.as_str())) && told.from == 1;
+        let first = met.insert((made.part, planned.block.as_str()));
         if first && made.search.1 > case.machine.probe.slow_feed + case.same {
             let says = format!(
                 "touch {id}: the first touch of a block must search at slow_feed ({} mm/min)",
@@ -183,7 +182,7 @@ fn log_is_open(case: &Case<'_>, told: &Told, said: &mut Said) {
     if case.post.check.as_ref().is_some_and(|c| c.log_always_open) {
         return;
     }
-    let mut open = None;
+    let (mut open, mut opened) = (None, false);
     let wanted = case.plan.and_then(|p| case.post.log_name(p).ok());
     for happened in &told.trunk {
         match &happened.event {
@@ -197,8 +196,11 @@ fn log_is_open(case: &Case<'_>, told: &Told, said: &mut Said) {
                     let says = format!("the log is called {name:?}, expected {:?}", wanted.as_deref().unwrap_or(""));
                     said.say(case, "check::log", &happened.at, says, "");
                 }
-                if *append != (told.from > 1) {
-                    let says = if *append {
+                let again = std::mem::replace(&mut opened, true);
+                if *append != (told.from > 1 || again) {
+                    let says = if again {
+                        "the lines of the log before this one are written over"
+                    } else if *append {
                         "a run from the beginning goes on with an old log"
                     } else {
                         "a run that goes on writes over the log of its beginning"

@@ -4,13 +4,13 @@ use super::common::MachineArgs;
 use super::load::load_plan;
 use super::{Answer, Io};
 use crate::check::{self, Against, Checked};
-use crate::diag::{Finding, Result, Severity, source};
+use crate::diag::{Finding, Result, Severity, Source, source};
 use crate::files;
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::program;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -43,12 +43,20 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     io.report(&findings);
     let plan = args.plan.as_ref().map(|file| load_plan(file, &machine, io)).transpose()?;
     let text = source(args.file.display().to_string(), files::read_text(&args.file)?);
-    let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from };
+    let beside = beside(&check::wanted_beside(&post, &text), &args.file)?;
+    let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from, beside: &beside };
     let checked = check::check(&machine, &post, &text, &against)?;
     io.report(&checked.findings);
     say(&machine, args, &checked, io);
     answer(&machine, &post, args, &checked, io);
     Ok(if good(&checked) { Answer::Done } else { Answer::No })
+}
+
+/// Files that lie in the folder of the program; which of them are lacking the check says.
+fn beside(names: &[String], program: &Path) -> Result<Vec<(String, Source)>> {
+    let folder = program.parent().unwrap_or_else(|| Path::new(""));
+    let there = names.iter().map(|name| (name, folder.join(name))).filter(|(_, path)| path.is_file());
+    there.map(|(name, path)| Ok((name.clone(), source(path.display().to_string(), files::read_text(&path)?)))).collect()
 }
 
 fn good(checked: &Checked) -> bool {

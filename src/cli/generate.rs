@@ -12,7 +12,7 @@ use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::{Run, assemble};
-use crate::post::Postprocessor;
+use crate::post::{NcProgram, Postprocessor};
 use crate::program::path::{Step, Stop};
 use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
@@ -96,7 +96,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         keep_inputs(file, own.into_iter().flatten())?;
     }
     let name = format!("{}.{}", spec.name, nc.extension);
-    let proof = prove(&machine, &post, &generated.plan, &name, &nc.text, io)?;
+    let proof = prove(&machine, &post, &generated.plan, &name, &nc, io)?;
     // the same touches for another control: what was proven of its program stays known
     if let Some(old) = old_programs(&plan_file, &generated.plan) {
         generated.plan.programs = old;
@@ -120,7 +120,7 @@ pub(super) fn prove(
     post: &Postprocessor,
     plan: &Plan,
     name: &str,
-    text: &str,
+    nc: &NcProgram,
     io: &Io,
 ) -> Result<Option<Proof>> {
     if post.check.is_none() {
@@ -132,8 +132,10 @@ pub(super) fn prove(
             .help("write [check] in the postprocessor file: docs/guide/check.md")]);
         return Ok(None);
     }
-    let against = Against { plan: Some(plan), ..Against::default() };
-    let checked = check::check(machine, post, &source(format!("{name} (not written)"), text), &against)?;
+    let beside = nc.sources();
+    let against = Against { plan: Some(plan), beside: &beside, ..Against::default() };
+    let text = source(format!("{name} (not written)"), nc.text.as_str());
+    let checked = check::check(machine, post, &text, &against)?;
     if checked.findings.iter().any(|f| f.severity == Severity::Error) {
         let mut findings = checked.findings;
         findings.push(

@@ -349,7 +349,7 @@ fn write(
     let program_file = args.out.join(format!("{}.{}", plan.program, nc.extension));
     let form_file = args.out.join(format!("{}.toml", plan.program));
     let name = format!("{}.{}", plan.program, nc.extension);
-    let proof = super::generate::prove(&loaded.machine, post, plan, &name, &nc.text, io)?;
+    let proof = super::generate::prove(&loaded.machine, post, plan, &name, &nc, io)?;
     let mut proven = plan.clone();
     proven.programs.extend(proof.map(|p| (post.name.clone(), p)));
     files::write_whole(plan_file, proven.to_json().as_bytes())?;

@@ -450,6 +450,8 @@ pub enum DialectName {
     Ngc,
     /// Fanuc, Haas: custom macro B.
     MacroB,
+    /// HEIDENHAIN: Klartext.
+    Klartext,
 }
 
 /// The axis of a letter, if axiscal knows it.

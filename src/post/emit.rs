@@ -5,7 +5,7 @@ use super::opening::Opening;
 use super::spelling::name_of;
 use super::{Frame, Postprocessor, log_text};
 use crate::axes::{AxisMap, AxisName};
-use crate::diag::{Failure, Finding, Findings, Result};
+use crate::diag::{Failure, Finding, Findings, Result, Source, source};
 use crate::machine::Machine;
 use crate::program::path::{Path, Step, TouchStep};
 use crate::program::plan::Plan;
@@ -41,6 +41,17 @@ impl NcProgram {
     pub fn files(&self, stem: &str) -> Vec<(String, &str)> {
         let program = (format!("{stem}.{}", self.extension), self.text.as_str());
         std::iter::once(program).chain(self.beside.iter().map(|f| (f.name.clone(), f.text.as_str()))).collect()
+    }
+}
+
+impl NcProgram {
+    /// The files beside the program as `check` takes them.
+    #[must_use]
+    pub fn sources(&self) -> Vec<(String, Source)> {
+        self.beside
+            .iter()
+            .map(|f| (f.name.clone(), source(format!("{} (not written)", f.name), f.text.as_str())))
+            .collect()
     }
 }
 
@@ -100,6 +111,10 @@ pub(super) struct Writer<'a> {
     pub(super) mounted: Vec<String>,
     /// Label of the set-up that is open.
     open_setup: Option<usize>,
+    /// Its number.
+    setup: u32,
+    /// The set-up in which each block of what is mounted was touched last.
+    pub(super) touched: BTreeMap<String, u32>,
     last: Named,
     /// Approach of the touch made last, and the way back off it: what its retract may use.
     approach: Vec<Value>,
@@ -145,6 +160,8 @@ impl<'a> Writer<'a> {
             oriented: None,
             mounted: path.mounted.clone(),
             open_setup: None,
+            setup: 0,
+            touched: BTreeMap::new(),
             last: Named::default(),
             approach: Vec::new(),
             heading_back: Vec::new(),
@@ -377,10 +394,26 @@ impl<'a> Writer<'a> {
         }
         let of = |axis: AxisName| {
             let direction = self.number(delta[axis.index()] / length);
-            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction }
+            let vector = self.vector(&(delta / length), axis);
+            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction, vector }
         };
         let way = named.iter().map(|(axis, _)| axis).filter(|a| !a.is_rotary()).map(of).collect();
         (way, self.length(length))
+    }
+
+    /// A component of a direction, for controls that take a vector of any length: all digits that the control has.
+    fn vector(&self, direction: &nalgebra::Vector3<f64>, axis: AxisName) -> String {
+        const LONG: f64 = 1000.0;
+        let along_one_axis = direction.iter().filter(|d| **d != 0.0).count() == 1;
+        self.number(direction[axis.index()] * if along_one_axis { 1.0 } else { LONG })
+    }
+
+    /// The set-up in which the block of a touch was touched before, where that is another one than the present: a run
+    /// that begins behind it has not met the block yet.
+    fn met_before(&mut self, touch: &TouchStep) -> Option<u32> {
+        let block = self.plan.touch(touch.id)?.block.clone();
+        let before = self.touched.insert(block, self.setup)?;
+        (before != self.setup && touch.search_feed > self.machine.probe.slow_feed).then_some(before)
     }
 
     fn moved(&mut self, to: &AxisMap) {
@@ -395,6 +428,7 @@ impl<'a> Writer<'a> {
     fn setup(&mut self, number: u32, says: &str, resume: Option<&[Step]>) -> Result<()> {
         self.close_setup()?;
         self.open_setup = Some(self.label);
+        self.setup = number;
         self.render("setup", context! { number => number, says => says })?;
         let moves = self.resume(resume)?;
         let possible = moves.is_some();
@@ -451,6 +485,7 @@ impl<'a> Writer<'a> {
                     axis => axis.to_string(),
                     name => self.post.number.name(axis),
                     direction => self.number(direction[i]),
+                    vector => self.vector(&direction, axis),
                     start => self.length(self.shown(axis, start[i])),
                     nominal => self.length(self.shown(axis, nominal[i])),
                     end => self.length(self.shown(axis, end[i])),
@@ -462,6 +497,7 @@ impl<'a> Writer<'a> {
             id => touch.id,
             says => touch.says.clone(),
             first => touch.first,
+            before => self.met_before(touch),
             end => self.words(&target)?,
             pose => self.words(&touch.pose)?,
             all => self.words(&xyz(&end))?,
@@ -477,8 +513,9 @@ impl<'a> Writer<'a> {
         self.render("touch", context)?;
         self.approach = approach;
         let back = |axis: AxisName| {
+            let vector = self.vector(&-direction, axis);
             let direction = self.number(-direction[axis.index()]);
-            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction }
+            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction, vector }
         };
         self.heading_back = target.iter().map(|(axis, _)| back(axis)).collect();
         self.way = self.length((nominal - start).norm());

@@ -84,6 +84,7 @@ impl Writer<'_> {
                 .help("make a program for each stylus, or generate without --tcp"));
         }
         self.mounted.clone_from(&stop.mounted);
+        self.touched.clear();
         // all rotary axes stand at 0, where the control's coordinates are the same for every length
         self.frame = Frame::new(self.machine, self.plan.controller_frame, stop.tool_length_mm);
         let longer = self.length(stop.tool_length_mm - self.plan.tool_length_mm);

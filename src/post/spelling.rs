@@ -2,7 +2,7 @@
 
 use super::as_written::LengthUnit;
 use crate::axes::{AxisMap, AxisName};
-use crate::units::inch_from_mm;
+use crate::units::{inch_from_mm, mm_from_inch};
 use std::collections::BTreeMap;
 
 /// How numbers and axis words are written.
@@ -52,6 +52,15 @@ impl NumberRule {
         if self.mark == '.' { text } else { text.replace('.', &self.mark.to_string()) }
     }
 
+    /// A length in mm, from the control's unit.
+    #[must_use]
+    pub fn mm(&self, length: f64) -> f64 {
+        match self.unit {
+            LengthUnit::Mm => length,
+            LengthUnit::Inch => mm_from_inch(length),
+        }
+    }
+
     /// A length (or a feed) in the control's unit, from mm.
     #[must_use]
     pub fn length(&self, mm: f64) -> String {
@@ -71,6 +80,22 @@ impl NumberRule {
     #[must_use]
     pub fn name(&self, axis: AxisName) -> String {
         self.names.get(&axis).cloned().unwrap_or_else(|| axis.to_string())
+    }
+
+    /// What words may call the axes: names that were given before letters, longer ones first, each name once.
+    #[must_use]
+    pub fn spoken(&self) -> Vec<(String, AxisName)> {
+        let given = |a: &AxisName| self.names.contains_key(a);
+        let mut names: Vec<(String, AxisName)> = Vec::new();
+        let (own, letters): (Vec<AxisName>, Vec<AxisName>) = AxisName::ALL.into_iter().partition(given);
+        for axis in own.into_iter().chain(letters) {
+            let name = self.name(axis);
+            if !name.is_empty() && names.iter().all(|(n, _)| *n != name) {
+                names.push((name, axis));
+            }
+        }
+        names.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
+        names
     }
 
     /// An axis word, e.g. `X-33.5`.

@@ -2,7 +2,7 @@
 //! outside.
 
 use axiscal::check::{Against, check};
-use axiscal::diag::{Severity, source};
+use axiscal::diag::{Severity, Source, source};
 use axiscal::machine::{self, Machine};
 use axiscal::post::Postprocessor;
 use axiscal::program::plan::Plan;
@@ -17,11 +17,12 @@ pub struct Original {
     pub post: Postprocessor,
     pub plan: Plan,
     pub text: String,
+    pub beside: Vec<(String, Source)>,
     pub sha256: String,
 }
 
 /// A program of a few touches of one block at two angles: all kinds of moves, small enough for thousands of edits.
-const SMALL: &str = r#"
+pub const SMALL: &str = r#"
 format = "axiscal-programs/1"
 name = "small"
 machine = "swivel-head"
@@ -65,15 +66,16 @@ pub fn original(controller: &str, built_in: Option<&str>) -> Original {
     };
     let (generated, _) = program::generate(&machine, &spec, &Options::default()).unwrap();
     let mut plan = generated.plan;
-    let text = post.program(&machine, &plan, &generated.path).unwrap().text;
-    let against = Against { plan: Some(&plan), ..Against::default() };
+    let nc = post.program(&machine, &plan, &generated.path).unwrap();
+    let (beside, text) = (nc.sources(), nc.text);
+    let against = Against { plan: Some(&plan), beside: &beside, ..Against::default() };
     let checked = check(&machine, &post, &source("original", text.as_str()), &against).unwrap();
     let wrong: Vec<String> = checked.findings.iter().map(ToString::to_string).collect();
     assert!(wrong.is_empty(), "{controller}: {wrong:#?}");
     assert_eq!(checked.touches, plan.touches.len());
     let sha256 = checked.proof.sha256.clone();
     plan.programs.insert(post.name.clone(), checked.proof);
-    Original { machine, post, plan, text, sha256 }
+    Original { machine, post, plan, text, beside, sha256 }
 }
 
 /// What became of an edited program.
@@ -94,7 +96,7 @@ pub enum Fate {
 impl Original {
     /// Looks at an edited text.
     pub fn fate(&self, text: &str) -> Fate {
-        let against = Against { plan: Some(&self.plan), ..Against::default() };
+        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
         match check(&self.machine, &self.post, &source("edited", text), &against) {
             Err(_) => Fate::NotRead,
             Ok(checked) => {
@@ -111,11 +113,26 @@ impl Original {
     /// Findings of an edited text, by code.
     #[allow(dead_code)] // the example does not ask for it
     pub fn codes(&self, text: &str) -> Vec<&'static str> {
-        let against = Against { plan: Some(&self.plan), ..Against::default() };
+        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
         match check(&self.machine, &self.post, &source("edited", text), &against) {
             Err(failure) => failure.0.iter().map(|f| f.code).collect(),
             Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
         }
+    }
+
+    /// The text without its block numbers, where it has any.
+    pub fn without_numbers(&self) -> String {
+        if self.post.block_numbers.is_none() {
+            return self.text.clone();
+        }
+        self.text.split_inclusive('\n').map(|l| l.split_once(' ').unwrap().1).collect()
+    }
+
+    /// A text with block numbers, where the control has any.
+    pub fn numbered(&self, text: &str) -> String {
+        let Some(rule) = &self.post.block_numbers else { return text.to_owned() };
+        let number = |n: usize| rule.word.replace("{n}", &(rule.first + n * rule.step).to_string());
+        text.split_inclusive('\n').enumerate().map(|(n, line)| number(n) + line).collect()
     }
 
     /// The fates of many random edits, with what was done.
@@ -124,7 +141,14 @@ impl Original {
             .into_par_iter()
             .map(|n| {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(n));
-                let (what, text) = edit(&self.text, &mut rng);
+                // the control numbers its blocks anew when one is taken out there; an editor elsewhere does not
+                let renumbers = self.post.block_numbers.is_some() && !n.is_multiple_of(8);
+                let (what, text) = if renumbers {
+                    let (what, text) = edit(&self.without_numbers(), &mut rng);
+                    (what, self.numbered(&text))
+                } else {
+                    edit(&self.text, &mut rng)
+                };
                 let fate = self.fate(&text);
                 (what, fate)
             })

@@ -3,9 +3,11 @@
 //! Sources: Fanuc B-63324EN/03 (15i) for blocks and G31; a clone's manual (NCT, pp. 158, 193) and Haas 96-8000 Rev AC
 //! (p. 116) for DPRNT; the rest as the postprocessor files say, unverified where they say so.
 
+use crate::axes::AxisName;
 use crate::check::code::{Code, Expr, Function, Op, Piece, Text, Var, What, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
+use crate::post::NumberRule;
 use nom::branch::alt;
 use nom::bytes::complete::{tag, take_till, take_while};
 use nom::character::complete::{char, digit1, one_of};
@@ -16,8 +18,11 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The letters that a block may hold.
-const ADDRESSES: [&str; 12] = ["G", "M", "X", "Y", "Z", "A", "B", "C", "F", "P", "R", "H"];
+/// The letters that a block may hold beside those of the axes.
+const ADDRESSES: [&str; 6] = ["G", "M", "F", "P", "R", "H"];
+
+/// The letters of the axes, in the order of [`AxisName::ALL`].
+const AXES: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
 
 type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 
@@ -25,8 +30,8 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 ///
 /// # Errors
 /// The first place that is not of this grammar.
-pub fn parse(text: &str) -> Result<Code, Fault> {
-    let mut reader = Reader::default();
+pub fn parse(text: &str, number: &NumberRule) -> Result<Code, Fault> {
+    let mut reader = Reader { names: number.spoken(), ..Reader::default() };
     for line in lines(text) {
         reader.line(&line)?;
     }
@@ -35,6 +40,8 @@ pub fn parse(text: &str) -> Result<Code, Fault> {
 
 #[derive(Default)]
 struct Reader {
+    /// What the control calls each axis.
+    names: Vec<(String, AxisName)>,
     code: Code,
     labels: BTreeMap<u32, usize>,
     jumps: Vec<(usize, u32, Range<usize>)>,
@@ -155,11 +162,14 @@ impl Reader {
         let mut words: Vec<Word> = Vec::new();
         let mut left = rest;
         while left.starts_with(|c: char| c.is_ascii_uppercase()) {
-            let Some(address) = ADDRESSES.into_iter().find(|a| left.starts_with(a)) else {
+            let axis = self.names.iter().find(|(name, _)| left.starts_with(name.as_str()));
+            let axis = axis.map(|(name, axis)| (name.len(), AXES[axis.index()]));
+            let other = || ADDRESSES.into_iter().find(|a| left.starts_with(a)).map(|a| (1, a));
+            let Some((length, address)) = axis.or_else(other) else {
                 return Err(line.not_understood(left, "a word that axiscal knows"));
             };
             let (after, (value, point)) =
-                cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of a word"))?;
+                cut(word_value).parse(&left[length..]).map_err(|e| line.unread(&e, "the value of a word"))?;
             if words.iter().any(|w| w.address == address) && address != "G" {
                 return Err(line.fault(left, format!("two {address} words stand in one block")));
             }
@@ -337,6 +347,11 @@ const LEVELS: [OpParser; 3] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::post::Postprocessor;
+
+    fn read(text: &str) -> Result<Code, Fault> {
+        parse(text, &Postprocessor::load_built_in_or_file("fanuc").unwrap().0.number)
+    }
 
     #[test]
     fn what_is_not_known_is_an_error_with_its_place() {
@@ -354,7 +369,7 @@ mod tests {
             ("%\nO1\n(A(B)\n", 7),
             ("%\nO1\nX1.\n%\n", 11),
         ] {
-            let fault = parse(text).unwrap_err();
+            let fault = read(text).unwrap_err();
             if fault.at.start != place {
                 wrong.push(format!("{text:?}, not {place} but {}: {}", fault.at.start, fault.says));
             }
@@ -365,7 +380,7 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn rubbish_never_panics(text in "%\nO1\n[ -~\n]{0,300}") {
-            let _ = parse(&text);
+            let _ = read(&text);
         }
     }
 }

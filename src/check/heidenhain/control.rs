@@ -1,0 +1,314 @@
+//! What a TNC does with a block: L, touch probe cycle 4, datum shift, M128, M91, system data.
+//!
+//! What cycle 4 does is as the postprocessor file says, unverified on a control: it moves along a vector until the probe
+//! triggers, keeps where that was in three Q parameters and -1 in the fourth where it did not, and goes back by MB, but
+//! not past its beginning. With the probe deflected at its beginning the control may stop by itself; here the cycle ends at
+//! once, and the program must see to it.
+
+use crate::axes::{AxisName, Position};
+use crate::check::code::{Values, Var};
+use crate::check::run::{Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::machine::Machine;
+use crate::post::Postprocessor;
+use crate::units::mm_from_inch;
+use std::collections::BTreeMap;
+
+/// The state of the control.
+#[derive(Debug, Clone)]
+pub struct Heidenhain {
+    inch: bool,
+    /// The preset that is active: machine coordinate of the datum, mm and deg.
+    preset: [f64; 6],
+    /// Length of the tool that is called, mm.
+    tool_mm: f64,
+    /// Of TRANS DATUM or cycle 7, mm and deg.
+    shift: [f64; 6],
+    tilted: bool,
+    tcpm: Tcpm,
+    /// M126: rotary axes take the short way.
+    short_way: bool,
+    /// mm/min
+    feed: f64,
+    /// Of cycle 13, deg.
+    angle: Option<f64>,
+    own: Values,
+    last: Last,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tcpm {
+    Off,
+    /// On before the program began.
+    Found,
+    /// Switched on by the program.
+    On,
+}
+
+/// The last run of cycle 4.
+#[derive(Debug, Clone, Copy, Default)]
+struct Last {
+    first: u32,
+    in_machine: bool,
+    hit: bool,
+    /// The way that it made, mm.
+    made: [f64; 3],
+}
+
+/// The Q parameters that a program may use: free for the user, TNC 640 User's Manual, "Q parameters".
+const OWN: std::ops::RangeInclusive<u32> = 1600..=1999;
+
+impl Heidenhain {
+    fn unit(&self, axis: AxisName) -> f64 {
+        if self.inch && !axis.is_rotary() { mm_from_inch(1.0) } else { 1.0 }
+    }
+
+    /// Machine coordinate less the coordinate that a word without M91 means, mm or deg.
+    fn offset(&self, axis: AxisName) -> f64 {
+        let tool = if axis == AxisName::Z { self.tool_mm } else { 0.0 };
+        self.preset[axis.index()] + self.shift[axis.index()] + tool
+    }
+
+    fn target(&self, words: &[Spoken], vm: &Vm) -> Result<[Option<f64>; 6], String> {
+        let m91 = words.iter().any(|w| w.address == "M91");
+        let mut to = [None; 6];
+        for axis in AxisName::ALL {
+            let letter = axis.letter();
+            let of = |w: &&Spoken| w.address.strip_prefix('I').unwrap_or(w.address).starts_with(letter);
+            let Some(word) = words.iter().filter(|w| w.address != "L").find(of) else { continue };
+            let way = word.value * self.unit(axis);
+            to[axis.index()] = Some(match (word.address.starts_with('I'), m91) {
+                (true, true) => return Err("a step stands with M91".to_owned()),
+                (true, false) => vm.at.get(axis) + way,
+                (false, true) => way,
+                (false, false) => way + self.offset(axis),
+            });
+        }
+        Ok(to)
+    }
+
+    fn may_move(&self, vm: &Vm) -> Result<(), String> {
+        if self.tilted {
+            return Err("it moves in the tilted plane: PLANE RESET STAY is missing".to_owned());
+        }
+        match (self.tcpm, vm.world.is_tcp()) {
+            (Tcpm::Found, _) => Err("it moves under the M128 of before: M129 is missing".to_owned()),
+            (Tcpm::Off, true) => Err("the plan is for the control's transformation: M128 is missing".to_owned()),
+            (Tcpm::On, false) => Err("it moves under M128, and no plan says for which touches".to_owned()),
+            _ => Ok(()),
+        }
+    }
+
+    fn feed_of(&mut self, words: &[Spoken]) -> Result<(), String> {
+        if let Some(f) = words.iter().find(|w| w.address == "F") {
+            if f.value <= 0.0 {
+                return Err(format!("the feed is {}", f.value));
+            }
+            self.feed = f.value * self.unit(AxisName::X);
+        }
+        Ok(())
+    }
+
+    fn linear(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
+        self.may_move(vm)?;
+        self.feed_of(words)?;
+        let to = self.target(words, vm)?;
+        let turns = AxisName::ALL.iter().any(|a| a.is_rotary() && to[a.index()].is_some());
+        if turns && self.short_way {
+            return Err("a rotary axis may take the short way: M127 is missing".to_owned());
+        }
+        let rate = if words.iter().any(|w| w.address == "FMAX") {
+            Rate::Rapid
+        } else if self.feed > 0.0 {
+            Rate::Feed(self.feed)
+        } else {
+            return Err("L without a feed".to_owned());
+        };
+        vm.go(&to, rate, true)?;
+        Ok(Next::On)
+    }
+
+    fn probe(&mut self, words: &[Spoken], vm: &Vm) -> Result<Next, String> {
+        self.may_move(vm)?;
+        let value = |address: &str| words.iter().find(|w| w.address == address).map_or(0.0, |w| w.value);
+        let in_machine = value("REFERENCE") == 1.0;
+        if in_machine && self.tcpm == Tcpm::On {
+            return Err("REFERENCE SYSTEM:1 stands under M128".to_owned());
+        }
+        let first = value("PROBE") as u32;
+        if !OWN.contains(&first) || !OWN.contains(&(first + 3)) {
+            return Err(format!(
+                "Q{first} to Q{} are not the program's own: Q1600 to Q1999 are",
+                first.saturating_add(3)
+            ));
+        }
+        let along = [value("IX"), value("IY"), value("IZ")];
+        let length = along.iter().map(|d| d * d).sum::<f64>().sqrt();
+        if !(length > 1e-9 && length.is_finite()) {
+            return Err("cycle 4 has no direction".to_owned());
+        }
+        let way = value("DIST") * self.unit(AxisName::X);
+        if way <= 0.0 {
+            return Err(format!("cycle 4 is to move by {way} mm"));
+        }
+        self.last = Last { first, in_machine, ..Last::default() };
+        let mut to = [None; 6];
+        for (axis, part) in AxisName::ALL.into_iter().zip(along).filter(|(_, part)| *part != 0.0) {
+            to[axis.index()] = Some(vm.at.get(axis) + way * part / length);
+        }
+        let feed = value("F") * self.unit(AxisName::X);
+        if feed <= 0.0 {
+            return Err(format!("the feed is {feed}"));
+        }
+        Ok(Next::Probe(Probe {
+            from: vm.at,
+            to: vm.target(&to)?,
+            feed,
+            toward: true,
+            known: vm.known,
+            // the head of the program says at what it must stand; a program cannot switch it off
+            overridden: false,
+            strict: false,
+        }))
+    }
+
+    /// Back from the face, as cycle 4 does by itself.
+    fn back(&self, mm: f64, vm: &mut Vm) {
+        let made = self.last.made.iter().map(|d| d * d).sum::<f64>().sqrt();
+        let back = mm.min(made);
+        if !self.last.hit || back <= 0.0 {
+            return;
+        }
+        let from = vm.at;
+        for (slot, way) in vm.at.0.iter_mut().zip(self.last.made) {
+            *slot -= way * back / made;
+        }
+        vm.note(Event::Release { from, to: vm.at });
+    }
+
+    fn auxiliary(&mut self, m: f64, vm: &mut Vm) -> Result<Next, String> {
+        match m as u32 {
+            0 => vm.note(Event::Wait(String::new())),
+            5 => vm.note(Event::Other("spindle off".to_owned())),
+            9 => vm.note(Event::Other("coolant off".to_owned())),
+            19 => vm.note(Event::Orient(self.angle.ok_or("M19 without cycle 13: to which angle?")?)),
+            30 => return Ok(Next::End),
+            126 | 127 => self.short_way = m == 126.0,
+            128 => self.tcpm = Tcpm::On,
+            129 => self.tcpm = Tcpm::Off,
+            _ => return Err(format!("M{m} is not known here")),
+        }
+        Ok(Next::On)
+    }
+
+    fn system(&self, data: &str, vm: &Vm) -> Option<f64> {
+        let (id, index) = data.strip_prefix("ID")?.split_once(" IDX")?;
+        let index: usize = index.parse().ok()?;
+        // any time: what a program makes of it is the difference of two
+        const CLOCK_S: f64 = 1000.0;
+        let axis = || AxisName::ALL.get(index.checked_sub(1)?).copied().filter(|a| vm.axes[a.index()]);
+        Some(match id {
+            "320" => CLOCK_S,
+            "240" => vm.at.get(axis()?),
+            "270" => {
+                let axis = axis()?;
+                vm.at.get(axis) - self.offset(axis)
+            }
+            _ => return None,
+        })
+    }
+}
+
+impl Dialect for Heidenhain {
+    fn begin(start: Start, _post: &Postprocessor, _machine: &Machine) -> Self {
+        let awkward = start == Start::Awkward;
+        let some = |values: [f64; 6]| if awkward { values } else { [0.0; 6] };
+        Self {
+            inch: false,
+            preset: some([7.5, -3.25, 11.0, 1.5, -2.0, 0.75]),
+            tool_mm: if awkward { 120.25 } else { 0.0 },
+            shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0]),
+            tilted: awkward,
+            tcpm: if awkward { Tcpm::Found } else { Tcpm::Off },
+            short_way: awkward,
+            feed: 0.0,
+            angle: None,
+            own: Values::new(),
+            last: Last::default(),
+        }
+    }
+
+    fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
+        let Some(head) = words.first() else { return Ok(Next::On) };
+        match head.address {
+            "L" => return self.linear(words, vm),
+            "PROBE" => return self.probe(words, vm),
+            "BACK" => self.back(head.value * self.unit(AxisName::X), vm),
+            "M" => return self.auxiliary(head.value, vm),
+            "INCH" => self.inch = head.value == 1.0,
+            "PLANE" => self.tilted = false,
+            "ANGLE" => self.angle = Some(head.value),
+            "NO SHIFT" => self.shift = [0.0; 6],
+            "SHIFT" => {
+                if words.iter().any(|w| w.address.starts_with('I')) {
+                    return Err("a datum shift by a step is not known here".to_owned());
+                }
+                for axis in AxisName::ALL {
+                    if let Some(word) = words.iter().find(|w| w.address.starts_with(axis.letter())) {
+                        self.shift[axis.index()] = word.value * self.unit(axis);
+                    }
+                }
+            }
+            other => return Err(format!("{other} is not known here")),
+        }
+        Ok(Next::On)
+    }
+
+    fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
+        match var {
+            Var::Number(n) if OWN.contains(n) => own(&self.own, var).map_err(|_| format!("Q{n} has no value")),
+            Var::Number(n) => Err(format!("what Q{n} holds is not known here")),
+            Var::Name(data) => self.system(data, vm).ok_or_else(|| format!("{data} is no system data of this machine")),
+        }
+    }
+
+    fn exists(&self, var: &Var) -> bool {
+        self.own.contains_key(var)
+    }
+
+    fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {
+        match var {
+            Var::Number(n) if OWN.contains(n) => {
+                self.own.insert(var.clone(), value);
+                Ok(())
+            }
+            Var::Number(n) => Err(format!("Q{n} is not the program's own: Q1600 to Q1999 are")),
+            Var::Name(name) => Err(format!("{name} cannot be written")),
+        }
+    }
+
+    fn probed(&mut self, probe: &Probe, outcome: Outcome, stands: &Position) {
+        let Last { first, in_machine, .. } = self.last;
+        self.last.hit = outcome.hit;
+        for (number, axis) in (first..).zip([AxisName::X, AxisName::Y, AxisName::Z]) {
+            self.last.made[axis.index()] = stands.get(axis) - probe.from.get(axis);
+            let offset = if in_machine { 0.0 } else { self.offset(axis) };
+            self.own.insert(Var::Number(number), (stands.get(axis) - offset) / self.unit(axis));
+        }
+        self.own.insert(Var::Number(first + 3), if outcome.hit { 0.0 } else { -1.0 });
+    }
+
+    fn settings(&self) -> BTreeMap<String, String> {
+        let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
+        let on = |yes: bool| if yes { "on" } else { "off" }.to_owned();
+        BTreeMap::from([
+            ("tilted plane".to_owned(), on(self.tilted)),
+            ("tool centre point control".to_owned(), on(self.tcpm != Tcpm::Off)),
+            ("short way".to_owned(), on(self.short_way)),
+            ("datum shift".to_owned(), numbers(&self.shift)),
+        ])
+    }
+
+    fn spell(&self, value: f64, decimals: usize, width: usize) -> String {
+        format!("{value:>width$.decimals$}")
+    }
+}

@@ -1,0 +1,459 @@
+//! The grammar of programs: running block numbers, L, TCH PROBE 4, FN, formulas, labels, FN 16. What it does not know is an
+//! error.
+//!
+//! Sources: as `postprocessors/heidenhain.toml` says, most of it unverified on a control.
+
+use super::formula::formula;
+use super::masks::{Masks, folder, string};
+use super::scan::Scan;
+use crate::axes::AxisName;
+use crate::check::code::{Code, Expr, Op, Piece, Var, What, Word};
+use crate::check::lines::{Line, lines};
+use crate::check::run::Fault;
+use crate::post::Postprocessor;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Reads a program.
+///
+/// # Errors
+/// The first place that is not of this grammar.
+pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fault> {
+    let mut reader = Reader::new(post, masks);
+    let mut number = 0;
+    for line in lines(text) {
+        if line.text.is_empty() && line.start == text.len() {
+            break;
+        }
+        reader.line(&line, number)?;
+        number += 1;
+    }
+    reader.finish(text.len())
+}
+
+/// A cycle whose further blocks must follow.
+struct Open {
+    /// Where its first block stands.
+    start: usize,
+    /// Which block comes next.
+    stage: usize,
+    words: Vec<Word>,
+    kind: Cycle,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cycle {
+    Probe,
+    Orientation,
+    DatumShift,
+    Rotation,
+    WorkingPlane,
+}
+
+struct Reader<'a> {
+    post: &'a Postprocessor,
+    masks: &'a Masks,
+    /// What the control calls each axis; longer names first.
+    names: Vec<(String, AxisName)>,
+    code: Code,
+    labels: BTreeMap<u32, usize>,
+    jumps: Vec<(usize, u32, Range<usize>)>,
+    open: Option<Open>,
+    /// Name and unit of BEGIN PGM.
+    begun: Option<(String, String)>,
+    ended: bool,
+}
+
+fn number(address: &'static str, value: f64) -> Word {
+    word(address, Expr::Number(value))
+}
+
+fn word(address: &'static str, value: Expr) -> Word {
+    Word { address, value, point: true }
+}
+
+const ABSOLUTE: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
+const STEPS: [&str; 6] = ["IX", "IY", "IZ", "IA", "IB", "IC"];
+
+impl<'a> Reader<'a> {
+    fn new(post: &'a Postprocessor, masks: &'a Masks) -> Self {
+        Self {
+            post,
+            masks,
+            names: post.number.spoken(),
+            code: Code::default(),
+            labels: BTreeMap::new(),
+            jumps: Vec::new(),
+            open: None,
+            begun: None,
+            ended: false,
+        }
+    }
+
+    fn line(&mut self, line: &Line<'_>, at: usize) -> Result<(), Fault> {
+        let mut scan = Scan::new(*line, line.text, self.post.number.mark);
+        if let Some(rule) = &self.post.block_numbers {
+            let expected = rule.word.replace("{n}", &(rule.first + at * rule.step).to_string());
+            scan.need(&expected, &format!("the block number {}", expected.trim_end()))?;
+        }
+        if scan.rest().starts_with(';') {
+            return Ok(());
+        }
+        if self.ended {
+            return Err(scan.fault("something stands behind END PGM"));
+        }
+        if let Some(open) = self.open.take() {
+            return self.cycle(&mut scan, open);
+        }
+        if self.begun.is_none() {
+            return self.begin(&mut scan);
+        }
+        self.block(&mut scan)?;
+        if self.open.is_some() || self.ended { Ok(()) } else { scan.end() }
+    }
+
+    fn begin(&mut self, scan: &mut Scan<'_>) -> Result<(), Fault> {
+        let at = scan.place();
+        scan.need("BEGIN PGM ", "BEGIN PGM")?;
+        let name = scan.up_to(" ", "the program's name")?.to_owned();
+        let unit = scan.all().to_owned();
+        let inches = match unit.as_str() {
+            "MM" => 0.0,
+            "INCH" => 1.0,
+            _ => return Err(Fault { at, says: format!("the unit is {unit:?}, MM or INCH is expected") }),
+        };
+        self.begun = Some((name, unit));
+        self.code.push(at, What::Block(vec![number("INCH", inches)]));
+        Ok(())
+    }
+
+    fn block(&mut self, scan: &mut Scan<'_>) -> Result<(), Fault> {
+        let at = scan.place();
+        let one = |address: &'static str| What::Block(vec![number(address, 0.0)]);
+        if scan.rest().starts_with("L ") && scan.take("L") {
+            return self.linear(scan, at);
+        }
+        if scan.take("FN ") {
+            return self.function(scan, at);
+        }
+        if scan.rest().starts_with("QS") {
+            let var = string(scan)?;
+            scan.need(" = \"", "= and a text in quotes")?;
+            let text = scan.up_to("\"", "the quote that ends the text")?;
+            self.code.push(at, What::Hold(var, vec![Piece::Text(Arc::from(text))]));
+        } else if scan.rest().starts_with('Q') {
+            let var = scan.parameter("a Q parameter")?;
+            scan.need(" = ", "= and a formula")?;
+            let value = formula(scan, 0)?;
+            self.code.push(at, What::Set(var, value));
+        } else if scan.take("LBL ") {
+            let label = scan.whole("the number of a label")?;
+            if label == 0 {
+                self.code.push(at, What::Return(None));
+            } else if self.labels.insert(label, self.code.statements.len()).is_some() {
+                return Err(Fault { at, says: format!("LBL {label} stands twice") });
+            }
+        } else if scan.take("CALL LBL ") {
+            let label = scan.whole("the number of a label")?;
+            let call = self.code.push(at.clone(), What::Call(0));
+            self.jumps.push((call, label, at));
+        } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
+            self.opened(at, Cycle::Probe);
+            scan.end()?;
+        } else if scan.take("CYCL DEF ") {
+            let kinds = [
+                ("13.0 ORIENTATION", Cycle::Orientation),
+                ("7.0 DATUM SHIFT", Cycle::DatumShift),
+                ("10.0 ROTATION", Cycle::Rotation),
+                ("19.0 WORKING PLANE", Cycle::WorkingPlane),
+            ];
+            let Some((_, kind)) = kinds.into_iter().find(|(name, _)| scan.take(name)) else {
+                return Err(scan.expected("a cycle that axiscal knows"));
+            };
+            self.opened(at, kind);
+            scan.end()?;
+        } else if scan.take_whole("PLANE RESET STAY") {
+            self.code.push(at, one("PLANE"));
+        } else if scan.take_whole("FUNCTION RESET TCPM") {
+            self.code.push(at, What::Block(vec![number("M", 129.0)]));
+        } else if scan.take_whole("TRANS DATUM RESET") {
+            self.code.push(at, one("NO SHIFT"));
+        } else if scan.take("TRANS DATUM AXIS") {
+            let words = self.axes(scan)?;
+            self.code.push(at, What::Block(std::iter::once(number("SHIFT", 0.0)).chain(words).collect()));
+        } else if scan.take_whole("STOP") {
+            self.code.push(at, What::Wait(Vec::new()));
+        } else if scan.take("END PGM ") {
+            let (name, unit) = self.begun.clone().unwrap_or_default();
+            if scan.all() != format!("{name} {unit}") {
+                return Err(Fault { at, says: format!("END PGM {name} {unit} is expected") });
+            }
+            self.ended = true;
+            self.code.push(at, What::End);
+        } else if scan.take("M") {
+            let m = scan.whole("the number of an M function")?;
+            self.code.push(at, What::Block(vec![number("M", f64::from(m))]));
+        } else {
+            return Err(scan.expected("a block that axiscal knows"));
+        }
+        Ok(())
+    }
+
+    /// ` X+10 IC-90`: the axis words that stand here, each behind a blank.
+    fn axes(&self, scan: &mut Scan<'_>) -> Result<Vec<Word>, Fault> {
+        let mut words: Vec<Word> = Vec::new();
+        loop {
+            let named = self.names.iter().find_map(|(name, axis)| {
+                let before = [(" ", ABSOLUTE), (" I", STEPS)];
+                let (blank, addresses) = before.into_iter().find(|(b, _)| {
+                    let after = scan.rest().strip_prefix(b).and_then(|r| r.strip_prefix(name.as_str()));
+                    after.is_some_and(|r| r.starts_with(['+', '-']))
+                })?;
+                Some((format!("{blank}{name}"), addresses[axis.index()], *axis))
+            });
+            let Some((written, address, axis)) = named else { return Ok(words) };
+            let taken = |w: &Word| w.address == ABSOLUTE[axis.index()] || w.address == STEPS[axis.index()];
+            if words.iter().any(taken) {
+                return Err(scan.fault(format!("axis {axis} stands twice")));
+            }
+            scan.take(&written);
+            words.push(word(address, scan.signed("a position with its sign")?));
+        }
+    }
+
+    /// `X-33 Y-3 R0 F1500 M91`
+    fn linear(&mut self, scan: &mut Scan<'_>, at: Range<usize>) -> Result<(), Fault> {
+        let mut words = vec![number("L", 0.0)];
+        let axes = self.axes(scan)?;
+        if axes.is_empty() {
+            return Err(scan.expected("an axis and its position with a sign, X+10"));
+        }
+        words.extend(axes);
+        scan.need(" R0", "an axis word, or R0: without cutter compensation")?;
+        if scan.take(" FMAX") {
+            words.push(number("FMAX", 0.0));
+        } else if scan.take(" F") {
+            words.push(number("F", scan.unsigned("a feed")?));
+        }
+        if scan.take_whole(" M91") {
+            words.push(number("M91", 0.0));
+        }
+        self.code.push(at, What::Block(words));
+        Ok(())
+    }
+
+    fn function(&mut self, scan: &mut Scan<'_>, at: Range<usize>) -> Result<(), Fault> {
+        let place = scan.place();
+        let n = scan.whole("the number of a function")?;
+        scan.need(": ", ": behind the number of the function")?;
+        match n {
+            0..=4 => self.arithmetic(scan, n, at),
+            9..=12 => self.jump(scan, n, at),
+            14 => {
+                scan.need("ERROR = ", "ERROR = and a number")?;
+                let error = scan.whole("the number of a message")?;
+                self.code.push(at, What::Abort(vec![Piece::Text(Arc::from(format!("error {error}")))]));
+                Ok(())
+            }
+            16 => self.print(scan, at),
+            18 => self.system(scan, at),
+            _ => Err(Fault { at: place, says: format!("FN {n} is not known here") }),
+        }
+    }
+
+    /// `FN 0: Q1600 = +1`, `FN 1: Q1 = +Q2 + -5`
+    fn arithmetic(&mut self, scan: &mut Scan<'_>, n: u32, at: Range<usize>) -> Result<(), Fault> {
+        const WHAT: &str = "a value with its sign";
+        let var = scan.parameter("a Q parameter")?;
+        scan.need(" = ", "= and a value")?;
+        let mut value = scan.signed(WHAT)?;
+        if let Some((sign, op)) =
+            [(1, (" + ", Op::Add)), (2, (" - ", Op::Sub)), (3, (" * ", Op::Mul)), (4, (" DIV ", Op::Div))]
+                .into_iter()
+                .find_map(|(k, v)| (k == n).then_some(v))
+        {
+            scan.need(sign, "the sign of the function")?;
+            value = Expr::Two(op, Box::new(value), Box::new(scan.signed(WHAT)?));
+        }
+        self.code.push(at, What::Set(var, value));
+        Ok(())
+    }
+
+    /// `FN 9: IF +Q1604 EQU -1 GOTO LBL 90`
+    fn jump(&mut self, scan: &mut Scan<'_>, n: u32, at: Range<usize>) -> Result<(), Fault> {
+        const WHAT: &str = "a value with its sign";
+        let (sign, op) = match n {
+            9 => (" EQU ", Op::Eq),
+            10 => (" NE ", Op::Ne),
+            11 => (" GT ", Op::Gt),
+            _ => (" LT ", Op::Lt),
+        };
+        scan.need("IF ", "IF")?;
+        let left = scan.signed(WHAT)?;
+        scan.need(sign, &format!("{} of FN {n}", sign.trim()))?;
+        let right = scan.signed(WHAT)?;
+        scan.need(" GOTO LBL ", "GOTO LBL")?;
+        let label = scan.whole("the number of a label")?;
+        let over = self.code.push(at.clone(), What::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
+        let jump = self.code.push(at.clone(), What::Jump(0));
+        self.jumps.push((jump, label, at));
+        self.aim(over, jump + 1);
+        Ok(())
+    }
+
+    /// `FN 18: SYSREAD Q1621 = ID240 NR1 IDX1`
+    fn system(&mut self, scan: &mut Scan<'_>, at: Range<usize>) -> Result<(), Fault> {
+        const WHAT: &str = "system data that axiscal knows";
+        scan.need("SYSREAD ", "SYSREAD")?;
+        let var = scan.parameter("a Q parameter")?;
+        scan.need(" = ", "= and system data")?;
+        let place = scan.place();
+        scan.need("ID", WHAT)?;
+        let id = scan.whole(WHAT)?;
+        scan.need(" NR", WHAT)?;
+        let nr = scan.whole(WHAT)?;
+        scan.need(" IDX", WHAT)?;
+        let index = scan.whole(WHAT)?;
+        if !matches!((id, nr, index), (240 | 270, 1, 1..=6) | (320, 1, 0)) {
+            return Err(Fault { at: place, says: format!("ID{id} NR{nr} IDX{index} is not known here") });
+        }
+        let data = Var::Name(Arc::from(format!("ID{id} IDX{index}")));
+        self.code.push(at, What::Set(var, Expr::Var(data)));
+        Ok(())
+    }
+
+    /// `FN 16: F-PRINT mask / file`
+    fn print(&mut self, scan: &mut Scan<'_>, at: Range<usize>) -> Result<(), Fault> {
+        scan.need("F-PRINT ", "F-PRINT")?;
+        let place = scan.place();
+        let fault = |says: String| Fault { at: place.clone(), says };
+        let path = scan.up_to(" / ", "the mask, / and the file")?;
+        let to = scan.all();
+        let folder = folder(self.post);
+        let name = path.strip_prefix(folder).ok_or_else(|| {
+            fault(format!("the mask {path} does not stand in {folder}, where the postprocessor file has it"))
+        })?;
+        let mask = self.masks.get(name).ok_or_else(|| {
+            fault(format!("the mask {name} does not lie beside the program: what is written cannot be said"))
+        })?;
+        if to == "SCREEN:" {
+            self.code.push(at, What::Message(mask.text.clone()));
+            return Ok(());
+        }
+        let append = mask.append.ok_or_else(|| {
+            fault(format!("the mask {name} says neither M_APPEND nor M_TRUNCATE: what becomes of the log is not known"))
+        })?;
+        if !mask.closes {
+            return Err(fault(format!(
+                "the mask {name} has no M_CLOSE: the log is lost when the program is broken off"
+            )));
+        }
+        // a log elsewhere keeps its whole path: it is then not the one of the plan
+        let log = Arc::from(to.strip_prefix(folder).unwrap_or(to));
+        self.code.push(at.clone(), What::LogOpen { name: vec![Piece::Text(log)], append });
+        self.code.push(at.clone(), What::LogLine(mask.text.clone()));
+        self.code.push(at, What::LogClose);
+        Ok(())
+    }
+
+    fn opened(&mut self, at: Range<usize>, kind: Cycle) {
+        self.open = Some(Open { start: at.start, stage: 1, words: Vec::new(), kind });
+    }
+
+    /// A further block of a cycle.
+    fn cycle(&mut self, scan: &mut Scan<'_>, mut open: Open) -> Result<(), Fault> {
+        let at = open.start..scan.place().end;
+        match open.kind {
+            Cycle::Probe => {
+                let done = self.probe(scan, &mut open)?;
+                scan.end()?;
+                if !done {
+                    self.open = Some(open);
+                    return Ok(());
+                }
+                let back = open.words.iter().find(|w| w.address == "MB").map_or(Expr::Number(0.0), |w| w.value.clone());
+                self.code.push(at.clone(), What::Block(open.words));
+                self.code.push(at, What::Block(vec![word("BACK", back)]));
+            }
+            Cycle::Orientation => {
+                scan.need("CYCL DEF 13.1 ANGLE", "CYCL DEF 13.1 ANGLE")?;
+                let angle = scan.signed("an angle with its sign")?;
+                scan.end()?;
+                self.code.push(at, What::Block(vec![word("ANGLE", angle)]));
+            }
+            Cycle::DatumShift => {
+                scan.need(&format!("CYCL DEF 7.{}", open.stage), "the next block of the cycle: CYCL DEF 7.1")?;
+                let words = self.axes(scan)?;
+                scan.end()?;
+                self.code.push(at, What::Block(std::iter::once(number("SHIFT", 0.0)).chain(words).collect()));
+            }
+            Cycle::Rotation => {
+                scan.need("CYCL DEF 10.1 ROT+0", "CYCL DEF 10.1 ROT+0: axiscal knows no other rotation")?;
+                scan.end()?;
+            }
+            Cycle::WorkingPlane => {
+                scan.need("CYCL DEF 19.1 A+0 B+0 C+0", "CYCL DEF 19.1 A+0 B+0 C+0: axiscal knows no other plane")?;
+                scan.end()?;
+                self.code.push(at, What::Block(vec![number("PLANE", 0.0)]));
+            }
+        }
+        Ok(())
+    }
+
+    /// `TCH PROBE 4.1 Q1601`, `4.2 IX+0 IY+0 IZ-1`, `4.3 DIST+4 F60 MB0.5 REFERENCE SYSTEM:1`; true after the last.
+    fn probe(&mut self, scan: &mut Scan<'_>, open: &mut Open) -> Result<bool, Fault> {
+        let stage = format!("TCH PROBE 4.{}", open.stage);
+        scan.need(&stage, &format!("the next block of the cycle, {stage}"))?;
+        open.stage += 1;
+        if stage.ends_with('1') {
+            scan.need(" ", "a Q parameter")?;
+            if let Var::Number(first) = scan.parameter("a Q parameter")? {
+                open.words.push(number("PROBE", f64::from(first)));
+            }
+            return Ok(false);
+        }
+        if stage.ends_with('2') {
+            for (address, letter) in [("IX", " IX"), ("IY", " IY"), ("IZ", " IZ")] {
+                scan.need(letter, "the direction, IX IY IZ")?;
+                open.words.push(word(address, scan.signed("a number with its sign")?));
+            }
+            return Ok(false);
+        }
+        scan.need(" DIST", "DIST")?;
+        open.words.push(word("DIST", scan.signed("a way with its sign")?));
+        scan.need(" F", "F and a feed")?;
+        open.words.push(number("F", scan.unsigned("a feed")?));
+        scan.need(" MB", "MB and the way back")?;
+        open.words.push(number("MB", scan.unsigned("the way back")?));
+        scan.need(" REFERENCE SYSTEM:", "REFERENCE SYSTEM:")?;
+        let place = scan.place();
+        let reference = scan.whole("0 or 1")?;
+        if reference > 1 {
+            return Err(Fault { at: place, says: format!("there is no reference system {reference}: 0 or 1") });
+        }
+        open.words.push(number("REFERENCE", f64::from(reference)));
+        Ok(true)
+    }
+
+    fn aim(&mut self, jump: usize, to: usize) {
+        if let Some(statement) = self.code.statements.get_mut(jump)
+            && let What::Jump(place) | What::JumpUnless(_, place) | What::Call(place) = &mut statement.what
+        {
+            *place = to;
+        }
+    }
+
+    fn finish(mut self, end: usize) -> Result<Code, Fault> {
+        if !self.ended {
+            return Err(Fault { at: end..end, says: "the program ends without END PGM".to_owned() });
+        }
+        for (jump, label, at) in std::mem::take(&mut self.jumps) {
+            let Some(to) = self.labels.get(&label).copied() else {
+                return Err(Fault { at, says: format!("there is no LBL {label}") });
+            };
+            self.aim(jump, to);
+        }
+        Ok(self.code)
+    }
+}

@@ -1,0 +1,128 @@
+//! `check` of the programs that are written for each machine: nothing is wrong with any of them.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)] // a failure has its place
+
+use axiscal::check::{Against, Checked, check};
+use axiscal::diag::source;
+use axiscal::machine::{self, Machine};
+use axiscal::post::{Postprocessor, parse};
+use axiscal::program::{self, Generated, Options};
+
+fn machine(name: &str) -> Machine {
+    let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
+    machines.into_iter().find(|m| m.name == name).unwrap()
+}
+
+fn generated(machine: &Machine, program: &str, tcp: bool) -> Generated {
+    let spec = program::choose(program::built_in().unwrap(), program, machine).unwrap();
+    program::generate(machine, &spec, &Options { strict: false, tcp }).unwrap().0
+}
+
+fn controller(name: &str) -> Postprocessor {
+    Postprocessor::load_built_in_or_file(name).unwrap().0
+}
+
+/// A variant of a built-in controller: its file with these lines.
+fn variant(base: &str, lines: &str) -> Postprocessor {
+    let text = format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}");
+    parse(&source("mine.toml", text)).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+fn checked(post: &Postprocessor, machine: &Machine, generated: &Generated) -> Checked {
+    let nc = post.program(machine, &generated.plan, &generated.path).unwrap();
+    let beside = nc.sources();
+    let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+    check(machine, post, &source(format!("{}.{}", post.name, nc.extension), nc.text), &against)
+        .unwrap_or_else(|e| panic!("{} on {}: {:?}", post.name, machine.name, e.0))
+}
+
+/// Nothing is wrong with a program, and it makes all its touches.
+fn is_clean(post: &Postprocessor, machine: &Machine, generated: &Generated) {
+    let checked = checked(post, machine, generated);
+    let wrong: Vec<String> = checked.findings.iter().map(ToString::to_string).collect();
+    assert!(wrong.is_empty(), "{} on {}: {wrong:#?}", post.name, machine.name);
+    assert_eq!(checked.touches, generated.plan.touches.len());
+    assert!(checked.branches > 4 * checked.touches, "{}", checked.branches);
+}
+
+const CONTROLLERS: [&str; 4] = ["linuxcnc", "fanuc", "haas", "heidenhain"];
+
+/// The machines with a small program, for every control.
+fn all_clean(machine_name: &str, program: &str, tcp: bool, controllers: &[&str]) {
+    let machine = machine(machine_name);
+    let generated = generated(&machine, program, tcp);
+    for name in controllers {
+        is_clean(&controller(name), &machine, &generated);
+    }
+}
+
+#[test]
+fn swivel_head() {
+    all_clean("swivel-head", "head", false, &["heidenhain"]);
+    all_clean("swivel-head", "table", false, &CONTROLLERS);
+}
+
+#[test]
+fn double_head() {
+    all_clean("double-head", "double-head", false, &CONTROLLERS);
+}
+
+#[test]
+fn trunnion() {
+    all_clean("trunnion", "basic", false, &CONTROLLERS);
+}
+
+#[test]
+fn swivel_table_b() {
+    all_clean("swivel-table-b", "basic", false, &CONTROLLERS);
+}
+
+#[test]
+fn under_the_control_s_own_transformation() {
+    all_clean("trunnion", "basic", true, &CONTROLLERS);
+    all_clean("swivel-table-b", "basic", true, &["heidenhain", "fanuc"]);
+    // LinuxCNC has no transformation of its own for a head
+    all_clean("swivel-head", "table", true, &CONTROLLERS[1..]);
+}
+
+#[test]
+fn inches() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for base in ["fanuc", "haas", "heidenhain"] {
+        for decimals in [4, 5] {
+            let lines = format!(
+                "[number]\ndecimals = {decimals}\nunverified = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = 5\nunverified = \"ours\"\n"
+            );
+            is_clean(&variant(base, &lines), &machine, &generated);
+        }
+    }
+}
+
+#[test]
+fn names_and_numbers_of_axes() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for (base, names) in [
+        ("fanuc", "axis_names = { C = \"A\" }\naxis_numbers = { B = 6, C = 4 }"),
+        ("haas", "axis_names = { B = \"A\" }"),
+        ("heidenhain", "axis_names = { C = \"W\" }"),
+    ] {
+        let lines = format!("[number]\n{names}\nunverified = \"ours\"\n");
+        is_clean(&variant(base, &lines), &machine, &generated);
+    }
+    // LinuxCNC counts its axes by their letters: one that is called otherwise is refused
+    let post = variant("linuxcnc", "[number]\naxis_names = { B = \"A\" }\nsource = \"ours\"\n");
+    assert!(!checked(&post, &machine, &generated).findings.is_empty());
+}
+
+#[test]
+fn axes_of_0_to_360() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    is_clean(&variant("heidenhain", "[settings]\nmodulo = \"C\"\n"), &machine, &generated);
+}
+
+#[test]
+fn stops_for_another_stylus() {
+    all_clean("trunnion", "full", false, &["heidenhain"]);
+}

@@ -1,0 +1,146 @@
+//! `axiscal check` from outside: exit codes, messages, the files beside a program.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)] // a failure has its place
+#![allow(dead_code)] // it uses a part of what the other tests use
+
+#[path = "check/edits.rs"]
+mod edits;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use std::path::Path;
+
+fn axiscal(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("axiscal").unwrap();
+    command.current_dir(folder);
+    command
+}
+
+/// A folder with a small program for a control.
+fn folder(controller: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("small.toml"), edits::SMALL).unwrap();
+    axiscal(folder.path())
+        .args([
+            "generate",
+            "--machine",
+            "swivel-head",
+            "--program",
+            "small.toml",
+            "--out",
+            ".",
+            "--controller",
+            controller,
+        ])
+        .assert()
+        .success()
+        .stderr(predicate::str::contains("not checked").not());
+    folder
+}
+
+fn check(folder: &Path, controller: &str, file: &str) -> Command {
+    let mut command = axiscal(folder);
+    command.args(["check", file, "--machine", "swivel-head", "--controller", controller]);
+    command
+}
+
+fn edited(folder: &Path, file: &str, from: &str, to: &str) {
+    let text = std::fs::read_to_string(folder.join(file)).unwrap();
+    let edited = text.replacen(from, to, 1);
+    assert_ne!(text, edited);
+    std::fs::write(folder.join(file), edited).unwrap();
+}
+
+#[test]
+fn exit_code_0_where_nothing_is_wrong() {
+    for (controller, file) in
+        [("linuxcnc", "small.ngc"), ("fanuc", "small.nc"), ("haas", "small.nc"), ("heidenhain", "small.h")]
+    {
+        let folder = folder(controller);
+        let clean = predicate::str::contains("3 touches").and(predicate::str::contains("nothing is wrong with it"));
+        check(folder.path(), controller, file).assert().code(0).stdout(clean.clone());
+        check(folder.path(), controller, file).args(["--plan", "small.plan.json"]).assert().code(0).stdout(clean);
+        let plan = std::fs::read_to_string(folder.path().join("small.plan.json")).unwrap();
+        assert!(plan.contains(&format!("\"{controller}\"")), "the plan remembers what was proven");
+    }
+}
+
+#[test]
+fn exit_code_1_where_something_is_wrong() {
+    let folder = folder("heidenhain");
+    edited(folder.path(), "small.h", "L Z+11.3 R0 FMAX M91", "L Z+1.13 R0 FMAX M91");
+    let with_plan = |json: bool| {
+        let mut command = check(folder.path(), "heidenhain", "small.h");
+        command.args(["--plan", "small.plan.json"]).args(json.then_some("--json"));
+        command
+    };
+    with_plan(false)
+        .assert()
+        .code(1)
+        .stderr(predicate::str::contains("small.h:113:").and(predicate::str::contains("collision")))
+        .stdout(predicate::str::contains("do not run it"));
+    let output = with_plan(true).assert().code(1).get_output().stdout.clone();
+    let answer: serde_json::Value = serde_json::from_slice(&output).unwrap();
+    assert_eq!((&answer["good"], &answer["format"]), (&false.into(), &"axiscal-check/1".into()));
+    let findings = answer["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|f| f["code"] == "check::collision" && f["line"] == 113), "{findings:#?}");
+    assert!(findings.iter().any(|f| f["code"] == "check::changed"));
+}
+
+#[test]
+fn a_program_that_begins_later_must_be_meant_so() {
+    let folder = folder("heidenhain");
+    edited(folder.path(), "small.h", "Q1600 = +1", "Q1600 = +2");
+    let later = |from: &str| {
+        let mut command = check(folder.path(), "heidenhain", "small.h");
+        command.args(["--plan", "small.plan.json", "--from", from]);
+        command
+    };
+    later("1").assert().code(1).stderr(predicate::str::contains("begins at set-up 2"));
+    later("2").assert().code(0);
+}
+
+#[test]
+fn exit_code_2_where_it_cannot_be_said() {
+    let folder = folder("heidenhain");
+    let path = folder.path();
+    let fails = |command: &mut Command, says: &str| {
+        command.assert().code(2).stderr(predicate::str::contains(says));
+    };
+    // what the grammar does not know, with its place
+    let written = std::fs::read_to_string(path.join("small.h")).unwrap();
+    edited(path, "small.h", "PLANE RESET STAY", "PLANE RESET TURN");
+    fails(&mut check(path, "heidenhain", "small.h"), "small.h:80:4: not understood");
+    std::fs::write(path.join("small.h"), &written).unwrap();
+    // a mask is a part of the program
+    edited(path, "SMALL_P.A", "%10.4LF", "%10.4lf");
+    fails(&mut check(path, "heidenhain", "small.h"), "SMALL_P.A:2:");
+    std::fs::remove_file(path.join("SMALL_P.A")).unwrap();
+    fails(&mut check(path, "heidenhain", "small.h"), "the mask SMALL_P.A does not lie beside the program");
+    // another control's grammar
+    fails(&mut check(path, "linuxcnc", "small.h"), "not understood");
+    // files that cannot be read
+    fails(&mut check(path, "heidenhain", "none.h"), "none.h");
+    fails(&mut check(path, "heidenhain", "."), "");
+    std::fs::write(path.join("bytes.h"), [0xff, 0xfe, 0x00]).unwrap();
+    fails(&mut check(path, "heidenhain", "bytes.h"), "bytes.h");
+    fails(check(path, "heidenhain", "small.h").args(["--plan", "none.json"]), "none.json");
+    fails(check(path, "heidenhain", "small.h").args(["--plan", "small.toml"]), "small.toml");
+    // calls that are unusable
+    fails(&mut check(path, "nobody", "small.h"), "no controller is called");
+    fails(check(path, "heidenhain", "small.h").args(["--from", "x"]), "--from");
+    fails(axiscal(path).args(["check", "small.h"]), "--controller");
+    fails(check(path, "heidenhain", "small.h").args(["--mounting", "nowhere"]), "nowhere");
+    fails(
+        axiscal(path).args([
+            "check",
+            "small.h",
+            "--machine",
+            "trunnion",
+            "--controller",
+            "heidenhain",
+            "--plan",
+            "small.plan.json",
+        ]),
+        "swivel-head",
+    );
+}
