@@ -14,7 +14,8 @@ fn main() {
     let mut words = std::env::args().skip(1);
     let count: u64 = words.next().and_then(|w| w.parse().ok()).unwrap_or(2000);
     let named: Vec<String> = words.collect();
-    let controllers = if named.is_empty() { vec!["linuxcnc".into(), "fanuc".into(), "haas".into()] } else { named };
+    let controllers =
+        if named.is_empty() { ["linuxcnc", "fanuc", "haas", "sinumerik"].map(String::from).to_vec() } else { named };
     println!(
         "| controller | edits | not read | refused by what it does | refused as changed only | moves identically | escaped | s |"
     );

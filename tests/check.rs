@@ -6,7 +6,7 @@ mod edits;
 
 use edits::{Fate, original};
 
-const CONTROLLERS: [&str; 3] = ["linuxcnc", "fanuc", "haas"];
+const CONTROLLERS: [&str; 4] = ["linuxcnc", "fanuc", "haas", "sinumerik"];
 
 /// How many random edits CI makes for each dialect; `examples/edits.rs` makes thousands.
 const EDITS: u64 = 150;

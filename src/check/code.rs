@@ -107,6 +107,8 @@ pub enum Piece {
         /// What is written.
         value: Expr,
     },
+    /// What a text variable holds.
+    Kept(Var),
 }
 
 /// A text that the program writes.
@@ -136,6 +138,15 @@ pub enum What {
     Jump(usize),
     /// On at another statement when the condition does not hold.
     JumpUnless(Expr, usize),
+    /// A text is kept, at most so many characters of it.
+    SetText {
+        /// Where.
+        var: Var,
+        /// The longest text that it takes.
+        most: usize,
+        /// What.
+        text: Text,
+    },
     /// A subroutine: the number of its first statement.
     Call(usize),
     /// Back to where it was called.
@@ -153,6 +164,22 @@ pub enum What {
     LogLine(Text),
     /// The log is closed.
     LogClose,
+    /// A line is added to a log that need not be opened, and may be full: the variable then holds what is wrong.
+    LogWrite {
+        /// 0 when the line is in the log.
+        error: Var,
+        /// Name of the log.
+        name: Text,
+        /// The line.
+        text: Text,
+    },
+    /// A log that need not be opened is thrown away.
+    LogDelete {
+        /// 0 when it was there.
+        error: Var,
+        /// Name of the log.
+        name: Text,
+    },
     /// The program waits for a person, who is shown a text.
     Wait(Text),
     /// The program is broken off with a message.

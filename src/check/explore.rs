@@ -21,6 +21,8 @@ pub enum Deviation {
     Disagree(f64),
     /// The probe triggers and does not close again.
     Stuck,
+    /// A line cannot be written into the log.
+    NotWritten,
 }
 
 impl Deviation {
@@ -91,6 +93,7 @@ pub fn explore<'p, D: Dialect>(
     restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
 ) -> Told {
     let before = run.dialect.settings();
+    run.keeps_forks = limits.is_some();
     let mut told = Told {
         from,
         trunk: Vec::new(),
@@ -106,6 +109,9 @@ pub fn explore<'p, D: Dialect>(
         let paused = run.on();
         // events before the last stop belong to the part that was up then; a stop is at most the last of them
         note_parts(&mut told.parts, &run.vm, part_before);
+        for (leaves, fork) in run.take_forks() {
+            told.branches.push(until_it_stops(fork, Deviation::NotWritten, leaves));
+        }
         match paused {
             Err(fault) => {
                 told.fault = Some(fault);
@@ -212,8 +218,14 @@ fn follow<D: Dialect>(
             run.vm.stuck = true;
             nominal
         }
+        Deviation::NotWritten => nominal,
     };
+    run.keeps_forks = false;
     run.resolve(outcome);
+    until_it_stops(run, deviation, leaves)
+}
+
+fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves: usize) -> Branch {
     let mut fault = None;
     let mut moves = 0;
     let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));

@@ -572,6 +572,7 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
         Deviation::Shift(_) => "the block stands off by more than the placement tolerance",
         Deviation::Disagree(_) => "search and measuring touch disagree",
         Deviation::Stuck => "the probe does not close again",
+        Deviation::NotWritten => "a line cannot be written into the log",
     };
     let mut complain = |at: &Range<usize>, says: &str| {
         said.say(case, "check::goes_on", at, format!("{what}: {says}"), "the program must say what is wrong and stop");

@@ -19,6 +19,7 @@ mod proof;
 mod run;
 mod runs;
 mod seconds;
+mod sinumerik;
 mod touches;
 mod world;
 
@@ -90,7 +91,7 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
         let says = format!("the line is longer than the {} characters that the control takes", post.line_length);
         return Err(Finding::error("check::line_length", says).at(source, line.all()).into());
     }
-    let program = runs::Program::parse(rule, text).map_err(|fault| {
+    let program = runs::Program::parse(post, rule, text).map_err(|fault| {
         Finding::error("check::not_understood", fault.says)
             .help("axiscal does not know this; whether it is safe cannot be said")
             .at(source, fault.at)

@@ -8,7 +8,7 @@ use super::world::World;
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -135,6 +135,8 @@ pub struct Vm {
     pub hits: usize,
     /// An axis has moved since the last stop.
     pub moved: bool,
+    /// The angles near which axes that count from 0 to 360 are counted when they first move, deg.
+    pub turned_near: Position,
 }
 
 impl Vm {
@@ -309,6 +311,15 @@ pub struct Run<'p, D> {
     done: u64,
     pending: Option<Probe>,
     over: bool,
+    texts: BTreeMap<Var, String>,
+    /// Logs that were thrown away, and the one into which it writes, where none is opened.
+    deleted: BTreeSet<String>,
+    writes_to: Option<String>,
+    /// No log takes a line any more.
+    log_is_full: bool,
+    /// What would happen if a line could not be written is kept: place in the record, and the run at that line.
+    pub keeps_forks: bool,
+    forks: Vec<(usize, Self)>,
     /// The axes and the record.
     pub vm: Vm,
     /// The language.
@@ -318,8 +329,27 @@ pub struct Run<'p, D> {
 impl<'p, D: Dialect> Run<'p, D> {
     /// A program that begins.
     pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
-        let returns = Vec::new();
-        Self { code, next: 0, returns, done: 0, pending: None, over: false, vm, dialect }
+        Self {
+            code,
+            next: 0,
+            returns: Vec::new(),
+            done: 0,
+            pending: None,
+            over: false,
+            texts: BTreeMap::new(),
+            deleted: BTreeSet::new(),
+            writes_to: None,
+            log_is_full: false,
+            keeps_forks: false,
+            forks: Vec::new(),
+            vm,
+            dialect,
+        }
+    }
+
+    /// Takes the runs in which a line could not be written.
+    pub fn take_forks(&mut self) -> Vec<(usize, Self)> {
+        std::mem::take(&mut self.forks)
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -388,6 +418,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                 Piece::Fixed { decimals, width, value } => {
                     out.push_str(&self.dialect.spell(self.value(value)?, *decimals, *width));
                 }
+                Piece::Kept(var) => out.push_str(self.texts.get(var).ok_or_else(|| format!("{var} has no value"))?),
             }
         }
         Ok(out)
@@ -439,6 +470,22 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.vm.note(Event::LogOpen { name, append: *append });
             }
             What::LogClose => self.vm.note(Event::LogClose),
+            What::SetText { var, most, text } => {
+                let text = self.text(text)?;
+                if text.chars().count() > *most {
+                    return Err(format!("{var} holds {most} characters, the text has {}", text.chars().count()));
+                }
+                self.texts.insert(var.clone(), text);
+            }
+            What::LogWrite { error, name, text } => self.log_write(error, name, text)?,
+            What::LogDelete { error, name } => {
+                let name = self.text(name)?;
+                if self.writes_to.as_ref() == Some(&name) {
+                    return Err(format!("the log {name} is thrown away after something was written into it"));
+                }
+                self.deleted.insert(name);
+                self.dialect.write(error, 0.0)?;
+            }
             What::Abort(text) => {
                 let text = self.text(text)?;
                 self.end(Event::Abort(text));
@@ -448,6 +495,29 @@ impl<'p, D: Dialect> Run<'p, D> {
         Ok(None)
     }
 
+    fn log_write(&mut self, error: &Var, name: &[Piece], text: &[Piece]) -> Result<(), String> {
+        const FULL: f64 = 10.0;
+        let (name, text) = (self.text(name)?, self.text(text)?);
+        if self.log_is_full {
+            self.vm.note(Event::Other(format!("no line goes into {name}")));
+            return self.dialect.write(error, FULL);
+        }
+        if self.keeps_forks {
+            let (trace, forks) = (std::mem::take(&mut self.vm.trace), std::mem::take(&mut self.forks));
+            let mut fork = self.clone();
+            (self.vm.trace, self.forks) = (trace, forks);
+            // it comes to this line again
+            (fork.keeps_forks, fork.log_is_full, fork.next) = (false, true, fork.next - 1);
+            self.forks.push((self.vm.trace.len(), fork));
+        }
+        if self.writes_to.as_ref() != Some(&name) {
+            self.vm.note(Event::LogOpen { name: name.clone(), append: !self.deleted.contains(&name) });
+            self.writes_to = Some(name);
+        }
+        self.vm.note(Event::Log(text));
+        self.dialect.write(error, 0.0)
+    }
+
     fn say(&mut self, text: &[Piece], event: fn(String) -> Event) -> Result<(), String> {
         let text = self.text(text)?;
         self.vm.note(event(text));
@@ -455,6 +525,9 @@ impl<'p, D: Dialect> Run<'p, D> {
     }
 
     fn end(&mut self, event: Event) {
+        if self.writes_to.take().is_some() {
+            self.vm.note(Event::LogClose);
+        }
         self.vm.note(event);
         self.over = true;
     }

@@ -6,7 +6,7 @@ use super::explore::{Limits, Told, explore};
 use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
 use super::world::World;
-use super::{macro_b, ngc};
+use super::{macro_b, ngc, sinumerik};
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
@@ -33,10 +33,11 @@ impl Program {
     ///
     /// # Errors
     /// The first place that is not of the dialect's grammar.
-    pub fn parse(rule: &CheckRule, text: &str) -> Result<Self, Fault> {
+    pub fn parse(post: &Postprocessor, rule: &CheckRule, text: &str) -> Result<Self, Fault> {
         let code = match rule.dialect {
             DialectName::Ngc => ngc::parse(text)?,
             DialectName::MacroB => macro_b::parse(text)?,
+            DialectName::Sinumerik => sinumerik::parse(text, post)?,
         };
         let var = variable(&rule.from);
         let set_at = code.statements.iter().position(|s| matches!(&s.what, What::Set(v, Expr::Number(_)) if *v == var));
@@ -124,6 +125,7 @@ pub fn all(
     match program.dialect {
         DialectName::Ngc => Runs::<ngc::Ngc>::new(machine, post, plan, program, world, scenes).all(),
         DialectName::MacroB => Runs::<macro_b::MacroB>::new(machine, post, plan, program, world, scenes).all(),
+        DialectName::Sinumerik => Runs::<sinumerik::Sinumerik>::new(machine, post, plan, program, world, scenes).all(),
     }
 }
 
@@ -204,6 +206,12 @@ impl<'a, D: Dialect> Runs<'a, D> {
         self.machine.axes.iter().for_each(|a| axes[a.name.index()] = true);
         // under the control's own transformation a program sees to it that the rotary axes stand at 0 when it begins
         let known = AxisName::ALL.map(|a| self.tcp() && a.is_rotary());
+        // axes that count from 0 to 360 only are counted as the plan counts them
+        let mut turned_near = self.machine.origin.position();
+        if let Some(touch) = self.plan.and_then(|p| p.touches.first()) {
+            let start = touch.start_position();
+            turned_near.0.iter_mut().zip(start.0).for_each(|(slot, angle)| *slot += angle);
+        }
         let vm = Vm {
             at,
             known,
@@ -217,6 +225,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             shift: [0.0; 3],
             hits: 0,
             moved: true,
+            turned_near,
         };
         Run::new(code, D::begin(start, self.post, self.machine), vm)
     }

@@ -24,6 +24,11 @@ impl World {
         Self { parts, origin: origin.position(), tcp }
     }
 
+    /// Are the control's coordinates those of the tool centre point?
+    pub fn is_tcp(&self) -> bool {
+        self.tcp
+    }
+
     /// Place of the last part.
     pub fn last_part(&self) -> usize {
         self.parts.len().saturating_sub(1)

@@ -450,6 +450,8 @@ pub enum DialectName {
     Ngc,
     /// Fanuc, Haas: custom macro B.
     MacroB,
+    /// SINUMERIK 840D sl and ONE.
+    Sinumerik,
 }
 
 /// The axis of a letter, if axiscal knows it.
