@@ -224,9 +224,13 @@ impl<'a, 'b> Walk<'a, 'b> {
                 fault.says.clone(),
                 "the control would stop here, or do something that axiscal does not know",
             );
-        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
+        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. }))
+            || (told.from == 1 && !told.trunk.iter().any(|h| matches!(h.event, Event::Move { .. })))
+        {
             let shown = told.trunk.iter().rev().find_map(|h| match &h.event {
-                Event::Abort(text) | Event::Message(text) if !text.is_empty() => Some(text.as_str()),
+                Event::Abort(text) | Event::Message(text) | Event::Wait(text) if !text.is_empty() => {
+                    Some(text.as_str())
+                }
                 _ => None,
             });
             let says = format!(

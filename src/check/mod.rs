@@ -187,7 +187,8 @@ fn with_parts(
     let told = runs::all(machine, post, against.plan, program, &world, &scenes);
     let first = told.runs.first();
     // what the control rounds, and under a transformation what the rounding of three words does
-    let same = 0.51 * 10f64.powi(-(post.number.decimals as i32)) + 1e-6 + if tcp { 1e-4 } else { 0.0 };
+    let step = 10f64.powi(-(post.number.decimals as i32)) * post.unit_mm();
+    let same = 0.51 * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };
     let case = Case {
         machine,
         post,

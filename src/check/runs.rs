@@ -320,7 +320,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
                         let outcome = run.vm.world.outcome(&run.vm, &probe);
                         run.resolve(outcome);
                     }
-                    _ => return false,
+                    Ok(Pause::Done) => return false,
+                    // it goes on to something that the control would not do
+                    Err(_) => return true,
                 }
             }
         };

@@ -136,7 +136,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
             said.say(case, "check::log", &place, format!("touch {id} is logged without having been made"), "");
             continue;
         };
-        let step = 0.5 * 10f64.powi(-(case.post.log.decimals as i32));
+        let step = 0.5 * 10f64.powi(-(case.post.log.decimals as i32)) * case.post.unit_mm();
         let room = step
             + LOGGED
             + if plan.controller_frame == crate::program::plan::ControllerFrame::Tcp { 1e-4 } else { 0.0 };

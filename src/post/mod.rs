@@ -164,6 +164,12 @@ pub struct ColumnRule {
 }
 
 impl Postprocessor {
+    /// The unit of length of its programs and logs, mm.
+    #[must_use]
+    pub fn unit_mm(&self) -> f64 {
+        if self.log.unit == LengthUnit::Inch { crate::units::mm_from_inch(1.0) } else { 1.0 }
+    }
+
     /// Whether a program may wait for a person.
     #[must_use]
     pub fn can_stop(&self) -> bool {
