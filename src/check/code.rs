@@ -219,6 +219,16 @@ pub type Values = BTreeMap<Var, f64>;
 const SAME: f64 = 1e-9;
 
 impl Expr {
+    /// Does it read a variable of this kind?
+    pub fn reads(&self, kind: &dyn Fn(&Var) -> bool) -> bool {
+        match self {
+            Self::Var(var) => kind(var),
+            Self::Number(_) | Self::Exists(_) => false,
+            Self::Indirect(of) | Self::Call(_, of) => of.reads(kind),
+            Self::Two(_, left, right) => left.reads(kind) || right.reads(kind),
+        }
+    }
+
     /// The value.
     ///
     /// # Errors

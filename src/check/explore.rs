@@ -4,7 +4,7 @@
 //! the way, contact at once, a block that stands off, a probe that does not close again, a search and a measuring touch
 //! that disagree, a person who breaks the program off. A branch is followed until the program ends or moves on.
 
-use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Vm};
+use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Trouble, Vm};
 use super::world::way_mm;
 use std::collections::BTreeMap;
 
@@ -23,6 +23,8 @@ pub enum Deviation {
     Stuck,
     /// A line cannot be written into the log.
     NotWritten,
+    /// The probe is deflected when the program looks at it.
+    Deflected,
 }
 
 impl Deviation {
@@ -109,8 +111,8 @@ pub fn explore<'p, D: Dialect>(
         let paused = run.on();
         // events before the last stop belong to the part that was up then; a stop is at most the last of them
         note_parts(&mut told.parts, &run.vm, part_before);
-        for (leaves, fork) in run.take_forks() {
-            told.branches.push(until_it_stops(fork, Deviation::NotWritten, leaves));
+        for (leaves, trouble, fork) in run.take_forks() {
+            told.branches.extend(until_it_stops(fork, trouble.into(), leaves));
         }
         match paused {
             Err(fault) => {
@@ -125,7 +127,7 @@ pub fn explore<'p, D: Dialect>(
                     let leaves = run.vm.trace.len();
                     let trace = std::mem::take(&mut run.vm.trace);
                     for deviation in deviations(&run.vm, &probe, outcome, limits) {
-                        told.branches.push(follow(run.clone(), &probe, outcome, deviation, leaves));
+                        told.branches.extend(follow(run.clone(), &probe, outcome, deviation, leaves));
                     }
                     if ABORTED_AT.contains(&probes)
                         && let Some(again) = restart(&run)
@@ -202,7 +204,7 @@ fn follow<D: Dialect>(
     nominal: Outcome,
     deviation: Deviation,
     leaves: usize,
-) -> Branch {
+) -> Vec<Branch> {
     let way = way_mm(probe);
     let shifted = |mm: f64| Outcome { hit: true, part: (nominal.part + mm / way).clamp(0.0, 1.0) };
     let outcome = match deviation {
@@ -218,19 +220,35 @@ fn follow<D: Dialect>(
             run.vm.stuck = true;
             nominal
         }
-        Deviation::NotWritten => nominal,
+        Deviation::NotWritten | Deviation::Deflected => nominal,
     };
-    run.keeps_forks = false;
     run.resolve(outcome);
     until_it_stops(run, deviation, leaves)
 }
 
-fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves: usize) -> Branch {
+impl From<Trouble> for Deviation {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::LogFull => Self::NotWritten,
+            Trouble::Deflected => Self::Deflected,
+        }
+    }
+}
+
+/// Follows a run until it ends or moves on; the line with which it says what is wrong may be lost as well.
+fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves: usize) -> Vec<Branch> {
+    let mut branches = Vec::new();
     let mut fault = None;
     let mut moves = 0;
     let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));
     loop {
-        match run.on() {
+        let paused = run.on();
+        for (_, trouble, fork) in run.take_forks() {
+            if trouble == Trouble::LogFull && deviation.must_stop() {
+                branches.extend(until_it_stops(fork, Deviation::NotWritten, leaves));
+            }
+        }
+        match paused {
             Err(f) => {
                 fault = Some(f);
                 break;
@@ -251,5 +269,7 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
             }
         }
     }
-    Branch { leaves, deviation, over: run.is_over(), fault, settings: run.dialect.settings(), trace: run.vm.trace }
+    let (over, settings) = (run.is_over(), run.dialect.settings());
+    branches.insert(0, Branch { leaves, deviation, over, fault, settings, trace: run.vm.trace });
+    branches
 }

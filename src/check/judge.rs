@@ -224,9 +224,7 @@ impl<'a, 'b> Walk<'a, 'b> {
                 fault.says.clone(),
                 "the control would stop here, or do something that axiscal does not know",
             );
-        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. }))
-            || (told.from == 1 && !told.trunk.iter().any(|h| matches!(h.event, Event::Move { .. })))
-        {
+        } else if stops_by_itself(told) {
             let shown = told.trunk.iter().rev().find_map(|h| match &h.event {
                 Event::Abort(text) | Event::Message(text) | Event::Wait(text) if !text.is_empty() => {
                     Some(text.as_str())
@@ -560,6 +558,20 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 }
 
+/// Does the whole program end in the middle, or with a stop before its log is closed?
+fn stops_by_itself(told: &Told) -> bool {
+    if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
+        return true;
+    }
+    let acts = |h: &&Happened| matches!(h.event, Event::Move { .. } | Event::Probe { .. } | Event::Log(_));
+    let waits = told.trunk.iter().rev().take_while(|h| !acts(h)).any(|h| matches!(h.event, Event::Wait(_)));
+    let closed = told.trunk.iter().rev().find_map(|h| match &h.event {
+        Event::Log(text) => Some(text.starts_with('E')),
+        _ => None,
+    });
+    told.from == 1 && waits && closed != Some(true)
+}
+
 // ------------------------------------------------------------------------------------------------------ branches
 
 /// When something went wrong the program must say so and stay where it is.
@@ -576,6 +588,7 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
         Deviation::Shift(_) => "the block stands off by more than the placement tolerance",
         Deviation::Disagree(_) => "search and measuring touch disagree",
         Deviation::Stuck => "the probe does not close again",
+        Deviation::Deflected => "the probe is deflected before the move",
         Deviation::NotWritten => "a line cannot be written into the log",
     };
     let mut complain = |at: &Range<usize>, says: &str| {

@@ -135,6 +135,8 @@ pub struct Vm {
     pub hits: usize,
     /// An axis has moved since the last stop.
     pub moved: bool,
+    /// The program has looked at the probe since the last move.
+    pub asked: bool,
     /// The angles near which axes that count from 0 to 360 are counted when they first move, deg.
     pub turned_near: Position,
 }
@@ -147,6 +149,7 @@ impl Vm {
 
     /// Notes an event.
     pub fn note(&mut self, event: Event) {
+        self.asked &= !matches!(event, Event::Move { .. } | Event::Probe { .. });
         match &event {
             // several stops without a move between them are one
             Event::Wait(_) if self.moved => {
@@ -259,6 +262,10 @@ pub trait Dialect: Clone + Send + Sync {
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String>;
     /// Whether a variable exists.
     fn exists(&self, var: &Var) -> bool;
+    /// Does this variable hold whether the probe is deflected?
+    fn is_probe_input(&self, _var: &Var) -> bool {
+        false
+    }
     /// A variable is written.
     ///
     /// # Errors
@@ -299,6 +306,15 @@ pub struct Fault {
     pub says: String,
 }
 
+/// What may go wrong at a statement that is no move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// A line cannot be written.
+    LogFull,
+    /// The probe is deflected when the program looks at it.
+    Deflected,
+}
+
 /// Statements after which a run that has not ended never will.
 const MOST_STATEMENTS: u64 = 3_000_000;
 
@@ -317,9 +333,9 @@ pub struct Run<'p, D> {
     writes_to: Option<String>,
     /// No log takes a line any more.
     log_is_full: bool,
-    /// What would happen if a line could not be written is kept: place in the record, and the run at that line.
+    /// Runs in which there is trouble at a statement are kept: place in the record, what, and the run at that statement.
     pub keeps_forks: bool,
-    forks: Vec<(usize, Self)>,
+    forks: Vec<(usize, Trouble, Self)>,
     /// The axes and the record.
     pub vm: Vm,
     /// The language.
@@ -347,9 +363,28 @@ impl<'p, D: Dialect> Run<'p, D> {
         }
     }
 
-    /// Takes the runs in which a line could not be written.
-    pub fn take_forks(&mut self) -> Vec<(usize, Self)> {
+    /// Takes the runs in which there is trouble.
+    pub fn take_forks(&mut self) -> Vec<(usize, Trouble, Self)> {
         std::mem::take(&mut self.forks)
+    }
+
+    /// Keeps the run that comes to this statement again with trouble.
+    fn fork(&mut self, trouble: Trouble) {
+        if !self.keeps_forks {
+            return;
+        }
+        let (trace, forks) = (std::mem::take(&mut self.vm.trace), std::mem::take(&mut self.forks));
+        let mut fork = self.clone();
+        (self.vm.trace, self.forks) = (trace, forks);
+        (fork.keeps_forks, fork.next) = (false, fork.next - 1);
+        match trouble {
+            Trouble::LogFull => fork.log_is_full = true,
+            Trouble::Deflected => {
+                fork.vm.stuck = true;
+                fork.vm.note(Event::Other("the probe is deflected".to_owned()));
+            }
+        }
+        self.forks.push((self.vm.trace.len(), trouble, fork));
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -444,6 +479,10 @@ impl<'p, D: Dialect> Run<'p, D> {
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
+                if condition.reads(&|var| self.dialect.is_probe_input(var)) {
+                    self.fork(Trouble::Deflected);
+                    self.vm.asked = true;
+                }
                 if self.value(condition)? == 0.0 {
                     self.next = *to;
                 }
@@ -502,14 +541,7 @@ impl<'p, D: Dialect> Run<'p, D> {
             self.vm.note(Event::Other(format!("no line goes into {name}")));
             return self.dialect.write(error, FULL);
         }
-        if self.keeps_forks {
-            let (trace, forks) = (std::mem::take(&mut self.vm.trace), std::mem::take(&mut self.forks));
-            let mut fork = self.clone();
-            (self.vm.trace, self.forks) = (trace, forks);
-            // it comes to this line again
-            (fork.keeps_forks, fork.log_is_full, fork.next) = (false, true, fork.next - 1);
-            self.forks.push((self.vm.trace.len(), fork));
-        }
+        self.fork(Trouble::LogFull);
         if self.writes_to.as_ref() != Some(&name) {
             self.vm.note(Event::LogOpen { name: name.clone(), append: !self.deleted.contains(&name) });
             self.writes_to = Some(name);

@@ -225,6 +225,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             shift: [0.0; 3],
             hits: 0,
             moved: true,
+            asked: false,
             turned_near,
         };
         Run::new(code, D::begin(start, self.post, self.machine), vm)

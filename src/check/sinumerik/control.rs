@@ -255,7 +255,7 @@ impl Sinumerik {
         let named = |axis: AxisName| words.iter().filter_map(|w| axis_word(w.address)).any(|(a, _)| a == axis);
         self.measuring = AxisName::ALL.map(named);
         (self.triggered, self.latched) = (false, None);
-        Ok(Next::Probe(Probe {
+        let probe = Probe {
             from: vm.at,
             to: vm.target(to)?,
             feed: self.feed,
@@ -264,7 +264,13 @@ impl Sinumerik {
             // a program cannot lock the override: its head tells the operator
             overridden: false,
             strict: false,
-        }))
+        };
+        let touches = vm.known.iter().zip(vm.axes).all(|(k, a)| *k || !a) && vm.world.outcome(vm, &probe).hit;
+        if touches && !vm.asked {
+            return Err("a search begins without a look at the probe: were it deflected, nothing would stop the move"
+                .to_owned());
+        }
+        Ok(Next::Probe(probe))
     }
 
     fn system_variable(&self, name: &str, index: &str, vm: &Vm) -> Result<f64, String> {
@@ -418,11 +424,19 @@ impl Dialect for Sinumerik {
         if self.ahead {
             return Err(format!("STOPRE is missing: {var} would be read before the block before it has ended"));
         }
-        if name == "$AC_TIMER" { own(&self.timers, var) } else { self.system_variable(name, index, vm) }
+        if name == "$AC_TIMER" {
+            // time goes on with whatever happens
+            return own(&self.timers, var).map(|since| since + vm.trace.len() as f64);
+        }
+        self.system_variable(name, index, vm)
     }
 
     fn exists(&self, var: &Var) -> bool {
         self.own.contains_key(var)
+    }
+
+    fn is_probe_input(&self, var: &Var) -> bool {
+        matches!(var, Var::Name(name) if name.starts_with("$A_PROBE["))
     }
 
     fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {

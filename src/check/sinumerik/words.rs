@@ -3,7 +3,7 @@
 use super::expression::{Names, identifier};
 use crate::axes::AxisName;
 use crate::check::code::{Expr, Word};
-use crate::check::lines::{Line, blanks, number};
+use crate::check::lines::{Line, blanks, number, unsigned};
 use crate::check::run::Fault;
 use nom::Parser;
 use nom::character::complete::char;
@@ -108,11 +108,11 @@ fn word<'a>(names: &Names, line: &Line<'_>, left: &'a str) -> Result<(&'a str, W
     }
     let letter = left.get(..1).ok_or_else(unknown)?;
     let behind = left.get(1..).ok_or_else(unknown)?;
-    let address = match names.axis(letter) {
-        Some(axis) => address(axis, Way::Modal),
-        None => LETTERS.into_iter().find(|l| *l == letter).ok_or_else(unknown)?,
+    let (address, signed) = match names.axis(letter) {
+        Some(axis) => (address(axis, Way::Modal), true),
+        None => (LETTERS.into_iter().find(|l| *l == letter).ok_or_else(unknown)?, false),
     };
-    let (after, (value, _)) = number(behind).map_err(|_| unknown())?;
+    let (after, (value, _)) = if signed { number(behind) } else { unsigned(behind) }.map_err(|_| unknown())?;
     Ok((after, Word { address, value: Expr::Number(value), point: true }))
 }
 
