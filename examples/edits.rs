@@ -1,7 +1,8 @@
 //! Thousands of random edits of a program for each control: how many are not read, refused by what they do, refused only
 //! because the program does otherwise than what was written, how many move identically, and whether one escaped.
 //!
-//! `cargo run --release --example edits -- [COUNT] [CONTROLLER …]`
+//! `cargo run --release --example edits -- [COUNT] [--same] [--text] [CONTROLLER …]`; `--same` lists those that move
+//! identically, `--text` prints the program itself.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 #![allow(dead_code)] // it uses a part of what the tests use
 
@@ -13,8 +14,8 @@ use edits::{Fate, original};
 fn main() {
     let mut words = std::env::args().skip(1);
     let count: u64 = words.next().and_then(|w| w.parse().ok()).unwrap_or(2000);
-    let named: Vec<String> = words.collect();
-    let all = ["linuxcnc", "fanuc", "haas", "heidenhain"];
+    let (options, named): (Vec<String>, Vec<String>) = words.partition(|w| w.starts_with("--"));
+    let all = ["linuxcnc", "fanuc", "haas", "sinumerik", "heidenhain"];
     let controllers = if named.is_empty() { all.map(str::to_owned).to_vec() } else { named };
     println!(
         "| controller | edits | not read | refused by what it does | refused as changed only | moves identically | escaped | s |"
@@ -34,6 +35,12 @@ fn main() {
             number(Fate::Escaped),
             begun.elapsed().as_secs_f64()
         );
+        if options.iter().any(|o| o == "--text") {
+            println!("{}", original.text);
+        }
+        if options.iter().any(|o| o == "--same") {
+            fates.iter().filter(|(_, f)| *f == Fate::Same).for_each(|(what, _)| println!("the same: {what}"));
+        }
         for (what, _) in fates.iter().filter(|(_, f)| *f == Fate::Escaped) {
             println!("escaped: {what}");
         }

@@ -6,7 +6,7 @@ mod edits;
 
 use edits::{Fate, original};
 
-const CONTROLLERS: [&str; 4] = ["heidenhain", "linuxcnc", "fanuc", "haas"];
+const CONTROLLERS: [&str; 5] = ["heidenhain", "linuxcnc", "fanuc", "haas", "sinumerik"];
 
 /// How many random edits CI makes for each dialect; `examples/edits.rs` makes thousands.
 const EDITS: u64 = 150;

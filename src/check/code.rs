@@ -142,12 +142,19 @@ pub enum What {
     Jump(usize),
     /// On at another statement when the condition does not hold.
     JumpUnless(Expr, usize),
+    /// A text is kept, at most so many characters of it.
+    SetText {
+        /// Where.
+        var: Var,
+        /// The longest text that it takes.
+        most: usize,
+        /// What.
+        text: Text,
+    },
     /// A subroutine: the number of its first statement.
     Call(usize),
     /// Back to where it was called.
     Return(Option<Expr>),
-    /// A text is kept in a variable.
-    Hold(Var, Text),
     /// A message to the operator.
     Message(Text),
     /// A log is opened; `append`: what it holds is kept.
@@ -161,6 +168,22 @@ pub enum What {
     LogLine(Text),
     /// The log is closed.
     LogClose,
+    /// A line is added to a log that need not be opened, and may be full: the variable then holds what is wrong.
+    LogWrite {
+        /// 0 when the line is in the log.
+        error: Var,
+        /// Name of the log.
+        name: Text,
+        /// The line.
+        text: Text,
+    },
+    /// A log that need not be opened is thrown away.
+    LogDelete {
+        /// 0 when it was there.
+        error: Var,
+        /// Name of the log.
+        name: Text,
+    },
     /// The program waits for a person, who is shown a text.
     Wait(Text),
     /// The program is broken off with a message.
@@ -200,6 +223,16 @@ pub type Values = BTreeMap<Var, f64>;
 const SAME: f64 = 1e-9;
 
 impl Expr {
+    /// Does it read a variable of this kind?
+    pub fn reads(&self, kind: &dyn Fn(&Var) -> bool) -> bool {
+        match self {
+            Self::Var(var) => kind(var),
+            Self::Number(_) | Self::Exists(_) => false,
+            Self::Indirect(of) | Self::Call(_, of) => of.reads(kind),
+            Self::Two(_, left, right) => left.reads(kind) || right.reads(kind),
+        }
+    }
+
     /// The value.
     ///
     /// # Errors

@@ -4,7 +4,7 @@
 //! the way, contact at once, a block that stands off, a probe that does not close again, a search and a measuring touch
 //! that disagree, a person who breaks the program off. A branch is followed until the program ends or moves on.
 
-use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Vm};
+use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Trouble, Vm};
 use super::world::way_mm;
 use std::collections::BTreeMap;
 
@@ -21,6 +21,10 @@ pub enum Deviation {
     Disagree(f64),
     /// The probe triggers and does not close again.
     Stuck,
+    /// A line cannot be written into the log.
+    NotWritten,
+    /// The probe is deflected when the program looks at it.
+    Deflected,
 }
 
 impl Deviation {
@@ -108,6 +112,7 @@ pub fn explore<'p, D: Dialect>(
     restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
 ) -> Told {
     let before = run.dialect.settings();
+    run.keeps_forks = limits.is_some();
     let mut told = Told {
         from,
         trunk: Vec::new(),
@@ -123,6 +128,9 @@ pub fn explore<'p, D: Dialect>(
         let paused = run.on();
         // events before the last stop belong to the part that was up then; a stop is at most the last of them
         note_parts(&mut told.parts, &run.vm, part_before);
+        for (leaves, trouble, fork) in run.take_forks() {
+            told.branches.extend(until_it_stops(fork, trouble.into(), leaves));
+        }
         match paused {
             Err(fault) => {
                 told.fault = Some(fault);
@@ -136,7 +144,7 @@ pub fn explore<'p, D: Dialect>(
                     let leaves = run.vm.trace.len();
                     let trace = std::mem::take(&mut run.vm.trace);
                     for deviation in deviations(&run.vm, &probe, outcome, limits) {
-                        told.branches.push(follow(run.clone(), &probe, outcome, deviation, leaves));
+                        told.branches.extend(follow(run.clone(), &probe, outcome, deviation, leaves));
                     }
                     if ABORTED_AT.contains(&probes)
                         && let Some(again) = restart(&run)
@@ -213,7 +221,7 @@ fn follow<D: Dialect>(
     nominal: Outcome,
     deviation: Deviation,
     leaves: usize,
-) -> Branch {
+) -> Vec<Branch> {
     let way = way_mm(probe);
     let shifted = |mm: f64| Outcome { hit: true, part: (nominal.part + mm / way).clamp(0.0, 1.0) };
     let outcome = match deviation {
@@ -229,13 +237,35 @@ fn follow<D: Dialect>(
             run.vm.stuck = true;
             nominal
         }
+        Deviation::NotWritten | Deviation::Deflected => nominal,
     };
     run.resolve(outcome);
+    until_it_stops(run, deviation, leaves)
+}
+
+impl From<Trouble> for Deviation {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::LogFull => Self::NotWritten,
+            Trouble::Deflected => Self::Deflected,
+        }
+    }
+}
+
+/// Follows a run until it ends or moves on; the line with which it says what is wrong may be lost as well.
+fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves: usize) -> Vec<Branch> {
+    let mut branches = Vec::new();
     let mut fault = None;
     let mut moves = 0;
     let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));
     loop {
-        match run.on() {
+        let paused = run.on();
+        for (_, trouble, fork) in run.take_forks() {
+            if trouble == Trouble::LogFull && deviation.must_stop() {
+                branches.extend(until_it_stops(fork, Deviation::NotWritten, leaves));
+            }
+        }
+        match paused {
             Err(f) => {
                 fault = Some(f);
                 break;
@@ -256,5 +286,7 @@ fn follow<D: Dialect>(
             }
         }
     }
-    Branch { leaves, deviation, over: run.is_over(), fault, settings: run.dialect.settings(), trace: run.vm.trace }
+    let (over, settings) = (run.is_over(), run.dialect.settings());
+    branches.insert(0, Branch { leaves, deviation, over, fault, settings, trace: run.vm.trace });
+    branches
 }

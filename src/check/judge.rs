@@ -224,9 +224,11 @@ impl<'a, 'b> Walk<'a, 'b> {
                 fault.says.clone(),
                 "the control would stop here, or do something that axiscal does not know",
             );
-        } else if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) && !told.declines() {
+        } else if stops_by_itself(told) && !told.declines() {
             let texts = told.trunk.iter().rev().filter_map(|h| match &h.event {
-                Event::Abort(text) | Event::Message(text) if !text.is_empty() => Some(text.as_str()),
+                Event::Abort(text) | Event::Message(text) | Event::Wait(text) if !text.is_empty() => {
+                    Some(text.as_str())
+                }
                 _ => None,
             });
             // the last message may only say where; the one before it says what
@@ -566,6 +568,20 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 }
 
+/// Does the whole program end in the middle, or with a stop before its log is closed?
+fn stops_by_itself(told: &Told) -> bool {
+    if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
+        return true;
+    }
+    let acts = |h: &&Happened| matches!(h.event, Event::Move { .. } | Event::Probe { .. } | Event::Log(_));
+    let waits = told.trunk.iter().rev().take_while(|h| !acts(h)).any(|h| matches!(h.event, Event::Wait(_)));
+    let closed = told.trunk.iter().rev().find_map(|h| match &h.event {
+        Event::Log(text) => Some(text.starts_with('E')),
+        _ => None,
+    });
+    told.from == 1 && waits && closed != Some(true)
+}
+
 // ------------------------------------------------------------------------------------------------------ branches
 
 /// When something went wrong the program must say so and stay where it is.
@@ -582,6 +598,8 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
         Deviation::Shift(_) => "the block stands off by more than the placement tolerance",
         Deviation::Disagree(_) => "search and measuring touch disagree",
         Deviation::Stuck => "the probe does not close again",
+        Deviation::Deflected => "the probe is deflected before the move",
+        Deviation::NotWritten => "a line cannot be written into the log",
     };
     let mut complain = |at: &Range<usize>, says: &str| {
         said.say(case, "check::goes_on", at, format!("{what}: {says}"), "the program must say what is wrong and stop");

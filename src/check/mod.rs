@@ -20,6 +20,7 @@ mod proof;
 mod run;
 mod runs;
 mod seconds;
+mod sinumerik;
 mod touches;
 mod world;
 

@@ -8,7 +8,7 @@ use super::world::World;
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -142,6 +142,10 @@ pub struct Vm {
     pub hits: usize,
     /// An axis has moved since the last stop.
     pub moved: bool,
+    /// The program has looked at the probe since the last move.
+    pub asked: bool,
+    /// The angles near which axes that count from 0 to 360 are counted when they first move, deg.
+    pub turned_near: Position,
 }
 
 impl Vm {
@@ -152,6 +156,7 @@ impl Vm {
 
     /// Notes an event.
     pub fn note(&mut self, event: Event) {
+        self.asked &= !matches!(event, Event::Move { .. } | Event::Probe { .. });
         match &event {
             // several stops without a move between them are one
             Event::Wait(_) if self.moved => {
@@ -264,6 +269,10 @@ pub trait Dialect: Clone + Send + Sync {
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String>;
     /// Whether a variable exists.
     fn exists(&self, var: &Var) -> bool;
+    /// Does this variable hold whether the probe is deflected?
+    fn is_probe_input(&self, _var: &Var) -> bool {
+        false
+    }
     /// A variable is written.
     ///
     /// # Errors
@@ -304,6 +313,15 @@ pub struct Fault {
     pub says: String,
 }
 
+/// What may go wrong at a statement that is no move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// A line cannot be written.
+    LogFull,
+    /// The probe is deflected when the program looks at it.
+    Deflected,
+}
+
 /// Statements after which a run that has not ended never will.
 const MOST_STATEMENTS: u64 = 3_000_000;
 
@@ -316,8 +334,15 @@ pub struct Run<'p, D> {
     done: u64,
     pending: Option<Probe>,
     over: bool,
-    /// Texts that variables hold.
     texts: BTreeMap<Var, String>,
+    /// Logs that were thrown away, and the one into which it writes, where none is opened.
+    deleted: BTreeSet<String>,
+    writes_to: Option<String>,
+    /// No log takes a line any more.
+    log_is_full: bool,
+    /// Runs in which there is trouble at a statement are kept: place in the record, what, and the run at that statement.
+    pub keeps_forks: bool,
+    forks: Vec<(usize, Trouble, Self)>,
     /// The axes and the record.
     pub vm: Vm,
     /// The language.
@@ -327,8 +352,46 @@ pub struct Run<'p, D> {
 impl<'p, D: Dialect> Run<'p, D> {
     /// A program that begins.
     pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
-        let (returns, texts) = (Vec::new(), BTreeMap::new());
-        Self { code, next: 0, returns, done: 0, pending: None, over: false, texts, vm, dialect }
+        Self {
+            code,
+            next: 0,
+            returns: Vec::new(),
+            done: 0,
+            pending: None,
+            over: false,
+            texts: BTreeMap::new(),
+            deleted: BTreeSet::new(),
+            writes_to: None,
+            log_is_full: false,
+            keeps_forks: false,
+            forks: Vec::new(),
+            vm,
+            dialect,
+        }
+    }
+
+    /// Takes the runs in which there is trouble.
+    pub fn take_forks(&mut self) -> Vec<(usize, Trouble, Self)> {
+        std::mem::take(&mut self.forks)
+    }
+
+    /// Keeps the run that comes to this statement again with trouble.
+    fn fork(&mut self, trouble: Trouble) {
+        if !self.keeps_forks {
+            return;
+        }
+        let (trace, forks) = (std::mem::take(&mut self.vm.trace), std::mem::take(&mut self.forks));
+        let mut fork = self.clone();
+        (self.vm.trace, self.forks) = (trace, forks);
+        (fork.keeps_forks, fork.next) = (false, fork.next - 1);
+        match trouble {
+            Trouble::LogFull => fork.log_is_full = true,
+            Trouble::Deflected => {
+                fork.vm.stuck = true;
+                fork.vm.note(Event::Other("the probe is deflected".to_owned()));
+            }
+        }
+        self.forks.push((self.vm.trace.len(), trouble, fork));
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -395,7 +458,7 @@ impl<'p, D: Dialect> Run<'p, D> {
             match piece {
                 Piece::Text(t) => out.push_str(t),
                 Piece::Held(var) => {
-                    out.push_str(self.texts.get(var).ok_or_else(|| format!("{var} holds no text"))?);
+                    out.push_str(self.texts.get(var).ok_or_else(|| format!("{var} has no value"))?);
                 }
                 Piece::Fixed { decimals, width, value } => {
                     out.push_str(&self.dialect.spell(self.value(value)?, *decimals, *width));
@@ -425,6 +488,10 @@ impl<'p, D: Dialect> Run<'p, D> {
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
+                if condition.reads(&|var| self.dialect.is_probe_input(var)) {
+                    self.fork(Trouble::Deflected);
+                    self.vm.asked = true;
+                }
                 if self.value(condition)? == 0.0 {
                     self.next = *to;
                 }
@@ -443,10 +510,6 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
                 self.dialect.left(value, &self.vm);
             }
-            What::Hold(var, text) => {
-                let text = self.text(text)?;
-                self.texts.insert(var.clone(), text);
-            }
             What::Message(text) => self.say(text, Event::Message)?,
             What::Wait(text) => self.say(text, Event::Wait)?,
             What::LogLine(text) => self.say(text, Event::Log)?,
@@ -455,6 +518,22 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.vm.note(Event::LogOpen { name, append: *append });
             }
             What::LogClose => self.vm.note(Event::LogClose),
+            What::SetText { var, most, text } => {
+                let text = self.text(text)?;
+                if text.chars().count() > *most {
+                    return Err(format!("{var} holds {most} characters, the text has {}", text.chars().count()));
+                }
+                self.texts.insert(var.clone(), text);
+            }
+            What::LogWrite { error, name, text } => self.log_write(error, name, text)?,
+            What::LogDelete { error, name } => {
+                let name = self.text(name)?;
+                if self.writes_to.as_ref() == Some(&name) {
+                    return Err(format!("the log {name} is thrown away after something was written into it"));
+                }
+                self.deleted.insert(name);
+                self.dialect.write(error, 0.0)?;
+            }
             What::Abort(text) => {
                 let text = self.text(text)?;
                 self.end(Event::Abort(text));
@@ -464,6 +543,22 @@ impl<'p, D: Dialect> Run<'p, D> {
         Ok(None)
     }
 
+    fn log_write(&mut self, error: &Var, name: &[Piece], text: &[Piece]) -> Result<(), String> {
+        const FULL: f64 = 10.0;
+        let (name, text) = (self.text(name)?, self.text(text)?);
+        if self.log_is_full {
+            self.vm.note(Event::Other(format!("no line goes into {name}")));
+            return self.dialect.write(error, FULL);
+        }
+        self.fork(Trouble::LogFull);
+        if self.writes_to.as_ref() != Some(&name) {
+            self.vm.note(Event::LogOpen { name: name.clone(), append: !self.deleted.contains(&name) });
+            self.writes_to = Some(name);
+        }
+        self.vm.note(Event::Log(text));
+        self.dialect.write(error, 0.0)
+    }
+
     fn say(&mut self, text: &[Piece], event: fn(String) -> Event) -> Result<(), String> {
         let text = self.text(text)?;
         self.vm.note(event(text));
@@ -471,6 +566,9 @@ impl<'p, D: Dialect> Run<'p, D> {
     }
 
     fn end(&mut self, event: Event) {
+        if self.writes_to.take().is_some() {
+            self.vm.note(Event::LogClose);
+        }
         self.vm.note(event);
         self.over = true;
     }

@@ -6,7 +6,7 @@ use super::explore::{Limits, Told, explore};
 use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
 use super::world::World;
-use super::{heidenhain, macro_b, ngc};
+use super::{heidenhain, macro_b, ngc, sinumerik};
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
@@ -38,6 +38,7 @@ impl Program {
             DialectName::Ngc => ngc::parse(text)?,
             DialectName::MacroB => macro_b::parse(text, &post.number)?,
             DialectName::Klartext => heidenhain::parse(text, post, masks)?,
+            DialectName::Sinumerik => sinumerik::parse(text, post)?,
         };
         let var = variable(&rule.from);
         let set_at = code.statements.iter().position(|s| matches!(&s.what, What::Set(v, Expr::Number(_)) if *v == var));
@@ -131,6 +132,7 @@ pub fn all(
         DialectName::Ngc => Runs::<ngc::Ngc>::new(machine, post, plan, program, world, scenes).all(),
         DialectName::MacroB => Runs::<macro_b::MacroB>::new(machine, post, plan, program, world, scenes).all(),
         DialectName::Klartext => Runs::<heidenhain::Heidenhain>::new(machine, post, plan, program, world, scenes).all(),
+        DialectName::Sinumerik => Runs::<sinumerik::Sinumerik>::new(machine, post, plan, program, world, scenes).all(),
     }
 }
 
@@ -214,6 +216,12 @@ impl<'a, D: Dialect> Runs<'a, D> {
         self.machine.axes.iter().for_each(|a| axes[a.name.index()] = true);
         // under the control's own transformation a program sees to it that the rotary axes stand at 0 when it begins
         let known = AxisName::ALL.map(|a| self.tcp() && a.is_rotary());
+        // axes that count from 0 to 360 only are counted as the plan counts them
+        let mut turned_near = self.machine.origin.position();
+        if let Some(touch) = self.plan.and_then(|p| p.touches.first()) {
+            let start = touch.start_position();
+            turned_near.0.iter_mut().zip(start.0).for_each(|(slot, angle)| *slot += angle);
+        }
         let vm = Vm {
             at,
             known,
@@ -227,6 +235,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
             shift: [0.0; 3],
             hits: 0,
             moved: true,
+            asked: false,
+            turned_near,
         };
         Run::new(code, D::begin(start, self.post, self.machine), vm)
     }
@@ -322,7 +332,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
                         let outcome = run.vm.world.outcome(&run.vm, &probe);
                         run.resolve(outcome);
                     }
-                    _ => return false,
+                    Ok(Pause::Done) => return false,
+                    // it goes on to something that the control would not do
+                    Err(_) => return true,
                 }
             }
         };

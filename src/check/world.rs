@@ -24,7 +24,7 @@ impl World {
         Self { parts, origin: origin.position(), tcp }
     }
 
-    /// Coordinates are those of the tool centre point.
+    /// Are the control's coordinates those of the tool centre point?
     pub fn is_tcp(&self) -> bool {
         self.tcp
     }

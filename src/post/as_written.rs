@@ -452,6 +452,8 @@ pub enum DialectName {
     MacroB,
     /// HEIDENHAIN: Klartext.
     Klartext,
+    /// SINUMERIK 840D sl and ONE.
+    Sinumerik,
 }
 
 /// The axis of a letter, if axiscal knows it.

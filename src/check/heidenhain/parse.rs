@@ -141,7 +141,7 @@ impl<'a> Reader<'a> {
             let var = string(scan)?;
             scan.need(" = \"", "= and a text in quotes")?;
             let text = scan.up_to("\"", "the quote that ends the text")?;
-            self.code.push(at, What::Hold(var, vec![Piece::Text(Arc::from(text))]));
+            self.code.push(at, What::SetText { var, most: usize::MAX, text: vec![Piece::Text(Arc::from(text))] });
         } else if scan.rest().starts_with('Q') {
             let var = scan.parameter("a Q parameter")?;
             scan.need(" = ", "= and a formula")?;

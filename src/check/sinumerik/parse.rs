@@ -1,0 +1,608 @@
+//! The grammar: declarations, IF blocks and loops, jumps, messages, WRITE. What it does not know is an error.
+//!
+//! Sources: NC Programming 12/2019, 6FC5398-2EP40-0BA0, pp. 565-566 (WRITE); Arbeitsvorbereitung 10/2015,
+//! 6FC5398-2BP40-5AA3, pp. 92-94 (SPRINT); Job Planning 07/2010, 6FC5398-2BP40-0BA0, p. 270 (measuring); the rest as the
+//! postprocessor file says, unverified where it says so.
+
+use super::expression::{Names, Type, identifier, is_truth, quoted};
+use super::words::words;
+use crate::axes::AxisName;
+use crate::check::code::{Code, Expr, Function, Piece, Text, Var, What};
+use crate::check::lines::{Line, blanks, lines};
+use crate::check::run::Fault;
+use crate::post::Postprocessor;
+use nom::character::complete::{char, digit1};
+use nom::sequence::delimited;
+use nom::{IResult, Parser};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
+
+/// Words that cannot be names of variables or labels.
+const RESERVED: [&str; 28] = [
+    "DEF", "INT", "REAL", "STRING", "IF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "LOOP", "ENDLOOP", "REPEAT", "UNTIL",
+    "GOTO", "GOTOF", "GOTOB", "MSG", "SETAL", "WRITE", "DELETE", "SPRINT", "SUPA", "STOPRE", "TRAFOOF", "TRAORI",
+    "TRANS", "MEAS", "SPOS",
+];
+
+/// Reads a program. The names of the axes are those of the postprocessor file.
+///
+/// # Errors
+/// The first place that is not of this grammar.
+pub fn parse(text: &str, post: &Postprocessor) -> Result<Code, Fault> {
+    let axes = AxisName::ALL.into_iter().map(|a| (post.number.name(a), a)).collect();
+    let mut reader = Reader { names: Names { types: BTreeMap::new(), axes }, ..Reader::default() };
+    for line in lines(text) {
+        reader.line(&line)?;
+    }
+    reader.finish(text.len())
+}
+
+/// An IF or a loop that is not closed yet.
+enum Open {
+    /// The jump over the part that is being read, and the one at the end of the first part.
+    If {
+        over: usize,
+        end: Option<usize>,
+    },
+    /// First statement; the jump out of it.
+    While {
+        start: usize,
+        out: usize,
+    },
+    Loop {
+        start: usize,
+    },
+    Repeat {
+        start: usize,
+    },
+}
+
+/// Where a label may be looked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Direction {
+    Onward,
+    Back,
+    Both,
+}
+
+struct Jump {
+    statement: usize,
+    label: String,
+    direction: Direction,
+    at: Range<usize>,
+    inside: Vec<usize>,
+}
+
+#[derive(Default)]
+struct Reader {
+    code: Code,
+    names: Names,
+    labels: BTreeMap<String, (usize, Vec<usize>)>,
+    jumps: Vec<Jump>,
+    open: Vec<(Open, usize, Range<usize>)>,
+    /// Structures so far: each has its number.
+    structures: usize,
+    begun: bool,
+    running: bool,
+    ended: bool,
+}
+
+impl Reader {
+    fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
+        let body = without_comment(line.text);
+        let body = body.trim_end_matches([' ', '\t']);
+        // the line as far as it acts: what is expected behind its end is said there
+        let line = &Line { start: line.start, text: body };
+        let rest = blanks(body).map_err(|e| line.unread(&e, "a block"))?.0;
+        if rest.is_empty() {
+            return Ok(());
+        }
+        let first = !std::mem::replace(&mut self.begun, true);
+        if let Some(name) = rest.strip_prefix("%_N_") {
+            let good = name.strip_suffix("_MPF").is_some_and(|n| identifier(n).is_ok_and(|(left, _)| left.is_empty()));
+            return if first && good {
+                Ok(())
+            } else {
+                Err(line.fault(rest, "the head of a file stands first: %_N_NAME_MPF"))
+            };
+        }
+        let rest = without_number(rest);
+        let rest = match label(rest) {
+            Some((after, name)) => {
+                self.label(line, rest, name)?;
+                blanks(after).map_err(|e| line.unread(&e, "a block"))?.0
+            }
+            None => rest,
+        };
+        if rest.is_empty() { Ok(()) } else { self.statement(line, rest) }
+    }
+
+    fn statement(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let (after, keyword) = identifier(rest).unwrap_or((rest, ""));
+        if keyword == "DEF" {
+            return self.declaration(line, after);
+        }
+        self.running = true;
+        let at = line.rest(rest);
+        let left = match keyword {
+            "IF" => self.condition(line, after, at)?,
+            "ELSE" | "ENDIF" | "WHILE" | "ENDWHILE" | "LOOP" | "ENDLOOP" | "REPEAT" | "UNTIL" => {
+                self.structure(line, rest, keyword, after, at)?
+            }
+            "GOTO" | "GOTOF" | "GOTOB" => self.goto(line, rest, at)?,
+            "MSG" => {
+                let (left, text) = self.in_brackets(line, after, |names, i| match i.strip_prefix(')') {
+                    Some(_) => Ok((i, Text::new())),
+                    None => names.text(i, true),
+                })?;
+                self.code.push(at, What::Message(text));
+                left
+            }
+            "SETAL" => self.alarm(line, after, at)?,
+            "WRITE" => {
+                let (left, (error, name, text)) = self.in_brackets(line, after, |names, i| {
+                    let (i, (error, _, name, _)) = (error_variable(names), comma, quoted, comma).parse(i)?;
+                    let (i, text) = names.text(i, false)?;
+                    Ok((i, (error, Arc::<str>::from(name), text)))
+                })?;
+                self.code.push(at, What::LogWrite { error, name: vec![Piece::Text(name)], text });
+                left
+            }
+            "DELETE" => {
+                let (left, (error, name)) = self.in_brackets(line, after, |names, i| {
+                    let (i, (error, _, name)) = (error_variable(names), comma, quoted).parse(i)?;
+                    Ok((i, (error, Arc::<str>::from(name))))
+                })?;
+                self.code.push(at, What::LogDelete { error, name: vec![Piece::Text(name)] });
+                left
+            }
+            _ if rest.starts_with('$') => {
+                let (after, var) = self.names.system(rest).map_err(|e| line.unread(&e, "a system variable"))?;
+                self.assignment(line, after, var, Type::Real, at)?
+            }
+            name if after.starts_with('=') && self.names.axis(name).is_none() => {
+                let own = self.names.types.get(name).copied();
+                let r = self.names.number(name).map(|_| Type::Real);
+                match own.or(r) {
+                    Some(kind) => self.assignment(line, after, Var::Name(Arc::from(name)), kind, at)?,
+                    None => return self.block(line, rest),
+                }
+            }
+            _ => return self.block(line, rest),
+        };
+        let left = blanks(left).map_err(|e| line.unread(&e, "the end of the block"))?.0;
+        if left.is_empty() { Ok(()) } else { Err(line.not_understood(left, "the end of the block")) }
+    }
+
+    fn block(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let words = words(&self.names, line, rest)?;
+        let ends = |w: &crate::check::code::Word| w.address == "M" && w.value == Expr::Number(30.0);
+        self.ended |= words.iter().any(ends);
+        self.code.push(line.rest(rest), What::Block(words));
+        Ok(())
+    }
+
+    fn in_brackets<'a, T>(
+        &self,
+        line: &Line<'_>,
+        rest: &'a str,
+        inside: impl Fn(&Names, &'a str) -> IResult<&'a str, T>,
+    ) -> Result<(&'a str, T), Fault> {
+        delimited((char('('), blanks), |i| inside(&self.names, i), (blanks, char(')')))
+            .parse(rest)
+            .map_err(|e: Failed<'_>| line.not_understood(place(&e), "what stands in these brackets"))
+    }
+
+    fn declaration(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        if self.running {
+            return Err(line.fault(rest, "DEF stands before everything else"));
+        }
+        let (after, kind) = (blanks, declared)
+            .parse(rest)
+            .map(|(after, (_, kind))| (after, kind))
+            .map_err(|e: Failed<'_>| line.not_understood(place(&e), "INT, REAL or STRING[200]"))?;
+        let mut left = after;
+        loop {
+            let at = line.rest(left);
+            let (after, name) = (blanks, identifier)
+                .parse(left)
+                .map(|(after, (_, name))| (after, name))
+                .map_err(|e: Failed<'_>| line.not_understood(place(&e), "a name"))?;
+            self.free(line, left, name)?;
+            self.names.types.insert(Arc::from(name), kind);
+            let var = Var::Name(Arc::from(name));
+            left = if after.starts_with('=') {
+                self.assignment(line, after, var, kind, at)?
+            } else {
+                let what = match kind {
+                    Type::Text(most) => What::SetText { var, most, text: Text::new() },
+                    _ => What::Set(var, Expr::Number(0.0)),
+                };
+                self.code.push(at, what);
+                after
+            };
+            left = blanks(left).map_err(|e| line.unread(&e, "a name"))?.0;
+            match left.strip_prefix(',') {
+                Some(next) => left = next,
+                None if left.is_empty() => return Ok(()),
+                None => return Err(line.not_understood(left, "a comma or the end of the block")),
+            }
+        }
+    }
+
+    /// A name that nothing else has.
+    fn free(&self, line: &Line<'_>, rest: &str, name: &str) -> Result<(), Fault> {
+        const LENGTH: std::ops::RangeInclusive<usize> = 2..=31;
+        let taken = self.names.types.contains_key(name) || self.names.axis(name).is_some();
+        if taken || RESERVED.contains(&name) || self.names.number(name).is_some() {
+            return Err(line.fault(rest, format!("{name} already means something else")));
+        }
+        if !LENGTH.contains(&name.len()) {
+            return Err(line.fault(rest, format!("{name}: a name has 2 to 31 characters")));
+        }
+        Ok(())
+    }
+
+    fn assignment<'a>(
+        &mut self,
+        line: &Line<'_>,
+        rest: &'a str,
+        var: Var,
+        kind: Type,
+        at: Range<usize>,
+    ) -> Result<&'a str, Fault> {
+        let value = rest.strip_prefix('=').ok_or_else(|| line.not_understood(rest, "= and a value"))?;
+        let unread = |e: &Failed<'_>| line.not_understood(place(e), "a value");
+        if let Type::Text(most) = kind {
+            let (left, text) = self.names.text(value, false).map_err(|e| unread(&e))?;
+            self.code.push(at, What::SetText { var, most, text });
+            return Ok(left);
+        }
+        let (left, value) = self.names.value_of(value).map_err(|e| unread(&e))?;
+        let value = match value {
+            // a whole number is rounded when something else is put into it
+            value if kind == Type::Int && !matches!(value, Expr::Number(_)) => {
+                Expr::Call(Function::Round, Box::new(value))
+            }
+            value => value,
+        };
+        self.code.push(at, What::Set(var, value));
+        Ok(left)
+    }
+
+    /// SETAL is shown; whether it stops depends on its number and the machine: the program must stop by itself.
+    fn alarm<'a>(&mut self, line: &Line<'_>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        let (left, (number, mut text)) = self.in_brackets(line, rest, |names, i| {
+            let (i, number) = digit1(i)?;
+            match comma(i) {
+                Ok((i, _)) => names.text(i, true).map(|(i, text)| (i, (number, text))),
+                Err(_) => Ok((i, (number, Text::new()))),
+            }
+        })?;
+        if !matches!(number.parse::<u32>(), Ok(60_000..=69_999)) {
+            return Err(line.fault(rest, "alarms of programs have numbers from 60000 to 69999"));
+        }
+        text.insert(0, Piece::Text(Arc::from(format!("{number} "))));
+        self.code.push(at, What::Message(text));
+        Ok(left)
+    }
+
+    // ------------------------------------------------------------------------------------------- IF, loops, jumps
+
+    fn whether<'a>(&self, line: &Line<'_>, rest: &'a str) -> Result<(&'a str, Expr), Fault> {
+        let unread = |rest: &str| line.not_understood(rest, "a condition");
+        let (inside, gap) = blanks(rest).map_err(|e| line.unread(&e, "a condition"))?;
+        if gap.is_empty() && !inside.starts_with('(') {
+            return Err(unread(rest));
+        }
+        let (left, condition) = self.names.expression(inside).map_err(|e| unread(place(&e)))?;
+        if is_truth(&condition) { Ok((left, condition)) } else { Err(unread(inside)) }
+    }
+
+    fn condition<'a>(&mut self, line: &Line<'_>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        let (left, condition) = self.whether(line, rest)?;
+        let over = self.code.push(at.clone(), What::JumpUnless(condition, 0));
+        let left = blanks(left).map_err(|e| line.unread(&e, "GOTOF or the end of the block"))?.0;
+        if left.is_empty() {
+            self.opened(Open::If { over, end: None }, at);
+            return Ok(left);
+        }
+        let left = self.goto(line, left, at)?;
+        self.aim(over, self.code.statements.len());
+        Ok(left)
+    }
+
+    fn goto<'a>(&mut self, line: &Line<'_>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        let unread = |rest: &str| line.not_understood(rest, "GOTOF, GOTOB or GOTO and a label");
+        let (after, word) = identifier(rest).map_err(|_| unread(rest))?;
+        let direction = match word {
+            "GOTOF" => Direction::Onward,
+            "GOTOB" => Direction::Back,
+            "GOTO" => Direction::Both,
+            _ => return Err(unread(rest)),
+        };
+        let (after, gap) = blanks(after).map_err(|e| line.unread(&e, "a label"))?;
+        let (left, label) = identifier(after).map_err(|_| unread(after))?;
+        if gap.is_empty() {
+            return Err(unread(after));
+        }
+        let statement = self.code.push(at.clone(), What::Jump(0));
+        let inside = self.inside();
+        self.jumps.push(Jump { statement, label: label.to_owned(), direction, at, inside });
+        Ok(left)
+    }
+
+    fn label(&mut self, line: &Line<'_>, rest: &str, name: &str) -> Result<(), Fault> {
+        self.running = true;
+        const LENGTH: std::ops::RangeInclusive<usize> = 2..=32;
+        if RESERVED.contains(&name) || !LENGTH.contains(&name.len()) {
+            return Err(line.fault(rest, format!("{name} is no label")));
+        }
+        let place = (self.code.statements.len(), self.inside());
+        match self.labels.insert(name.to_owned(), place) {
+            Some(_) => Err(line.fault(rest, format!("the label {name} stands twice"))),
+            None => Ok(()),
+        }
+    }
+
+    fn inside(&self) -> Vec<usize> {
+        self.open.iter().map(|(_, number, _)| *number).collect()
+    }
+
+    fn opened(&mut self, open: Open, at: Range<usize>) {
+        self.structures += 1;
+        self.open.push((open, self.structures, at));
+    }
+
+    fn structure<'a>(
+        &mut self,
+        line: &Line<'_>,
+        rest: &str,
+        keyword: &str,
+        after: &'a str,
+        at: Range<usize>,
+    ) -> Result<&'a str, Fault> {
+        let here = self.code.statements.len();
+        match keyword {
+            "WHILE" => {
+                let (left, condition) = self.whether(line, after)?;
+                let out = self.code.push(at.clone(), What::JumpUnless(condition, 0));
+                self.opened(Open::While { start: here, out }, at);
+                return Ok(left);
+            }
+            "LOOP" => self.opened(Open::Loop { start: here }, at),
+            "REPEAT" => self.opened(Open::Repeat { start: here }, at),
+            _ => return self.closed(line, rest, keyword, after, at),
+        }
+        Ok(after)
+    }
+
+    fn closed<'a>(
+        &mut self,
+        line: &Line<'_>,
+        rest: &str,
+        keyword: &str,
+        after: &'a str,
+        at: Range<usize>,
+    ) -> Result<&'a str, Fault> {
+        let alone = || line.fault(rest, format!("{keyword} does not belong to what is open here"));
+        let (open, _, begun) = self.open.pop().ok_or_else(alone)?;
+        match (keyword, open) {
+            ("ELSE", Open::If { over, end: None }) => {
+                let end = self.code.push(at, What::Jump(0));
+                self.aim(over, self.code.statements.len());
+                // another part: a jump from one into the other goes into a structure
+                self.opened(Open::If { over, end: Some(end) }, begun);
+            }
+            ("ENDIF", Open::If { over, end }) => self.aim(end.unwrap_or(over), self.code.statements.len()),
+            ("ENDWHILE", Open::While { start, out }) => {
+                self.code.push(at, What::Jump(start));
+                self.aim(out, self.code.statements.len());
+            }
+            ("ENDLOOP", Open::Loop { start }) => {
+                self.code.push(at, What::Jump(start));
+            }
+            ("UNTIL", Open::Repeat { start }) => {
+                let (left, condition) = self.whether(line, after)?;
+                self.code.push(at, What::JumpUnless(condition, start));
+                return Ok(left);
+            }
+            _ => return Err(alone()),
+        }
+        Ok(after)
+    }
+
+    fn aim(&mut self, jump: usize, to: usize) {
+        if let Some(statement) = self.code.statements.get_mut(jump)
+            && let What::Jump(place) | What::JumpUnless(_, place) = &mut statement.what
+        {
+            *place = to;
+        }
+    }
+
+    fn finish(mut self, end: usize) -> Result<Code, Fault> {
+        if let Some((_, _, at)) = self.open.pop() {
+            return Err(Fault {
+                at,
+                says: "what begins here has no end: ENDIF, ENDWHILE, ENDLOOP or UNTIL".to_owned(),
+            });
+        }
+        if !self.ended {
+            return Err(Fault { at: end..end, says: "the program has no M30".to_owned() });
+        }
+        for jump in std::mem::take(&mut self.jumps) {
+            let label = &jump.label;
+            let lacks = |says: String| Fault { at: jump.at.clone(), says };
+            let (to, inside) =
+                self.labels.get(label).cloned().ok_or_else(|| lacks(format!("there is no label {label}:")))?;
+            let onward = to > jump.statement;
+            if (onward && jump.direction == Direction::Back) || (!onward && jump.direction == Direction::Onward) {
+                return Err(lacks(format!("the label {label} stands in the other direction")));
+            }
+            if !jump.inside.starts_with(&inside) {
+                return Err(lacks(format!("the label {label} stands inside of an IF or a loop")));
+            }
+            self.aim(jump.statement, to);
+        }
+        Ok(self.code)
+    }
+}
+
+/// What nom could not read.
+fn place<'a>(error: &Failed<'a>) -> &'a str {
+    match error {
+        nom::Err::Error(e) | nom::Err::Failure(e) => e.input,
+        nom::Err::Incomplete(_) => "",
+    }
+}
+
+/// A line up to a semicolon that stands outside of quotation marks.
+fn without_comment(text: &str) -> &str {
+    let mut quoted = false;
+    for (place, character) in text.char_indices() {
+        match character {
+            '"' => quoted = !quoted,
+            ';' if !quoted => return text.get(..place).unwrap_or(text),
+            _ => {}
+        }
+    }
+    text
+}
+
+/// A block behind its number.
+fn without_number(rest: &str) -> &str {
+    let number = (char('N'), digit1::<&str, nom::error::Error<&str>>, nom::character::complete::space1);
+    let mut number = number;
+    number.parse(rest).map_or(rest, |(after, _)| after)
+}
+
+/// `AXC_END:`
+fn label(rest: &str) -> Option<(&str, &str)> {
+    let (after, name) = identifier(rest).ok()?;
+    let after = after.strip_prefix(':')?;
+    (!after.starts_with('=')).then_some((after, name))
+}
+
+fn comma(input: &str) -> IResult<&str, char> {
+    delimited(blanks, char(','), blanks).parse(input)
+}
+
+/// `INT`, `REAL`, `STRING[200]`
+fn declared(input: &str) -> IResult<&str, Type> {
+    let bad = || nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Alt));
+    let (after, word) = identifier(input)?;
+    let (after, kind) = match word {
+        "INT" => (after, Type::Int),
+        "REAL" => (after, Type::Real),
+        "STRING" => {
+            let (after, most) = delimited(char('['), digit1, char(']')).parse(after)?;
+            (after, Type::Text(most.parse().ok().filter(|n| (1..=200).contains(n)).ok_or_else(bad)?))
+        }
+        _ => return Err(bad()),
+    };
+    if after.starts_with([' ', '\t']) { Ok((after, kind)) } else { Err(bad()) }
+}
+
+/// The variable for the error number of a function.
+fn error_variable<'a>(names: &Names) -> impl Fn(&'a str) -> IResult<&'a str, Var> {
+    move |input| match identifier(input)? {
+        (after, name) if names.types.get(name) == Some(&Type::Int) => Ok((after, Var::Name(Arc::from(name)))),
+        _ => Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Verify))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Code, Fault> {
+        let (post, _) = Postprocessor::load_built_in_or_file("sinumerik").unwrap();
+        parse(text, &post)
+    }
+
+    #[test]
+    fn what_is_not_known_is_an_error_with_its_place() {
+        let mut wrong = Vec::new();
+        for (text, place) in [
+            ("G0 X1..5\nM30\n", 3),
+            ("G0 X1 X=2\nM30\n", 6),
+            ("G0X1\nM30\n", 0),
+            ("G0 X1Y2\nM30\n", 5),
+            ("FOOBAR\nM30\n", 0),
+            ("G0 Q1\nM30\n", 3),
+            ("G0 X=FOO\nM30\n", 5),
+            ("CYCLE800()\nM30\n", 0),
+            ("/G0 X1\nM30\n", 0),
+            ("G0 X1\nDEF INT AB\nM30\n", 9),
+            ("DEF INT X\nM30\n", 7),
+            ("DEF INT AB\nDEF REAL AB\nM30\n", 19),
+            ("DEF BOOL AB\nM30\n", 4),
+            ("DEF REAL AB\nIF AB\nENDIF\nM30\n", 15),
+            ("DEF REAL AB\nIF AB<1 OR AB>2\nENDIF\nM30\n", 19),
+            ("DEF REAL AB\nIF AB<1\nM30\n", 12),
+            ("ENDIF\nM30\n", 0),
+            ("GOTOF NOWHERE\nM30\n", 0),
+            ("AB:\nGOTOF AB\nM30\n", 4),
+            ("GOTOB AB\nAB:\nM30\n", 0),
+            ("AB:\nAB:\nM30\n", 4),
+            ("GOTOF AB\nLOOP\nAB:\nENDLOOP\nM30\n", 0),
+            ("DEF STRING[20] AB\nAB=SPRINT(\"%F\",1)\nM30\n", 29),
+            ("DEF STRING[20] AB\nAB=SPRINT(\"%D\",1.5)\nM30\n", 32),
+            ("DEF STRING[20] AB\nDEF REAL CD\nAB=\"A\"<<CD\nM30\n", 38),
+            ("WRITE(AB,\"LOG\",\"A\")\nM30\n", 6),
+            ("MSG(\"A)\nM30\n", 7),
+            ("G0 X=$AA_FOO[X]\nM30\n", 5),
+            ("G0 X=$AA_IM[W]\nM30\n", 5),
+            ("SETAL(1,\"A\")\nM30\n", 5),
+            ("G0 X1\n%_N_A_MPF\nM30\n", 6),
+            ("G0 X1\n", 6),
+        ] {
+            match read(text) {
+                Ok(_) => wrong.push(format!("{text:?} was read")),
+                Err(fault) if fault.at.start != place => {
+                    wrong.push(format!("{text:?}, not {place} but {}: {}", fault.at.start, fault.says));
+                }
+                Err(_) => {}
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+
+    #[test]
+    fn all_that_the_language_has_is_read() {
+        let text = "%_N_A_MPF\n;$PATH=/_N_WKS_DIR\nDEF INT AB=1, CD ; two\nDEF REAL EF=1.5EX-3\nDEF STRING[80] GH=\"A;B\"\n\
+            N10 G0 SUPA X-3.5 Y=AC(-2) Z=IC(.5)\nN20 G1 X=EF*2-(AB+1)/2 F=300 MEAS=1\nC=DC(90) G0\n\
+            IF (AB==1) AND NOT (CD<>2)\nR1=ABS(-EF)\nELSE\nR1=ROUND(SQRT(4))\nENDIF\nWHILE CD<3\nCD=CD+1\nENDWHILE\n\
+            LOOP\nIF CD>5 GOTOF OUT\nCD=CD+1\nENDLOOP\nOUT: STOPRE\nREPEAT\nCD=CD-1\nUNTIL CD==0\nSETAL(65000,\"A\"<<EF)\n\
+            MSG()\nMSG(\"A \"<<AB<<GH)\nGH=SPRINT(\"N%D X%12.4F\",AB,EF)\nWRITE(CD,\"LOG\",GH<<AB)\nDELETE(CD,\"LOG\")\n\
+            $AC_TIMER[1]=0\nSPOS=90\nM30\n";
+        read(text).unwrap_or_else(|e| panic!("{:?} {}", &text[e.at.clone()], e.says));
+    }
+
+    #[test]
+    fn operations_bind_as_in_the_list_of_the_control() {
+        let value = |written: &str| {
+            let code = read(&format!("DEF REAL AB={written}\nM30\n")).unwrap();
+            match &code.statements[0].what {
+                What::Set(_, expr) => expr.value(&|v| Err(v.to_string()), &|_| false).unwrap(),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(value("2+3*4"), 14.0);
+        assert_eq!(value("(2+3)*4"), 20.0);
+        assert_eq!(value("10-2-3"), 5.0);
+        assert_eq!(value("-2*-3"), 6.0);
+        assert_eq!(value("12/3/2"), 2.0);
+        assert_eq!(value("360*ROUND((10-350)/360)"), -360.0);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn rubbish_never_panics(text in "(DEF INT AB\n)?[ -~\n\u{e4}]{0,300}") {
+            let _ = read(&text);
+        }
+    }
+}
