@@ -93,14 +93,7 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
-        Verdict::Unexplained if only_a_trace(m) => (
-            Level::Unknown,
-            format!(
-                "The model fits within the probe's noise (the touches miss by {}, the noise is {}), but a weak pattern is left that may be chance: more touches would tell.",
-                um(d.rms_um),
-                um(d.noise_um)
-            ),
-        ),
+        Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
         Verdict::Unexplained => (
             Level::Act,
             format!(
@@ -122,14 +115,8 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
         Verdict::TooLittleData => String::new(),
         _ => d.says.clone(),
     };
-    Headline { level, sentence, detail }
-}
-
-/// Something passed a test and was not borne out, while the noise explains all that is left: no reason to take the machine
-/// apart.
-fn only_a_trace(m: &Material) -> bool {
-    let d = m.diagnosis;
-    d.verdict == Verdict::Unexplained && m.comparison.explained_by_noise && d.rms_um <= 1.2 * d.noise_um
+    // the rooms write um in plain letters
+    Headline { level, sentence: sentence.replace(" um ", " µm "), detail }
 }
 
 fn missing(m: &Material, c: &Candidate) -> String {
@@ -258,7 +245,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, &mut out);
             }
         }
-        Verdict::Unexplained if only_a_trace(m) => out.push(Next::new(
+        Verdict::Unexplained if d.faint => out.push(Next::new(
             "Measure more touches",
             "Repeats and further poses say whether the weak pattern is there at all.",
             plan_next.clone(),
@@ -268,7 +255,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
     }
     if d.verdict != Verdict::TooLittleData
         && !m.fit.outcome.undetermined.is_empty()
-        && (d.verdict == Verdict::Adequate || only_a_trace(m))
+        && (d.verdict == Verdict::Adequate || d.faint)
     {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
         let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);

@@ -58,6 +58,27 @@ export function measured(dir, name) {
   return folder;
 }
 
+/** Time constant of the machine that warms up. */
+export const RISE_H = 0.2;
+
+/** A machine whose column rises while it warms up, measured with the program that comes back to its places. */
+export function warming(dir) {
+  const folder = join(dir, "warming");
+  mkdirSync(folder);
+  const at = (file) => join(folder, file);
+  writeFileSync(at("wrong.toml"), `seed = 8
+[effects.warm-up]
+wz = 25
+tau = ${RISE_H}
+[noise]
+touch_um = 0.5
+`);
+  axiscal("generate", "--machine", "swivel-head", "--program", "full", "--controller", "linuxcnc", "--out", folder);
+  axiscal("simulate", "--plan", at("full.plan.json"), "--machine", "swivel-head", "--scenario", at("wrong.toml"), "--controller", "linuxcnc", "--out", at("full.log"));
+  axiscal("new", "--machine", "swivel-head", "--plan", at("full.plan.json"), "--log", at("full.log"), "--controller", "linuxcnc", "--out", at("study.toml"));
+  return folder;
+}
+
 /** The same touches again and again with fresh noise, until there are ten thousand: for times. */
 export function many(dir) {
   const folder = measured(dir, "many");

@@ -3,6 +3,7 @@
 import { call, listen, on, state, step, trouble } from "./talk.js";
 import { rescale } from "./plots.js";
 import "./space.js";
+import "./correlation.js";
 import "./effects.js";
 import "./touches.js";
 import "./formula.js";
