@@ -57,8 +57,7 @@ const FAINT: f64 = 1.2;
 
 /// Something passed a test and was not borne out, while the noise explains all that is left.
 fn faint(out: &Diagnosis, fit: &Fit) -> bool {
-    let noise_does =
-        fit.dof > 0 && fit.outcome.chi2_per_dof <= crate::fit::noise::chi2_limit(fit.dof, fit.noise.dof);
+    let noise_does = fit.dof > 0 && fit.outcome.chi2_per_dof <= crate::fit::noise::chi2_limit(fit.dof, fit.noise.dof);
     out.verdict == Verdict::Unexplained && noise_does && out.rms_um <= FAINT * out.noise_um
 }
 

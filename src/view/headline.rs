@@ -128,15 +128,22 @@ fn missing(m: &Material, c: &Candidate) -> String {
         um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         um(d.noise_um)
     );
-    let size: Vec<String> = c
+    let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
+    let sizes: Vec<String> = c
         .parameters
         .iter()
         .filter(|p| p.sigma.is_some())
         .take(2)
-        .map(|p| format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit))
+        .map(|p| match known.iter().find(|r| r.name == p.name && r.sigma.is_some()) {
+            Some(record) => format!("{} {}", p.name, size(record, m)),
+            None => format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit),
+        })
         .collect();
-    let size =
-        if size.is_empty() || c.parameters.len() > 2 { String::new() } else { format!(" ({})", size.join(", ")) };
+    let one = !sizes.is_empty() && c.parameters.len() <= 2 && c.same_as.is_empty();
+    let size = if one { format!(" ({})", sizes.join(", ")) } else { String::new() };
+    // where no single number says how large it is, the touches do
+    let moves = if one { None } else { most_moved_um(m) };
+    let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
     let what = match &c.same_as[..] {
         [] => format!("{}{size}", c.name),
         [one] => format!("{}, or {}: these touches cannot tell which", c.name, name(one)),
@@ -144,7 +151,15 @@ fn missing(m: &Material, c: &Candidate) -> String {
     };
     let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
     let (whose, has) = whose(m, &c.effect);
-    format!("{whose} {has} an error that is not in the model yet: {what}. {falls}{rest}")
+    format!("{whose} {has} an error that is not in the model yet: {what}. {falls}{moves}{rest}")
+}
+
+/// The most that the proposed effect takes away from a touch that both fits use, µm.
+fn most_moved_um(m: &Material) -> Option<f64> {
+    let after = m.proposed?;
+    let used = |i: &usize| m.fit.weight[*i] > 0.0 && after.weight.get(*i).is_some_and(|w| *w > 0.0);
+    let moved = |i: usize| um_from_mm((m.fit.residual_mm[i] - after.residual_mm[i]).abs());
+    (0..m.fit.residual_mm.len()).filter(used).map(moved).max_by(f64::total_cmp)
 }
 
 /// Whose error an effect is: a probe that triggers late is no fault of the machine.

@@ -502,12 +502,7 @@ struct Tried<'a> {
 ///
 /// # Errors
 /// When it is in the model, is unknown, was typed wrongly, or cannot be fitted.
-pub fn tried(
-    now: &Snapshot,
-    shelf: &Shelf,
-    effect: Option<&str>,
-    draft: Option<&Draft>,
-) -> Result<Vec<u8>, Refused> {
+pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<&Draft>) -> Result<Vec<u8>, Refused> {
     let opened = &*now.opened;
     let typed = match draft {
         Some(draft) => Some(draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?),

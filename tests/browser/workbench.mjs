@@ -187,9 +187,9 @@ async function formulaBox(t) {
 /** The variables in the table of docs/guide/effects.md. */
 function wordsOfTheGuide() {
   const guide = readFileSync(join(process.env.AXISCAL_ROOT, "docs/guide/effects.md"), "utf8").split("\n## Formulas\n")[1];
-  const rows = guide.split("\n").filter((line) => line.startsWith("| `"));
-  const functions = rows.findIndex((line) => line.includes("`sin"));
-  return rows.slice(0, functions < 0 ? undefined : functions).flatMap((line) => {
+  // the first table alone
+  const rows = guide.trimStart().split("\n\n")[0].split("\n").filter((line) => line.startsWith("| `"));
+  return rows.flatMap((line) => {
     const cell = line.split("|")[1];
     const all = [...cell.matchAll(/`([^`]*)`/g)].flatMap((m) => m[1].split(" "));
     return all.includes("…") ? [..."XYZABC"].map((axis) => all[0][0] + axis) : all;

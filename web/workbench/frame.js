@@ -10,6 +10,9 @@ function triangle(pen, x, y, r) {
   pen.lineTo(x - r, y + 0.6 * r);
 }
 
+/** Marks up to this size, px, are drawn as squares. */
+const SMALL = 3;
+
 const SHAPES = {
   circle: (pen, x, y, r) => { pen.moveTo(x + r, y); pen.arc(x, y, r, 0, 2 * Math.PI); },
   square: (pen, x, y, r) => pen.rect(x - r, y - r, 2 * r, 2 * r),
@@ -56,6 +59,8 @@ export function frame(plot, box, traces, band) {
     const some = trace.selectedpoints ? new Set(trace.selectedpoints) : null;
     const shape = SHAPES[marker.symbol];
     const thin = marker.symbol === "x-thin-open";
+    // of ten thousand small dots nobody sees whether they are round
+    const dot = marker.size <= SMALL;
     pen.fillStyle = marker.color;
     pen.strokeStyle = marker.color;
     pen.lineWidth = 1;
@@ -66,6 +71,10 @@ export function frame(plot, box, traces, band) {
         if (some && some.has(k) !== chosen) continue;
         const x = trace.x[k];
         if (x === null || x === undefined) continue;
+        if (dot) {
+          pen.fillRect(left + across.l2p(x) - 0.45 * marker.size, top + up.l2p(trace.y[k]) - 0.45 * marker.size, 0.9 * marker.size, 0.9 * marker.size);
+          continue;
+        }
         pen.beginPath();
         shape(pen, left + across.l2p(x), top + up.l2p(trace.y[k]), marker.size / 2);
         if (thin) pen.stroke();
