@@ -235,7 +235,7 @@ globalThis.axiscalPlots = (() => {
     }
     const noise = 2 * view.errors.noise_um;
     const lay = layout(el, {
-      xaxis: { title: { text: safe(variable.title) }, zeroline: false },
+      xaxis: { title: { text: safe(variable.title), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false },
       yaxis: { title: { text: alongNormal ? 'miss along the face, µm' : 'miss, µm' }, zeroline: true },
       shapes: [{ type: 'rect', x0: 0, x1: 1, xref: 'paper', y0: -noise, y1: noise, fillcolor: c.band, line: { width: 0 }, layer: 'below' }],
       hovermode: 'closest',

@@ -5,6 +5,8 @@ import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from
 import { createRequire } from "node:module";
 import { join } from "node:path";
 
+import { smaller } from "./png.mjs";
+
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
 /** Calls the program; "no" (1) is an answer. */
@@ -146,6 +148,12 @@ export async function watched(context) {
 
 // an answer that says no (a stale state, a mistake in a formula) is shown in the page, and Chromium notes it as well
 const refusal = (text) => /Failed to load resource: the server responded with a status of (409|422)/.test(text);
+
+/** A screenshot for the eye, and for the guide where that is asked for. */
+export async function picture(page, { out, pictures }, name) {
+  const shot = await page.screenshot({ path: join(out, `${name}.png`) });
+  if (pictures) writeFileSync(join(pictures, `${name}.png`), smaller(shot));
+}
 
 /** No fault that axe calls serious or critical. */
 export async function accessible(page, what) {

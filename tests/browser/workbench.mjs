@@ -2,7 +2,7 @@
 
 import { appendFileSync, existsSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { RISE_H, accessible, axiscal, equal, holds, many, measured, warming, watched, workbench } from "./tools.mjs";
+import { RISE_H, accessible, axiscal, equal, holds, many, measured, picture, warming, watched, workbench } from "./tools.mjs";
 
 const number = async (page, id) => Number(await page.textContent(`#${id}`));
 const text = (folder) => readFileSync(join(folder, "study.toml"), "utf8");
@@ -48,8 +48,7 @@ async function wholeLoop(t) {
   const noise = await number(page, "noise");
   holds(before > 3 * noise, `the error before is ${before} µm against ${noise} µm`);
   const wide = await spread(page);
-  await page.screenshot({ path: join(t.out, "workbench-before.png") });
-  if (t.pictures) await page.screenshot({ path: join(t.pictures, "workbench-before.png") });
+  await picture(page, t, "workbench-before");
 
   // the first candidate is opened: what it is, and its curve over the touches
   const first = page.locator("#candidates > li").first();
@@ -58,7 +57,8 @@ async function wholeLoop(t) {
   await page.waitForSelector("#previewed:not([hidden])");
   const curve = await page.evaluate(() => document.querySelector("#residuals .plot[data-version]").data.slice(3, 6).reduce((n, d) => n + d.y.length, 0));
   holds(curve > 3, "no curve is drawn");
-  await page.screenshot({ path: join(t.out, "workbench-candidate.png") });
+  await page.waitForFunction(() => document.querySelector(".details")?.textContent.includes("With it"));
+  await picture(page, t, "workbench-candidate");
 
   // it is switched on
   await after(page, () => first.getByRole("switch").click());
@@ -77,8 +77,7 @@ async function wholeLoop(t) {
   await told(page);
   equal(await page.getAttribute("#verdict", "data-verdict"), "adequate", "verdict after");
   holds(await number(page, "held-out") < 2 * noise, "the error on touches left out");
-  await page.screenshot({ path: join(t.out, "workbench-after.png") });
-  if (t.pictures) await page.screenshot({ path: join(t.pictures, "workbench-after.png") });
+  await picture(page, t, "workbench-after");
 
   // and the compensation is written beside the study
   await page.selectOption("#controller", "linuxcnc");
@@ -261,7 +260,7 @@ async function planNextFromThePage(t) {
   equal(plan.touches.length, Number(touches), says);
   holds(plan.touches.at(-1).time_s <= 4 * 60, `the program takes ${plan.touches.at(-1).time_s} s`);
   const program = written.find((f) => f.endsWith(".ngc"));
-  holds(program && readFileSync(join(folder, "study-next", program), "utf8").includes("G38.2"), `no program: ${written}`);
+  holds(program && readFileSync(join(folder, "study-next", program), "utf8").includes("G38.3"), `no program: ${written}`);
   await page.locator("#job").scrollIntoViewIfNeeded();
   await page.screenshot({ path: join(t.out, "workbench-next.png") });
   equal(seen.errors, [], "errors in the console");
