@@ -96,7 +96,13 @@ impl Shelf {
             let left = base.effects.iter().filter(|e| *e != gone);
             left.cloned().collect::<Vec<_>>()
         });
-        for effects in with.chain(without) {
+        // time constants and periods are searched from several starts, which takes long: what is said of the next state
+        // must not wait for that
+        let searched = |id: &String| {
+            let effect = now.opened.catalogue.get(id, &now.opened.machine);
+            effect.is_some_and(|e| e.parameters.iter().any(|p| p.shape.is_some()))
+        };
+        for effects in with.chain(without).filter(|effects| !effects.iter().any(searched)) {
             if !wanted() {
                 return;
             }
