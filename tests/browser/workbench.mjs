@@ -252,7 +252,7 @@ async function planNextFromThePage(t) {
   await page.click("#plan-next");
   await page.waitForSelector("#job[data-state=running]");
   holds(await page.isDisabled("#export"), "two tasks at once");
-  await page.waitForSelector("#job[data-state=done]", { timeout: 300_000 });
+  await page.waitForSelector("#job[data-state=done]", { timeout: 600_000 });
   const says = await page.textContent("#job");
   const [, touches] = /written into study-next beside the study, (\d+) touches/.exec(says) ?? [];
   const written = readdirSync(join(folder, "study-next"));
