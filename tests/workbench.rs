@@ -512,3 +512,57 @@ fn a_slow_or_silent_client_does_not_hold_the_others_up() {
     first.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
     assert!(first.read_to_end(&mut answer).is_ok(), "the connection is still open");
 }
+
+#[test]
+fn a_model_at_hand_is_what_a_fresh_fit_says() {
+    let dir = folder();
+    let told =
+        |state: &Value| (state["residual_um"].clone(), state["parameters"].clone(), state["correlation"].clone());
+    let (off, on) = {
+        let w = Workbench::open(dir.path());
+        let off = w.get("/api/state").json();
+        let on = w.switch("squareness-xy", true).json();
+        assert!(on["rms_um"].as_f64().unwrap() < 0.5 * off["rms_um"].as_f64().unwrap());
+        for expected in [&off, &on] {
+            let again = w.switch("squareness-xy", expected == &on).json();
+            assert_eq!(again["fit_ms"], 0.0, "this model was fitted before");
+            assert_eq!(told(&again), told(expected));
+        }
+        // other touches are another fit, and the way back is none
+        let masked = w.step(w.version(), &json!({ "mask": { "touches": [[1, 7]], "reason": "a chip" } })).json();
+        assert!(masked["fit_ms"].as_f64().unwrap() > 0.0);
+        assert_ne!(told(&masked), told(&on));
+        let back = w.step(w.version(), &json!("undo")).json();
+        assert_eq!((back["fit_ms"].as_f64(), told(&back)), (Some(0.0), told(&on)));
+        (off, on)
+    };
+    let fresh = Workbench::open(dir.path()).get("/api/state").json();
+    assert!(fresh["fit_ms"].as_f64().unwrap() > 0.0);
+    assert_eq!(told(&fresh), told(&on));
+    assert_ne!(told(&fresh), told(&off));
+}
+
+#[test]
+fn an_effect_that_changes_on_the_disk_is_fitted_anew() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let draft = |formula: &str| json!({ "id": "mine", "at": "Y", "terms": [{ "parameter": "mine", "unit": "urad", "dof": "dx", "formula": formula }] });
+    let saved = w.step(w.version(), &json!({ "save": { "draft": draft("-Y"), "on": true } })).json();
+    let value = |state: &Value| {
+        let all = state["parameters"].as_array().unwrap();
+        all.iter().find(|p| p["name"] == "mine").unwrap()["value"].as_f64().unwrap()
+    };
+    let file = dir.path().join("my-effects.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("formula = \"-Y\"", "formula = \"-0.25*Y\"")).unwrap();
+    let began = Instant::now();
+    loop {
+        let now = w.get("/api/state").json();
+        if now["version"] != saved["version"] {
+            assert!((value(&now) / value(&saved) - 4.0).abs() < 1e-6, "{} and {}", value(&saved), value(&now));
+            break;
+        }
+        assert!(began.elapsed() < Duration::from_secs(20), "the change is not seen");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}

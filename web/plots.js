@@ -69,6 +69,9 @@ globalThis.axiscalPlots = (() => {
     return Plotly.react(el, traces, lay, CONFIG);
   }
 
+  /** On paper there is less room for words. */
+  const narrow = (el, px) => el.clientWidth > 0 && el.clientWidth < px;
+
   const rungName = (view, i) => view.ladder[i].label;
 
   /** The error before and after, against the noise. */
@@ -97,7 +100,7 @@ globalThis.axiscalPlots = (() => {
     }
     const lay = layout(el, {
       margin: { l: 8, r: 14, t: 26, b: 44 },
-      xaxis: { title: { text: 'the touches miss by (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
+      xaxis: { title: { text: narrow(el, 330) ? 'miss (RMS), µm' : 'the touches miss by (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
       yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [{ type: 'line', x0: noise, x1: noise, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: noise, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: noise > 0.6 * top ? 'right' : 'left', showarrow: false, text: `probe's noise ${digits(noise)} µm`, font: { size: 11 } }],
@@ -142,7 +145,7 @@ globalThis.axiscalPlots = (() => {
     const reach = 1.08 * Math.max(view.tolerance.error_um * 1.15, ...shown.map((p) => Math.abs(p.at_radius_um) + (p.at_radius_expanded_um || 0)));
     const lay = layout(el, {
       margin: { l: 8, r: 12, t: 8, b: 44 }, shapes,
-      xaxis: { title: { text: `error at ${view.tolerance.radius_mm} mm, µm (bar: 95 %)` }, range: [-reach, reach], zeroline: true },
+      xaxis: { title: { text: `error at ${view.tolerance.radius_mm} mm, µm${narrow(el, 450) ? '' : ' (bar: 95 %)'}` }, range: [-reach, reach], zeroline: true },
       yaxis: { autorange: 'reversed', ticks: '', gridcolor: 'rgba(0,0,0,0)', tickfont: { size: 11 } },
     });
     const say = shown.map((p) => `${p.name} ${digits(p.at_radius_um)} ± ${digits(p.at_radius_expanded_um, 2)} µm (${JUDGEMENTS[p.judgement].word})`).join('; ');
@@ -232,7 +235,7 @@ globalThis.axiscalPlots = (() => {
     }
     const noise = 2 * view.errors.noise_um;
     const lay = layout(el, {
-      xaxis: { title: { text: safe(variable.title) }, zeroline: false },
+      xaxis: { title: { text: safe(variable.title), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false },
       yaxis: { title: { text: alongNormal ? 'miss along the face, µm' : 'miss, µm' }, zeroline: true },
       shapes: [{ type: 'rect', x0: 0, x1: 1, xref: 'paper', y0: -noise, y1: noise, fillcolor: c.band, line: { width: 0 }, layer: 'below' }],
       hovermode: 'closest',

@@ -38,6 +38,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         if let Some(first) = found.candidates.first() {
             io.say_as_it_is(format!("next: axiscal add {} {}", args.study.display(), first.effect));
         }
+    } else if found.faint {
+        io.say_as_it_is(format!("next: axiscal plan-next {} --out next --controller NAME", args.study.display()));
     } else if matches!(found.verdict, Verdict::Unexplained) {
         io.say_as_it_is(format!("next: axiscal sketch-effect {} --out my-effects.toml", args.study.display()));
     }

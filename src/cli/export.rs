@@ -145,6 +145,9 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
             let named = found.candidates.first().map_or_else(String::new, |c| format!(" (first: {})", c.effect));
             ("missing-effect", format!("an effect is missing from the model{named}"))
         }
+        Verdict::Unexplained if found.faint => {
+            ("unexplained", "the model fits within the noise, but a faint pattern is left in the touches".to_owned())
+        }
         Verdict::Unexplained => ("unexplained", "the model fails, and no known effect explains it".to_owned()),
     };
     let finding = Finding::error(

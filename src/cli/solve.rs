@@ -123,6 +123,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                     }
                 }
             }
+            (Verdict::Unexplained, _) if found.faint => {
+                Some("what is left is as small as the noise, but for a pattern too faint to name".to_owned())
+            }
             (Verdict::Unexplained, _) => Some(format!(
                 "no known effect explains what is left: `axiscal sketch-effect {} --out my-effects.toml` writes its curve as a formula",
                 args.study.display()

@@ -28,6 +28,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The verdict in a sentence.
     pub says: String,
+    /// With `unexplained`: the noise explains all that is left but for a pattern too faint to name. No reason to take the
+    /// machine apart.
+    pub faint: bool,
     /// √(Σr²/n) over the touches used, µm.
     pub rms_um: f64,
     /// Standard deviation of a touch, µm.

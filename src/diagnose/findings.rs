@@ -152,6 +152,7 @@ pub(super) fn put_together(
         format: FORMAT,
         verdict,
         says: String::new(),
+        faint: false,
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),

@@ -52,8 +52,18 @@ pub fn of(seen: &Examination) -> Decision {
     Decision { verdict, borne_out }
 }
 
-/// Says the verdict in a sentence.
+/// Above this ratio of what is left to the noise nobody calls what is left faint.
+const FAINT: f64 = 1.2;
+
+/// Something passed a test and was not borne out, while the noise explains all that is left.
+fn faint(out: &Diagnosis, fit: &Fit) -> bool {
+    let noise_does = fit.dof > 0 && fit.outcome.chi2_per_dof <= crate::fit::noise::chi2_limit(fit.dof, fit.noise.dof);
+    out.verdict == Verdict::Unexplained && noise_does && out.rms_um <= FAINT * out.noise_um
+}
+
+/// Says the verdict in a sentence: the terminal, the report and the workbench say it as it is said here.
 pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
+    out.faint = faint(out, fit);
     let against = format!("{:.2} um RMS against {:.2} um noise", out.rms_um, out.noise_um);
     out.says = match out.verdict {
         Verdict::Adequate => {
@@ -72,6 +82,13 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
             fit.free.len()
         ),
         Verdict::MissingEffect => out.candidates.first().map_or_else(String::new, |c| missing(c, &against)),
+        Verdict::Unexplained if out.faint => {
+            let first = out.depends.first().map_or_else(String::new, |w| format!(": {}", w.says));
+            format!(
+                "The model fits within the noise ({against}), but a faint pattern is left that chance seldom makes{first}. Further \
+                 touches would tell whether it is there."
+            )
+        }
         Verdict::Unexplained => {
             let first = out.depends.first().map_or_else(String::new, |w| format!(" {}.", w.says));
             let gross = out.gross.first().filter(|g| g.rms_um < 0.1 * out.rms_um).map(|g| format!(" {}.", g.says));

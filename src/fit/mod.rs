@@ -60,7 +60,7 @@ pub struct Mask {
 }
 
 /// What a fit is asked for.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Settings {
     /// Ids of the effects: the whole model.
     pub effects: Vec<String>,

@@ -93,14 +93,7 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
-        Verdict::Unexplained if only_a_trace(m) => (
-            Level::Unknown,
-            format!(
-                "The model fits within the probe's noise (the touches miss by {}, the noise is {}), but a weak pattern is left that may be chance: more touches would tell.",
-                um(d.rms_um),
-                um(d.noise_um)
-            ),
-        ),
+        Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
         Verdict::Unexplained => (
             Level::Act,
             format!(
@@ -122,14 +115,8 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
         Verdict::TooLittleData => String::new(),
         _ => d.says.clone(),
     };
-    Headline { level, sentence, detail }
-}
-
-/// Something passed a test and was not borne out, while the noise explains all that is left: no reason to take the machine
-/// apart.
-fn only_a_trace(m: &Material) -> bool {
-    let d = m.diagnosis;
-    d.verdict == Verdict::Unexplained && m.comparison.explained_by_noise && d.rms_um <= 1.2 * d.noise_um
+    // the rooms write um in plain letters
+    Headline { level, sentence: sentence.replace(" um ", " µm "), detail }
 }
 
 fn missing(m: &Material, c: &Candidate) -> String {
@@ -141,15 +128,22 @@ fn missing(m: &Material, c: &Candidate) -> String {
         um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         um(d.noise_um)
     );
-    let size: Vec<String> = c
+    let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
+    let sizes: Vec<String> = c
         .parameters
         .iter()
         .filter(|p| p.sigma.is_some())
         .take(2)
-        .map(|p| format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit))
+        .map(|p| match known.iter().find(|r| r.name == p.name && r.sigma.is_some()) {
+            Some(record) => format!("{} {}", p.name, size(record, m)),
+            None => format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit),
+        })
         .collect();
-    let size =
-        if size.is_empty() || c.parameters.len() > 2 { String::new() } else { format!(" ({})", size.join(", ")) };
+    let one = !sizes.is_empty() && c.parameters.len() <= 2 && c.same_as.is_empty();
+    let size = if one { format!(" ({})", sizes.join(", ")) } else { String::new() };
+    // where no single number says how large it is, the touches do
+    let moves = if one { None } else { most_moved_um(m) };
+    let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
     let what = match &c.same_as[..] {
         [] => format!("{}{size}", c.name),
         [one] => format!("{}, or {}: these touches cannot tell which", c.name, name(one)),
@@ -157,7 +151,15 @@ fn missing(m: &Material, c: &Candidate) -> String {
     };
     let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
     let (whose, has) = whose(m, &c.effect);
-    format!("{whose} {has} an error that is not in the model yet: {what}. {falls}{rest}")
+    format!("{whose} {has} an error that is not in the model yet: {what}. {falls}{moves}{rest}")
+}
+
+/// The most that the proposed effect takes away from a touch that both fits use, µm.
+fn most_moved_um(m: &Material) -> Option<f64> {
+    let after = m.proposed?;
+    let used = |i: &usize| m.fit.weight[*i] > 0.0 && after.weight.get(*i).is_some_and(|w| *w > 0.0);
+    let moved = |i: usize| um_from_mm((m.fit.residual_mm[i] - after.residual_mm[i]).abs());
+    (0..m.fit.residual_mm.len()).filter(used).map(moved).max_by(f64::total_cmp)
 }
 
 /// Whose error an effect is: a probe that triggers late is no fault of the machine.
@@ -258,7 +260,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, &mut out);
             }
         }
-        Verdict::Unexplained if only_a_trace(m) => out.push(Next::new(
+        Verdict::Unexplained if d.faint => out.push(Next::new(
             "Measure more touches",
             "Repeats and further poses say whether the weak pattern is there at all.",
             plan_next.clone(),
@@ -268,7 +270,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
     }
     if d.verdict != Verdict::TooLittleData
         && !m.fit.outcome.undetermined.is_empty()
-        && (d.verdict == Verdict::Adequate || only_a_trace(m))
+        && (d.verdict == Verdict::Adequate || d.faint)
     {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
         let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);

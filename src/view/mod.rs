@@ -11,6 +11,7 @@ pub mod record;
 mod touches;
 
 pub use headline::{Headline, Level, Next};
+pub use parameters::correlation;
 pub use record::View;
 
 use crate::compare::Comparison;

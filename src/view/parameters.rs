@@ -59,7 +59,8 @@ fn record(m: &Material, p: &Parameter, meaning: &str, effects: &[&Effect]) -> Pa
 }
 
 /// Correlation coefficients of the results.
-pub(super) fn correlation(fit: &Fit) -> Correlation {
+#[must_use]
+pub fn correlation(fit: &Fit) -> Correlation {
     let c = uncertainty::results_covariance(fit);
     let sd = |i: usize| c.matrix[i][i].max(0.0).sqrt();
     let matrix = (0..c.names.len())

@@ -230,8 +230,14 @@ fn from_finding(f: &Finding, text: &str, draft: &Draft) -> Mistake {
     let help = f.help.clone();
     let field = f.span.as_ref().and_then(|span| {
         let wrong = text.get(span.clone())?.trim_matches(['"', '\'']);
-        // which of the terms: those whose own line begins before the place
+        // which of the terms, and of the shapes behind them: those whose own line begins before the place
         let term = text.get(..span.start)?.matches("{ parameter").count().checked_sub(1);
+        let shape = term.and_then(|i| i.checked_sub(draft.terms.len()));
+        if let Some((i, s)) = shape.and_then(|i| draft.shape.get(i).map(|s| (i, s))) {
+            let known = [("parameter", &s.parameter), ("unit", &s.unit)];
+            let word = known.iter().find(|(_, typed)| typed.trim() == wrong).map_or("start", |(w, _)| *w);
+            return Some(format!("shape.{i}.{word}"));
+        }
         let found = match term.and_then(|i| draft.terms.get(i).map(|t| (i, t))) {
             Some((i, t)) => [("parameter", &t.parameter), ("unit", &t.unit), ("dof", &t.dof), ("formula", &t.formula)]
                 .iter()

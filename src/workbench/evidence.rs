@@ -84,8 +84,7 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
 /// # Errors
 /// When a refit is impossible.
 pub fn diagnosis(state: &Snapshot) -> Result<Diagnosis> {
-    let mut settings = state.opened.study.settings();
-    settings.quick = true;
+    let settings = super::shelf::settings(&state.opened);
     let subject = Subject {
         machine: &state.opened.machine,
         catalogue: &state.opened.catalogue,

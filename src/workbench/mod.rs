@@ -1,6 +1,7 @@
 //! The workbench: a study live in the browser, on this machine alone.
 //!
 //! [`session`] holds the study and makes every step (one writer, each step with the version that it was asked for);
+//! [`shelf`] keeps the models that were fitted and fits what is likely to be asked for next;
 //! [`evidence`] works out behind it what is missing; [`guard`] says which request may be answered; [`server`] carries
 //! requests there and answers back. What touches the disk comes in as a [`Host`]: `cli` is it.
 //!
@@ -14,6 +15,7 @@ pub mod pages;
 pub mod record;
 pub mod server;
 pub mod session;
+pub mod shelf;
 
 use crate::diag::{Finding, Result};
 use crate::machine::Machine;

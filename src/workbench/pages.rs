@@ -9,12 +9,15 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, kind, contents.
-const ASSETS: [(&str, &str, &str); 10] = [
+const ASSETS: [(&str, &str, &str); 13] = [
     ("plotly.min.js", SCRIPT, include_str!("../../web/vendor/plotly.min.js")),
     ("workbench.css", STYLE, include_str!("../../web/workbench.css")),
     ("main.js", SCRIPT, include_str!("../../web/workbench/main.js")),
     ("talk.js", SCRIPT, include_str!("../../web/workbench/talk.js")),
     ("plots.js", SCRIPT, include_str!("../../web/workbench/plots.js")),
+    ("correlation.js", SCRIPT, include_str!("../../web/workbench/correlation.js")),
+    ("frame.js", SCRIPT, include_str!("../../web/workbench/frame.js")),
+    ("later.js", SCRIPT, include_str!("../../web/workbench/later.js")),
     ("space.js", SCRIPT, include_str!("../../web/workbench/space.js")),
     ("effects.js", SCRIPT, include_str!("../../web/workbench/effects.js")),
     ("touches.js", SCRIPT, include_str!("../../web/workbench/touches.js")),

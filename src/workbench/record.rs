@@ -7,6 +7,7 @@
 use super::draft::{self, Draft, MEANING};
 use super::evidence::Scored;
 use super::session::{Refused, Snapshot};
+use super::shelf::{self, Shelf};
 use super::{Answered, Host};
 use crate::diag::{Failure, Finding, Severity};
 use crate::diagnose::Diagnosis;
@@ -18,6 +19,7 @@ use crate::study::history::History;
 use crate::units::um_from_mm;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The format line.
 pub const FORMAT: &str = "axiscal-workbench/1";
@@ -65,6 +67,8 @@ pub struct Behind {
     pub diagnosis: Option<Diagnosis>,
     /// RMS on index visits left out.
     pub held_out_rms_um: Option<f64>,
+    /// RMS on the last run left out.
+    pub later_run_rms_um: Option<f64>,
     /// Milliseconds that it took.
     pub ms: f64,
     /// Why there is none.
@@ -111,6 +115,7 @@ struct Live<'a> {
     parameters: Vec<&'a Parameter>,
     undetermined: &'a [Undetermined],
     weak: &'a [Combination],
+    correlation: crate::view::record::Correlation,
     warnings: &'a [String],
     /// Measured less model along the outward normal.
     residual_um: Vec<f64>,
@@ -167,6 +172,7 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         parameters: o.parameters.iter().zip(nuisance).filter(|(_, n)| !n).map(|(p, _)| p).collect(),
         undetermined: &o.undetermined,
         weak: &o.weak,
+        correlation: crate::view::correlation(fit),
         warnings: &o.warnings,
         residual_um: fit.residual_mm.iter().map(|r| short(um_from_mm(*r), 1e4)).collect(),
         standardised: fit.studentised.iter().map(|s| short(*s, 1e3)).collect(),
@@ -496,24 +502,29 @@ struct Tried<'a> {
 ///
 /// # Errors
 /// When it is in the model, is unknown, was typed wrongly, or cannot be fitted.
-pub fn tried(now: &Snapshot, effect: Option<&str>, draft: Option<&Draft>) -> Result<Vec<u8>, Refused> {
+pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<&Draft>) -> Result<Vec<u8>, Refused> {
     let opened = &*now.opened;
-    let catalogue = match draft {
-        Some(draft) => draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?,
-        None => crate::model::catalogue::Catalogue::clone(&opened.catalogue),
+    let typed = match draft {
+        Some(draft) => Some(draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?),
+        None => None,
     };
     let id = draft.map(|d| d.id.as_str()).or(effect).ok_or_else(|| {
         Refused::Unusable(Failure::new("workbench::nothing", "no effect is named").help("choose one of the list"))
     })?;
-    let mut settings = opened.study.settings();
-    settings.quick = true;
+    let mut settings = shelf::settings(opened);
     if settings.effects.iter().any(|e| e == id) {
         let says = format!("effect {id:?} is in the model already");
         return Err(Refused::Unusable(Failure::new("study::in_model", says)));
     }
     settings.effects.push(id.to_owned());
-    let data = crate::model::data::Data::clone(&opened.data);
-    let fit = fit::identify_data(&opened.machine, &catalogue, data, &settings)?;
+    let fit = match typed {
+        // what is only typed is in no catalogue, and so on no shelf
+        Some(catalogue) => {
+            let data = crate::model::data::Data::clone(&opened.data);
+            Arc::new(fit::identify_data(&opened.machine, &catalogue, data, &settings)?)
+        }
+        None => shelf.fit(opened, now.inputs, settings)?.0,
+    };
     let before = &now.fit.residual_mm;
     let own = fit.outcome.parameters.iter().filter(|p| p.effect == id);
     Ok(bytes(&Tried {

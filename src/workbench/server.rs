@@ -7,6 +7,7 @@ use super::draft::Draft;
 use super::guard::{Denied, Guard};
 use super::record::{self, Behind, Job};
 use super::session::{Ask, Refused, Session, Snapshot};
+use super::shelf::Shelf;
 use super::{Host, Verb, evidence, pages};
 use crate::diag::{Failure, Result};
 use axum::Router;
@@ -39,6 +40,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(300);
 /// What all requests share.
 pub struct Shared {
     session: Mutex<Session>,
+    shelf: Arc<Shelf>,
     behind: Mutex<Behind>,
     job: Mutex<Option<Job>>,
     busy: AtomicBool,
@@ -49,7 +51,7 @@ pub struct Shared {
 }
 
 /// A panic elsewhere has left what the lock guards as it was before: see the head of this file.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -89,6 +91,7 @@ impl Server {
         let port = listener.local_addr().map_err(taken)?.port();
         let (wake, woken) = mpsc::channel();
         let shared = Arc::new(Shared {
+            shelf: session.shelf(),
             session: Mutex::new(session),
             behind: Mutex::default(),
             job: Mutex::new(None),
@@ -394,7 +397,7 @@ async fn try_out(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
         if now.version != asked.version {
             return refused(Refused::Stale(now.version));
         }
-        match record::tried(&now, asked.effect.as_deref(), asked.draft.as_ref()) {
+        match record::tried(&now, &shared.shelf, asked.effect.as_deref(), asked.draft.as_ref()) {
             Ok(bytes) => answer_json(bytes),
             Err(why) => refused(why),
         }
@@ -487,6 +490,14 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
         lock(&shared.session).write_ladder(now.version);
         let work = || {
             let began = std::time::Instant::now();
+            if let Some(known) = shared.shelf.behind(&now) {
+                let (by_visit, later_run) = (known.held_out_rms_um, known.later_run_rms_um);
+                lock(&shared.session).enter_held_out(now.version, by_visit, later_run);
+                *lock(&shared.behind) = known.clone();
+                shared.tell("evidence", now.version);
+                shared.shelf.ahead(&now, &known, current);
+                return;
+            }
             let mut behind = Behind { version: now.version, ..Behind::default() };
             behind.scores = Some(evidence::scores(&now));
             behind.ms = began.elapsed().as_secs_f64() * 1e3;
@@ -499,6 +510,7 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
             let later = crate::fit::held_out::later_run(&now.fit).map(|h| h.rms_um);
             lock(&shared.session).enter_held_out(now.version, held_out, later);
             behind.held_out_rms_um = held_out;
+            behind.later_run_rms_um = later;
             if !current() {
                 return;
             }
@@ -508,8 +520,10 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
             }
             behind.complete = true;
             behind.ms = began.elapsed().as_secs_f64() * 1e3;
-            *lock(&shared.behind) = behind;
+            shared.shelf.keep_behind(&now, &behind);
+            *lock(&shared.behind) = behind.clone();
             shared.tell("evidence", now.version);
+            shared.shelf.ahead(&now, &behind, current);
         };
         let worked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| match &pool {
             Ok(pool) => pool.install(work),

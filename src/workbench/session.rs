@@ -5,6 +5,7 @@
 //! step that fails leaves everything as it was; a process that is killed leaves whole files of before or after the step.
 
 use super::draft::{self, Draft, Mistake};
+use super::shelf::{self, Shelf};
 use super::{Host, Opened, Place};
 use crate::diag::{Failure, Result, source};
 use crate::fit::{self, Fit};
@@ -99,13 +100,14 @@ pub struct Snapshot {
     pub redo: Option<String>,
     /// Why the study on the disk cannot be used, where it cannot.
     pub fault: Option<Failure>,
-    /// Milliseconds that the fit took.
+    /// Milliseconds that the fit took; none where it was made before.
     pub fit_ms: f64,
 }
 
 /// The study that is being worked on.
 pub struct Session {
     host: Arc<dyn Host>,
+    shelf: Arc<Shelf>,
     state: Snapshot,
     past: Vec<Made>,
     future: Vec<Made>,
@@ -120,20 +122,27 @@ impl Session {
     pub fn open(host: Arc<dyn Host>) -> Result<Self> {
         let opened = host.open()?;
         let mark = host.mark(&opened.study);
-        let (fit, fit_ms) = fit(&opened)?;
+        let shelf = Arc::new(Shelf::default());
+        let (fit, fit_ms) = shelf.fit(&opened, 1, shelf::settings(&opened))?;
         let mut opened = opened;
         opened.history.push(rung(&opened, &fit));
         let state = Snapshot {
             version: 1,
             inputs: 1,
             opened: Arc::new(opened),
-            fit: Arc::new(fit),
+            fit,
             undo: None,
             redo: None,
             fault: None,
             fit_ms,
         };
-        Ok(Self { host, state, past: Vec::new(), future: Vec::new(), mark })
+        Ok(Self { host, shelf, state, past: Vec::new(), future: Vec::new(), mark })
+    }
+
+    /// The models that were fitted already.
+    #[must_use]
+    pub fn shelf(&self) -> Arc<Shelf> {
+        self.shelf.clone()
     }
 
     /// The present state.
@@ -178,7 +187,7 @@ impl Session {
             return false;
         }
         self.mark = mark;
-        let read = self.host.open().and_then(|opened| fit(&opened).map(|(fit, ms)| (opened, fit, ms)));
+        let read = self.read_anew();
         self.state.version += 1;
         match read {
             Ok((mut opened, fit, fit_ms)) => {
@@ -196,7 +205,7 @@ impl Session {
                 opened.history.push(rung(&opened, &fit));
                 self.state.inputs += 1;
                 self.state.opened = Arc::new(opened);
-                self.state.fit = Arc::new(fit);
+                self.state.fit = fit;
                 self.state.fit_ms = fit_ms;
             }
             Err(failure) => self.state.fault = Some(failure),
@@ -361,14 +370,14 @@ impl Session {
             && effects_change.is_none();
         let putting = Putting { host: &*self.host, from, to, effects: effects_change };
         let (fit, fit_ms) = if same_inputs {
-            let fitted = fit(&opened)?;
+            let fitted = self.shelf.fit(&opened, self.state.inputs, shelf::settings(&opened))?;
             putting.write()?;
             fitted
         } else {
             // what the study names is read anew from the disk; where that fails everything is put back
             putting.write()?;
             let history = opened.history.clone();
-            match self.host.open().and_then(|o| fit(&o).map(|(fit, ms)| (o, fit, ms))) {
+            match self.read_anew() {
                 Ok((read, fit, ms)) => {
                     opened = Opened { history, ..read };
                     (fit, ms)
@@ -385,13 +394,20 @@ impl Session {
             version: self.state.version + 1,
             inputs: self.state.inputs + u64::from(!same_inputs),
             opened: Arc::new(opened),
-            fit: Arc::new(fit),
+            fit,
             undo: None,
             redo: None,
             fault: None,
             fit_ms,
         };
         Ok(())
+    }
+
+    /// The study as it lies on the disk, with its fit.
+    fn read_anew(&self) -> Result<(Opened, Arc<Fit>, f64)> {
+        let opened = self.host.open()?;
+        let (fit, ms) = self.shelf.fit(&opened, self.state.inputs + 1, shelf::settings(&opened))?;
+        Ok((opened, fit, ms))
     }
 }
 
@@ -431,16 +447,6 @@ impl Putting<'_> {
     fn size_there(&self) -> usize {
         self.host.read(Place::Effects).ok().flatten().map_or(0, |b| b.len())
     }
-}
-
-/// The fit of a study without the figures that need the whole catalogue, and the milliseconds that it took.
-fn fit(opened: &Opened) -> Result<(Fit, f64)> {
-    let began = std::time::Instant::now();
-    let mut settings = opened.study.settings();
-    settings.quick = true;
-    let data = crate::model::data::Data::clone(&opened.data);
-    let fit = fit::identify_data(&opened.machine, &opened.catalogue, data, &settings)?;
-    Ok((fit, began.elapsed().as_secs_f64() * 1e3))
 }
 
 /// A fit as a step of the ladder; the errors on touches left out follow.

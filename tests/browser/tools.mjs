@@ -5,6 +5,8 @@ import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from
 import { createRequire } from "node:module";
 import { join } from "node:path";
 
+import { smaller } from "./png.mjs";
+
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
 /** Calls the program; "no" (1) is an answer. */
@@ -55,6 +57,27 @@ export function measured(dir, name) {
   const folder = join(dir, name);
   mkdirSync(folder);
   for (const file of ["head.plan.json", "head.log", "table.plan.json", "table.log", "study.toml"]) copyFileSync(join(made, file), join(folder, file));
+  return folder;
+}
+
+/** Time constant of the machine that warms up. */
+export const RISE_H = 0.2;
+
+/** A machine whose column rises while it warms up, measured with the program that comes back to its places. */
+export function warming(dir) {
+  const folder = join(dir, "warming");
+  mkdirSync(folder);
+  const at = (file) => join(folder, file);
+  writeFileSync(at("wrong.toml"), `seed = 8
+[effects.warm-up]
+wz = 25
+tau = ${RISE_H}
+[noise]
+touch_um = 0.5
+`);
+  axiscal("generate", "--machine", "swivel-head", "--program", "full", "--controller", "linuxcnc", "--out", folder);
+  axiscal("simulate", "--plan", at("full.plan.json"), "--machine", "swivel-head", "--scenario", at("wrong.toml"), "--controller", "linuxcnc", "--out", at("full.log"));
+  axiscal("new", "--machine", "swivel-head", "--plan", at("full.plan.json"), "--log", at("full.log"), "--controller", "linuxcnc", "--out", at("study.toml"));
   return folder;
 }
 
@@ -125,6 +148,12 @@ export async function watched(context) {
 
 // an answer that says no (a stale state, a mistake in a formula) is shown in the page, and Chromium notes it as well
 const refusal = (text) => /Failed to load resource: the server responded with a status of (409|422)/.test(text);
+
+/** A screenshot for the eye, and for the guide where that is asked for. */
+export async function picture(page, { out, pictures }, name) {
+  const shot = await page.screenshot({ path: join(out, `${name}.png`) });
+  if (pictures) writeFileSync(join(pictures, `${name}.png`), smaller(shot));
+}
 
 /** No fault that axe calls serious or critical. */
 export async function accessible(page, what) {

@@ -1,8 +1,9 @@
 // The workbench: the whole loop on a machine with a hidden effect, and everything that a page may do to a study.
 
-import { appendFileSync, existsSync, readFileSync, writeFileSync } from "node:fs";
+import { appendFileSync, existsSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { availableParallelism, loadavg } from "node:os";
 import { join } from "node:path";
-import { accessible, axiscal, equal, holds, many, measured, watched, workbench } from "./tools.mjs";
+import { RISE_H, accessible, axiscal, equal, holds, many, measured, picture, warming, watched, workbench } from "./tools.mjs";
 
 const number = async (page, id) => Number(await page.textContent(`#${id}`));
 const text = (folder) => readFileSync(join(folder, "study.toml"), "utf8");
@@ -48,8 +49,7 @@ async function wholeLoop(t) {
   const noise = await number(page, "noise");
   holds(before > 3 * noise, `the error before is ${before} µm against ${noise} µm`);
   const wide = await spread(page);
-  await page.screenshot({ path: join(t.out, "workbench-before.png") });
-  if (t.pictures) await page.screenshot({ path: join(t.pictures, "workbench-before.png") });
+  await picture(page, t, "workbench-before");
 
   // the first candidate is opened: what it is, and its curve over the touches
   const first = page.locator("#candidates > li").first();
@@ -58,7 +58,8 @@ async function wholeLoop(t) {
   await page.waitForSelector("#previewed:not([hidden])");
   const curve = await page.evaluate(() => document.querySelector("#residuals .plot[data-version]").data.slice(3, 6).reduce((n, d) => n + d.y.length, 0));
   holds(curve > 3, "no curve is drawn");
-  await page.screenshot({ path: join(t.out, "workbench-candidate.png") });
+  await page.waitForFunction(() => document.querySelector(".details")?.textContent.includes("With it"));
+  await picture(page, t, "workbench-candidate");
 
   // it is switched on
   await after(page, () => first.getByRole("switch").click());
@@ -77,8 +78,7 @@ async function wholeLoop(t) {
   await told(page);
   equal(await page.getAttribute("#verdict", "data-verdict"), "adequate", "verdict after");
   holds(await number(page, "held-out") < 2 * noise, "the error on touches left out");
-  await page.screenshot({ path: join(t.out, "workbench-after.png") });
-  if (t.pictures) await page.screenshot({ path: join(t.pictures, "workbench-after.png") });
+  await picture(page, t, "workbench-after");
 
   // and the compensation is written beside the study
   await page.selectOption("#controller", "linuxcnc");
@@ -178,9 +178,114 @@ async function formulaBox(t) {
   holds(own.includes('id = "my-square"') && own.includes('formula = "-Y"'), own);
   holds(text(folder).includes('effects_file = ["my-effects.toml"]') && text(folder).includes('"my-square"'), text(folder));
   holds(await number(page, "rms") < 0.4 * before, "the effect of one's own explains nothing");
-  // the words of a formula are at hand
+  // the words of a formula are at hand, as the guide has them
   await page.getByText("words of a formula").click();
-  holds(await page.locator("#draft-words tbody tr").count() === 37, "words are missing");
+  equal((await page.locator("#draft-words tbody button").allTextContents()).sort(), wordsOfTheGuide().sort(), "words of a formula");
+  equal(seen.errors, [], "errors in the console");
+}
+
+/** The variables in the table of docs/guide/effects.md. */
+function wordsOfTheGuide() {
+  const guide = readFileSync(join(process.env.AXISCAL_ROOT, "docs/guide/effects.md"), "utf8").split("\n## Formulas\n")[1];
+  // the first table alone
+  const rows = guide.trimStart().split("\n\n")[0].split("\n").filter((line) => line.startsWith("| `"));
+  return rows.flatMap((line) => {
+    const cell = line.split("|")[1];
+    const all = [...cell.matchAll(/`([^`]*)`/g)].flatMap((m) => m[1].split(" "));
+    return all.includes("…") ? [..."XYZABC"].map((axis) => all[0][0] + axis) : all;
+  });
+}
+
+/** A machine that warms up: the formula holds a time constant, which the fit finds within its limits. */
+async function formulaWithATimeConstant(t) {
+  const folder = warming(t.dir);
+  const address = await workbench(join(folder, "study.toml"), t.atEnd);
+  const [page, seen] = await watched(t.context);
+  await page.goto(address);
+  await page.waitForSelector("body[data-version]");
+  const before = await number(page, "rms");
+  await page.fill("#draft-id", "my-warm-up");
+  await page.selectOption("#draft-at", "base");
+  await page.selectOption("#draft-terms [data-word=unit]", "um");
+  await page.selectOption("#draft-terms [data-word=dof]", "dz");
+  await page.click("#draft-shape");
+  const shape = page.locator("#draft-shapes > div");
+  equal(await page.evaluate(() => document.activeElement.dataset.word), "parameter", "the keyboard goes to the new row");
+  await shape.locator("[data-word=parameter]").fill("rise");
+  await shape.locator("[data-word=unit]").selectOption("h");
+  // without a beginning there is nothing to search from
+  await shape.locator("[data-word=start]").fill("");
+  await page.fill("#draft-terms input.formula", "1 - exp(-t/rise)");
+  await page.waitForFunction(() => document.querySelector("#draft-shapes .mistake").textContent.includes("begin"));
+  equal(await shape.locator("[data-word=start]").getAttribute("aria-invalid"), "true");
+  await shape.locator("[data-word=start]").fill("0.3");
+  await shape.locator("[data-word=min]").fill("0.01");
+  await shape.locator("[data-word=max]").fill("10");
+  await page.waitForSelector("#previewed:not([hidden])");
+  equal(await page.textContent("#draft-shapes .mistake"), "");
+  // a mistake of the program's stands at its field as well
+  await shape.locator("[data-word=min]").fill("5");
+  await page.waitForFunction(() => document.querySelector("#draft-shapes .mistake").textContent.length > 0);
+  await shape.locator("[data-word=min]").fill("0.01");
+  await page.waitForFunction(() => document.querySelector("#draft-shapes .mistake").textContent === "" && document.querySelector("#draft-answer").textContent.startsWith("with it"));
+  const found = /rise = ([0-9.]+) ± ([0-9.]+) h/.exec(await page.textContent("#draft-answer"));
+  holds(found, await page.textContent("#draft-answer"));
+  holds(Math.abs(Number(found[1]) - RISE_H) < 4 * Number(found[2]) && Number(found[2]) < RISE_H / 3, `the time constant is ${found[1]} ± ${found[2]} h, planted ${RISE_H} h`);
+  await after(page, () => page.click("#draft-save-on"));
+  const own = readFileSync(join(folder, "my-effects.toml"), "utf8");
+  holds(/shape = \[\s*\{ parameter = "rise", unit = "h", start = 0\.3, min = 0\.01, max = 10\.0 \}/.test(own), own);
+  holds(await number(page, "rms") < 0.7 * before, "the effect explains nothing");
+  holds((await page.textContent("#parameters")).includes("rise"), "the time constant is no result");
+  equal(seen.errors, [], "errors in the console");
+}
+
+/** Two effects that these touches cannot tell apart: the page writes the program that parts them. */
+async function planNextFromThePage(t) {
+  const { folder, page, seen } = await opened(t, "next");
+  await told(page);
+  await page.selectOption("#controller", "linuxcnc");
+  // a time that is none is refused, and nothing is written
+  await page.fill("#minutes", "0");
+  await page.click("#plan-next");
+  await page.waitForFunction(() => document.querySelector("#messages").textContent.includes("no usable number"));
+  holds(!existsSync(join(folder, "study-next")), "a program was written all the same");
+  await page.fill("#minutes", "4");
+  await page.click("#plan-next");
+  await page.waitForSelector("#job[data-state=running]");
+  holds(await page.isDisabled("#export"), "two tasks at once");
+  await page.waitForSelector("#job[data-state=done]", { timeout: 600_000 });
+  const says = await page.textContent("#job");
+  const [, touches] = /written into study-next beside the study, (\d+) touches/.exec(says) ?? [];
+  const written = readdirSync(join(folder, "study-next"));
+  const plan = JSON.parse(readFileSync(join(folder, "study-next", written.find((f) => f.endsWith(".plan.json"))), "utf8"));
+  equal(plan.touches.length, Number(touches), says);
+  holds(plan.touches.at(-1).time_s <= 4 * 60, `the program takes ${plan.touches.at(-1).time_s} s`);
+  const program = written.find((f) => f.endsWith(".ngc"));
+  holds(program && readFileSync(join(folder, "study-next", program), "utf8").includes("G38.3"), `no program: ${written}`);
+  await page.locator("#job").scrollIntoViewIfNeeded();
+  await page.screenshot({ path: join(t.out, "workbench-next.png") });
+  equal(seen.errors, [], "errors in the console");
+}
+
+/** The correlation map: the values of `identify`, drawn when it is looked at, and anew after a step. */
+async function correlationMap(t) {
+  const { folder, page, seen } = await opened(t, "correlation");
+  await page.locator("#correlation").scrollIntoViewIfNeeded();
+  await page.waitForSelector("#correlation[data-version]");
+  const drawn = () => page.evaluate(() => { const [d] = document.querySelector("#correlation").data; return { names: [...d.x], z: d.z.map((r) => [...r]) }; });
+  const { names, z } = await drawn();
+  const view = join(folder, "view.json");
+  axiscal("report", join(folder, "study.toml"), "--out", join(folder, "r.html"), "--view", view);
+  const known = JSON.parse(readFileSync(view, "utf8")).correlation;
+  equal([names, z], [known.names, known.matrix], "the map");
+  holds(names.length > 4 && z.every((row, i) => Math.abs(row[i] - 1) < 1e-9), "the diagonal");
+  holds(/told apart/.test(await page.textContent("#correlation-says")), "no words");
+  await page.screenshot({ path: join(t.out, "workbench-correlation.png") });
+  await page.fill("#find", "squareness-xy");
+  await page.click("[data-switch=squareness-xy]");
+  await page.locator("#correlation").scrollIntoViewIfNeeded();
+  await page.waitForFunction((n) => document.querySelector("#correlation").data[0].x.length === n + 1, names.length);
+  holds((await drawn()).names.includes("EC0Y"), "the new result");
   equal(seen.errors, [], "errors in the console");
 }
 
@@ -242,31 +347,47 @@ async function byKeyboardAndByEar(t) {
   equal(seen.errors, [], "errors in the console");
 }
 
-/** From the click to the new plots; printed, and judged by people: machines differ. */
-async function timed(t, study, what) {
+/**
+ * From the click to the new plots. `limit` ms: the best of the clicks must stay below it; the medians are printed and
+ * judged by people, because other programs share the machine.
+ */
+async function timed(t, study, what, limit) {
   const address = await workbench(study, t.atEnd);
   const [page, seen] = await watched(t.context);
   await page.goto(address);
   await page.waitForSelector("body[data-version]", { timeout: 300_000 });
   await page.waitForSelector("#candidates [data-switch=squareness-xy]", { timeout: 300_000 });
-  const all = [];
-  for (let k = 0; k < 9; k += 1) {
-    // the evidence behind the last click is ready, as for a person who looks before the next one
-    await page.waitForSelector("#candidates[data-complete=true]", { state: "attached", timeout: 300_000 });
-    await page.waitForTimeout(200);
+  if (await page.isVisible("#more")) await page.click("#more");
+  const click = async (effect) => {
     await page.evaluate(() => { window.axiscalTimes = null; });
-    await page.evaluate(() => document.querySelector("[data-switch=squareness-xy]").click());
-    await page.waitForFunction(() => window.axiscalTimes?.painted, undefined, { timeout: 60_000 });
-    all.push(await page.evaluate(() => window.axiscalTimes));
+    await page.evaluate((id) => document.querySelector(`[data-switch="${id}"]`).click(), effect);
+    await page.waitForFunction(() => window.axiscalTimes?.settled, undefined, { timeout: 60_000 });
+    return page.evaluate(() => window.axiscalTimes);
+  };
+  const [first, again] = [[], []];
+  // what no evidence has been worked out for is fitted at the click; what was there before is at hand
+  for (const effect of ["squareness-xy", "scale-x", "scale-y", "angular-cx", "squareness-yz"]) {
+    for (const _ of ["on", "off", "on", "off"]) {
+      const times = await click(effect);
+      (times.fit > 0 ? first : again).push(times);
+      await page.waitForTimeout(150);
+    }
   }
   const touches = await page.textContent("#used");
   const plots = await page.evaluate(() => [...document.querySelectorAll("#residuals .plot")].filter((p) => p.getBoundingClientRect().top < innerHeight).length);
-  const middle = (key) => all.map((a) => a[key]).sort((a, b) => a - b)[all.length >> 1].toFixed(0);
-  const says = `${what}: ${touches} touches, ${plots} plots in sight, ms from the click, median of ${all.length}: fit ${middle("fit")}, answered ${middle("answered")}, drawn ${middle("drawn")}, painted ${middle("painted")}`;
-  console.log(`  ${says}`);
-  appendFileSync(join(t.out, "times.txt"), `${says}\n`);
+  const lines = [[first, "models not seen before"], [again, "models seen before"]].map(([all, which]) => {
+    const sorted = (key) => all.map((a) => a[key]).sort((a, b) => a - b);
+    const each = ["fit", "answered", "painted", "settled"].map((key) => { const s = sorted(key); return `${key} ${s[s.length >> 1].toFixed(0)} (${s[0].toFixed(0)})`; });
+    return `${what}, ${which}: ${touches} touches, ${plots} plots in sight, ms from the click, median (best) of ${all.length}: ${each.join(", ")}`;
+  });
+  for (const line of lines) console.log(`  ${line}`);
+  appendFileSync(join(t.out, "times.txt"), `${lines.join("\n")}\n`);
   await page.screenshot({ path: join(t.out, `times-${what}.png`) });
-  holds(all.every((a) => a.painted > 0), "no times");
+  holds(first.length >= 5 && again.length >= 5, `${first.length} models were fitted, ${again.length} were at hand`);
+  const best = Math.min(...again.map((a) => a.painted));
+  // what runs beside this test takes its share of the processors
+  const crowd = Math.max(1, loadavg()[0] / availableParallelism());
+  holds(best < limit * crowd, `the best click took ${best.toFixed(0)} ms, the limit is ${limit} ms, ${crowd.toFixed(1)} programs share a processor`);
   equal(seen.errors, [], "errors in the console");
 }
 
@@ -274,12 +395,12 @@ async function times(t) {
   const folder = measured(t.dir, "times");
   const head = join(folder, "head.toml");
   axiscal("new", "--machine", "swivel-head", "--plan", join(folder, "head.plan.json"), "--log", join(folder, "head.log"), "--out", head);
-  await timed(t, head, "head");
-  await timed(t, join(folder, "study.toml"), "head-and-table");
+  await timed(t, head, "head", 100);
+  await timed(t, join(folder, "study.toml"), "head-and-table", 100);
 }
 
 async function timesOfMany(t) {
-  await timed(t, many(t.dir), "many");
+  await timed(t, many(t.dir), "many", 500);
 }
 
 async function withoutToken(t) {
@@ -303,6 +424,9 @@ export const workbenchCases = [
   ["workbench_undo_and_redo", undoAndRedo],
   ["workbench_touches_are_taken_out", touchesAreTakenOut],
   ["workbench_formula_box", formulaBox],
+  ["workbench_formula_with_a_time_constant", formulaWithATimeConstant],
+  ["workbench_plan_next", planNextFromThePage],
+  ["workbench_correlation_map", correlationMap],
   ["workbench_change_on_disk", changeOnDisk],
   ["workbench_two_tabs", twoTabs],
   ["workbench_by_keyboard_and_by_ear", byKeyboardAndByEar],

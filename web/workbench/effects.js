@@ -1,5 +1,6 @@
 // The list of effects: what is in the model, and what the touches say of every other one, with a switch for each.
 
+import { later, never } from "./later.js";
 import { state, on, setPreview, step, trouble, tryOut } from "./talk.js";
 import { byId, chance, element, show, significant, stated } from "./words.js";
 
@@ -14,6 +15,7 @@ function toggle(effect, isOn, disabled) {
       const id = e.currentTarget.dataset.switch;
       await step({ switch: { effect: id, on: !isOn } });
       // the row has moved to the other list: the keyboard goes along
+      draw();
       document.querySelector(`[data-switch="${CSS.escape(id)}"]`)?.focus();
     },
   }, element("span", { "aria-hidden": "true" }));
@@ -102,15 +104,29 @@ function keepFocus(work) {
   if (id) document.querySelector(`[data-effect="${CSS.escape(id)}"] ${which}`)?.focus({ preventScroll: true });
 }
 
+function matches(e) {
+  const wanted = byId("find").value.trim().toLowerCase();
+  return !wanted || `${e.id} ${e.name} ${e.says} ${e.family}`.toLowerCase().includes(wanted);
+}
+
+/** The list of what is in the model; the other one is long. */
+function drawModel() {
+  const { live, inputs, behind } = state;
+  const byName = new Map(inputs.effects.map((e) => [e.id, e]));
+  const effects = live.effects.map((id) => byName.get(id)).filter((e) => e && matches(e));
+  byId("in-model").replaceChildren(...effects.map((e) => row(e, null)));
+  const working = behind?.version !== live.version || !behind.complete;
+  show("evidence-state", working ? "working out what the touches say of each effect …" : "");
+  byId("candidates").dataset.complete = String(!working);
+}
+
 function draw() {
+  never("effects");
   if (!state.live) return;
   keepFocus(() => {
     const { live, inputs, behind } = state;
-    const wanted = byId("find").value.trim().toLowerCase();
-    const matches = (e) => !wanted || `${e.id} ${e.name} ${e.says} ${e.family}`.toLowerCase().includes(wanted);
+    const wanted = byId("find").value.trim();
     const byName = new Map(inputs.effects.map((e) => [e.id, e]));
-    const effects = live.effects.map((id) => byName.get(id)).filter((e) => e && matches(e));
-    byId("in-model").replaceChildren(...effects.map((e) => row(e, null)));
     const current = behind?.version === live.version;
     const scores = current && behind.scores ? behind.scores : [];
     const ranked = rank(scores);
@@ -124,9 +140,7 @@ function draw() {
     byId("candidates").replaceChildren(...shown.map(([e, s]) => row(e, s)));
     byId("more").hidden = Boolean(wanted) || rest.length <= FEW;
     show("more", all ? "Show the strongest only" : `Show all ${rest.length} effects`);
-    const working = !current || !behind.complete;
-    show("evidence-state", working ? "working out what the touches say of each effect …" : "");
-    byId("candidates").dataset.complete = String(!working);
+    drawModel();
   });
 }
 
@@ -139,9 +153,14 @@ function rank(scores) {
 
 byId("find").addEventListener("input", draw);
 byId("more").addEventListener("click", () => { all = !all; draw(); });
-on("live", (live, newer) => {
+on("live", (live, newer, first) => {
   if (newer && opened && live.effects.includes(opened)) opened = null;
-  draw();
+  if (!newer || first) {
+    draw();
+    return;
+  }
+  keepFocus(drawModel);
+  later("effects", draw);
 });
 on("behind", draw);
 on("preview", (preview) => {
@@ -150,5 +169,5 @@ on("preview", (preview) => {
   box.textContent = preview
     ? `Curve: what ${preview.effect} would take away, ${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS (Escape hides it)`
     : "";
-  draw();
+  later("effects", draw);
 });

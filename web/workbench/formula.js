@@ -36,12 +36,44 @@ function term(formula = "1 - cos(B)") {
   return box;
 }
 
+let shapes = 0;
+
+/** A number inside the formulas that the fit looks for: a time constant, a period. */
+function shape() {
+  shapes += 1;
+  const n = shapes;
+  const label = (word, control) => element("label", {}, word, control);
+  const typed = (word, more = {}) => element("input", { "data-word": word, "aria-describedby": `shape-${n}`, ...more });
+  const number = (word, value) => typed(word, { type: "number", step: "any", size: 8, value });
+  const unit = element("select", { "data-word": "unit", "aria-describedby": `shape-${n}` });
+  const box = element("div", { class: "term" },
+    element("div", { class: "row" }, label("number in the formula", typed("parameter", { value: n === 1 ? "tau" : `tau_${n}`, maxlength: 40, spellcheck: "false" })), label("unit", unit),
+      label("the search begins at", number("start", 1)), label("not below", number("min")), label("not above", number("max")),
+      element("button", { type: "button", "aria-label": `take number ${n} away`, click: () => { box.remove(); typing(); } }, "×")),
+    element("p", { class: "mistake", id: `shape-${n}` }));
+  fill(unit, state.inputs.words.units, "h");
+  byId("draft-shapes").append(box);
+  return box;
+}
+
+const word = (box, name) => box.querySelector(`[data-word=${name}]`).value;
+
+/** An empty field is no number, and no limit. */
+function limit(box, name) {
+  const text = word(box, name).trim();
+  return text === "" ? null : Number(text);
+}
+
 function draft() {
-  const word = (box, name) => box.querySelector(`[data-word=${name}]`).value;
   const rows = [...byId("draft-terms").children];
+  const numbers = [...byId("draft-shapes").children];
+  const missing = numbers.flatMap((box, i) => (Number.isFinite(limit(box, "start") ?? NaN) ? []
+    : [{ field: `shape.${i}.start`, message: "the search must begin somewhere", help: "write a number that may be about right" }]));
+  if (missing.length) throw { mistakes: missing };
   return {
     id: byId("draft-id").value.trim(), name: byId("draft-name").value.trim(), at: byId("draft-at").value,
     terms: rows.map((box) => ({ parameter: word(box, "parameter").trim(), unit: word(box, "unit"), dof: word(box, "dof"), formula: word(box, "formula") })),
+    shape: numbers.map((box) => ({ parameter: word(box, "parameter").trim(), unit: word(box, "unit"), start: limit(box, "start"), min: limit(box, "min"), max: limit(box, "max") })),
   };
 }
 
@@ -55,9 +87,10 @@ function mark(mistakes) {
   const rest = [];
   for (const m of mistakes) {
     const words = m.help ? `${m.message}: ${m.help}` : m.message;
-    const [kind, n, word] = m.field.split(".");
-    const box = kind === "terms" ? byId("draft-terms").children[Number(n)] : null;
-    const input = box ? box.querySelector(`[data-word=${word}]`) : byId(`draft-${kind}`);
+    const [kind, n, field] = m.field.split(".");
+    const rows = { terms: "draft-terms", shape: "draft-shapes" }[kind];
+    const box = rows ? byId(rows).children[Number(n)] : null;
+    const input = box ? box.querySelector(`[data-word=${field}]`) : kind ? byId(`draft-${kind}`) : null;
     if (input) input.setAttribute("aria-invalid", "true");
     if (box) {
       box.querySelector(".mistake").textContent = words;
@@ -95,8 +128,9 @@ function typing() {
 async function save(isOn) {
   clearTimeout(timer);
   clear();
-  const wanted = draft();
+  let wanted;
   try {
+    wanted = draft();
     // mistakes are shown in their place before anything is written
     await tryOut({ draft: wanted });
   } catch (error) {
@@ -108,6 +142,7 @@ async function save(isOn) {
 
 byId("draft").addEventListener("submit", (e) => { e.preventDefault(); look(); });
 byId("draft-terms").addEventListener("input", typing);
+byId("draft-shapes").addEventListener("input", typing);
 byId("draft-at").addEventListener("change", () => {
   const place = dofs();
   show("draft-at-says", place.says);
@@ -115,6 +150,7 @@ byId("draft-at").addEventListener("change", () => {
   typing();
 });
 byId("draft-more").addEventListener("click", () => term("1").querySelector("[data-word=formula]").focus());
+byId("draft-shape").addEventListener("click", () => shape().querySelector("[data-word=parameter]").select());
 byId("draft-save").addEventListener("click", () => save(false));
 byId("draft-save-on").addEventListener("click", () => save(true));
 

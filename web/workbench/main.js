@@ -3,6 +3,7 @@
 import { call, listen, on, state, step, trouble } from "./talk.js";
 import { rescale } from "./plots.js";
 import "./space.js";
+import "./correlation.js";
 import "./effects.js";
 import "./touches.js";
 import "./formula.js";
@@ -38,7 +39,7 @@ function verdict() {
   const found = behind?.version === live.version ? behind.diagnosis : null;
   const at = byId("verdict");
   const noise = live.explained_by_noise;
-  const bad = found ? ["missing-effect", "unexplained"].includes(found.verdict) : noise === false;
+  const bad = found ? ["missing-effect", "unexplained"].includes(found.verdict) && !found.faint : noise === false;
   // good is said only once it is known: what is small may still depend on something
   at.className = bad ? "bad" : found?.verdict === "adequate" ? "good" : "";
   at.dataset.verdict = found?.verdict ?? "";
@@ -46,10 +47,12 @@ function verdict() {
   const soFar = noise === null ? "As many unknowns as touches: nothing is left over to judge the model by."
     : noise ? "What is left is as small as noise; whether it depends on something is being worked out …"
     : `The model misses the touches by ${ratio} times their noise; what is missing is being worked out …`;
-  show("verdict", found?.says ?? soFar);
+  // the rooms write um in plain letters
+  show("verdict", found?.says.replace(/(\d )um\b/g, "$1µm") ?? soFar);
   const first = found?.candidates[0];
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${first.same_as.join(", ")}: a further program would.` : ""}`
+    : found.faint ? "What is left is as small as the noise, but for a faint pattern: write the program that tells more."
     : found.verdict === "unexplained" ? "No known effect explains what is left: try a formula of your own, or look at the touches that stand out."
     : found.verdict === "adequate" ? "Nothing is missing that these touches can show: write the compensation." : "There are too few touches to judge: write a further program.");
   if (behind?.version === live.version && behind.failed.length) trouble({ messages: behind.failed });

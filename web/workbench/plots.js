@@ -1,5 +1,7 @@
 // The residual of every touch against what it may depend on, and the ladder. One touch is the same touch in every plot.
 
+import { frame, unframe } from "./frame.js";
+import { later, never } from "./later.js";
 import { state, on, setPreview } from "./talk.js";
 import { byId, colour, element, significant } from "./words.js";
 
@@ -91,9 +93,12 @@ function grid() {
   for (const variable of state.inputs.variables) {
     const plot = element("div", { class: "plot", role: "group", "aria-label": `residual against ${variable.title}` });
     const ring = element("div", { class: "ring", hidden: true });
-    const cell = { variable, plot, ring, stale: true, seen: false, made: false };
+    const around = element("div", { class: "cell" }, plot, ring);
+    const cell = { variable, plot, ring, around, stale: true, seen: false, made: false };
     plot.dataset.variable = variable.id;
-    box.append(element("div", { class: "cell" }, plot, ring));
+    // who points at a mark means that of the library, which knows its touch
+    plot.addEventListener("pointerenter", () => { if (cell.stale && cell.made) draw(cell); });
+    box.append(around);
     cells.push(cell);
     watcher.observe(plot);
   }
@@ -120,6 +125,19 @@ const isMany = () => (state.inputs?.touches.n ?? 0) > MANY;
 function drawSeen() {
   if (!state.live || !state.inputs) return;
   for (const cell of cells) if (cell.seen && cell.stale) draw(cell);
+}
+
+/** The marks go to their new places at once; the library draws after the paint, one plot a turn. */
+function moveSeen() {
+  for (const cell of cells) {
+    if (!cell.seen) continue;
+    if (!cell.made || !frame(cell.plot, cell.around, traces(cell), 2 * state.live.noise_um)) {
+      draw(cell);
+      continue;
+    }
+    cell.plot.dataset.framed = state.live.version;
+    later(`plot ${cell.variable.id}`, () => { if (cell.seen && cell.stale) draw(cell); });
+  }
 }
 
 function traces(cell) {
@@ -182,6 +200,7 @@ function curve(own, x, um) {
 function draw(cell) {
   const { live } = state;
   cell.stale = false;
+  never(`plot ${cell.variable.id}`);
   const band = 2 * live.noise_um;
   const layout = layoutOf({
     dragmode: "zoom", uirevision: "keep", selectionrevision: live.version,
@@ -191,6 +210,7 @@ function draw(cell) {
   });
   const config = { ...CONFIG, modeBarButtonsToAdd: ["select2d", "lasso2d"] };
   Plotly.react(cell.plot, traces(cell), layout, config);
+  unframe(cell.around);
   cell.plot.dataset.version = live.version;
   if (!cell.made) {
     cell.made = true;
@@ -231,6 +251,7 @@ function sort(t) {
 }
 
 let drawnInputs = null;
+let shown = 0;
 on("live", (live, newer, first) => {
   if (drawnInputs !== state.inputs) {
     drawnInputs = state.inputs;
@@ -241,10 +262,11 @@ on("live", (live, newer, first) => {
   }
   if (newer) {
     cells.forEach((cell) => { cell.stale = true; });
-    drawSeen();
+    shown = live.version;
+    moveSeen();
     hover(null);
   }
-  showLadder();
+  later("ladder", showLadder);
 });
 
 /** The ladder is drawn when it is in sight and has changed. */
@@ -262,6 +284,8 @@ new IntersectionObserver((entries) => {
   showLadder();
 }, { rootMargin: "200px" }).observe(byId("ladder"));
 on("preview", () => {
+  // a step takes the curve away with all that it draws anew
+  if (state.live?.version !== shown) return;
   cells.forEach((cell) => { cell.stale = true; });
   drawSeen();
 });

@@ -1,5 +1,6 @@
 // The blocks with the residual of every touch as an arrow, magnified.
 
+import { later } from "./later.js";
 import { state, on } from "./talk.js";
 import { layoutOf, onHover } from "./plots.js";
 import { byId, colour, show, significant } from "./words.js";
@@ -122,5 +123,5 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 on("live", (live, newer) => {
   if (!newer) return;
   stale = true;
-  draw();
+  later("space", draw);
 });

@@ -1,5 +1,7 @@
 // Talks with the server, and holds what it has said: `inputs` (touches, effects), `live` (the fit) and `behind` (evidence).
 
+import { later, soonest } from "./later.js";
+
 const TOKEN_KEY = "axiscal-token";
 
 function token() {
@@ -85,9 +87,9 @@ export async function step(what) {
     const answered = performance.now();
     await put(live);
     const drawn = performance.now();
-    window.axiscalTimes = { answered: answered - began, drawn: drawn - began, fit: live.fit_ms };
-    await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
-    window.axiscalTimes.painted = performance.now() - began;
+    const times = { answered: answered - began, drawn: drawn - began, fit: live.fit_ms };
+    later("settled", () => { window.axiscalTimes = { ...times, settled: performance.now() - began }; });
+    await new Promise((done) => soonest("painted", () => { times.painted = performance.now() - began; done(); }));
     return true;
   } catch (error) {
     if (error.status === 409) await refresh().catch(trouble);

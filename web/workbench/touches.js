@@ -1,5 +1,6 @@
 // Every touch in a table, the worst first; choosing touches and taking them out, each with a reason.
 
+import { later } from "./later.js";
 import { state, on, step } from "./talk.js";
 import { choose, chosen, hover, onHover, onPick, unchoose } from "./plots.js";
 import { byId, element, show, significant } from "./words.js";
@@ -90,20 +91,15 @@ byId("choose-none").addEventListener("click", () => choose([]));
 byId("earlier-touches").addEventListener("click", () => { page = Math.max(0, page - 1); draw(); });
 byId("later-touches").addEventListener("click", () => { page += 1; draw(); });
 
-let waiting = null;
 /** A long table is put in order when the plots are on the screen. */
-function later() {
-  if (waiting !== null) return;
-  waiting = requestAnimationFrame(() => setTimeout(() => {
-    waiting = null;
-    if (!state.live || !state.inputs) return;
-    sort();
-    page = Math.min(page, Math.max(0, Math.ceil(state.inputs.touches.n / PAGE) - 1));
-    draw();
-    count();
-  }));
+function anew() {
+  if (!state.live || !state.inputs) return;
+  sort();
+  page = Math.min(page, Math.max(0, Math.ceil(state.inputs.touches.n / PAGE) - 1));
+  draw();
+  count();
 }
-on("live", (live, newer) => { if (newer) later(); });
+on("live", (live, newer) => { if (newer) later("touches", anew); });
 onPick(() => { draw(); count(); });
 
 onHover((i) => {
