@@ -133,10 +133,10 @@ pub(super) fn write(
         .collect();
     let shift = export.compensation.tables.as_ref().map_or([0.0; 3], |t| t.workpiece_shift_mm);
     let shape = |s: &crate::tables::correction::AxisShape| format!("{} ({})", s.parameter, s.effect);
-    let in_grids: Vec<String> = if tables.grid.is_some() {
-        correction.shapes.iter().chain(&correction.across).map(shape).collect()
-    } else {
+    let in_grids: Vec<String> = if grids.is_empty() {
         Vec::new()
+    } else {
+        correction.shapes.iter().chain(&correction.across).map(shape).collect()
     };
     let text = render(
         "readme",
