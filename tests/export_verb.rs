@@ -6,9 +6,7 @@ use assert_cmd::Command;
 use common::*;
 use predicates::prelude::*;
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::Path;
 
 fn axiscal(at: &Path) -> Command {
@@ -113,11 +111,12 @@ fn old_values_come_from_the_backup_and_the_restoring_file_brings_them_back() {
     assert_eq!(answer["values"].as_array().unwrap().len(), new.len());
 
     // the head of every file: study, its hash, the day of the data
-    let hash = Sha256::digest(std::fs::read(at.join("study.toml")).unwrap());
-    let hash = hash.iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").unwrap();
-        text
-    });
+    let hash_of = |out: &str| -> String {
+        let record: Value = serde_json::from_str(&text(at, &format!("{out}/compensation.json"))).unwrap();
+        record["provenance"]["study_sha256"].as_str().unwrap().to_owned()
+    };
+    let hash = hash_of("comp");
+    assert!(hash.len() == 64 && hash.bytes().all(|b| b.is_ascii_hexdigit()), "{hash}");
     let files = answer["files"].as_array().unwrap();
     assert!(files.len() >= 6, "{files:?}");
     for name in files {
@@ -129,6 +128,7 @@ fn old_values_come_from_the_backup_and_the_restoring_file_brings_them_back() {
     // without --date: the day of the log file
     export(at, "sinumerik", "comp", &more[..3]).assert().success();
     assert!(!text(at, "comp/axiscal_trafo.ini").contains("2026-11-20"));
+    assert_eq!(hash_of("comp"), hash, "the same data");
 
     // the same by hand, value by value
     let mut by_hand = vec!["--accept-unverified".to_owned()];
@@ -139,12 +139,16 @@ fn old_values_come_from_the_backup_and_the_restoring_file_brings_them_back() {
     export(at, "sinumerik", "hand", &words).assert().success();
     assert_eq!(sinumerik(&text(at, "hand/axiscal_trafo.ini")), new);
 
+    // another byte in the log is another hash
+    let log = text(at, "run.log");
+    std::fs::write(at.join("run.log"), log.replace('\n', "\r\n")).unwrap();
     // without old values: said, and the restoring file says it too
     export(at, "sinumerik", "none", &["--accept-unverified"]).assert().success().stderr(
         predicate::str::contains("the control's old values are not known")
             .and(predicate::str::contains("--backup FILE")),
     );
     assert!(text(at, "none/restore_trafo.ini").contains("ASSUMED"));
+    assert_ne!(hash_of("none"), hash);
     assert!(text(at, "none/README.txt").contains("NOT KNOWN: the control's old values"));
 }
 
@@ -165,7 +169,7 @@ fn old_values_by_hand_are_checked() {
         (&["--old", &of("1"), "--old", &of("1")], "it is given twice"),
         (&["--backup", "backup.ini", "--old", &of("1")], "it is given twice"),
         (&["--backup", "empty.ini"], "none of the values"),
-        (&["--backup", "twice.ini"], "twice.ini:2:1: $MC_TRAFO5_BASE_TOOL_1[1] stands twice: 1 and 2"),
+        (&["--backup", "twice.ini"], "twice.ini:2:1: error: $MC_TRAFO5_BASE_TOOL_1[1] stands twice: 1 and 2"),
     ];
     for (more, says) in cases {
         let all = [&["--accept-unverified"][..], more].concat();
@@ -208,8 +212,8 @@ fn what_nobody_has_verified_is_written_only_when_it_is_accepted() {
         "double-head",
         "double-head",
         "sinumerik",
-        "seed = 1\n[effects.location-a]\nEY0A = 0.02\n",
-        "location-b,location-a,block-setup",
+        "seed = 1\n[effects.location-a]\nEY0A = 0.02\n[noise]\ntouch_um = 0.5\n",
+        "location-b,location-a,block-setup,pretravel",
     );
     export(folder.path(), "sinumerik", "comp", &[]).assert().success();
 }

@@ -50,7 +50,7 @@ impl Said<'_> {
             None if term || table => Ok(true),
             None => Err("it is in no table, and not among what stays".to_owned()),
             Some(l) if l.why.trim().is_empty() => Err("it stays, and nobody says why".to_owned()),
-            Some(l) if !l.left_um.is_some_and(f64::is_finite) => {
+            Some(l) if !l.size(|um| format!("{um}")).contains("um") => {
                 Err(format!("it stays ({}), and its size is not said", l.why))
             }
             Some(_) => Ok(false),

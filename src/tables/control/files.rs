@@ -120,7 +120,7 @@ pub(super) fn write(
         .left
         .iter()
         .map(|l| {
-            let size = l.left_um.map_or_else(|| "an error of unknown size".to_owned(), |um| format!("{um:.2} um"));
+            let size = l.size(|um| format!("{um:.2}"));
             context! { parameter => l.parameter.clone(), value => format!("{:.6}", l.value), unit => l.unit.clone(), size,
             lever => format!("{:.0}", l.lever_mm), why => one_line(&l.why) }
         })
