@@ -113,7 +113,7 @@ fn old_values_come_from_the_backup_and_the_restoring_file_brings_them_back() {
     // the head of every file: study, its hash, the day of the data
     let hash_of = |out: &str| -> String {
         let record: Value = serde_json::from_str(&text(at, &format!("{out}/compensation.json"))).unwrap();
-        record["provenance"]["study_sha256"].as_str().unwrap().to_owned()
+        record["study_sha256"].as_str().unwrap().to_owned()
     };
     let hash = hash_of("comp");
     assert!(hash.len() == 64 && hash.bytes().all(|b| b.is_ascii_hexdigit()), "{hash}");
