@@ -253,6 +253,38 @@ fn the_unit_of_the_table_is_the_user_s() {
     export(at, "fanuc", "x", &["--unit", "furlong"]).assert().code(2);
 }
 
+/// Controls without a file that a user writes: the sheet is the record of what was entered, and serves as the backup.
+#[test]
+fn a_worksheet_serves_as_the_backup_of_the_next_export() {
+    let folder = trunnion("haas");
+    let at = folder.path();
+    let sheet = |name: &str| -> BTreeMap<String, f64> {
+        let value = |line: &str| {
+            let (name, value) = line.split(';').next()?.split_once('=')?;
+            Some((name.trim().to_owned(), value.trim().parse().ok()?))
+        };
+        text(at, name).lines().filter_map(value).collect()
+    };
+    for control in ["haas", "heidenhain"] {
+        let [one, two] = ["one", "two"].map(|n| format!("{control}-{n}"));
+        let first = json(export(at, control, &one, &["--accept-unverified"]));
+        let entered = format!("{one}/axiscal_worksheet.txt");
+        let more = ["--accept-unverified", "--backup", entered.as_str()];
+        let second = json(export(at, control, &two, &more));
+        assert_eq!(first["values"].as_array().unwrap().len(), second["values"].as_array().unwrap().len());
+        let (was, back) = (sheet(&entered), sheet(&format!("{two}/restore_worksheet.txt")));
+        assert!(was.len() >= 6 && was == back, "{control}: {was:?} {back:?}");
+        // the same error again on top of it
+        let again = sheet(&format!("{two}/axiscal_worksheet.txt"));
+        let old = sheet(&format!("{one}/restore_worksheet.txt"));
+        for (name, value) in &was {
+            let twice = old[name] + 2.0 * (value - old[name]);
+            assert!((again[name] - twice).abs() < 2.1e-4, "{control} {name}: {} instead of {twice}", again[name]);
+        }
+        assert!(was.iter().any(|(name, value)| (value - old[name]).abs() > 0.01), "{control}: {was:?}");
+    }
+}
+
 /// A model that does not fit is no compensation.
 #[test]
 fn after_a_bad_verdict_nothing_is_written_unless_forced() {
