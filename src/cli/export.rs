@@ -384,7 +384,7 @@ fn say_left(what: &str, left: &[Left], args: &Args, io: &Io) {
     }
     io.say(format!("{what}, at a radius of {} mm:", args.radius));
     for l in left {
-        let size = l.left_um.map_or_else(|| "an error of unknown size".into(), |um| format!("{} um", significant(um)));
+        let size = l.size(significant);
         io.say(format!("  {:<6} {} {} leaves {size}: {}", l.parameter, significant(l.value), l.unit, l.why));
     }
 }

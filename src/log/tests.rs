@@ -378,6 +378,26 @@ proptest! {
         }
     }
 
+    /// Inspection results have no sum: a digit may change unseen, a point may not appear.
+    #[test]
+    fn damage_never_invents_an_inspected_point(damages in prop::collection::vec(damage(), 1..4)) {
+        let machine = machine("swivel-head");
+        let plan = plan(&machine, "head", "x+");
+        let form = points::PointsForm::built_in().unwrap().into_iter().find(|f| f.name == "msr").unwrap();
+        let mut text = include_bytes!("../../tests/logs/good/inspection.msr").to_vec();
+        damages.iter().for_each(|d| apply(&mut text, d));
+        let n_lines = |word: &[u8]| text.windows(word.len()).filter(|w| *w == word).count();
+        for run in [None, Some(1)] {
+            if let Ok((read, _)) = points::parse(&text, "t", &form, run) {
+                prop_assert!(read.points.len() <= n_lines(b"G801").min(n_lines(b"G800")));
+            }
+        }
+        if let Ok((read, _)) = read(&text, "t", Writer::Points(&form), &machine, &plan) {
+            let ids: std::collections::BTreeSet<u64> = read.touches.iter().map(|t| t.id).collect();
+            prop_assert!(ids.len() == read.touches.len() && ids.iter().all(|id| plan.touch(*id).is_some()));
+        }
+    }
+
     /// The fast way reads nothing that the grammar does not read, and nothing otherwise; the usual line it does read.
     #[test]
     fn the_fast_way_and_the_grammar_agree(

@@ -16,7 +16,7 @@ mod render;
 mod spelling;
 pub mod tables;
 
-pub use as_written::DialectName;
+pub use as_written::{DialectName, LengthUnit};
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
@@ -26,7 +26,7 @@ pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, source};
-use as_written::{BlockNumbers, Coordinates, EndOfLine, LengthUnit, Padding, Role};
+use as_written::{BlockNumbers, Coordinates, EndOfLine, Padding, Role};
 use std::collections::BTreeMap;
 use std::path::Path;
 

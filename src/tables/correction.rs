@@ -271,8 +271,10 @@ impl Collector<'_> {
                 Err(why) => self.leave_out(p, true, why),
             },
             Meaning::Nothing(why) => {
-                self.leave_out(p, true, why);
                 let index = effect.parameters.iter().position(|known| known.name == p.name);
+                // a time constant is no error of its own
+                let known = index.and_then(|i| effect.parameters.get(i)).is_none_or(|known| known.shape.is_none());
+                self.leave_out(p, known, why);
                 let found = index.and_then(|i| across(effect, i, self.machine));
                 if let Some(Ok(shape)) = found.map(|(input, output)| self.shape(p, effect, input, output)) {
                     self.correction.across.push(shape);

@@ -23,6 +23,10 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 pub const CONTROLS: [&str; 4] = ["sinumerik", "fanuc", "heidenhain", "haas"];
+/// Their files are read by a reader made from the manuals' pages.
+const DOCUMENTED: [&str; 2] = ["sinumerik", "fanuc"];
+/// No page says what their values mean: the virtual machine takes the numbers as this program writes them.
+const ROUND_TRIP_ONLY: [&str; 2] = ["heidenhain", "haas"];
 
 pub fn tables(control: &str) -> Tables {
     let all = Postprocessor::built_in().unwrap();
@@ -177,11 +181,11 @@ fn way(machine: &Machine, control: &str, planted: &Planted, plan: &Plan) -> (f64
 
 /// For each control, parameter and sign: every touch reads what was foretold; what is carried is gone to the control's
 /// resolution, what is not is said.
-fn every_parameter(name: &str, at_least: usize) {
+fn every_parameter(name: &str, controls: [&str; 2], at_least: usize) {
     let (catalogue, machine) = (catalogue(), machine(name));
     let plan = plan(&machine, 7);
     let (mut carried, mut told) = (0, BTreeMap::new());
-    for control in CONTROLS {
+    for control in controls {
         if control::kind_of(&machine, &tables(control)).is_err() {
             assert!(control == "haas" && machine.side(Side::Tool).any(|a| a.name.is_rotary()), "{control} {name}");
             continue;
@@ -220,22 +224,80 @@ fn every_parameter(name: &str, at_least: usize) {
 
 #[test]
 fn every_parameter_of_the_swivel_head_comes_back() {
-    every_parameter("swivel-head", 30);
+    every_parameter("swivel-head", DOCUMENTED, 24);
+}
+
+#[test]
+fn every_parameter_of_the_swivel_head_comes_back_round_trip_only() {
+    every_parameter("swivel-head", ROUND_TRIP_ONLY, 10);
 }
 
 #[test]
 fn every_parameter_of_the_double_head_comes_back() {
-    every_parameter("double-head", 30);
+    every_parameter("double-head", DOCUMENTED, 24);
+}
+
+#[test]
+fn every_parameter_of_the_double_head_comes_back_round_trip_only() {
+    every_parameter("double-head", ROUND_TRIP_ONLY, 10);
 }
 
 #[test]
 fn every_parameter_of_the_trunnion_comes_back() {
-    every_parameter("trunnion", 40);
+    every_parameter("trunnion", DOCUMENTED, 24);
+}
+
+#[test]
+fn every_parameter_of_the_trunnion_comes_back_round_trip_only() {
+    every_parameter("trunnion", ROUND_TRIP_ONLY, 14);
 }
 
 #[test]
 fn every_parameter_of_the_swivel_table_comes_back() {
-    every_parameter("swivel-table-b", 40);
+    every_parameter("swivel-table-b", DOCUMENTED, 24);
+}
+
+#[test]
+fn every_parameter_of_the_swivel_table_comes_back_round_trip_only() {
+    every_parameter("swivel-table-b", ROUND_TRIP_ONLY, 14);
+}
+
+/// Each error that depends on a position, alone and of both signs: its position table is read, and the error is gone.
+#[test]
+fn every_position_dependent_parameter_comes_back() {
+    let catalogue = catalogue();
+    let (mut tried, mut wrong) = (0, Vec::new());
+    for name in MACHINES {
+        let machine = machine(name);
+        let plan = plan(&machine, 5);
+        let parameters = catalogue
+            .iter()
+            .filter(|e| e.applies_to(&machine) && !e.discrete)
+            .flat_map(|e| e.parameters.iter().filter(|p| p.shape.is_none()).map(move |p| (e.id.as_str(), p)));
+        for (effect, p) in parameters {
+            for sign in [1.0, -1.0] {
+                let planted: Planted = vec![(effect, &p.name, sign * 10.0 * p.typical)];
+                let known = correction(&machine, &planted, None);
+                if known.shapes.is_empty() && known.across.is_empty() {
+                    continue;
+                }
+                let export = export(&machine, "sinumerik", &planted, &accepting());
+                let grids = &export.compensation.tables.as_ref().unwrap().grids;
+                let scenario = scenario(&machine, &planted);
+                let largest = |c: Option<&Compensation>| {
+                    readings(&machine, &plan, &scenario, c).iter().fold(0.0_f64, |m, e| m.max(e.abs())) * 1e3
+                };
+                let (before, after) = (largest(None), largest(Some(&loaded(&machine, &export, None))));
+                tried += 1;
+                // interpolation to 0.01 um, the second order of a turned axis
+                if grids.is_empty() || !export.left.is_empty() || before < 0.1 || after > 0.05 + 0.01 * before {
+                    wrong.push(format!("{name} {} ({effect}): {before:.3} um before, {after:.3} um after", p.name));
+                }
+            }
+        }
+    }
+    println!("{tried} tables");
+    assert!(wrong.is_empty() && tried > 100, "{tried} tried, {} wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 /// Everything at once, of random size and sign: with SINUMERIK nothing stays but where the workpiece is.
@@ -379,7 +441,12 @@ fn fanuc_by_hand() {
     let planted = vec![("location-a", "EY0A", 0.0204), ("location-c", "EX0C", 0.0106)];
     let export = export(&machine, "fanuc", &planted, &accepting());
     let text = text(&export, "axiscal_parameters.txt");
-    let expected = "%\nN19700Q1M0.000;\nN19701Q1M0.020;\nN19702Q1M-250.000;\nN19703Q1M0.011;\nN19704Q1M0.000;\nN19705Q1M0.000;\n%\n";
+    let (title, text) = text.split_once('\n').unwrap();
+    for word in ["%", "STUDY.TOML", "0123ABCD", "2026-11-20"] {
+        assert!(title.contains(word), "{title}");
+    }
+    let expected =
+        "N19700Q1M0.000;\nN19701Q1M0.020;\nN19702Q1M-250.000;\nN19703Q1M0.011;\nN19704Q1M0.000;\nN19705Q1M0.000;\n%\n";
     assert_eq!(text, expected);
     assert!(self::text(&export, "axiscal_g10.nc").contains("G10 L52\nN19700 R0.000\n"));
     // inch: the letter says it, and the control reads the same place

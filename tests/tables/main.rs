@@ -11,5 +11,6 @@ mod component;
 mod controls;
 mod export;
 mod mapping;
+mod said;
 mod stock;
 mod support;

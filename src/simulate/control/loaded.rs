@@ -260,7 +260,8 @@ pub fn fanuc(files: &[Source], machine: &Machine, findings: &mut Findings) -> Lo
         let mut at = 0;
         for raw in source.inner().split_inclusive('\n') {
             let line = raw.trim();
-            let comment = line.is_empty() || line == "%" || line.starts_with('(');
+            // behind a % stands a title at most (leader section, B-64014EN/03 p. 21)
+            let comment = line.is_empty() || line.starts_with(['%', '(']);
             match parameter(line) {
                 _ if comment => {}
                 Some((number, value)) => {

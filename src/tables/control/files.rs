@@ -120,7 +120,7 @@ pub(super) fn write(
         .left
         .iter()
         .map(|l| {
-            let size = l.left_um.map_or_else(|| "an error of unknown size".to_owned(), |um| format!("{um:.2} um"));
+            let size = l.size(|um| format!("{um:.2}"));
             context! { parameter => l.parameter.clone(), value => format!("{:.6}", l.value), unit => l.unit.clone(), size,
             lever => format!("{:.0}", l.lever_mm), why => one_line(&l.why) }
         })
@@ -133,10 +133,10 @@ pub(super) fn write(
         .collect();
     let shift = export.compensation.tables.as_ref().map_or([0.0; 3], |t| t.workpiece_shift_mm);
     let shape = |s: &crate::tables::correction::AxisShape| format!("{} ({})", s.parameter, s.effect);
-    let in_grids: Vec<String> = if tables.grid.is_some() {
-        correction.shapes.iter().chain(&correction.across).map(shape).collect()
-    } else {
+    let in_grids: Vec<String> = if grids.is_empty() {
         Vec::new()
+    } else {
+        correction.shapes.iter().chain(&correction.across).map(shape).collect()
     };
     let text = render(
         "readme",

@@ -224,22 +224,26 @@ pub fn export(
     let zero = add_angles(machine, tables, kind, &carried, options, &mut filled);
     let old_grids = active.and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.grids);
     let unit_step = *tables.step_mm.get_ref();
-    let mut grid_list = Vec::new();
+    let mut grid_list = None;
     if let Some(form) = &tables.grid {
         match grids::grids(machine, correction, form, old_grids, [unit_step, *tables.step_deg.get_ref()]) {
-            Ok(found) => grid_list = found,
+            Ok(found) => grid_list = Some(found),
             Err(why) => findings.push(
                 Finding::error("tables::grids", why)
                     .help("take the smallest effects out of the study's model, one by one"),
             ),
         }
     }
-    if grid_list.iter().any(|_| options.unit == LengthUnit::Inch) {
+    if options.unit == LengthUnit::Inch && grid_list.as_ref().is_some_and(|g| !g.is_empty()) {
+        // a forced export leaves them out too: in the wrong unit they would be wrong
+        grid_list = None;
         findings.push(
             Finding::error("tables::inch", "position tables are written for metric controls only")
                 .help("leave the position-dependent effects out, or export with --unit mm"),
         );
     }
+    let has_grids = grid_list.is_some();
+    let grid_list = grid_list.unwrap_or_default();
     if options.force {
         for finding in findings.0.iter_mut().filter(|f| f.severity == Severity::Error) {
             finding.severity = Severity::Warning;
@@ -269,7 +273,7 @@ pub fn export(
         carried: &carried,
         filled: &filled,
         zero: &zero,
-        has_grids: tables.grid.is_some(),
+        has_grids,
         radius_mm: options.radius_mm,
     };
     let left = pieces.left();

@@ -13,7 +13,7 @@ pub mod stock;
 pub mod work_offset;
 
 use super::compensation::{Compensation, Mode};
-use super::correction::{Correction, Limits};
+use super::correction::{Correction, Limits, left_um};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
 use ini::UserIni;
@@ -60,6 +60,22 @@ pub struct Left {
     pub left_um: Option<f64>,
     /// Why it is not carried.
     pub why: String,
+}
+
+impl Left {
+    /// The error that it leaves, in words; `show` writes a number. What grows with time or temperature is said per hour or
+    /// kelvin.
+    #[must_use]
+    pub fn size(&self, show: impl Fn(f64) -> String) -> String {
+        if let Some(um) = self.left_um {
+            return format!("{} um", show(um));
+        }
+        let growing = self.unit.rsplit_once('/').and_then(|(unit, per)| {
+            let unit = if unit == "ppm" { "um/m" } else { unit };
+            matches!(per, "h" | "K").then(|| left_um(self.value, unit, self.lever_mm))?.map(|um| (um, per))
+        });
+        growing.map_or_else(|| "an error of unknown size".to_owned(), |(um, per)| format!("{} um per {per}", show(um)))
+    }
 }
 
 /// What one way of loading carries and leaves.

@@ -44,11 +44,9 @@ fn carried(terms: &[Term]) -> Vec<String> {
 fn left(lines: &[Left]) -> Vec<String> {
     let mut rows = Vec::new();
     for l in lines {
-        let error = match l.left_um {
-            Some(um) if l.unit == "mm" || l.unit == "um" => format!("leaves {um:.2} um"),
-            Some(um) => format!("leaves {um:.2} um at {} mm", l.lever_mm),
-            None => "leaves an error that its unit does not tell".to_owned(),
-        };
+        let size = l.size(|um| format!("{um:.2}"));
+        let anywhere = ["mm", "um"].iter().any(|unit| l.unit.split('/').next() == Some(*unit)) && l.unit != "um/m";
+        let error = if anywhere { format!("leaves {size}") } else { format!("leaves {size} at {} mm", l.lever_mm) };
         rows.push(vec![
             one_line(&l.parameter),
             one_line(&l.effect),
@@ -87,8 +85,15 @@ pub(super) fn text(packing: &Packing, by_component: &Way, by_stock: &Way) -> Res
         .flatten()
         .map(|(axis, deg)| format!("{axis}: {deg:.6} deg added to its HOME_OFFSET"))
         .collect();
-    let tables: Vec<String> =
-        packing.tables.iter().map(|(axis, t)| format!("{axis}: {} ({} lines)", t.file, t.rows.len())).collect();
+    let shapes_of = |axis| -> String {
+        let own = correction.shapes.iter().filter(|s| s.axis == axis);
+        own.map(|s| format!(" {} ({})", one_line(&s.parameter), one_line(&s.effect))).collect::<Vec<_>>().join(",")
+    };
+    let tables: Vec<String> = packing
+        .tables
+        .iter()
+        .map(|(axis, t)| format!("{axis}: {} ({} lines):{}", t.file, t.rows.len(), shapes_of(*axis)))
+        .collect();
     let measurement: Vec<String> =
         correction.of_measurement.iter().map(|(effect, n)| format!("{} ({n})", one_line(effect))).collect();
     let table_axes =
