@@ -119,7 +119,7 @@ fn literal_macro_b(text: &str) -> String {
     let motion = begun.filter(|l| ["G0 ", "G1 ", "G31 "].iter().any(|g| l.starts_with(g)));
     motion
         .filter_map(|line| {
-            let block = line.split_once(" F[").map_or(line, |(axes, _)| axes);
+            let block = line.split_once(" F[").or(line.split_once(" F#")).map_or(line, |(axes, _)| axes);
             (!block.contains(['#', '['])).then(|| format!("{block}\n"))
         })
         .collect()

@@ -156,19 +156,29 @@ fn edits_by_hand_are_caught_with_the_right_words() {
     let t = original.text.clone();
     let gone = |_: &str| String::new();
     let cases: Vec<(&str, String, &str, &str)> = vec![
-        ("a sign changed", with(&t, "G0 SUPA X=-", 1, &|l| l.replace("=-", "=")), "check::not_the_plan", "start"),
+        (
+            "a sign changed",
+            with(&t, "G0 SUPA X=-", 1, &|l| l.replace("=-", "=")),
+            "check::stops",
+            "further along the approach",
+        ),
         (
             "a place over the block",
             with(&t, "G0 SUPA Z=11.3", 1, &|l| l.replace("11.3", "1.13")),
             "check::collision",
             "collision",
         ),
-        ("a point lost", with(&t, "G1 SUPA Z=1.5", 1, &|l| l.replace("Z=1.5", "Z=15")), "check::not_the_plan", "start"),
+        (
+            "a point lost",
+            with(&t, "G1 SUPA Z=1.5", 1, &|l| l.replace("Z=1.5", "Z=15")),
+            "check::unguarded",
+            "did not come",
+        ),
         (
             "a rapid in place of a guarded move",
             with(&t, "G1 SUPA Z=10 MEAS", 1, &|_| "G0 SUPA Z=10\n".into()),
-            "check::unguarded",
-            "did not come",
+            "check::stops",
+            "the probe triggered",
         ),
         (
             "MEAS deleted",
@@ -179,8 +189,8 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         (
             "MEAS deleted on the way",
             with(&t, "G1 SUPA Z=10 MEAS", 1, &|l| l.replace(" MEAS=1", "")),
-            "check::unguarded",
-            "did not come",
+            "check::stops",
+            "the probe triggered",
         ),
         (
             "the falling edge",

@@ -56,9 +56,9 @@ fn exit_code_0_where_nothing_is_wrong() {
         [("linuxcnc", "small.ngc"), ("fanuc", "small.nc"), ("haas", "small.nc"), ("heidenhain", "small.h")]
     {
         let folder = folder(controller);
-        let clean = predicate::str::contains("3 touches").and(predicate::str::contains("nothing is wrong with it"));
-        check(folder.path(), controller, file).assert().code(0).stdout(clean.clone());
-        check(folder.path(), controller, file).args(["--plan", "small.plan.json"]).assert().code(0).stdout(clean);
+        let clean = || predicate::str::contains("3 touches").and(predicate::str::contains("nothing is wrong with it"));
+        check(folder.path(), controller, file).assert().code(0).stdout(clean());
+        check(folder.path(), controller, file).args(["--plan", "small.plan.json"]).assert().code(0).stdout(clean());
         let plan = std::fs::read_to_string(folder.path().join("small.plan.json")).unwrap();
         assert!(plan.contains(&format!("\"{controller}\"")), "the plan remembers what was proven");
     }
@@ -109,7 +109,7 @@ fn exit_code_2_where_it_cannot_be_said() {
     // what the grammar does not know, with its place
     let written = std::fs::read_to_string(path.join("small.h")).unwrap();
     edited(path, "small.h", "PLANE RESET STAY", "PLANE RESET TURN");
-    fails(&mut check(path, "heidenhain", "small.h"), "small.h:80:4: not understood");
+    fails(&mut check(path, "heidenhain", "small.h"), "small.h:80:4: error: not understood");
     std::fs::write(path.join("small.h"), &written).unwrap();
     // a mask is a part of the program
     edited(path, "SMALL_P.A", "%10.4LF", "%10.4lf");

@@ -71,12 +71,21 @@ pub struct Told {
     pub aborted: Vec<(usize, BTreeMap<String, String>)>,
 }
 
+/// A probing move that asks whether the probe is deflected is no longer than this, mm.
+const ASKED_MM: f64 = 0.1;
+
 impl Told {
-    /// It was told to begin at a later set-up, and stopped before it moved or wrote anything: it says that it cannot.
+    /// It was told to begin at a later set-up, and stopped before it probed anything: it says that it cannot. The moves of its
+    /// opening, from wherever the machine stands, are judged like those of any run.
     pub fn declines(&self) -> bool {
-        let acts = |h: &Happened| matches!(h.event, Event::Move { .. } | Event::Probe { .. } | Event::Log(_));
-        let stops = |h: &Happened| matches!(h.event, Event::Abort(_));
-        self.from > 1 && self.fault.is_none() && !self.trunk.iter().any(acts) && self.trunk.iter().any(stops)
+        let acts = |h: &Happened| match &h.event {
+            // over less it only asks whether the probe is ready
+            Event::Probe { probe, .. } => way_mm(probe) > ASKED_MM,
+            Event::Log(line) => line.starts_with('P'),
+            _ => false,
+        };
+        let says = |h: &Happened| matches!(h.event, Event::Abort(_) | Event::Message(_));
+        self.from > 1 && self.fault.is_none() && !self.trunk.iter().any(acts) && self.trunk.iter().any(says)
     }
 }
 

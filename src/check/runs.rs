@@ -4,7 +4,7 @@
 use super::code::{Code, Expr, Var, What};
 use super::explore::{Limits, Told, explore};
 use super::proof::write_event;
-use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
+use super::run::{Dialect, Event, Fault, Happened, Pause, Rate, Run, Start, Vm};
 use super::world::World;
 use super::{heidenhain, macro_b, ngc, sinumerik};
 use crate::axes::{AxisName, Position};
@@ -398,32 +398,58 @@ fn number_after_n(text: &str) -> Option<u64> {
 
 /// Where a run from elsewhere, with the control in another state, does otherwise.
 fn otherwise(one: &Told, other: &Told) -> Option<(Range<usize>, String)> {
-    let spelled = |told: &Told| -> Vec<(Range<usize>, String)> {
-        let mut out = Vec::new();
-        for happened in &told.trunk {
-            let mut text = String::new();
-            match &happened.event {
-                Event::Move { to, rate, exact, named, .. } => {
-                    let to: Vec<String> = AxisName::ALL
-                        .into_iter()
-                        .filter(|a| named[a.index()])
-                        .map(|a| format!("{a}{:.6}", to.get(a) + 0.0))
-                        .collect();
-                    text = format!("{to:?} {rate:?} {exact}");
-                }
-                Event::Probe { probe, .. } if probe.known != one_known(told) => continue,
-                _ => write_event(&mut text, happened),
-            }
-            out.push((happened.at.clone(), text));
-        }
-        out
+    let (a, b) = (deeds(one), deeds(other));
+    let differs = |x: &Deed, y: &Deed| {
+        let apart = |(p, q): (&f64, &f64)| (p - q).abs() > ROUNDING;
+        x.says != y.says || x.numbers.len() != y.numbers.len() || x.numbers.iter().zip(&y.numbers).any(apart)
     };
-    let (a, b) = (spelled(one), spelled(other));
-    let first = a.iter().zip(&b).find(|(x, y)| x.1 != y.1).map(|(x, _)| x.0.clone());
-    let shorter = (a.len() != b.len()).then(|| a.get(b.len()).or(a.last()).map_or(0..0, |x| x.0.clone()));
+    let first = a.iter().zip(&b).find(|(x, y)| differs(x, y)).map(|(x, _)| x.at.clone());
+    let shorter = (a.len() != b.len()).then(|| a.get(b.len()).or(a.last()).map_or(0..0, |x| x.at.clone()));
     let place = first.or(shorter)?;
     let says = "the program does otherwise when it finds the control in another state (units, G91, offsets, feed mode) or the axes elsewhere: something that it needs is not set in its head";
     Some((place, says.to_owned()))
+}
+
+/// What a program computes from offsets that it reads is rounded otherwise when they are others, mm or deg.
+const ROUNDING: f64 = 1e-5;
+
+/// What a program does, as far as it must be the same wherever it begins.
+struct Deed {
+    at: Range<usize>,
+    says: String,
+    /// Positions, mm or deg; feeds, mm/min.
+    numbers: Vec<f64>,
+}
+
+fn deeds(told: &Told) -> Vec<Deed> {
+    let all_known = one_known(told);
+    let mut out = Vec::new();
+    for happened in &told.trunk {
+        let (mut says, mut numbers) = (String::new(), Vec::new());
+        match &happened.event {
+            Event::Move { to, rate, exact, named, .. } => {
+                let rate = match rate {
+                    Rate::Rapid => "rapid",
+                    Rate::Feed(feed) => {
+                        numbers.push(*feed);
+                        "feed"
+                    }
+                };
+                says = format!("{rate} {exact} {named:?}");
+                numbers.extend(AxisName::ALL.into_iter().filter(|a| named[a.index()]).map(|a| to.get(a)));
+            }
+            Event::Probe { probe, .. } if probe.known != all_known => continue,
+            Event::Probe { probe, outcome } => {
+                says = format!("probe {} {} {} {}", probe.toward, probe.overridden, probe.strict, outcome.hit);
+                numbers.push(probe.feed);
+                numbers.extend(probe.from.0);
+                numbers.extend(probe.to.0);
+            }
+            _ => write_event(&mut says, happened),
+        }
+        out.push(Deed { at: happened.at.clone(), says, numbers });
+    }
+    out
 }
 
 /// The axes of the machine, all known.

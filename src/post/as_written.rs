@@ -427,6 +427,9 @@ pub struct Check {
     /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
     #[schemars(with = "String")]
     pub from: Spanned<String>,
+    /// Said by a variant whose programs hold macros that nobody has described to axiscal: they are not read back.
+    #[serde(default)]
+    pub not_read_back: bool,
     /// The control logs to a device that is always there: the program neither names nor opens a log.
     #[serde(default)]
     pub log_always_open: bool,

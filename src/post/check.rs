@@ -43,7 +43,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     if let Some(tables) = &file.tables {
         super::tables::check(&mut check, tables);
     }
-    let reading = file.check.as_ref().map(|c| {
+    let reading = file.check.as_ref().filter(|c| !c.not_read_back).map(|c| {
         check.origin("check", &c.source, &c.unverified, &c.from.span());
         check.word("from", &c.from, |f| !f.trim().is_empty(), "the variable that the program sets to 1 near its top");
         CheckRule {

@@ -226,6 +226,8 @@ impl Names {
         let (mut rest, format) = quoted(input)?;
         let mut text = Text::new();
         let mut left = format;
+        // a place is told by what of the whole line is left, not of the text in quotes
+        let from_here = |left: &str| input.get(1 + format.len() - left.len()..).unwrap_or(input);
         while !left.is_empty() {
             let (after, plain) = take_till(|c| c == '%').parse(left)?;
             if !plain.is_empty() {
@@ -235,16 +237,17 @@ impl Names {
             if left.is_empty() {
                 break;
             }
-            let (after, (_, width, decimals, kind)) =
-                (char('%'), opt(digit1), opt(preceded(char('.'), digit1)), one_of("DF")).parse(left)?;
+            let mut conversion = (char('%'), opt(digit1), opt(preceded(char('.'), digit1)), one_of("DF"));
+            let parsed: IResult<&str, _> = conversion.parse(left);
+            let Ok((after, (_, width, decimals, kind))) = parsed else { return refuse(from_here(left)) };
             let places = |digits: Option<&str>| digits.map_or(Ok(0), str::parse::<usize>);
             let (Ok(width), Ok(decimals)) = (places(width), places(decimals).map(|d| (d, decimals.is_some()))) else {
-                return refuse(left);
+                return refuse(from_here(left));
             };
             const MOST: usize = 30;
             let good = if kind == 'D' { !decimals.1 } else { decimals.1 };
             if !good || width > MOST || decimals.0 > MOST {
-                return refuse(left);
+                return refuse(from_here(left));
             }
             let (next, value) = preceded((blanks, char(','), blanks), |i| self.value_of(i)).parse(rest)?;
             if kind == 'D' && !self.is_whole(&value) {

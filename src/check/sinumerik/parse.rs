@@ -527,9 +527,9 @@ mod tests {
     fn what_is_not_known_is_an_error_with_its_place() {
         let mut wrong = Vec::new();
         for (text, place) in [
-            ("G0 X1..5\nM30\n", 3),
+            ("G0 X1..5\nM30\n", 6),
             ("G0 X1 X=2\nM30\n", 6),
-            ("G0X1\nM30\n", 0),
+            ("G0X1\nM30\n", 2),
             ("G0 X1Y2\nM30\n", 5),
             ("FOOBAR\nM30\n", 0),
             ("G0 Q1\nM30\n", 3),
