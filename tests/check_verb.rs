@@ -114,8 +114,10 @@ fn exit_code_2_where_it_cannot_be_said() {
     // a mask is a part of the program
     edited(path, "SMALL_P.A", "%10.4LF", "%10.4lf");
     fails(&mut check(path, "heidenhain", "small.h"), "SMALL_P.A:2:");
-    std::fs::remove_file(path.join("SMALL_P.A")).unwrap();
+    std::fs::rename(path.join("SMALL_P.A"), path.join("away")).unwrap();
     fails(&mut check(path, "heidenhain", "small.h"), "the mask SMALL_P.A does not lie beside the program");
+    std::fs::rename(path.join("away"), path.join("SMALL_P.A")).unwrap();
+    edited(path, "SMALL_P.A", "%10.4lf", "%10.4LF");
     // another control's grammar
     fails(&mut check(path, "linuxcnc", "small.h"), "not understood");
     // files that cannot be read

@@ -222,7 +222,6 @@ fn every_controllers_program_for_every_machine_is_proven() {
 }
 
 #[test]
-#[ignore = "open: the program `full` of Fanuc for swivel-head is refused (check::goes_on), so `generate` does not write it"]
 fn the_full_program_is_proven_too() {
     let (proven, refused) = proven(|name| name == "full");
     assert!(refused.is_empty() && proven >= 5 * 4, "{proven}: {refused:#?}");

@@ -646,15 +646,16 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
     compare_settings(case, &told.settings[0], &branch.settings, &first.at, what, said);
 }
 
+/// How far a way back may lead sideways: its words are rounded, and it may be short, mm.
+const SIDEWAYS_MM: f64 = 0.002;
+
 /// Does a move go back from where the branch began?
 fn goes_back(branch: &Branch, from: &Position, to: &Position) -> bool {
     let Some(Event::Probe { probe, .. }) = branch.trace.first().map(|h| &h.event) else { return false };
     let along = probe.to.xyz_mm() - probe.from.xyz_mm();
     let way = to.xyz_mm() - from.xyz_mm();
     let turned = from.0[3..] != to.0[3..];
-    !turned
-        && way.dot(&along) <= 0.0
-        && (way.norm() < 1e-9 || way.cross(&along).norm() < 1e-3 * way.norm() * along.norm())
+    !turned && way.dot(&along) <= 0.0 && way.cross(&along).norm() <= (1e-3 * way.norm() + SIDEWAYS_MM) * along.norm()
 }
 
 // ------------------------------------------------------------------------------------------------------ settings
