@@ -21,13 +21,11 @@ use std::sync::Arc;
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fault> {
     let mut reader = Reader::new(post, masks);
-    let mut number = 0;
-    for line in lines(text) {
+    for (number, line) in (0..).zip(lines(text)) {
         if line.text.is_empty() && line.start == text.len() {
             break;
         }
         reader.line(&line, number)?;
-        number += 1;
     }
     reader.finish(text.len())
 }

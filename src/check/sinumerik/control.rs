@@ -132,7 +132,7 @@ impl Sinumerik {
         }
         let at = vm.at.get(axis);
         let mut up = (place - at).rem_euclid(TURN);
-        if up < SAME_DEG || up > TURN - SAME_DEG {
+        if !(SAME_DEG..=TURN - SAME_DEG).contains(&up) {
             up = 0.0;
         }
         let by = match way {

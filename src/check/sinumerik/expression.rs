@@ -40,11 +40,11 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 const OF_AXIS: [&str; 4] = ["$AA_IM", "$AA_IW", "$AA_MM", "$AA_MW"];
 const NUMBERED: [&str; 3] = ["$AC_MEA", "$A_PROBE", "$AC_TIMER"];
 
-fn refuse<'a, T>(input: &'a str) -> IResult<&'a str, T> {
+fn refuse<T>(input: &str) -> IResult<&str, T> {
     Err(nom::Err::Failure(nom::error::Error::new(input, nom::error::ErrorKind::Verify)))
 }
 
-fn miss<'a, T>(input: &'a str) -> IResult<&'a str, T> {
+fn miss<T>(input: &str) -> IResult<&str, T> {
     Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Alt)))
 }
 
