@@ -71,13 +71,17 @@ fn angles_tell_harmonics_apart() {
                 .collect();
             assert!(angles.len() >= 8, "{name} {}: {angles:?}", axis.name);
             assert!(angles.iter().any(|a| *a > 0.0) && (axis.name == AxisName::C || angles.iter().any(|a| *a < 0.0)));
+            // seen at these angles only, k per turn is other per turn where all of them are turns of k - other, and its mirror
+            // image where they are turns of k + other: at multiples of 45 deg 7 per turn is once per turn backwards
             for k in 1..=8 {
                 for other in 1..k {
-                    let apart = angles.iter().map(|a| {
-                        let turn = (a * f64::from(k - other)).rem_euclid(360.0);
-                        turn.min(360.0 - turn)
-                    });
-                    assert!(apart.fold(0.0, f64::max) > 30.0, "{name} {}: {other} and {k} per turn", axis.name);
+                    for between in [k - other, k + other] {
+                        let apart = angles.iter().map(|a| {
+                            let turn = (a * f64::from(between)).rem_euclid(360.0);
+                            turn.min(360.0 - turn)
+                        });
+                        assert!(apart.fold(0.0, f64::max) > 30.0, "{name} {}: {other} and {k} per turn", axis.name);
+                    }
                 }
             }
             let senses = distinct(plan.touches.iter().filter_map(|t| t.from.get(axis.name)));
