@@ -170,7 +170,8 @@ async function formulaBox(t) {
   // a good one draws its curve
   await formula.fill("-Y");
   await page.waitForSelector("#previewed:not([hidden])");
-  holds((await page.textContent("#draft-answer")).startsWith("with it"), "no answer");
+  // the curve and the sentence do not come in the same turn
+  await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it"));
   equal(await page.textContent("#draft .caret"), "");
   holds(!text(folder).includes("my-square"), "drawing a curve writes nothing");
   await after(page, () => page.click("#draft-save-on"));
