@@ -168,9 +168,9 @@ async function formulaBox(t) {
   equal(await formula.getAttribute("aria-invalid"), "true");
   // a good one draws its curve
   await formula.fill("-Y");
-  await page.waitForSelector("#previewed:not([hidden])");
-  // the curve and the sentence do not come in the same turn
+  // the sentence comes last, after the curve
   await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it"));
+  equal(await page.isHidden("#previewed"), false, "the curve");
   equal(await page.textContent("#draft .caret"), "");
   holds(!text(folder).includes("my-square"), "drawing a curve writes nothing");
   await after(page, () => page.click("#draft-save-on"));
@@ -221,7 +221,8 @@ async function formulaWithATimeConstant(t) {
   await shape.locator("[data-word=start]").fill("0.3");
   await shape.locator("[data-word=min]").fill("0.01");
   await shape.locator("[data-word=max]").fill("10");
-  await page.waitForSelector("#previewed:not([hidden])");
+  await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it"));
+  equal(await page.isHidden("#previewed"), false, "the curve");
   equal(await page.textContent("#draft-shapes .mistake"), "");
   // a mistake of the program's stands at its field as well
   await shape.locator("[data-word=min]").fill("5");

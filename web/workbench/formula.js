@@ -1,6 +1,6 @@
 // The formula box: an effect as a person types it, its curve over the residual, and the way into the effects file.
 
-import { state, on, step, tryOut } from "./talk.js";
+import { state, on, setPreview, step, tryOut } from "./talk.js";
 import { byId, element, show, significant, stated } from "./words.js";
 
 let terms = 0;
@@ -109,24 +109,32 @@ function failed(error) {
   else show("draft-answer", (error.messages ?? [{ message: String(error) }]).map((m) => (m.help ? `${m.message}: ${m.help}` : m.message)).join("\n"));
 }
 
+let looks = 0;
+
+/** What is shown belongs to the fields as they are: an answer to older ones is thrown away, and with a mistake in the fields goes the curve. */
 async function look() {
+  const mine = ++looks;
   clear();
+  setPreview(null);
   try {
     const found = await tryOut({ draft: draft() });
+    if (mine !== looks) return;
     const sizes = found.parameters.map((p) => `${p.name} = ${stated(p.value, p.sigma)} ${p.sigma ? `± ${significant(p.sigma, 2)} ` : ""}${p.unit}`);
     show("draft-answer", `with it ${significant(found.rms_before_um)} → ${significant(found.rms_after_um)} µm RMS; ${sizes.join(", ")}`);
   } catch (error) {
-    failed(error);
+    if (mine === looks) failed(error);
   }
 }
 
 function typing() {
   clearTimeout(timer);
+  looks += 1; // what is on its way is about other fields
   timer = setTimeout(look, 250);
 }
 
 async function save(isOn) {
   clearTimeout(timer);
+  looks += 1;
   clear();
   let wanted;
   try {
