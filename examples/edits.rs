@@ -15,7 +15,7 @@ fn main() {
     let mut words = std::env::args().skip(1);
     let count: u64 = words.next().and_then(|w| w.parse().ok()).unwrap_or(2000);
     let (options, named): (Vec<String>, Vec<String>) = words.partition(|w| w.starts_with("--"));
-    let all = ["linuxcnc", "fanuc", "haas", "sinumerik", "heidenhain"];
+    let all = ["linuxcnc", "fanuc", "haas", "sinumerik", "heidenhain", "fanuc-inspection-plus", "haas-inspection-plus"];
     let controllers = if named.is_empty() { all.map(str::to_owned).to_vec() } else { named };
     println!(
         "| controller | edits | not read | refused by what it does | refused as changed only | moves identically | escaped | s |"

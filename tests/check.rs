@@ -6,7 +6,8 @@ mod edits;
 
 use edits::{Fate, original};
 
-const CONTROLLERS: [&str; 5] = ["heidenhain", "linuxcnc", "fanuc", "haas", "sinumerik"];
+const CONTROLLERS: [&str; 7] =
+    ["heidenhain", "linuxcnc", "fanuc", "haas", "sinumerik", "fanuc-inspection-plus", "haas-inspection-plus"];
 
 /// How many random edits CI makes for each dialect; `examples/edits.rs` makes thousands.
 const EDITS: u64 = 150;
@@ -92,6 +93,37 @@ fn edits_by_hand_are_caught() {
         for (what, text) in cases {
             let codes = original.codes(&text);
             assert!(!codes.is_empty(), "{controller}: {what} was not caught");
+        }
+    }
+}
+
+#[test]
+fn edits_by_hand_of_a_program_for_a_package_are_caught() {
+    for controller in ["fanuc-inspection-plus", "haas-inspection-plus"] {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        let t = original.text.clone();
+        let guarded = "G65 P9810";
+        for (what, text, code) in [
+            (
+                "a rapid in its place",
+                with(&t, guarded, 1, &|l| format!("G0 {}\n", l.split(' ').nth(2).unwrap_or(""))),
+                "check::unguarded",
+            ),
+            ("a move at a feed in its place", with(&t, guarded, 1, &|l| l.replace(guarded, "G1")), "check::unguarded"),
+            ("another macro", with(&t, guarded, 1, &|l| l.replace("P9810", "P9811")), "check::not_run"),
+            (
+                "without its feed",
+                with(&t, guarded, 1, &|l| format!("{}\n", l.split(" F").next().unwrap_or(""))),
+                "check::not_run",
+            ),
+            ("one that turns", with(&t, guarded, 1, &|l| l.replace(" F", " C10. F")), "check::not_run"),
+            ("too fast", with(&t, guarded, 1, &|l| l.replace(" F", " F9")), "check::feed"),
+            ("too deep", with(&t, "G65 P9810 Z10.", 1, &|l| l.replace("Z10.", "Z1.")), "check::stops"),
+            ("a switch that moves", with(&t, "G65 P9832", 1, &|l| l.replace("P9832", "P9832 X1.")), "check::not_run"),
+        ] {
+            let codes = original.codes(&text);
+            assert!(codes.contains(&code), "{controller}: {what}: {codes:?}");
         }
     }
 }

@@ -46,6 +46,40 @@ fn is_clean(post: &Postprocessor, machine: &Machine, generated: &Generated) {
 
 const CONTROLLERS: [&str; 4] = ["linuxcnc", "fanuc", "haas", "heidenhain"];
 
+const PACKAGES: [&str; 2] = ["fanuc-inspection-plus", "haas-inspection-plus"];
+
+#[test]
+fn with_a_probing_package() {
+    for (machine, program) in [
+        ("swivel-head", "head"),
+        ("swivel-head", "table"),
+        ("double-head", "double-head"),
+        ("trunnion", "basic"),
+        ("swivel-table-b", "basic"),
+    ] {
+        all_clean(machine, program, false, &PACKAGES);
+    }
+    all_clean("trunnion", "basic", true, &PACKAGES);
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for base in PACKAGES {
+        let lines = "[number]\ndecimals = 4\nunverified = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = 5\nunverified = \"ours\"\n";
+        is_clean(&variant(base, lines), &machine, &generated);
+    }
+}
+
+/// The worked example of docs/guide/controllers.md, as it stands there.
+#[test]
+fn the_variant_of_the_guide() {
+    let guide = include_str!("../docs/guide/controllers.md");
+    let example = guide.split("```toml\n").find(|part| part.contains("shop-mill")).unwrap();
+    let text = example.split("```").next().unwrap();
+    let (post, _) = parse(&source("shop-mill.toml", text)).unwrap_or_else(|e| panic!("{e}"));
+    let machine = machine("swivel-head");
+    is_clean(&post, &machine, &generated(&machine, "table", false));
+    is_clean(&post, &machine, &generated(&machine, "head", false));
+}
+
 /// The machines with a small program, for every control.
 fn all_clean(machine_name: &str, program: &str, tcp: bool, controllers: &[&str]) {
     let machine = machine(machine_name);
@@ -119,7 +153,16 @@ fn names_and_numbers_of_axes() {
 fn axes_of_0_to_360() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "table", false);
-    is_clean(&variant("heidenhain", "[settings]\nmodulo = \"C\"\n"), &machine, &generated);
+    for base in ["heidenhain", "fanuc", "haas"] {
+        is_clean(&variant(base, "[settings]\nmodulo = \"C\"\n"), &machine, &generated);
+    }
+    // turned the other way round it is another program
+    let post = variant("fanuc", "[settings]\nmodulo = \"C\"\n");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    assert!(text.contains("G0 C-"), "no turn in the negative sense");
+    let against = Against { plan: Some(&generated.plan), ..Against::default() };
+    let other = check(&machine, &post, &source("p.nc", text.replacen("G0 C-", "G0 C", 1)), &against).unwrap();
+    assert!(!other.findings.is_empty());
 }
 
 #[test]

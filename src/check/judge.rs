@@ -4,7 +4,7 @@
 //! must happen when something goes wrong are judged here, from what the program did and not from how it was made.
 
 use super::explore::{Branch, Told};
-use super::run::{Event, Happened, Probe, Rate};
+use super::run::{Alarm, Event, Happened, Probe, Rate};
 use super::touches::{Made, against_plan};
 use super::world::World;
 use crate::axes::{AxisMap, AxisName, Position};
@@ -258,9 +258,12 @@ impl<'a, 'b> Walk<'a, 'b> {
                 }
                 self.moved(at, part, &from, &to, *rate, known, named);
             }
-            Event::Probe { probe, outcome } => {
+            Event::Probe { probe, outcome, latched } => {
                 let (from, to) = (self.case.world.axes(part, &probe.from), self.case.world.axes(part, &probe.to));
                 self.probe(at, part, probe, &from, &to, outcome.hit, outcome.part);
+                if let Some(contact) = &mut self.contact {
+                    contact.made.latched = self.case.world.axes(part, latched);
+                }
             }
             Event::Release { from, to } => {
                 let (from, to) = (self.case.world.axes(part, from), self.case.world.axes(part, to));
@@ -612,7 +615,7 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
     let moves = branch.trace.iter().skip(1).find(|h| match &h.event {
         Event::Move { from, to, .. } => !(stuck && goes_back(branch, from, to)),
         // with the probe deflected a search ends where it begins
-        Event::Probe { probe, outcome } => {
+        Event::Probe { probe, outcome, .. } => {
             !(stuck && (outcome.part == 0.0 || goes_back(branch, &probe.from, &probe.to)))
         }
         _ => false,
@@ -643,7 +646,16 @@ fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) 
     if ends_well && !branch.trace.iter().any(stops) {
         complain(&first.at, "the program ends as if it were complete");
     }
-    compare_settings(case, &told.settings[0], &branch.settings, &first.at, what, said);
+    let alarmed = branch.trace.iter().any(
+        |h| matches!(&h.event, Event::Probe { probe, outcome, .. } if probe.alarm == Alarm::AtEvent && outcome.hit),
+    );
+    let mut after = branch.settings.clone();
+    if alarmed {
+        // the package's own alarm: what it leaves is the package's, and the postprocessor file says what that is
+        let calls = case.post.check.as_ref().map(|c| c.calls.as_slice()).unwrap_or_default();
+        after.retain(|name, _| !calls.iter().any(|c| c.leaves.contains(name)));
+    }
+    compare_settings(case, &told.settings[0], &after, &first.at, what, said);
 }
 
 /// How far a way back may lead sideways: its words are rounded, and it may be short, mm.

@@ -84,28 +84,41 @@ struct Part {
 /// # Errors
 /// When the text is not of the dialect's grammar, or plan and machine do not belong together.
 pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
+    let program = read(post, source, against.beside)?;
+    match against.plan {
+        Some(plan) => with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?),
+        None => without_plan(machine, post, source, against, &program),
+    }
+}
+
+/// Is a text a program of the control's dialect, as far as the grammar says?
+///
+/// # Errors
+/// The first place that is not of the grammar.
+pub fn grammar(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<()> {
+    read(post, source, beside).map(|_| ())
+}
+
+fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<runs::Program> {
     let rule = post.check.as_ref().ok_or_else(|| {
         Failure::new(
             "check::no_dialect",
             format!("controller {} does not say how its programs are read back", post.name),
         )
-        .help("write [check] dialect = \"ngc\" (macro-b, klartext) in the postprocessor file")
+        .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
     })?;
     let text = source.inner();
     if let Some(line) = lines::lines(text).find(|l| l.text.chars().count() > post.line_length) {
         let says = format!("the line is longer than the {} characters that the control takes", post.line_length);
         return Err(Finding::error("check::line_length", says).at(source, line.all()).into());
     }
-    let masks = heidenhain::Masks::read(text, post, against.beside)?;
-    let program = runs::Program::parse(post, rule, text, &masks).map_err(|fault| {
+    let masks = heidenhain::Masks::read(text, post, beside)?;
+    runs::Program::parse(post, rule, text, &masks).map_err(|fault| {
         Finding::error("check::not_understood", fault.says)
             .help("axiscal does not know this; whether it is safe cannot be said")
             .at(source, fault.at)
-    })?;
-    match against.plan {
-        Some(plan) => with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?),
-        None => without_plan(machine, post, source, against, &program),
-    }
+            .into()
+    })
 }
 
 /// The names of the files that a program needs beside it at the control and that say what it writes.
@@ -202,7 +215,9 @@ fn with_parts(
     // a search that is a way along a vector: begin, way and end are rounded each
     let roundings = if program.is_relative() { 3.0 } else { 1.0 };
     let step = post.number.mm(10f64.powi(-(post.number.decimals as i32)));
-    let same = 0.51 * roundings * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };
+    // under a transformation the rounding of one word shows in the others as well
+    let turned = if tcp { 3f64.sqrt() } else { 1.0 };
+    let same = 0.51 * roundings * turned * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };
     let case = Case {
         machine,
         post,

@@ -95,7 +95,7 @@ pub fn write_event(text: &mut String, happened: &Happened) {
             }
             writeln!(text, " {exact} {named:?}")
         }
-        Event::Probe { probe, outcome } => {
+        Event::Probe { probe, outcome, .. } => {
             text.push_str("probe");
             place(text, &probe.from);
             text.push_str(" to");
@@ -104,7 +104,7 @@ pub fn write_event(text: &mut String, happened: &Happened) {
             whole(text, probe.feed);
             // part of the way: to a thousand-millionth
             let part = (outcome.part * 1e9).round() as i64;
-            writeln!(text, " {} {} {} {} {part}", probe.toward, probe.overridden, probe.strict, outcome.hit)
+            writeln!(text, " {} {} {} {} {part}", probe.toward, probe.overridden, probe.alarm.word(), outcome.hit)
         }
         Event::Release { from, to } => {
             text.push_str("release");

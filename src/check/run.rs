@@ -36,8 +36,39 @@ pub struct Probe {
     pub known: [bool; 6],
     /// The operator's feed override acts on it.
     pub overridden: bool,
-    /// A closed circuit of the control breaks the program off when the move ends the wrong way.
-    pub strict: bool,
+    /// When the control itself breaks the program off.
+    pub alarm: Alarm,
+}
+
+/// When a control breaks a program off at a move that the probe may end, with an alarm of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Alarm {
+    /// The program has to look.
+    Never,
+    /// When the event for which it waits does not come.
+    WithoutEvent,
+    /// When it does: a guarded move of a macro package.
+    AtEvent,
+}
+
+impl Alarm {
+    /// How it stands in a proof.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Never => "false",
+            Self::WithoutEvent => "true",
+            Self::AtEvent => "at the event",
+        }
+    }
+
+    /// Does it come?
+    pub fn comes(self, outcome: Outcome) -> bool {
+        match self {
+            Self::Never => false,
+            Self::WithoutEvent => !outcome.hit,
+            Self::AtEvent => outcome.hit,
+        }
+    }
 }
 
 /// How a move that the probe may end did end.
@@ -73,6 +104,8 @@ pub enum Event {
         probe: Probe,
         /// How it ended.
         outcome: Outcome,
+        /// The place that the control keeps of it.
+        latched: Position,
     },
     /// The control itself went back from where the probe had triggered, as a part of the same block.
     Release {
@@ -167,7 +200,7 @@ impl Vm {
             }
             Event::Log(_) => self.hits = 0,
             Event::Move { .. } | Event::Release { .. } => self.moved = true,
-            Event::Probe { probe, outcome } => {
+            Event::Probe { probe, outcome, .. } => {
                 self.moved = true;
                 self.hits += usize::from(probe.toward && outcome.hit);
             }
@@ -313,6 +346,34 @@ pub struct Fault {
     pub says: String,
 }
 
+/// Where the axes stand when they have stopped behind a contact: they need a way for that. A program that logs this place, and
+/// not the one that the control has kept, shows.
+fn beyond(probe: &Probe, contact: &Position) -> Position {
+    const OVERTRAVEL_MM: f64 = 0.0085;
+    let way = probe.to.xyz_mm() - probe.from.xyz_mm();
+    let mut at = *contact;
+    if let Some(along) = way.try_normalize(1e-12) {
+        let left = (probe.to.xyz_mm() - contact.xyz_mm()).norm();
+        at.0.iter_mut().zip(along.iter()).for_each(|(slot, a)| *slot += a * OVERTRAVEL_MM.min(left));
+    }
+    at
+}
+
+/// What the encoders of a real machine say at a contact: each axis off by its own fraction of a least step, another one at each
+/// place. A reading that is left over from another touch, or that nobody has made, shows.
+fn latched(contact: &Position, tcp: bool) -> Position {
+    const OFF: [f64; 6] = [1.3e-3, 1.1e-3, 0.9e-3, 0.4e-3, 0.5e-3, 0.6e-3];
+    // the same place has the same reading, whatever came before it
+    let phase = contact.0.iter().zip([12.9898, 78.233, 37.719, 4.581, 9.137, 7.313]).map(|(x, f)| x * f).sum::<f64>();
+    let mut at = *contact;
+    // under a transformation an angle's last digits would move the linear axes by more than those of the log
+    let axes = if tcp { 3 } else { 6 };
+    for (k, (slot, off)) in at.0.iter_mut().zip(OFF).enumerate().take(axes) {
+        *slot += off * (phase + 1.7 * k as f64).sin();
+    }
+    at
+}
+
 /// What may go wrong at a statement that is no move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
@@ -433,11 +494,17 @@ impl<'p, D: Dialect> Run<'p, D> {
         if outcome.part >= 1.0 {
             stands = probe.to;
         }
-        self.vm.at = stands;
-        self.vm.note(Event::Probe { probe: probe.clone(), outcome });
-        self.dialect.probed(&probe, outcome, &stands);
-        if probe.strict && !outcome.hit {
-            let says = if probe.toward { "the move ended without contact" } else { "the probe did not close" };
+        let touched = outcome.hit && outcome.part > 0.0 && probe.toward;
+        let latched = if touched { latched(&stands, self.vm.world.is_tcp()) } else { stands };
+        self.vm.at = if touched { beyond(&probe, &stands) } else { stands };
+        self.vm.note(Event::Probe { probe: probe.clone(), outcome, latched });
+        self.dialect.probed(&probe, outcome, &latched);
+        if probe.alarm.comes(outcome) {
+            let says = match (outcome.hit, probe.toward) {
+                (true, _) => "contact on the way",
+                (false, true) => "the move ended without contact",
+                (false, false) => "the probe did not close",
+            };
             self.vm.note(Event::Abort(says.to_owned()));
             self.over = true;
         }

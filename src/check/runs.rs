@@ -439,8 +439,8 @@ fn deeds(told: &Told) -> Vec<Deed> {
                 numbers.extend(AxisName::ALL.into_iter().filter(|a| named[a.index()]).map(|a| to.get(a)));
             }
             Event::Probe { probe, .. } if probe.known != all_known => continue,
-            Event::Probe { probe, outcome } => {
-                says = format!("probe {} {} {} {}", probe.toward, probe.overridden, probe.strict, outcome.hit);
+            Event::Probe { probe, outcome, .. } => {
+                says = format!("probe {} {} {} {}", probe.toward, probe.overridden, probe.alarm.word(), outcome.hit);
                 numbers.push(probe.feed);
                 numbers.extend(probe.from.0);
                 numbers.extend(probe.to.0);

@@ -30,7 +30,7 @@ pub fn seconds(trunk: &[Happened]) -> f64 {
                 let turning = if turn > 0.0 { turn / ROTARY_DEG_MIN * PER_MINUTE + SETTLE_S } else { 0.0 };
                 way / speed * PER_MINUTE + turning + MOVE_S
             }
-            Event::Probe { probe, outcome } => {
+            Event::Probe { probe, outcome, .. } => {
                 way(&probe.from, &probe.to) * outcome.part / probe.feed * PER_MINUTE + MOVE_S
             }
             Event::Release { from, to } => way(from, to) / RAPID_MM_MIN * PER_MINUTE + MOVE_S,

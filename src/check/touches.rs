@@ -22,6 +22,8 @@ pub struct Made {
     pub search: ([Position; 3], f64),
     /// The same of the measuring touch, and whether the feed override acts on it.
     pub measured: Option<([Position; 3], f64, bool)>,
+    /// What the control has kept of the last of them.
+    pub latched: Position,
     /// The ball has moved off between the two.
     pub backed_off: bool,
     /// What went into the log.
@@ -51,6 +53,7 @@ impl Made {
             block,
             search: ([*from, *to, *contact], probe.feed),
             measured: None,
+            latched: *contact,
             backed_off: false,
             log: None,
             senses: AxisMap::default(),
@@ -64,11 +67,6 @@ impl Made {
         if hit {
             self.measured = Some(([*from, *to, *contact], probe.feed, probe.overridden));
         }
-    }
-
-    fn contact(&self) -> &Position {
-        let (places, ..) = self.measured.as_ref().map_or((&self.search.0, 0.0), |m| (&m.0, m.1));
-        &places[2]
     }
 }
 
@@ -140,7 +138,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
         let room = step
             + LOGGED
             + if plan.controller_frame == crate::program::plan::ControllerFrame::Tcp { 1e-4 } else { 0.0 };
-        if made.contact().0.iter().zip(raw.position.0).any(|(a, b)| (a - b).abs() > room) {
+        if made.latched.0.iter().zip(raw.position.0).any(|(a, b)| (a - b).abs() > room) {
             let says = format!("touch {id}: the log does not hold the place of the contact");
             said.say(case, "check::log", &place, says, "");
         }

@@ -427,9 +427,9 @@ pub struct Check {
     /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
     #[schemars(with = "String")]
     pub from: Spanned<String>,
-    /// Said by a variant whose programs hold macros that nobody has described to axiscal: they are not read back.
+    /// What the macros of a package do, which a program calls (G65): only of Fanuc and Haas.
     #[serde(default)]
-    pub not_read_back: bool,
+    pub call: Vec<CallRule>,
     /// The control logs to a device that is always there: the program neither names nor opens a log.
     #[serde(default)]
     pub log_always_open: bool,
@@ -443,6 +443,29 @@ pub struct Check {
     pub source: Option<String>,
     /// Why it is not verified.
     pub unverified: Option<String>,
+}
+
+/// What a macro of a package does, so that a program which calls it can be proven.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CallRule {
+    /// Its number: 9810 for `G65 P9810`.
+    pub program: u32,
+    /// What it does.
+    pub does: Does,
+    /// Settings of the control that stay changed when it breaks the program off, by the names that `check` gives them.
+    #[serde(default)]
+    pub leaves: Vec<String>,
+}
+
+/// What a macro of a package does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Does {
+    /// A straight move to X, Y, Z at F that stops at contact, with an alarm that ends the program.
+    GuardedMove,
+    /// Nothing moves: a probe switched on or off.
+    NothingMoves,
 }
 
 /// The grammar of a control's programs.

@@ -43,14 +43,23 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     if let Some(tables) = &file.tables {
         super::tables::check(&mut check, tables);
     }
-    let reading = file.check.as_ref().filter(|c| !c.not_read_back).map(|c| {
+    let reading = file.check.as_ref().map(|c| {
         check.origin("check", &c.source, &c.unverified, &c.from.span());
+        if !c.call.is_empty() && c.dialect != w::DialectName::MacroB {
+            check.error(
+                &c.from.span(),
+                "post::call",
+                "[[check.call]] stands in the file of a control that has no G65".to_owned(),
+                "it describes macros of Fanuc and Haas (dialect = \"macro-b\")",
+            );
+        }
         check.word("from", &c.from, |f| !f.trim().is_empty(), "the variable that the program sets to 1 near its top");
         CheckRule {
             dialect: c.dialect,
             from: c.from.get_ref().clone(),
             leaves: c.leaves.clone(),
             after_abort: c.after_abort.clone(),
+            calls: c.call.clone(),
             log_always_open: c.log_always_open,
         }
     });

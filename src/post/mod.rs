@@ -16,7 +16,7 @@ mod render;
 mod spelling;
 pub mod tables;
 
-pub use as_written::{DialectName, LengthUnit};
+pub use as_written::{CallRule, DialectName, Does, LengthUnit};
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
@@ -113,6 +113,8 @@ pub struct CheckRule {
     pub log_always_open: bool,
     /// Settings that a run behind the last set-up gives back after the program was broken off.
     pub after_abort: Vec<String>,
+    /// What the macros of a package do.
+    pub calls: Vec<CallRule>,
     /// Settings that the program leaves changed.
     pub leaves: Vec<String>,
 }

@@ -7,7 +7,7 @@
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -167,7 +167,7 @@ impl Heidenhain {
             known: vm.known,
             // the head of the program says at what it must stand; a program cannot switch it off
             overridden: false,
-            strict: false,
+            alarm: Alarm::Never,
         }))
     }
 

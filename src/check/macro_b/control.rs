@@ -5,11 +5,12 @@
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
-use crate::post::Postprocessor;
+use crate::post::{CallRule, Does, Postprocessor};
 use crate::units::mm_from_inch;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The state of the control.
 #[derive(Debug, Clone)]
@@ -42,7 +43,19 @@ pub struct MacroB {
     /// In work coordinates, mm and deg.
     skipped: [f64; 6],
     seconds: f64,
+    /// What the macros of a package do.
+    calls: Arc<[CallRule]>,
+    /// M functions of the builder that switch the probe.
+    builder: Arc<[f64]>,
+    /// Axes that count from 0 to 360.
+    modulo: [bool; 6],
 }
+
+/// Whole turn, deg.
+const TURN: f64 = 360.0;
+
+/// Angles that differ by less are the same, deg.
+const SAME_DEG: f64 = 1e-6;
 
 impl MacroB {
     fn unit(&self, axis: AxisName) -> f64 {
@@ -68,11 +81,45 @@ impl MacroB {
         AxisName::ALL.into_iter().find(|a| self.numbers[a.index()] == Some(number))
     }
 
-    fn target(&self, words: &[Spoken], vm: &Vm) -> [Option<f64>; 6] {
+    fn target(&self, words: &[Spoken], vm: &mut Vm) -> [Option<f64>; 6] {
         AxisName::ALL.map(|axis| {
             let way = self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
-            Some(if self.incremental { vm.at.get(axis) + way } else { way + self.shift(axis) })
+            Some(match (self.incremental, self.modulo[axis.index()]) {
+                (true, _) => vm.at.get(axis) + way,
+                (false, true) => self.turn(axis, way, vm),
+                (false, false) => way + self.shift(axis),
+            })
         })
+    }
+
+    /// Where a roll-over axis ends, whole turns counted: its sign is the sense in which it turns (No. 1008, RABx = 1).
+    fn turn(&self, axis: AxisName, value: f64, vm: &mut Vm) -> f64 {
+        let place = value.abs() + self.shift(axis);
+        let at = vm.at.get(axis);
+        let mut by = (place - at).rem_euclid(TURN);
+        if !(SAME_DEG..=TURN - SAME_DEG).contains(&by) {
+            by = 0.0;
+        }
+        if value.is_sign_negative() && by > 0.0 {
+            by -= TURN;
+        }
+        if vm.known[axis.index()] {
+            return at + by;
+        }
+        // nobody knows how often it has turned: counted as the plan does from here on
+        let near = vm.turned_near.get(axis);
+        let end = near + (place - near + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
+        vm.at.set(axis, end - by);
+        end
+    }
+
+    /// What the control shows of a position, mm or deg.
+    fn shown(&self, axis: AxisName, place: f64) -> f64 {
+        if !self.modulo[axis.index()] {
+            return place;
+        }
+        let turned = place.rem_euclid(TURN);
+        if turned > TURN - SAME_DEG { 0.0 } else { turned }
     }
 
     /// A number without its point counts least increments.
@@ -110,6 +157,10 @@ impl MacroB {
     fn auxiliary(&mut self, m: f64, words: &[Spoken], vm: &mut Vm) -> Result<bool, String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         let whole = m.round() as i64;
+        if self.builder.contains(&m) {
+            vm.note(Event::Other(format!("M{m}")));
+            return Ok(false);
+        }
         if (m - m.round()).abs() > 1e-9 {
             return Err(format!("M{m} is not known here"));
         }
@@ -122,6 +173,50 @@ impl MacroB {
             _ => return Err(format!("M{m} is not known here")),
         }
         Ok(false)
+    }
+
+    /// G65: a macro of a package, as the postprocessor file describes it.
+    fn call(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
+        let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
+        let number = value("P").ok_or("G65 needs P")?;
+        let calls = Arc::clone(&self.calls);
+        let rule = calls.iter().find(|c| f64::from(c.program) == number).ok_or_else(|| {
+            format!("what G65 P{number} does is not known here: [[check.call]] of the postprocessor file may say it")
+        })?;
+        let given = |w: &&Spoken| !matches!(w.address, "G" | "P");
+        match rule.does {
+            Does::NothingMoves => {
+                if let Some(word) = words.iter().find(given) {
+                    return Err(format!("G65 P{number} is not known with the word {}", word.address));
+                }
+                vm.note(Event::Other(format!("P{number}")));
+                Ok(Next::On)
+            }
+            Does::GuardedMove => {
+                if let Some(word) = words.iter().filter(given).find(|w| !"XYZF".contains(w.address)) {
+                    return Err(format!("G65 P{number} is not known with the word {}", word.address));
+                }
+                if !words.iter().any(|w| "XYZ".contains(w.address)) {
+                    return Err("no axis word stands with the move".to_owned());
+                }
+                self.may_move()?;
+                let feed = value("F").filter(|f| *f > 0.0).ok_or("a guarded move needs a feed")?;
+                self.feed = feed * if self.inch { mm_from_inch(1.0) } else { 1.0 };
+                if self.feed_mode != 94.0 || self.incremental {
+                    return Err(format!("G65 P{number} needs G90 and G94"));
+                }
+                let to = self.target(words, vm);
+                Ok(Next::Probe(Probe {
+                    from: vm.at,
+                    to: vm.target(&to)?,
+                    feed: self.feed,
+                    toward: true,
+                    known: vm.known,
+                    overridden: (self.holds as u32) & 2 == 0,
+                    alarm: Alarm::AtEvent,
+                }))
+            }
+        }
     }
 
     fn may_move(&self) -> Result<(), String> {
@@ -178,19 +273,28 @@ impl MacroB {
             4130 => self.system_p,
             5021..=5026 => {
                 let axis = self.axis(n - 5020)?;
-                vm.at.get(axis) / self.unit(axis)
+                self.shown(axis, vm.at.get(axis)) / self.unit(axis)
             }
             5041..=5046 => {
                 let axis = self.axis(n - 5040)?;
-                (vm.at.get(axis) - self.shift(axis)) / self.unit(axis)
+                self.shown(axis, vm.at.get(axis) - self.shift(axis)) / self.unit(axis)
             }
             5061..=5066 => {
                 let axis = self.axis(n - 5060)?;
-                self.skipped[axis.index()] / self.unit(axis)
+                self.shown(axis, self.skipped[axis.index()]) / self.unit(axis)
             }
             _ => return None,
         })
     }
+}
+
+/// The M functions with which a file switches the probe on and off; those that mean something else to every control are not the
+/// builder's.
+fn builder(post: &Postprocessor) -> Arc<[f64]> {
+    const EVERYBODY_S: [f64; 9] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 30.0, 98.0, 99.0];
+    let lines = ["probe_on", "probe_off"].into_iter().filter_map(|name| post.settings.get(name));
+    let words = lines.flat_map(|text| text.split_whitespace()).filter_map(|word| word.strip_prefix('M'));
+    words.filter_map(|digits| digits.parse().ok()).filter(|m| !EVERYBODY_S.contains(m)).collect()
 }
 
 /// The G numbers (in tenths) of one modal group: a block may hold one of each.
@@ -232,6 +336,11 @@ impl Dialect for MacroB {
             own: Values::new(),
             skipped: [0.0; 6],
             seconds: 0.0,
+            calls: post.check.iter().flat_map(|c| c.calls.iter().cloned()).collect(),
+            builder: builder(post),
+            modulo: AxisName::ALL.map(|a| {
+                a.is_rotary() && post.settings.get("modulo").is_some_and(|letters| letters.contains(a.letter()))
+            }),
         }
     }
 
@@ -246,6 +355,12 @@ impl Dialect for MacroB {
             if gs.iter().filter(|g| group.contains(g)).count() > 1 {
                 return Err("two G words of one group stand in one block".to_owned());
             }
+        }
+        if gs.contains(&650) {
+            if gs.len() > 1 {
+                return Err("another G word stands before G65".to_owned());
+            }
+            return self.call(words, vm);
         }
         let axes = words.iter().any(|w| "XYZABC".contains(w.address));
         let motion = gs.iter().copied().find(|g| matches!(g, 0 | 10 | 310));
@@ -272,9 +387,8 @@ impl Dialect for MacroB {
         }
         if gs.iter().any(|g| matches!(g, 434 | 2340)) {
             (self.tool_on, self.tool_mm) = (true, self.stored_mm);
-            let moves = |axis: &AxisName| {
-                self.target(words, vm)[axis.index()].is_some_and(|to| (to - vm.at.get(*axis)).abs() > 1e-6)
-            };
+            let to = self.target(words, vm);
+            let moves = |axis: &AxisName| to[axis.index()].is_some_and(|to| (to - vm.at.get(*axis)).abs() > SAME_DEG);
             if AxisName::ALL.iter().any(moves) {
                 return Err("the block that switches the transformation on moves".to_owned());
             }
@@ -299,7 +413,7 @@ impl Dialect for MacroB {
                 toward: true,
                 known: vm.known,
                 overridden: (self.holds as u32) & 2 == 0,
-                strict: false,
+                alarm: Alarm::Never,
             }));
         }
         let rate = match motion {

@@ -31,7 +31,7 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, number: &NumberRule) -> Result<Code, Fault> {
-    let mut reader = Reader { names: number.spoken(), ..Reader::default() };
+    let mut reader = Reader { names: number.spoken(), always_mark: number.always_mark, ..Reader::default() };
     for line in lines(text) {
         reader.line(&line)?;
     }
@@ -42,6 +42,8 @@ pub fn parse(text: &str, number: &NumberRule) -> Result<Code, Fault> {
 struct Reader {
     /// What the control calls each axis.
     names: Vec<(String, AxisName)>,
+    /// Every number of a place or a feed is written with its decimal point: one without has lost it.
+    always_mark: bool,
     code: Code,
     labels: BTreeMap<u32, usize>,
     jumps: Vec<(usize, u32, Range<usize>)>,
@@ -172,6 +174,13 @@ impl Reader {
                 cut(word_value).parse(&left[length..]).map_err(|e| line.unread(&e, "the value of a word"))?;
             if words.iter().any(|w| w.address == address) && address != "G" {
                 return Err(line.fault(left, format!("two {address} words stand in one block")));
+            }
+            let a_length = AXES.contains(&address) || address == "F";
+            if self.always_mark && a_length && !point && !matches!(value, Expr::Number(0.0)) {
+                let says = format!(
+                    "the number behind {address} has no decimal point: the control may count it in thousandths"
+                );
+                return Err(line.fault(left, says));
             }
             words.push(Word { address, value, point });
             left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;

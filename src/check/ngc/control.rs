@@ -5,7 +5,7 @@
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -419,7 +419,7 @@ impl Dialect for Ngc {
                 toward: motion <= 383,
                 known: vm.known,
                 overridden: self.modes.override_on,
-                strict: motion == 382 || motion == 384,
+                alarm: if matches!(motion, 382 | 384) { Alarm::WithoutEvent } else { Alarm::Never },
             }));
         }
         let rate = match motion {

@@ -8,7 +8,7 @@
 use super::words::{Way, axis_word};
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -263,7 +263,7 @@ impl Sinumerik {
             known: vm.known,
             // a program cannot lock the override: its head tells the operator
             overridden: false,
-            strict: false,
+            alarm: Alarm::Never,
         };
         let touches = vm.known.iter().zip(vm.axes).all(|(k, a)| *k || !a) && vm.world.outcome(vm, &probe).hit;
         if touches && !vm.asked {
