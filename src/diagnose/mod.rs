@@ -12,6 +12,7 @@ mod findings;
 pub mod gross;
 mod missed;
 pub mod named;
+mod nothing;
 pub mod open;
 pub mod places;
 pub mod sketch;
@@ -183,6 +184,9 @@ fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Features
 /// When a refit is impossible.
 pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let Subject { machine, catalogue, fit, .. } = subject;
+    if fit.n_used() == 0 {
+        return Ok(nothing::used(subject, options));
+    }
     let features = features::features(fit, machine);
     let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
     let named = Named::of(fit, &evidence, machine, catalogue);
