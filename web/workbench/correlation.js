@@ -24,7 +24,7 @@ function draw() {
   matrix.forEach((row, i) => row.slice(0, i).forEach((r, k) => { if (Math.abs(r ?? 0) >= STRONG) strong.push([Math.abs(r), `${names[k]} and ${names[i]} (${r.toFixed(2)})`]); }));
   strong.sort((a, b) => b[0] - a[0]);
   const more = strong.length > 4 ? ` and ${strong.length - 4} more` : "";
-  show("correlation-says", `Near 0 two results are told apart; near 1 or −1 only their difference or sum is known well. ${strong.length
+  show("correlation-says", `Results of the model as it is switched now. Near 0 two results are told apart; near 1 or −1 only their difference or sum is known well. ${strong.length
     ? `Hard to tell apart here: ${strong.slice(0, 4).map((s) => s[1]).join(", ")}${more}.` : `No two results hang together by ${STRONG} or more.`}`);
   box.style.height = `${Math.min(40, 9 + 1.7 * names.length)}em`;
   const traces = [{
