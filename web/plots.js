@@ -171,7 +171,7 @@ globalThis.axiscalPlots = (() => {
     const wide = Math.max(...all) / Math.min(...all) > 12;
     const lay = layout(el, {
       showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
-      xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], title: { text: 'model, step by step' } },
+      xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], zeroline: false, title: { text: 'model, step by step' } },
       yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'bottom', bgcolor: c.paper, borderpad: 1, yshift: 2, showarrow: false, text: `probe's noise ${digits(noise)} µm` }],
@@ -362,10 +362,13 @@ globalThis.axiscalPlots = (() => {
   /** The heads of arrows: cones whose point is the arrow's end. */
   function arrowHeads(view, rung, arrows, colour, extent) {
     const t = view.touches;
+    const length = arrows.shafts.map(([a, b]) => Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]));
+    // a third of its arrow, at most
+    const size = length.map((l) => Math.min(l / 2.5, 0.04 * extent));
     const of = (k) => arrows.tips.map((p) => p[k]);
-    const along = (k) => arrows.which.map((i) => t.normal[i][k] * Math.sign(t.residual_um[rung][i]));
+    const along = (k) => arrows.which.map((i, n) => size[n] * t.normal[i][k] * Math.sign(t.residual_um[rung][i]));
     return {
-      type: 'cone', x: of(0), y: of(1), z: of(2), u: along(0), v: along(1), w: along(2), anchor: 'tip', sizemode: 'absolute', sizeref: 0.035 * extent,
+      type: 'cone', x: of(0), y: of(1), z: of(2), u: along(0), v: along(1), w: along(2), anchor: 'tip', sizemode: 'raw', sizeref: 1,
       colorscale: [[0, colour], [1, colour]], showscale: false, legendgroup: arrows.name, showlegend: false, hoverinfo: 'skip',
     };
   }
@@ -417,10 +420,10 @@ globalThis.axiscalPlots = (() => {
     const off = { visible: false, showgrid: false, zeroline: false };
     const side = (title) => ({ title: { text: title }, color: c.ink, gridcolor: c.grid, zerolinecolor: c.grid, backgroundcolor: 'rgba(0,0,0,0)', range: undefined });
     // the touches fill the picture; the table may be cut
-    const r = flat ? 1.05 * parts.extent : 0.85 * parts.extent;
+    const r = flat ? 1.05 * parts.extent : 0.76 * parts.extent;
     const lay = flat
       ? layout(el, { ...common, xaxis: { ...off, range: undefined }, yaxis: { ...off, scaleanchor: 'x' } })
-      : layout(el, { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 1.15, y: -1.55, z: 0.8 }, center: { x: 0, y: 0, z: -0.12 } },
+      : layout(el, { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 1.1, y: -1.47, z: 0.74 }, center: { x: 0, y: 0, z: -0.18 } },
         xaxis: { ...side('X, mm'), range: [parts.centre[0] - r, parts.centre[0] + r] },
         yaxis: { ...side('Y, mm'), range: [parts.centre[1] - r, parts.centre[1] + r] },
         zaxis: { ...side('Z, mm'), range: [parts.centre[2] - r, parts.centre[2] + r] } } });

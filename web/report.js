@@ -206,13 +206,13 @@
       plot(div, job);
       grid.append(f);
     }
-    s.append(grid);
-    s.append(make('p', {}, view.comparison_says));
+    // before the plots: on paper it would stand alone on a page behind them
+    s.append(make('p', {}, view.comparison_says), grid);
   }
 
   // ---------------------------------------------------------------- the machine
   {
-    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch points the way the touched face seems to stand off.', true);
+    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch points the way the touched face seems to stand off.');
     const [f, div] = figure('machine-plot', '', true);
     const scale = make('figcaption', {});
     const job = () => P.machine(div, view, state).then((parts) => {
