@@ -84,7 +84,8 @@ globalThis.axiscalPlots = (() => {
       { i: after, name: proposed ? `after, with<br>${safe(view.ladder[after].added.join(', '))}` : 'after (what the<br>model leaves)', colour: OKABE.blue },
     ].filter((r, k, all) => k === 0 || r.i !== all[0].i);
     const values = rows.map((r) => view.ladder[r.i].rms_um);
-    rows.forEach((r, k) => { r.name = `${r.name}<br><b>${digits(values[k])} µm</b>`; });
+    // as many unknowns as touches leave nothing but the computer's rounding
+    rows.forEach((r, k) => { r.name = `${r.name}<br><b>${values[k] < 5e-4 ? '0' : digits(values[k])} µm</b>`; });
     const top = Math.max(...values, noise);
     const traces = [{
       type: 'bar', orientation: 'h', y: rows.map((r) => r.name), x: values,
@@ -445,7 +446,7 @@ globalThis.axiscalPlots = (() => {
       type: 'heatmap', x: names, y: names, z: matrix, zmin: -1, zmax: 1,
       // blue to orange over the paper: told apart by everybody
       colorscale: [[0, OKABE.blue], [0.5, c.paper], [1, OKABE.red]], colorbar: { title: { text: 'correlation' }, thickness: 12, tickvals: [-1, -0.5, 0, 0.5, 1] },
-      text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2)))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
+      text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2).replace('-0.00', '0.00').replace('-', '−')))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
       hovertemplate: '%{y} and %{x}: %{z:.2f}<extra></extra>',
     }];
     const lay = layout(el, { margin: { l: 8, r: 10, t: 10, b: 8 }, yaxis: { autorange: 'reversed', ticks: '' }, xaxis: { ticks: '', tickangle: -45, automargin: true } });

@@ -98,7 +98,7 @@
   const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (nobody stated one: this is the default; [tolerance] in the study changes it)'}.`;
   id('parameters-says').append(
     proposed ? make('span.warn', {}, 'Values with the missing error in the model. Tick: without it; these values hold part of what is missing. ')
-      : view.diagnosis.verdict !== 'adequate' ? make('span.warn', {}, `These values ${view.diagnosis.faint || view.diagnosis.verdict === 'too-little-data' ? 'may hold' : 'hold'} part of what is missing. `) : '',
+      : view.diagnosis.verdict !== 'adequate' && view.parameters.some((p) => p.status !== 'undetermined') ? make('span.warn', {}, `These values ${view.diagnosis.faint || view.diagnosis.verdict === 'too-little-data' ? 'may hold' : 'hold'} part of what is missing. `) : '',
     `Circle: within, diamond: too large, square: uncertain. ${limit}`,
   );
   const copy = (text) => make('button.noprint', { type: 'button', 'aria-label': `copy the command ${text}`, onclick: (ev) => {
@@ -228,10 +228,18 @@
     const s = section('doubt', 'What this data cannot tell', '');
     const list = make('ul.plain');
     const effectName = (n) => d.effects[n]?.name ?? n;
-    const lines = view.undetermined.map((u) => [u.says, u.parted_by?.length ? ` It would take: ${u.parted_by.join('; or ')}.` : '']);
-    // what is said of several combinations alike is said once
-    const once = new Set([...lines.map((l) => l.join('')), ...view.weak.map((w) => w.says)]);
-    for (const text of once) list.append(make('li', {}, text));
+    // what is said of several alike is said once
+    const NO_TRACE = ' leaves no trace in these touches';
+    const untold = view.undetermined.map((u) => ({ says: u.says.split('; what parts them:')[0], takes: u.parted_by?.length ? u.parted_by.join('; or ') : '' }));
+    const silent = untold.filter((u) => u.says.includes(NO_TRACE));
+    const many = silent.length > 2 ? [{ says: `These leave no trace in these touches, so that their values are not known and stand at their start by convention: ${silent.map((u) => u.says.split(NO_TRACE)[0]).join('; ')}.`, takes: [...new Set(silent.map((u) => u.takes).filter(Boolean))].join('; or ') }] : silent;
+    const said = new Set();
+    const lines = [...untold.filter((u) => !silent.includes(u)), ...many].map((u) => {
+      const takes = !u.takes ? '' : said.has(u.takes) ? ' It would take the same.' : ` It would take: ${u.takes}.`;
+      if (u.takes) said.add(u.takes);
+      return u.says.replace(/\.?$/, '.') + takes;
+    });
+    for (const text of new Set([...lines, ...view.weak.map((w) => w.says)])) list.append(make('li', {}, text));
     if (d.not_seen.length) list.append(make('li', {}, `These effects leave no trace in these touches, so nobody can say whether the machine has them: ${d.not_seen.map(effectName).join(', ')}.`));
     const seen = [...d.power].sort((a, b) => b.minimal_detectable_um - a.minimal_detectable_um).slice(0, 8);
     if (seen.length) list.append(make('li', {}, `Effects that would have been found only from this size on: ${seen.map((q) => `${effectName(q.effect)} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));

@@ -31,7 +31,7 @@ function draw() {
     type: "heatmap", x: names, y: names, z: matrix, zmin: -1, zmax: 1, xgap: 1, ygap: 1,
     // blue over paper to orange: told apart by everybody
     colorscale: [[0, colour("x")], [0.5, colour("paper")], [1, colour("y")]], colorbar: { thickness: 12, tickvals: [-1, -0.5, 0, 0.5, 1] },
-    text: matrix.map((row) => row.map((r) => (r === null ? "" : r.toFixed(2)))), texttemplate: names.length <= 12 ? "%{text}" : "",
+    text: matrix.map((row) => row.map((r) => (r === null ? "" : r.toFixed(2).replace("-0.00", "0.00")))), texttemplate: names.length <= 12 ? "%{text}" : "",
     hovertemplate: "%{y} and %{x}: %{z:.2f}<extra></extra>",
   }];
   const layout = layoutOf({ xaxis: { type: "category", tickangle: -45, automargin: true }, yaxis: { type: "category", autorange: "reversed", automargin: true } });
