@@ -248,7 +248,6 @@ fn alias_sets_of_the_papers_plan() {
     assert!(same("positioning-c-2", "squareness-xy"), "{:?}", of(&a, "positioning-c-2"));
     assert!(inside("positioning-c-2", "radial-c-1") && inside("squareness-xy", "radial-c-1"));
     assert!(inside("axial-c-2", "tilt-c-1"), "{:?}", of(&a, "axial-c-2"));
-    assert!(inside("spindle-growth", "warm-up"), "{:?}", of(&a, "spindle-growth"));
     for id in xz {
         assert!(inside(id, "straightness-xz") && inside(id, "pitch-x"), "{id}: {:?}", of(&a, id));
     }
@@ -309,7 +308,7 @@ fn null_directions_are_sentences_with_a_remedy() {
     assert!(offset.says.contains("the tip's offset in Y (ey)"), "{}", offset.says);
     assert!(offset.says.contains("the place of axis C in Y (EY0C)"), "{}", offset.says);
     assert!(offset.says.contains("by convention"), "{}", offset.says);
-    assert!(offset.says.contains("only their sum (EY0C + ey) is seen"), "{}", offset.says);
+    assert!(offset.says.contains("no touch notices +1 mm of EY0C with +1 mm of ey"), "{}", offset.says);
     assert!(!fit.outcome.parted_together.is_empty());
     assert!(offset.parted_by.iter().any(|h| h.contains("turn the spindle by 180")), "{offset:?}");
     assert!(about("ex").says.contains("the tool's offset from axis B in X (EX0B)"), "{}", about("ex").says);
@@ -325,8 +324,18 @@ fn full_leaves_only_what_no_touch_can_show() {
     for (name, location, expected, most_pairs) in [
         ("swivel-head", ["location-b", "location-c"], &["zero-c", "backlash-z", "table-load", "tool-length"][..], 41),
         ("double-head", ["location-b", "location-a"], &["zero-b", "backlash-z", "tool-length"], 41),
-        ("trunnion", ["location-a", "location-c"], &["zero-a", "zero-c", "backlash-z", "table-load"], 41),
-        ("swivel-table-b", ["location-b", "location-c"], &["zero-b", "zero-c", "backlash-z", "table-load"], 41),
+        (
+            "trunnion",
+            ["location-a", "location-c"],
+            &["zero-a", "zero-c", "backlash-z", "table-load", "tool-length"],
+            41,
+        ),
+        (
+            "swivel-table-b",
+            ["location-b", "location-c"],
+            &["zero-b", "zero-c", "backlash-z", "table-load", "tool-length"],
+            41,
+        ),
     ] {
         let machine = common::machine(name);
         let catalogue = Catalogue::built_in().unwrap();
@@ -339,7 +348,9 @@ fn full_leaves_only_what_no_touch_can_show() {
         };
         let a = assess(&request).unwrap();
         println!("{name}: blind {:?}, pairs {}, {:?} {}", invisible(&a), a.alias_pairs, a.score, a.says);
-        assert_eq!(invisible(&a), expected.iter().copied().collect(), "{name}: pairs {}", a.alias_pairs);
+        let moves = |id: &&str| of(&a, id).typical_um > 1e-9;
+        let blind: BTreeSet<&str> = invisible(&a).into_iter().filter(moves).collect();
+        assert_eq!(blind, expected.iter().copied().collect(), "{name}: pairs {}", a.alias_pairs);
         assert!(a.alias_pairs <= most_pairs, "{name}: {:?}", a.alias_groups);
         assert_eq!(a.score, Score::Good, "{name}: {}", a.says);
         // a value that holds another effect with any touches is no fault of the plan, but it is named

@@ -162,7 +162,8 @@ fn type_b_rows_widen_and_unmodelled_effects_are_shown_beside() {
     for p in bare.parameters.iter().filter(|p| MODEL[..2].contains(&p.effect.as_str())) {
         // effects.md, section D: aliasing, not the probe, limits the paper's plan
         assert!(p.sigma_with_unmodelled.unwrap() > 2.0 * p.sigma.unwrap(), "{}", p.name);
-        assert_eq!(p.sigma_noise, p.sigma);
+        // the rest of the standard uncertainty is the scatter of visits that the machine's file declares
+        assert!(p.sigma_noise.unwrap() < p.sigma.unwrap(), "{}", p.name);
     }
     let type_b = [("nonsense".to_owned(), 1.0)].into_iter().collect();
     let all: Vec<(&Plan, &[Touch])> = runs.iter().map(|(p, t)| (p, &t[..])).collect();

@@ -74,27 +74,34 @@ pub fn undetermined(
     Undetermined { combination, says, parted_by: Vec::new() }
 }
 
+/// An amount of an unknown with its unit; lengths all in mm, so that they compare.
+fn plain<'u>((unknown, amount): (&'u Unknown, f64)) -> (f64, &'u str) {
+    if unknown.unit == "um" { (crate::units::mm_from_um(amount), "mm") } else { (amount, &unknown.unit) }
+}
+
 /// What is seen of two results that trade against each other: "their sum (ey + EY0C)", "EX0B + 3.54 mm/deg · EB0B".
 fn what_is_seen(a: (&Unknown, f64), b: (&Unknown, f64)) -> String {
-    let factor = -a.1 / b.1;
+    let ((in_a, unit_a), (in_b, unit_b)) = (plain(a), plain(b));
+    let factor = -in_a / in_b;
     let sign = if factor < 0.0 { '-' } else { '+' };
-    if a.0.unit == b.0.unit && (factor.abs() - 1.0).abs() < 1e-3 {
+    if unit_a == unit_b && (factor.abs() - 1.0).abs() < 1e-3 {
         let what = if factor < 0.0 { "difference" } else { "sum" };
         return format!("their {what} ({} {sign} {})", a.0.name, b.0.name);
     }
-    let unit = if a.0.unit == b.0.unit { String::new() } else { format!(" {}/{}", a.0.unit, b.0.unit) };
+    let unit = if unit_a == unit_b { String::new() } else { format!(" {unit_a}/{unit_b}") };
     format!("{} {sign} {}{unit} * {}", a.0.name, digits(factor.abs()), b.0.name)
 }
 
 /// How results trade against each other: "+1 mm of EX0B with -0.283 deg of EB0B".
 fn trade(physical: &[(&Unknown, f64)], with_blocks: bool) -> String {
     // the first is changed by one of its unit
-    let one = physical.first().map_or(1.0, |p| p.1);
+    let one = physical.first().map_or(1.0, |p| plain(*p).0);
     let each: Vec<String> = physical
         .iter()
-        .map(|(u, amount)| {
+        .map(|p| {
+            let (amount, unit) = plain(*p);
             let x = amount / one;
-            format!("{}{} {} of {}", if x < 0.0 { '-' } else { '+' }, digits(x.abs()), u.unit, u.name)
+            format!("{}{} {unit} of {}", if x < 0.0 { '-' } else { '+' }, digits(x.abs()), p.0.name)
         })
         .chain(with_blocks.then(|| "a set-up of the blocks that goes with it".to_owned()))
         .collect();
