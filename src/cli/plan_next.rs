@@ -66,6 +66,10 @@ pub struct Args {
     pub join: Option<PathBuf>,
 }
 
+fn warn<'a>(said: impl Iterator<Item = &'a String>, io: &Io) {
+    io.report(&said.map(|w| Finding::warning("next::left_out", w.clone())).collect::<Vec<_>>());
+}
+
 /// Runs `plan-next`.
 ///
 /// # Errors
@@ -92,12 +96,15 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let subject =
             Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
         let found = diagnose(subject, &diagnose::Options { power: false, refit: false, ..Default::default() })?;
+        warn(found.warnings.iter(), io);
         if found.verdict == Verdict::MissingEffect && !found.open.suspects.is_empty() {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
             Questions::left_open(found.open.suspects, &found.open.pairs)
         } else {
-            Questions::of_plan(&View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?)
+            let view = View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
+            warn(view.left_out.iter().map(|(_, says)| says).filter(|says| !found.warnings.contains(says)), io);
+            Questions::of_plan(&view)
         }
     } else {
         Questions::named(&args.effects)
@@ -114,6 +121,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let shape = questions.suspects.iter().find(|s| s.id == *id).and_then(|s| s.shape);
         let known = effects.iter().any(|(e, _)| e.id == *id);
         effects.extend(loaded.catalogue.get(id, &loaded.machine).filter(|_| !known).map(|e| (e, shape)));
+    }
+    let asked_of = View::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
+    if let Some((_, says)) = asked_of.left_out.first() {
+        return Err(Failure::new("next::no_value", says.clone())
+            .help("write its formula so that it holds at every touch, or ask for other effects"));
     }
     let budget_s = 60.0 * args.minutes;
     let stands = setting.stands(&loaded.machine, args.moved);

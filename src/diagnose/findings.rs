@@ -171,7 +171,7 @@ pub(super) fn put_together(
             .filter(|s| !s.visible())
             .map(|s| seen.named.effects[s.candidate].id.clone())
             .collect(),
-        warnings: Vec::new(),
+        warnings: seen.named.left_out.clone(),
         open,
     }
 }

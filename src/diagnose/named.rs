@@ -2,7 +2,7 @@
 
 use super::evidence::Evidence;
 use crate::fit::Fit;
-use crate::fit::candidates::{Columns, Variant, variants};
+use crate::fit::candidates::{Columns, Variant, variants, with_values};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::formula::slot;
@@ -10,9 +10,6 @@ use crate::model::predict::Observation;
 use crate::search::{Library, Origin};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
-
-/// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
-const LEAST_TRACE: f64 = 1e-6;
 
 /// A parameter of a candidate: one column.
 #[derive(Debug, Clone)]
@@ -47,6 +44,8 @@ pub struct Named<'c> {
     pub columns: Vec<Vec<Column>>,
     /// The scanned shape of each candidate.
     pub scanned: Vec<Option<Scanned>>,
+    /// What is said of effects that could not be tested.
+    pub left_out: Vec<String>,
 }
 
 /// Effects of catalogue and user that the model does not hold. Not the paper's sets, not whole hypotheses (gross
@@ -93,6 +92,7 @@ impl<'c> Named<'c> {
     #[must_use]
     pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
         let places = without_noise(fit);
+        let (effects, left_out) = with_values(effects, &places);
         let fixed = (0..effects.len()).filter(|i| scan_of(effects[*i]).is_none()).collect();
         let mut wanted = vec![Variant { effects: fixed, shapes: Vec::new() }];
         let mut scanned_at = Vec::new();
@@ -131,10 +131,6 @@ impl<'c> Named<'c> {
                     .collect();
                 for (mut column, c) in values.column_iter_mut().zip(&columns) {
                     column *= c.typical;
-                    // a formula without a value at some touch says nothing at all
-                    if column.iter().any(|v| !v.is_finite()) {
-                        column.fill(0.0);
-                    }
                 }
                 parts.push((i, shape, values));
                 columns
@@ -170,20 +166,13 @@ impl<'c> Named<'c> {
             let mut variants = Vec::new();
             while part < parts.len() && parts[part].0 == i {
                 let width = parts[part].2.ncols();
-                let mut columns = white.columns(at, width).into_owned();
-                for mut column in columns.column_iter_mut() {
-                    // what is left of an effect of which no used touch has a part is rounding, and no trace
-                    if column.norm() < LEAST_TRACE {
-                        column.fill(0.0);
-                    }
-                }
-                variants.push((parts[part].1, columns));
+                variants.push((parts[part].1, white.columns(at, width).into_owned()));
                 at += width;
                 part += 1;
             }
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             library.push_scan(&effect.id, origin, variants, usize::from(scanned[i].is_some()));
         }
-        Self { effects, library, raw_um, columns: info, scanned }
+        Self { effects, library, raw_um, columns: info, scanned, left_out }
     }
 }
