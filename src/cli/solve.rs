@@ -198,7 +198,7 @@ fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
 /// What the model leaves of index visits that were left out of the fit, in words.
 fn left_out(fit: &Fit) -> String {
     let Some(h) = fit::held_out::by_visit(fit) else { return String::new() };
-    let se = h.standard_error_um.map_or_else(String::new, |se| format!(" ± {}", significant(se)));
+    let se = h.standard_error_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
     format!(", {}{se} um on index visits left out", digits(h.rms_um, h.standard_error_um))
 }
 
@@ -278,7 +278,7 @@ fn propose(first: &Candidate, io: &Io) {
     io.say(format!("  {}", first.says));
     io.say(format!("  to confirm it: {}", first.look));
     if let (Some(before), Some(after)) = (first.held_out_before_um, first.held_out_after_um) {
-        let se = first.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", significant(se)));
+        let se = first.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
         let how = if first.nested { "the choice redone for each" } else { "the effect given" };
         let fall = digits(before - after, first.held_out_se_um);
         io.say(format!(

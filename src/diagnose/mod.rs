@@ -174,7 +174,8 @@ pub fn examine<'a>(
 fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Features) -> Option<Evidence> {
     const AT_MOST: usize = 4;
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
-    if fit.noise.visit_source != "revisits" || declared_mm == 0.0 || fit.noise.tau_test_mm <= declared_mm {
+    // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
+    if fit.noise.visit_source != "revisits" || declared_mm == 0.0 || fit.noise.tau_mm <= declared_mm {
         return None;
     }
     let evidence = Evidence::with_visits(fit, declared_mm);

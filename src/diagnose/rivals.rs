@@ -14,6 +14,10 @@ const MOST_STEPS: usize = 2;
 /// A difference of the criterion beyond which there is no doubt which side is better.
 const CLEARLY: f64 = 10.0;
 
+/// A difference beyond which a single shape is said to be better: an effect with a name and the shape that it has by itself
+/// are equally good, and the name says more.
+const BETTER: f64 = 4.0;
+
 /// What a shape still takes after the first effect counts when it is so much of all that there was to explain.
 const SHARE: f64 = 0.1;
 
@@ -73,7 +77,7 @@ pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, fi
     let names = way(question, named, false, Some(first));
     let shapes = way(question, &generics.library, true, None);
     let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
-    let better = (shapes.after_first < names.after_first).then_some(shape);
+    let better = (shapes.after_first + BETTER < names.after_first).then_some(shape);
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
     Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }

@@ -85,7 +85,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     for c in &d.candidates {
         let held = match (c.held_out_before_um, c.held_out_after_um) {
             (Some(before), Some(after)) => {
-                let se = c.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", significant(se)));
+                let se = c.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
                 format!("{} > {}{se}", significant(before), significant(after))
             }
             _ => "-".into(),

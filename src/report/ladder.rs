@@ -1,6 +1,5 @@
 //! A changed model, the ladder of models, and two studies side by side.
 
-use super::diagnosis::probability;
 use super::fit::{digits, number, significant, table};
 use super::plot::{Paper, line};
 use super::prose::sentence;
@@ -31,10 +30,15 @@ pub struct HeldOutDoubt {
     pub n_groups: usize,
 }
 
+/// A standard error: two digits, as many as it knows itself.
+fn two_digits(se: f64) -> String {
+    digits(se, Some(se))
+}
+
 /// A figure with its standard error.
 fn with_error(value: Option<f64>, se: Option<f64>) -> String {
     match (value, se) {
-        (Some(v), Some(s)) => format!("{} ± {}", digits(v, Some(s)), significant(s)),
+        (Some(v), Some(s)) => format!("{} ± {}", digits(v, Some(s)), two_digits(s)),
         (value, _) => or_dash(value),
     }
 }
@@ -78,7 +82,7 @@ pub fn change(
             "on touches left out it {} by {} ± {} um (one standard error, {} index visits in turn{how})\n",
             if fall < 0.0 { "rises" } else { "falls" },
             digits(fall.abs(), Some(se)),
-            significant(se),
+            two_digits(se),
             doubt.n_groups
         );
     }
@@ -104,27 +108,39 @@ pub fn change(
 /// The ladder as a table and a chart.
 #[must_use]
 pub fn history(h: &History, paper: Paper) -> String {
-    let mut t =
-        table(&["step", "change", "effects", "left um", "held out um", "nested um", "later run um", "chi2/dof"]);
+    // only where the search chose there is a nested figure
+    let nested = h.steps.iter().any(|s| s.nested_rms_um.is_some());
+    let mut head = vec!["step", "change", "left um", "held out um", "later run um", "chi2/dof"];
+    if nested {
+        head.insert(4, "nested um");
+    }
+    let mut t = table(&head);
     for s in &h.steps {
         let signed = |sign: &str, ids: &[String]| ids.iter().map(|e| format!("{sign}{e}")).collect::<Vec<_>>();
         let mut what = signed("+", &s.added);
         what.extend(signed("-", &s.removed));
         let first = if s.step == 1 { s.effects.join(" ") } else { what.join(" ") };
-        t.add_row(vec![
+        let mut row = vec![
             number(s.step),
             Cell::new(first),
-            number(s.effects.len()),
             number(significant(s.rms_um)),
             number(with_error(s.held_out_rms_um, s.held_out_se_um)),
-            number(or_dash(s.nested_rms_um)),
             number(or_dash(s.later_run_rms_um)),
             number(format!("{:.3}", s.chi2_per_dof)),
-        ]);
+        ];
+        if nested {
+            row.insert(4, number(or_dash(s.nested_rms_um)));
+        }
+        t.add_row(row);
     }
     t.set_width(paper.width.min(120) as u16);
-    let note = "held out: each index visit is left out of the fit in turn, ± one standard error; nested: the choice of the \
-                effect is redone each time as well (-: a person chose it, knowing all touches)";
+    let note = if nested {
+        "held out: each index visit is left out of the fit in turn, ± one standard error; nested: the choice of the effect is \
+         redone each time as well (-: a person chose it, knowing all touches)"
+    } else {
+        "held out: each index visit is left out of the fit in turn, ± one standard error; the effects were chosen knowing all \
+         touches"
+    };
     let points = |value: &dyn Fn(&crate::study::history::Step) -> Option<f64>| -> Vec<(f64, f64)> {
         h.steps.iter().filter_map(|s| Some((s.step as f64, value(s)?))).collect()
     };
@@ -154,7 +170,7 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
     row("noise of a touch, um", v.before.noise_um, v.after.noise_um);
     t.set_width(paper.width.min(100) as u16);
     out += &format!("{t}\n\n");
-    let mut t = table(&["error", "unit", "before", "after", "difference", "95 %", "p (Holm)", ""]);
+    let mut t = table(&["error", "unit", "before", "after", "difference", "95 %", ""]);
     for r in &v.parameters {
         t.add_row(vec![
             Cell::new(&r.name),
@@ -163,7 +179,6 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
             number(digits(r.after.0, Some(r.after.1))),
             number(digits(r.difference, Some(r.expanded))),
             number(format!("± {}", significant(r.expanded))),
-            number(probability(r.p_adjusted)),
             Cell::new(if r.changed { "changed" } else { "not changed" }),
         ]);
     }
