@@ -140,6 +140,9 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
     let options = diagnose::Options { at_most: 1, refit: false, power: false, ..diagnose::Options::default() };
     let found = diagnose::diagnose(subject, &options)?;
     let (word, next) = match found.verdict {
+        Verdict::TooLittleData if found.most_missed => {
+            ("too-little-data", "most touches cannot be used, and the rest is no sample of the machine".to_owned())
+        }
         Verdict::Adequate | Verdict::TooLittleData => return Ok(()),
         Verdict::MissingEffect => {
             let named = found.candidates.first().map_or_else(String::new, |c| format!(" (first: {})", c.effect));

@@ -19,7 +19,7 @@ pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
-pub use shapes::start_shapes;
+pub use shapes::{scan, start_shapes};
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;

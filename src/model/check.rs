@@ -191,6 +191,7 @@ impl<'a> Check<'a> {
                 source: t.source.clone().unwrap_or_else(|| ASSUMED.to_owned()),
                 shape: None,
                 scan: Vec::new(),
+                between: None,
             }),
         }
     }
@@ -228,6 +229,16 @@ impl<'a> Check<'a> {
                 "write scan = [5, 10, 20] or scan = { from = 0.1, to = 5, points = 12, log = true }, from min to max",
             );
         }
+        let place = |word: &Spanned<String>| VARIABLES.iter().position(|v| v == word.get_ref());
+        let between = s.between.as_ref().and_then(place);
+        if let Some(word) = s.between.as_ref().filter(|_| between.is_none()) {
+            self.error(
+                &word.span(),
+                "effects::between",
+                format!("{:?} is no variable of formulas", word.get_ref()),
+                "write the variable at whose value something jumps, for instance between = \"t\"",
+            );
+        }
         parameters.push(Parameter {
             name: name.clone(),
             alias: None,
@@ -238,6 +249,7 @@ impl<'a> Check<'a> {
             source: s.source.clone().unwrap_or_else(|| ASSUMED.to_owned()),
             shape: Some((s.start, low, high)),
             scan: scan.flatten().unwrap_or_default(),
+            between,
         });
     }
 

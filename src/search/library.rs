@@ -47,6 +47,8 @@ pub struct Candidate {
     pub variants: Vec<Variant>,
     /// Shape parameters that the scan searches: each counts as a parameter.
     pub n_scanned: usize,
+    /// One of a few shapes that are looked for before all others, with a share of the level of their own.
+    pub expected: bool,
 }
 
 /// Candidates with their columns: derivative of the whitened gap by each parameter in units of its typical size.
@@ -89,7 +91,14 @@ impl Library {
             spans.push(Variant { shape, columns: first..first + columns.ncols() });
         }
         if !spans.is_empty() {
-            self.candidates.push(Candidate { id: id.into(), origin, variants: spans, n_scanned });
+            self.candidates.push(Candidate { id: id.into(), origin, variants: spans, n_scanned, expected: false });
+        }
+    }
+
+    /// The last candidate is one of the few shapes that are looked for before all others.
+    pub(super) fn expect_last(&mut self) {
+        if let Some(last) = self.candidates.last_mut() {
+            last.expected = true;
         }
     }
 

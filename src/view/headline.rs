@@ -92,6 +92,8 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     let first = d.candidates.first().filter(|c| c.proposed || d.verdict == Verdict::MissingEffect);
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
+        // a gross mistake that made touches miss: there is nothing to compare its error with
+        Verdict::MissingEffect if d.most_missed => (Level::Act, d.says.clone()),
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
         Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
         Verdict::Unexplained => (
@@ -281,7 +283,12 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
 }
 
 fn found(m: &Material, first: &Candidate, plan_next: &str, out: &mut Vec<Next>) {
-    out.push(Next::new("Look at the machine", first.look.clone(), ""));
+    if m.diagnosis.most_missed {
+        out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
+        return;
+    }
+    let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
+    out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
     if !first.same_as.is_empty() {
         out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
     }
@@ -292,7 +299,7 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, out: &mut Vec<Next>) 
     ));
     let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
     if !mends.is_empty() {
-        out.push(Next::new("What mends it", mends, ""));
+        out.push(Next::new("What mends it", format!("{one_of_several}{mends}"), ""));
     }
 }
 
@@ -303,7 +310,8 @@ fn unexplained(m: &Material, out: &mut Vec<Next>) {
     }
     if let Some(shape) = &d.shape {
         let depends = d.depends.first().map_or("", |w| w.says.as_str());
-        out.push(Next::new("Look for it on the machine", format!("{}. {depends}.", capital(&shape.kind)), ""));
+        let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
+        out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
     }
     out.push(Next::new(
         "Write down its formula",
