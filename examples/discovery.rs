@@ -86,9 +86,10 @@ fn report_clean(name: &str, verdicts: &[Clean]) {
 fn report_strange(name: &str, seen: &[Seen]) {
     let of = |what: &dyn Fn(&Seen) -> bool| percent(seen.iter().filter(|s| what(s)).count(), seen.len());
     println!(
-        "in no catalogue, {name}: {} runs, adequate {}, right variable first {}, touches rejected {}",
+        "in no catalogue, {name}: {} runs, adequate {}, bare name {}, right variable first {}, touches rejected {}",
         seen.len(),
         of(&|s| s.verdict == Verdict::Adequate),
+        of(&|s| s.bare),
         of(&|s| s.right()),
         of(&|s| s.rejected > 0)
     );
@@ -100,10 +101,10 @@ fn report_strange(name: &str, seen: &[Seen]) {
             sketched.iter().copied().fold(0.0, f64::max)
         );
     }
-    for s in seen.iter().filter(|s| !s.right() || s.verdict == Verdict::Adequate).take(12) {
+    for s in seen.iter().filter(|s| !s.right() || s.bare || s.verdict == Verdict::Adequate).take(12) {
         println!(
-            "  - {:?} first {:?} then {:?}, proposed {:?}, {} rejected",
-            s.verdict, s.first, s.depends, s.proposed, s.rejected
+            "  - {:?} lambda {:.0} first {:?} then {:?}, proposed {:?}, {} rejected",
+            s.verdict, s.lambda, s.first, s.depends, s.proposed, s.rejected
         );
     }
 }

@@ -169,3 +169,66 @@ fn axes_of_0_to_360() {
 fn stops_for_another_stylus() {
     all_clean("trunnion", "full", false, &["heidenhain"]);
 }
+
+/// Text between two lines, taken out.
+fn without(text: &str, first: &str, last: &str) -> String {
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let from = lines.iter().position(|l| l.contains(first)).unwrap_or_else(|| panic!("no {first}"));
+    let to = from + lines[from..].iter().position(|l| l.contains(last)).unwrap_or_else(|| panic!("no {last}"));
+    lines[..from].iter().chain(&lines[to + 1..]).copied().collect()
+}
+
+#[test]
+fn under_a_transformation_the_rotary_axes_must_stand_at_0_when_it_begins() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", true);
+    for (name, guard) in [("fanuc", "IF[ABS[#50"), ("haas", "IF[ABS[#50")] {
+        let post = controller(name);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let edited = without(&text, guard, "GOTO9");
+        let against = Against { plan: Some(&generated.plan), ..Against::default() };
+        let found = check(&machine, &post, &source("p.nc", edited), &against).unwrap();
+        assert!(found.findings.iter().any(|f| f.code == "check::start"), "{name}: {:?}", found.findings);
+    }
+}
+
+/// A program that logs where the axes have come to a stand, or what is left of the touch before, in place of what the control has
+/// kept of this one.
+#[test]
+fn a_log_of_another_place_is_found() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for (name, line, instead) in [
+        ("fanuc", "#21=#5061", "#21=#5041"),
+        ("haas", "#21=#5061", "#21=#5041"),
+        ("sinumerik", "AXC_X=$AA_MM[X]", "AXC_X=$AA_IM[X]"),
+        ("fanuc", "#22=#5062\n", ""),
+        ("haas", "#22=#5062\n", ""),
+        ("fanuc", "#24=#5064\n", "#24=0.\n"),
+    ] {
+        let post = controller(name);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        // in the tenth touch
+        let at = text.match_indices(line).nth(9).unwrap_or_else(|| panic!("{name}: no {line:?}")).0;
+        let edited = format!("{}{instead}{}", &text[..at], &text[at + line.len()..]);
+        let against = Against { plan: Some(&generated.plan), ..Against::default() };
+        let found = check(&machine, &post, &source("p.nc", edited), &against).unwrap();
+        assert!(found.findings.iter().any(|f| f.code == "check::log"), "{name} {line:?}: {:?}", found.findings);
+    }
+}
+
+#[test]
+fn a_number_that_has_lost_its_point_is_no_number() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for name in ["fanuc", "haas"] {
+        let post = controller(name);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let at = text.find("\nG0 X").unwrap() + 1;
+        let point = at + text[at..].find('.').unwrap();
+        let edited = format!("{}{}", &text[..point], &text[point + 1..]);
+        let against = Against { plan: Some(&generated.plan), ..Against::default() };
+        let refused = check(&machine, &post, &source("p.nc", edited), &against).unwrap_err();
+        assert!(refused.0[0].message.contains("decimal point"), "{:?}", refused.0);
+    }
+}

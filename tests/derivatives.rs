@@ -179,3 +179,82 @@ fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_mach
     }
     assert!(n_checked > 10_000, "{n_checked}");
 }
+
+/// The touches of two programs with the scatter of visits in their noise: the whitened Jacobian is the derivative of the
+/// whitened residuals, the normal equations are its sums, and whitening is by V = σ²·I + τ²·Σ N·Nᵀ itself.
+#[test]
+fn whitened_rows_are_derivatives_also_where_visits_scatter() {
+    use axiscal::fit::effects_of;
+    use axiscal::fit::normal::Touches;
+    use axiscal::fit::solve::Problem;
+    use axiscal::model::data::{Run, assemble};
+    use axiscal::simulate::Scenario;
+    use nalgebra::{DMatrix, DVector};
+    let (sigma_mm, tau_mm) = (1e-3, 0.7e-3);
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let catalogue = Catalogue::built_in().unwrap();
+    for (name, programs, location) in [
+        ("swivel-head", &["head", "table"][..], ["location-b", "location-c"]),
+        ("trunnion", &["basic"], ["location-a", "location-c"]),
+    ] {
+        let machine = common::machine(name);
+        let plans: Vec<_> = programs.iter().map(|p| common::plan(&machine, p)).collect();
+        let scenario = Scenario::flawless().with_noise(sigma_mm, tau_mm, 3);
+        let touches: Vec<_> = plans.iter().map(|p| common::touch(&machine, p, &scenario, None)).collect();
+        let runs: Vec<Run> = plans
+            .iter()
+            .zip(&touches)
+            .map(|(plan, touches)| Run { plan, touches, mounting: None, started_s: None })
+            .collect();
+        let data = assemble(&machine, &runs);
+        let ids = [location[0], location[1], "block-setup", "pretravel", "backlash-x"].map(str::to_owned);
+        let effects = effects_of(&ids, &catalogue, &machine).unwrap();
+        let model = Model::new(&machine, &effects, &data.set_ups, machine.reference.pivot);
+        let free: Vec<usize> = (0..model.n_unknowns()).collect();
+        let batch = model.prepare(&data.observations);
+        let priors = [(0, 0.001, 0.02)];
+        let mut problem = Touches::new(&batch, &data.visits, model.start(), &free, &priors, (sigma_mm, tau_mm));
+        // one touch is not used
+        let mut weights = vec![1.0; data.observations.len()];
+        weights[5] = 0.0;
+        problem.set_weights(weights.clone());
+        let typical = |j: usize| model.unknowns[j].typical;
+        let theta = DVector::from_fn(free.len(), |j, _| rng.random_range(-3.0..3.0) * typical(j));
+        let (residual, jacobian) = problem.dense(&theta);
+        for j in 0..free.len() {
+            let step = 1e-4 * typical(j);
+            let mut at = theta.clone();
+            at[j] += step;
+            let plus = problem.dense(&at).0;
+            at[j] -= 2.0 * step;
+            let numeric = (plus - problem.dense(&at).0) / (2.0 * step);
+            let off = (&numeric - jacobian.column(j)).amax();
+            let scale = jacobian.column(j).amax().max(1.0 / typical(j));
+            assert!(off < 2e-5 * scale, "{name} {}: {off:e} of {scale:e}", model.unknowns[j].name);
+        }
+        let normal = problem.normal(&theta, true);
+        let close = |a: f64, b: f64, scale: f64| (a - b).abs() < 1e-9 * scale;
+        assert!(close(normal.sum, residual.norm_squared(), residual.norm_squared()), "{name}");
+        let (gradient, gram) = (jacobian.tr_mul(&residual), jacobian.tr_mul(&jacobian));
+        for i in 0..free.len() {
+            let scale = gram[(i, i)].sqrt() * residual.norm();
+            assert!(close(normal.gradient[i], gradient[i], scale), "{name} {}", model.unknowns[i].name);
+            for j in 0..free.len() {
+                let scale = (gram[(i, i)] * gram[(j, j)]).sqrt();
+                assert!(close(normal.gram[(i, j)], gram[(i, j)], scale), "{name} {i} {j}");
+            }
+        }
+        // V itself, without any of the above
+        let used: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
+        let n = |i: usize| Vector3::from_fn(|k, _| data.observations[i].state[slot::NORMAL_IN_R + k]);
+        let v = DMatrix::from_fn(used.len(), used.len(), |a, b| {
+            let shared = if data.visits[used[a]] == data.visits[used[b]] { n(used[a]).dot(&n(used[b])) } else { 0.0 };
+            tau_mm * tau_mm * shared + if a == b { sigma_mm * sigma_mm } else { 0.0 }
+        });
+        let gaps = problem.gaps(&theta);
+        let gaps = DVector::from_iterator(used.len(), used.iter().map(|&i| gaps[i]));
+        let prior = ((theta[0] - 0.001) / 0.02_f64).powi(2);
+        let sum = gaps.dot(&v.cholesky().unwrap().solve(&gaps)) + prior;
+        assert!(close(sum, normal.sum, sum), "{name}: {sum} and {}", normal.sum);
+    }
+}

@@ -69,5 +69,25 @@ fn missing_touches_are_the_finding() {
     let found = diagnosis(&machine, &[plan(&machine, "full")], &scenario);
     assert_eq!(found.verdict, Verdict::TooLittleData);
     assert!(found.says.contains("cannot be used") && found.says.contains("other way round"), "{}", found.says);
-    assert!(found.candidates.iter().all(|c| !c.proposed));
+    // a sample that is none speaks for no small effect
+    assert!(found.most_missed && found.candidates.is_empty() && found.depends.is_empty());
+}
+
+/// Revisited poses that come back 6 um elsewhere, where the machine file promises half a micrometre: no effect, and no fault
+/// of the model, but not nothing either.
+#[test]
+fn scatter_of_visits_far_above_the_declared_one_is_a_finding() {
+    let machine = machine("swivel-head");
+    let plans = [plan(&machine, "full")];
+    let found: Vec<Diagnosis> = (0..3)
+        .map(|seed| diagnosis(&machine, &plans, &Scenario::flawless().with_noise(5e-4, 6e-3, 400 + seed)))
+        .collect();
+    for d in &found {
+        assert_eq!(d.verdict, Verdict::Unexplained, "{}", d.says);
+        assert_eq!(d.depends[0].by, "visit", "{}", d.says);
+        assert!(d.says.contains("clamped anew") && d.noise_says.contains("from revisited poses"), "{}", d.says);
+    }
+    // what the machine file declares is no finding
+    let usual = diagnosis(&machine, &plans, &Scenario::flawless().with_noise(5e-4, 5e-4, 410));
+    assert!(usual.depends.iter().all(|w| w.id != "scatter:visit"), "{}", usual.says);
 }

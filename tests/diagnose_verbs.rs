@@ -143,9 +143,9 @@ fn rubbish_is_two_with_a_remedy() {
     let out = axiscal(at, &["sketch-effect", "study.toml", "--out", "mine-broken.toml"]);
     assert_eq!(out.status.code(), Some(2));
     assert_eq!(std::fs::read_to_string(at.join("mine-broken.toml")).unwrap(), "[[effect]]\nid = 3\n", "left as it was");
-    // nothing is left over in the noise: nothing is written
-    let out = axiscal(at, &["sketch-effect", "study.toml", "--out", "mine.toml"]);
-    assert_eq!(out.status.code(), Some(2));
+    // nothing is left over in the noise: the call is right, the answer is "no", and nothing is written
+    let (none, code) = json(at, &["sketch-effect", "study.toml", "--out", "mine.toml"]);
+    assert_eq!((none["effect"].is_null(), code), (true, 1), "{none}");
     assert!(!at.join("mine.toml").exists());
 }
 
@@ -211,11 +211,13 @@ fn a_users_effect_is_a_candidate_and_its_touches_come_back() {
 
 #[test]
 fn a_mistake_is_named_where_most_touches_miss() {
-    for (parameter, says) in
-        [("flip_Y", "axis Y is counted the wrong way round"), ("flip_B", "axis B is counted the wrong way round")]
-    {
+    for (parameter, programs, says) in [
+        ("flip_Y", &["head", "table"][..], "axis Y is counted the wrong way round"),
+        ("flip_B", &["head", "table"], "axis B is counted the wrong way round"),
+        ("swap_XY", &["full"], "axes X and Y are taken for each other"),
+    ] {
         let wrong = format!("seed = 2\n[effects.sign-or-axis-swap]\n{parameter} = 1.0\n[noise]\ntouch_um = 1.0\n");
-        let folder = folder(&["head", "table"], &wrong, None);
+        let folder = folder(programs, &wrong, None);
         let out = axiscal(folder.path(), &["diagnose", "study.toml", "--json"]);
         // so few touches may be left that there is no fit at all: that is said, and is no crash
         if out.status.code() == Some(2) {
@@ -225,5 +227,32 @@ fn a_mistake_is_named_where_most_touches_miss() {
         let d: Value = serde_json::from_slice(&out.stdout).unwrap();
         let text = format!("{} {}", d["says"], d["gross"]);
         assert!(text.contains(says), "{parameter}: {text}");
+        // it is the answer, and an answer of "no"; small effects are not spoken of
+        assert_eq!((out.status.code(), d["verdict"].as_str()), (Some(1), Some("missing-effect")), "{parameter}: {d}");
+        let candidates = d["candidates"].as_array().unwrap();
+        assert!(candidates.iter().all(|c| c["effect"] == "sign-or-axis-swap"), "{parameter}: {d}");
+        assert_ne!(d["gross"][0]["hypothesis"], "mm", "dividing by 25.4 is no explanation");
     }
+}
+
+/// Everything moves by 7 um at one moment, in two directions: a warm-up, a slipped block and a drift follow it a part of the
+/// way each, and none of them is it.
+#[test]
+fn a_step_in_time_gets_no_name_and_solve_leaves_the_study_alone() {
+    let own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"px\", unit = \"um\", dof = \"dx\", formula = \"step(t - 1.02)\" },\n{ parameter = \"pz\", unit = \"um\", dof = \"dz\", formula = \"step(t - 1.02)\" } ]\n";
+    let wrong =
+        "effects_file = \"own.toml\"\nseed = 8\n[effects.planted]\npx = 7.0\npz = -7.0\n[noise]\ntouch_um = 1.0\n";
+    let folder = folder(&["full"], wrong, Some(own));
+    let at = folder.path();
+    let (d, code) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!((d["verdict"].as_str(), code), (Some("unexplained"), 1), "{}", d["says"]);
+    assert_eq!(d["where"][0]["by"], "time", "{}", d["says"]);
+    let before = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    let (s, code) = json(at, &["solve", "study.toml", "--yes"]);
+    assert_eq!((s["verdict"].as_str(), code), (Some("unexplained"), 1), "{s}");
+    assert_eq!(std::fs::read_to_string(at.join("study.toml")).unwrap(), before, "{s}");
+    // and the terminal names no effect to look for
+    let out = axiscal(at, &["diagnose", "study.toml"]);
+    let text = String::from_utf8_lossy(&out.stdout);
+    assert!(!text.contains("look:") && text.contains("noise: touch"), "{text}");
 }

@@ -68,17 +68,20 @@ fn two_hidden_effects_are_both_named_on_full() {
 #[test]
 fn what_is_in_no_catalogue_is_never_adequate() {
     let bench = Bench::full();
-    let (mut right, mut all) = (0, 0);
+    let (mut right, mut all, mut bare) = (0, 0, 0);
     for (kind, (name, _, smooth)) in strange::KINDS.iter().enumerate() {
         let seen = strange::run(&bench, kind, 6, 105 + 100 * kind as u64);
         for s in &seen {
-            assert!(s.verdict != Verdict::Adequate || s.rejected > 0, "{name}: {s:?}");
+            assert!(s.verdict != Verdict::Adequate, "{name}: {s:?}");
             if *smooth {
                 assert!(s.sketched.is_some_and(|rms| rms < 1.2), "{name}: {s:?}");
             }
         }
+        bare += seen.iter().filter(|s| s.bare).count();
         right += seen.iter().filter(|s| s.right()).count();
         all += seen.len();
     }
     check("right variable first", right, all, 0.80);
+    // every one of them would be wrong
+    check("no bare name", all - bare, all, 0.97);
 }

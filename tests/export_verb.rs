@@ -325,6 +325,66 @@ fn values_beyond_the_limit_are_refused() {
     assert!((fanuc(&text(at, "comp/axiscal_parameters.txt"))["N19703"].1 - 0.62).abs() < 0.002);
 }
 
+#[test]
+fn a_restoring_file_is_not_written_over() {
+    let folder = trunnion("sinumerik");
+    let at = folder.path();
+    std::fs::write(at.join("backup.ini"), backup("sinumerik.ini")).unwrap();
+    export(at, "sinumerik", "comp", &["--accept-unverified", "--backup", "backup.ini"]).assert().success();
+    let restoring = text(at, "comp/restore_trafo.ini");
+    export(at, "sinumerik", "comp", &["--accept-unverified"])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("restore_trafo.ini of an earlier export holds other values"));
+    assert_eq!(text(at, "comp/restore_trafo.ini"), restoring);
+    // the same values again, and what is forced
+    export(at, "sinumerik", "comp", &["--accept-unverified", "--backup", "backup.ini"]).assert().success();
+    export(at, "sinumerik", "comp", &["--accept-unverified", "--force"]).assert().success();
+}
+
+#[test]
+fn a_restoring_worksheet_shows_the_way_back() {
+    let folder = trunnion("heidenhain");
+    let at = folder.path();
+    export(at, "heidenhain", "comp", &["--accept-unverified"]).assert().success();
+    let changes = |name: &str| -> Vec<f64> {
+        let change = |line: &str| line.split("change ").nth(1)?.split([';', ' ']).next()?.trim().parse().ok();
+        text(at, name).lines().filter_map(change).collect()
+    };
+    let names: Vec<String> = std::fs::read_dir(at.join("comp"))
+        .unwrap()
+        .map(|e| format!("comp/{}", e.unwrap().file_name().to_string_lossy()))
+        .filter(|n| n.contains("worksheet"))
+        .collect();
+    let (back, there): (Vec<_>, Vec<_>) = names.iter().partition(|n| n.contains("restore"));
+    let (back, there) = (changes(back[0]), changes(there[0]));
+    assert!(there.iter().any(|c| c.abs() > 0.01), "{there:?}");
+    assert_eq!(back.len(), there.len());
+    assert!(back.iter().zip(&there).all(|(b, t)| (b + t).abs() < 1e-9), "{back:?} {there:?}");
+}
+
+#[test]
+fn a_position_table_that_is_in_use_is_not_written_over() {
+    let scenario = "seed = 5\n[effects.scale-x]\nEXX = 60\n[noise]\ntouch_um = 0.5\n";
+    let folder = folder("swivel-head", "head", "sinumerik", scenario, "location-b,scale-x,block-setup,pretravel");
+    let at = folder.path();
+    std::fs::write(at.join("used.ini"), "$AN_CEC[0,0]=0.05\n$AN_CEC[0,1]=0.07\nM17\n").unwrap();
+    let more = ["--accept-unverified", "--force", "--backup", "used.ini"];
+    export(at, "sinumerik", "none", &more[..1]).assert().success();
+    assert!(text(at, "none/restore_cec.ini").contains("ASSUMED"));
+    let readme = text(at, "none/README.txt");
+    assert!(readme.contains("Position table 0: X by the position of X") && readme.contains("is ASSUMED"), "{readme}");
+    export(at, "sinumerik", "forced", &more)
+        .assert()
+        .success()
+        .stderr(predicate::str::contains("position table 0 of the control is in use: $AN_CEC[0,0] = 0.05"));
+    let quiet = [more[0], more[2], more[3]];
+    export(at, "sinumerik", "used", &quiet).assert().code(2).stderr(predicate::str::contains("is in use"));
+    std::fs::write(at.join("used.ini"), "$AN_CEC[0,0]=0\n$AN_CEC[0,1]=0\nM17\n").unwrap();
+    export(at, "sinumerik", "free", &quiet).assert().success();
+    assert!(!text(at, "free/restore_cec.ini").contains("ASSUMED"));
+}
+
 /// The program `head` does not touch what C carries: nothing of C is known, and nothing of it is written.
 #[test]
 fn only_what_was_identified_is_written() {

@@ -160,7 +160,13 @@ fn a_hidden_effect_is_compared_added_taken_out_and_kept_in_the_ladder() {
     assert!(!at.join("study.history.json").exists());
 
     let run = axiscal(at).args(["add", "study.toml", "radial-c-2"]).assert().success();
-    run.stdout(predicate::str::contains("error left, um RMS").and(predicate::str::contains("EXC2c")));
+    run.stdout(
+        predicate::str::contains("error left, um RMS")
+            .and(predicate::str::contains("EXC2c"))
+            // the fall has its doubt, and a choice by hand is no nested one
+            .and(predicate::str::contains("you chose the effect knowing all touches"))
+            .and(predicate::str::contains("one standard error")),
+    );
     assert!(study().contains("  \"radial-c-2\"\n]"), "{}", study());
     let h = json(at, &["history", "study.toml"]);
     let steps = h["steps"].as_array().unwrap();
@@ -171,6 +177,8 @@ fn a_hidden_effect_is_compared_added_taken_out_and_kept_in_the_ladder() {
         println!("{figure}: {} to {}", at(0), at(1));
         assert!(at(1) < 0.8 * at(0), "{figure}");
     }
+    let fall_of = |i: usize| steps[i]["held_out_se_um"].as_f64().unwrap();
+    assert!(fall_of(0) > 0.0 && fall_of(1) > 0.0 && steps[1]["nested_rms_um"].is_null(), "{}", steps[1]);
     let fall = axiscal(at).args(["history", "study.toml"]).assert().success();
     fall.stdout(predicate::str::contains("+radial-c-2").and(predicate::str::contains("held out")));
 
@@ -300,4 +308,28 @@ fn a_harmonic_of_the_table_is_named_by_its_order() {
     );
     assert!(c.says.contains("goes with C, twice per turn"), "{}", c.says);
     assert!(c.splits[0].share > 0.8);
+}
+
+/// A scan in steps of three minutes put it up to three minutes off, with some touches on the wrong side.
+#[test]
+fn a_slip_is_found_between_the_two_touches_where_it_came() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    for from_h in [0.6137, 1.0491] {
+        let text = format!(
+            "seed = 7\n[effects.block-slip]\ndx = 8.0\ndy = -6.0\ndz = 7.0\nfrom_h = {from_h}\n[noise]\ntouch_um = 0.5\n"
+        );
+        let wrong = scenario(&text, &machine);
+        let touches = touch(&machine, &plan, &wrong, None);
+        let effects = [&EFFECTS[..], &["block-slip"]].concat();
+        let settings = Settings { quick: true, ..Settings::default() };
+        let fit = identify_with(&machine, &[(&plan, &touches)], &effects, settings);
+        let found = value(&fit, "from_h");
+        let (low, high) = (found.min(from_h), found.max(from_h));
+        let first = touches[0].time_s.unwrap();
+        let hours = touches.iter().map(|t| (t.time_s.unwrap() - first) / 3600.0);
+        let wrong_side = hours.filter(|h| (low..high).contains(h)).count();
+        println!("slip at {from_h} h, found at {found} h, {wrong_side} touches on the wrong side");
+        assert!(wrong_side <= 1, "{found} h instead of {from_h} h: {wrong_side} touches");
+    }
 }

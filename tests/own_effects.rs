@@ -282,3 +282,134 @@ fn effects_are_listed_and_shown_at_eighty_columns() {
     assert_eq!(row["parameters"][0]["iso"], "EXX");
     axiscal(folder.path()).args(["effects", "show", "head-sag", "-m", "trunnion"]).assert().code(2);
 }
+
+/// Effects that have no value anywhere, at some touches, or where B is negative; none of them is in the model.
+const NO_VALUE: [(&str, &str); 3] =
+    [("own-nowhere", "0*B/(B - B)"), ("own-steep", "1/sin(B)"), ("own-root", "sqrt(B)")];
+
+#[test]
+fn an_effect_without_a_value_spoils_no_other_one() {
+    use axiscal::design::{Noise, Planned, Request, Task, assess};
+    use axiscal::diagnose::{Options, Subject, diagnose};
+    use axiscal::fit::{self, Settings, effects_of};
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head");
+    let scenario = Scenario::flawless().with_noise(1e-3, 0.0, 5);
+    let touches = touch(&machine, &plan, &scenario, None);
+    let runs = [Run { plan: &plan, touches: &touches, mounting: None, started_s: None }];
+    let ids = ["location-b", "block-setup", "pretravel"].map(str::to_owned).to_vec();
+    let settings = Settings { effects: ids.clone(), ..Settings::default() };
+    let listed = |which: &[(&str, &str)]| {
+        let mut catalogue = Catalogue::built_in().unwrap();
+        let rows = which.iter().map(|(id, formula)| {
+            let name = id.replace('-', "_");
+            format!("[[effect]]\nid = \"{id}\"\nat = \"B\"\nterms = [{{ parameter = \"{name}\", unit = \"um\", dof = \"dy\", formula = \"{formula}\" }}]\n")
+        });
+        let text: String = rows.collect();
+        catalogue.add_file(&source("mine.toml", &text)).unwrap();
+        catalogue
+    };
+    let answers = |catalogue: &Catalogue| {
+        let fit = fit::identify(&machine, catalogue, &runs, &settings).unwrap();
+        let subject = Subject { machine: &machine, catalogue, settings: &settings, fit: &fit };
+        let found = diagnose(subject, &Options { refit: false, ..Options::default() }).unwrap();
+        let request = Request {
+            task: Task {
+                machine: &machine,
+                catalogue,
+                effects: effects_of(&ids, catalogue, &machine).unwrap(),
+                held: Vec::new(),
+                reference: machine.reference.pivot,
+                temperature: true,
+            },
+            runs: vec![Planned::new(plan.clone())],
+            names: vec!["head".to_owned()],
+            probe: Noise { sigma_mm: 1e-3, tau_mm: 0.0 },
+            acting_tau_mm: Some(0.0),
+        };
+        (fit.outcome, found, assess(&request).unwrap())
+    };
+    let good = [("own-good", "cos(3*B)")];
+    let (o, found, a) = answers(&listed(&good));
+    assert!(o.parameters.iter().any(|p| p.sigma_with_unmodelled.is_some()));
+    let all: Vec<_> = good.iter().chain(&NO_VALUE).copied().collect();
+    let (mut o2, mut found2, a2) = answers(&listed(&all));
+    for (warnings, verb) in [(&o2.warnings, "identify"), (&found2.warnings, "diagnose"), (&a2.warnings, "assess")] {
+        for (id, formula) in NO_VALUE {
+            let says = |w: &&String| w.contains(id) && w.contains(&format!("{formula:?}")) && w.contains("touch ");
+            assert!(warnings.iter().any(|w| says(&w)), "{verb} says nothing of {id}: {warnings:?}");
+        }
+        assert!(warnings.iter().all(|w| !w.contains("own-good")), "{verb}: {warnings:?}");
+    }
+    // and all the rest is the same answer
+    o2.warnings = o.warnings.clone();
+    found2.warnings = found.warnings.clone();
+    assert_eq!(o, o2);
+    assert_eq!(serde_json::to_value(&found).unwrap(), serde_json::to_value(&found2).unwrap());
+    let seen = |a: &axiscal::design::record::Assessment| {
+        let each = a.effects.iter().map(|e| (e.effect.clone(), e.visible, e.same_as.clone(), e.contained_in.clone()));
+        each.collect::<Vec<_>>()
+    };
+    assert_eq!((seen(&a), &a.says, a.alias_pairs), (seen(&a2), &a2.says, a2.alias_pairs));
+    for (p, q) in a.parameters.iter().zip(&a2.parameters) {
+        assert!(
+            (p.sigma_with_unmodelled.unwrap() / q.sigma_with_unmodelled.unwrap() - 1.0).abs() < 1e-9,
+            "{p:?} {q:?}"
+        );
+    }
+}
+
+#[test]
+fn a_constant_without_a_value_is_refused() {
+    for formula in ["0/0", "1/0", "sqrt(-1)", "ln(0 - 2)"] {
+        let text = format!(
+            "[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [{{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"{formula}\" }}]\n"
+        );
+        let failure = Catalogue::default().add_file(&source("w.toml", text)).unwrap_err();
+        assert_eq!(failure.0[0].code, "effects::no_value", "{formula}");
+        assert!(failure.0[0].place().unwrap().starts_with("w.toml:4:"), "{formula}: {:?}", failure.0[0].place());
+    }
+}
+
+#[test]
+fn mistakes_of_a_file_are_said_in_words_and_with_their_place() {
+    let file = |formula: &str, unit: &str, dof: &str| {
+        format!(
+            "[[effect]]\nid = \"w\"\nat = \"B\"\nterms = [\n  {{ parameter = \"p\", unit = \"{unit}\", dof = \"{dof}\", formula = \"{formula}\" }},\n]\n"
+        )
+    };
+    for (formula, wrong, says) in [
+        ("1 - cos(Q)", "Q", "unknown word \"Q\" (variables: X Y Z A B C"),
+        ("2*(1 - cos(B)", "(1", "not closed"),
+        ("sin(B) cos(B)", "cos", "an operator is missing"),
+        ("sin(B) +", "+", "a value is missing after"),
+        ("1,5*B", ",", "a decimal point is a point"),
+    ] {
+        let text = file(formula, "um", "dx");
+        let failure = Catalogue::default().add_file(&source("w.toml", &text)).unwrap_err();
+        let column = 2 + text.lines().nth(4).unwrap().find(formula).unwrap() + formula.rfind(wrong).unwrap() - 1;
+        assert!(failure.0[0].message.contains(says), "{formula}: {}", failure.0[0].message);
+        assert_eq!(failure.0[0].place().unwrap(), format!("w.toml:5:{column}"), "{formula}");
+    }
+    for (formula, unit, dof, fits) in [
+        ("1", "um", "rx", false),
+        ("cos(C)", "um", "rx", false),
+        ("cos(C)/L", "um", "rx", true),
+        ("sin(B)", "urad", "dx", false),
+        ("sin(B)*px", "urad", "dx", true),
+        ("sin(B)", "urad", "ry", true),
+        ("t", "um/h", "dx", true),
+        ("t", "um/h", "rx", false),
+    ] {
+        let text = file(formula, unit, dof);
+        let read = Catalogue::default().add_file(&source("w.toml", &text));
+        match read {
+            Ok(_) => assert!(fits, "{formula} {unit} {dof}"),
+            Err(failure) => {
+                assert!(!fits, "{formula} {unit} {dof}: {:?}", failure.0[0]);
+                assert_eq!(failure.0[0].code, "effects::unit");
+                assert!(failure.0[0].place().unwrap().starts_with("w.toml:5:"), "{:?}", failure.0[0].place());
+            }
+        }
+    }
+}

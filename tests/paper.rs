@@ -279,3 +279,62 @@ fn without_compensating_the_head_the_table_is_wrong_by_the_heads_displacement() 
         assert!(fit.outcome.warnings.iter().any(|w| w.contains("miss the model")), "{:?}", fit.outcome.warnings);
     }
 }
+
+/// The method, section 7: which poses of the two-axis head tell all ten unknowns, and what is left without a trace where
+/// they do not (blocks where the plan says).
+#[test]
+fn ranks_and_null_vectors_of_the_two_axis_head() {
+    use axiscal::axes::AxisName;
+    use axiscal::fit::observe_plan;
+    use axiscal::model::data::{Run, assemble};
+    let machine = machine("double-head");
+    let catalogue = Catalogue::built_in().unwrap();
+    let whole = plan(&machine, "double-head");
+    let radius_mm = (machine.reference.pivot - machine.reference.ball).norm();
+    let observed = |left_out: &[(f64, f64)]| {
+        let mut plan = whole.clone();
+        plan.touches.retain(|t| {
+            let at = |a| t.pose.get(a).unwrap_or(0.0);
+            !left_out.iter().any(|(b, a)| (at(AxisName::B) - b).abs() < 1e-9 && (at(AxisName::A) - a).abs() < 1e-9)
+        });
+        let touches = touch(&machine, &plan, &Scenario::flawless(), None);
+        let run = Run { plan: &plan, touches: &touches, mounting: None, started_s: None };
+        let data = assemble(&machine, &[run]);
+        let of = |effect: &str| observe_plan(&machine, &catalogue, &data, &[effect.to_owned()]).unwrap();
+        assert_eq!(of("paper-double-head").1.rank, 8, "{left_out:?}");
+        of("double-head-10")
+    };
+    // the null vector in rad and in radii, its largest part 1
+    let null = |left_out: &[(f64, f64)]| {
+        let (model, seen) = observed(left_out);
+        assert_eq!((seen.rank, seen.unseen.len()), (9, 1), "{left_out:?}");
+        let amount = |c: usize| {
+            let x = seen.unseen[0][c] / seen.scale[c];
+            if model.unknowns[c].unit == "mm" { x / radius_mm } else { x.to_radians() }
+        };
+        let largest = (0..model.n_unknowns()).map(amount).fold(0.0, |m: f64, x| if x.abs() > m.abs() { x } else { m });
+        let of = |symbol: &str| {
+            let c = model.unknowns.iter().position(|u| u.alias.as_deref() == Some(symbol)).unwrap();
+            amount(c) / largest
+        };
+        let all = ["a_BZ", "b_BZ", "g_BZ", "d_xBZ", "d_yBZ", "d_zBZ", "a_BA", "g_BA", "d_xBA", "d_zBA"];
+        all.map(|symbol| (symbol, of(symbol)))
+    };
+    assert_eq!(observed(&[]).1.rank, 10);
+    for (left_out, parts) in [
+        // as printed, A to one side only: b_BZ : d_xBA/R : g_BA = 1 : 1 : -1
+        ((0.0, 90.0), &["b_BZ", "d_xBA", "g_BA"][..]),
+        // without B = -30: a_BZ, g_BZ, -a_BA, -g_BA in equal parts
+        ((-30.0, 0.0), &["a_BZ", "g_BZ", "a_BA", "g_BA"]),
+    ] {
+        let vector = null(&[left_out]);
+        println!("without {left_out:?}: {vector:?}");
+        for (symbol, part) in vector {
+            let expected = if parts.contains(&symbol) { 1.0 } else { 0.0 };
+            assert!((part.abs() - expected).abs() < 1e-6, "{symbol}: {vector:?}");
+        }
+        let of = |symbol: &str| vector.iter().find(|v| v.0 == symbol).unwrap().1;
+        assert!(of(parts[0]) * of(parts[1]) > 0.0, "{vector:?}");
+        assert!(parts[2..].iter().all(|p| of(p) * of(parts[0]) < 0.0), "{vector:?}");
+    }
+}

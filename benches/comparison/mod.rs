@@ -258,7 +258,7 @@ fn write_study(folder: &Path) -> PathBuf {
         study.push_str(&format!("[[data]]\nplan = \"{name}.plan.json\"\nlog = \"{name}.csv\"\ncontroller = \"csv\"\n"));
     }
     study.push_str(
-        "[model]\neffects = [\"location-b\", \"location-c\", \"pretravel\", \"block-setup\"]\n[noise]\ntouch_um = 1.0\n",
+        "[model]\neffects = [\"location-b\", \"location-c\", \"pretravel\", \"block-setup\"]\n[noise]\ntouch_um = 1.0\nvisit_um = 0.0\n",
     );
     let path = folder.join("study.toml");
     std::fs::write(&path, study).unwrap();

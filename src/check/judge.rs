@@ -261,7 +261,10 @@ impl<'a, 'b> Walk<'a, 'b> {
             Event::Probe { probe, outcome, latched } => {
                 let (from, to) = (self.case.world.axes(part, &probe.from), self.case.world.axes(part, &probe.to));
                 self.probe(at, part, probe, &from, &to, outcome.hit, outcome.part);
-                if let Some(contact) = &mut self.contact {
+                if outcome.hit
+                    && probe.toward
+                    && let Some(contact) = &mut self.contact
+                {
                     contact.made.latched = self.case.world.axes(part, latched);
                 }
             }

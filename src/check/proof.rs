@@ -13,10 +13,10 @@ use sha2::{Digest, Sha256};
 use std::fmt::Write;
 
 /// The proof of the runs of a program.
-pub fn proof(runs: &[Told]) -> Proof {
+pub fn proof<'a>(runs: impl Iterator<Item = &'a Told>) -> Proof {
     let mut all = Sha256::new();
     let mut lines = Vec::new();
-    for (n, told) in runs.iter().enumerate() {
+    for (n, told) in runs.enumerate() {
         let mut text = String::new();
         // writing into a String cannot fail
         let _ = writeln!(text, "run {n} from {}", told.from);

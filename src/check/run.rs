@@ -313,6 +313,11 @@ pub trait Dialect: Clone + Send + Sync {
     fn write(&mut self, var: &Var, value: f64) -> Result<(), String>;
     /// A move ended: where its result is kept.
     fn probed(&mut self, probe: &Probe, outcome: Outcome, stands: &Position);
+    /// The control latches all axes at the contact and lets them run out behind it; `false`: a cycle that keeps X, Y, Z and itself
+    /// brings the ball to where the program asks for.
+    fn latches(&self) -> bool {
+        true
+    }
     /// A subroutine was entered.
     fn entered(&mut self) {}
     /// A subroutine was left, with its value.
@@ -361,14 +366,12 @@ fn beyond(probe: &Probe, contact: &Position) -> Position {
 
 /// What the encoders of a real machine say at a contact: each axis off by its own fraction of a least step, another one at each
 /// place. A reading that is left over from another touch, or that nobody has made, shows.
-fn latched(contact: &Position, tcp: bool) -> Position {
-    const OFF: [f64; 6] = [1.3e-3, 1.1e-3, 0.9e-3, 0.4e-3, 0.5e-3, 0.6e-3];
+fn latched(contact: &Position, axes: &[bool; 6], rotary: bool) -> Position {
+    const OFF: [f64; 6] = [0.9e-3, 0.8e-3, 0.7e-3, 0.4e-3, 0.5e-3, 0.6e-3];
     // the same place has the same reading, whatever came before it
     let phase = contact.0.iter().zip([12.9898, 78.233, 37.719, 4.581, 9.137, 7.313]).map(|(x, f)| x * f).sum::<f64>();
     let mut at = *contact;
-    // under a transformation an angle's last digits would move the linear axes by more than those of the log
-    let axes = if tcp { 3 } else { 6 };
-    for (k, (slot, off)) in at.0.iter_mut().zip(OFF).enumerate().take(axes) {
+    for (k, (slot, off)) in at.0.iter_mut().zip(OFF).enumerate().filter(|(k, _)| axes[*k] && (*k < 3 || rotary)) {
         *slot += off * (phase + 1.7 * k as f64).sin();
     }
     at
@@ -495,8 +498,11 @@ impl<'p, D: Dialect> Run<'p, D> {
             stands = probe.to;
         }
         let touched = outcome.hit && outcome.part > 0.0 && probe.toward;
-        let latched = if touched { latched(&stands, self.vm.world.is_tcp()) } else { stands };
-        self.vm.at = if touched { beyond(&probe, &stands) } else { stands };
+        let latches = self.dialect.latches();
+        // under a transformation an angle's last digits would move the linear axes by more than those of the log
+        let rotary = latches && !self.vm.world.is_tcp();
+        let latched = if touched { latched(&stands, &self.vm.axes, rotary) } else { stands };
+        self.vm.at = if touched && latches { beyond(&probe, &stands) } else { stands };
         self.vm.note(Event::Probe { probe: probe.clone(), outcome, latched });
         self.dialect.probed(&probe, outcome, &latched);
         if probe.alarm.comes(outcome) {

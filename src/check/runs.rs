@@ -109,6 +109,8 @@ fn compared(condition: &Expr, var: &Var, found: &mut dyn FnMut(f64)) {
 pub struct All {
     /// The first is that of the whole program.
     pub runs: Vec<Told>,
+    /// Runs that find the machine where the program must not begin.
+    pub refused: Vec<Told>,
     /// What is wrong in the comparison of runs.
     pub findings: Vec<(Range<usize>, String)>,
     /// Set-ups at which it can begin.
@@ -190,7 +192,23 @@ impl<'a, D: Dialect> Runs<'a, D> {
         if let (Some(awkward), Some(fresh)) = (runs.first(), fresh) {
             findings.extend(otherwise(awkward, &fresh));
         }
-        All { runs, findings, setups: self.program.setups, stops, clear_from_anywhere }
+        let refused = self.refused(beginning);
+        findings.extend(refused.iter().filter_map(moves_all_the_same));
+        All { runs, refused, findings, setups: self.program.setups, stops, clear_from_anywhere }
+    }
+
+    /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere.
+    fn refused(&self, beginning: Position) -> Vec<Told> {
+        const ELSEWHERE_DEG: f64 = 0.01;
+        if !self.tcp() {
+            return Vec::new();
+        }
+        let elsewhere = |axis: AxisName, by: f64| {
+            let mut at = beginning;
+            at.set(axis, at.get(axis) + by);
+            self.told(1, Start::Awkward, at, None)
+        };
+        self.machine.rotary().flat_map(|a| [ELSEWHERE_DEG, -ELSEWHERE_DEG].map(|by| elsewhere(a.name, by))).collect()
     }
 
     fn tcp(&self) -> bool {
@@ -371,6 +389,13 @@ impl<'a, D: Dialect> Runs<'a, D> {
         // the program is begun well inside of its window
         (window, is_clear)
     }
+}
+
+/// It begins where it must not.
+fn moves_all_the_same(told: &Told) -> Option<(Range<usize>, String)> {
+    let moves = told.trunk.iter().find(|h| matches!(h.event, Event::Move { .. } | Event::Probe { .. }))?;
+    let says = "under the control's own transformation the program must not move unless the rotary axes stand at 0: begun with one at 0.01 deg, it does";
+    Some((moves.at.clone(), says.to_owned()))
 }
 
 /// Stops of a run: several without a move between them are one.

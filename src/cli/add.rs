@@ -39,7 +39,12 @@ pub struct HistoryArgs {
 /// # Errors
 /// When the study is unusable, an effect is unknown, does not apply or is in the model, or the study changed meanwhile.
 pub fn add(args: &Args, io: &Io) -> Result<Answer> {
-    run(args, io, |loaded, text| {
+    add_chosen(args, io, None)
+}
+
+/// The same for an effect that the search chose, with the error that it leaves on touches which had no part in choosing it.
+pub(super) fn add_chosen(args: &Args, io: &Io, nested_rms_um: Option<f64>) -> Result<Answer> {
+    run(args, io, nested_rms_um, |loaded, text| {
         for id in &args.effects {
             applies(loaded, id)?;
         }
@@ -52,7 +57,7 @@ pub fn add(args: &Args, io: &Io) -> Result<Answer> {
 /// # Errors
 /// When the study is unusable, an effect is not in the model, or the study changed meanwhile.
 pub fn remove(args: &Args, io: &Io) -> Result<Answer> {
-    run(args, io, |loaded, text| {
+    run(args, io, None, |loaded, text| {
         let gone = |name: &str| {
             loaded.catalogue.iter().any(|e| {
                 args.effects.contains(&e.id) && e.parameters.iter().any(|p| crate::symbols::same(&p.name, name))
@@ -95,7 +100,12 @@ fn applies(loaded: &Loaded, id: &str) -> Result<()> {
     Err(Failure::new("model::unknown_effect", format!("no effect is called {id:?}")).help(help))
 }
 
-fn run(args: &Args, io: &Io, edit: impl Fn(&Loaded, &str) -> Result<String>) -> Result<Answer> {
+fn run(
+    args: &Args,
+    io: &Io,
+    nested_rms_um: Option<f64>,
+    edit: impl Fn(&Loaded, &str) -> Result<String>,
+) -> Result<Answer> {
     let bytes = files::read_bytes(&args.study)?;
     let text = files::read_text(&args.study)?;
     let mut loaded = load_study(&args.study, io)?;
@@ -109,8 +119,13 @@ fn run(args: &Args, io: &Io, edit: impl Fn(&Loaded, &str) -> Result<String>) -> 
     let (study, _) = crate::study::Study::parse(&source(args.study.display().to_string(), edited.clone()))?;
     loaded.study = study;
     let after = fit_of(&loaded)?;
-    history.push(step(&loaded, &after));
-    let changes = change::change(&before.outcome, &after.outcome);
+    history.push(Step { nested_rms_um, ..step(&loaded, &after) });
+    let left_out = (held_out::by_visit(&before), held_out::by_visit(&after));
+    let fall = match &left_out {
+        (Some(b), Some(a)) => held_out::fall(b, a, &before.data.visits),
+        _ => None,
+    };
+    let changes = change::change(&before.outcome, &after.outcome, fall);
     if !args.dry_run {
         if files::read_bytes(&args.study)? != bytes {
             return Err(Failure::new("study::changed", format!("{} was changed meanwhile", args.study.display()))
@@ -123,7 +138,14 @@ fn run(args: &Args, io: &Io, edit: impl Fn(&Loaded, &str) -> Result<String>) -> 
     }
     let rms = |fit: &Fit| held_out::later_run(fit).map(|h| h.rms_um);
     let later = (rms(&before), rms(&after));
-    io.say(report::ladder::change(&before.outcome, &after.outcome, &changes, later, io.paper(false)));
+    let se = |h: &Option<held_out::HeldOut>| h.as_ref().and_then(|h| h.standard_error_um);
+    let doubt = report::ladder::HeldOutDoubt {
+        standard_errors: (se(&left_out.0), se(&left_out.1)),
+        fall,
+        nested_rms_um,
+        n_groups: left_out.1.as_ref().map_or(0, |h| h.groups),
+    };
+    io.say(report::ladder::change((&before.outcome, &after.outcome), &changes, later, &doubt, io.paper(false)));
     io.say(if args.dry_run {
         format!("{} is as it was (--dry-run)", args.study.display())
     } else {
@@ -132,6 +154,10 @@ fn run(args: &Args, io: &Io, edit: impl Fn(&Loaded, &str) -> Result<String>) -> 
     let plain = |fit: &Fit| fit::outcome::Outcome { residuals: None, ..fit.outcome.clone() };
     io.answer(&json!({
         "before": plain(&before), "after": plain(&after), "remarks": changes.remarks, "written": !args.dry_run,
+        "held_out": {
+            "se_before_um": doubt.standard_errors.0, "se_after_um": doubt.standard_errors.1,
+            "fall_um": fall.map(|f| f.0), "fall_se_um": fall.map(|f| f.1), "nested_rms_um": nested_rms_um,
+        },
     }));
     Ok(Answer::Done)
 }
@@ -188,6 +214,7 @@ pub fn step(loaded: &Loaded, fit: &Fit) -> Step {
         effects: loaded.study.effects.clone(),
         rms_um: o.rms_um,
         held_out_rms_um: o.held_out_rms_um,
+        held_out_se_um: held_out::by_visit(fit).and_then(|h| h.standard_error_um),
         later_run_rms_um: held_out::later_run(fit).map(|h| h.rms_um),
         chi2_per_dof: o.chi2_per_dof,
         unknowns: o.unknowns,

@@ -140,6 +140,9 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
     let options = diagnose::Options { at_most: 1, refit: false, power: false, ..diagnose::Options::default() };
     let found = diagnose::diagnose(subject, &options)?;
     let (word, next) = match found.verdict {
+        Verdict::TooLittleData if found.most_missed => {
+            ("too-little-data", "most touches cannot be used, and the rest is no sample of the machine".to_owned())
+        }
         Verdict::Adequate | Verdict::TooLittleData => return Ok(()),
         Verdict::MissingEffect => {
             let named = found.candidates.first().map_or_else(String::new, |c| format!(" (first: {})", c.effect));
@@ -237,6 +240,7 @@ fn control(
     };
     let (export, findings) = control::export(machine, name, tables, correction, &options)?;
     io.report(&findings.0);
+    keep_restoring(machine, tables, &export.files, args)?;
     for (file, contents) in &export.files {
         files::write_whole(&args.out.join(file), contents)?;
     }
@@ -285,6 +289,32 @@ fn control(
         "radius_mm": args.radius,
     }));
     Ok(Answer::Done)
+}
+
+/// The restoring file of an earlier export may be all that is left of the control's old values: it is not written over by another.
+fn keep_restoring(machine: &Machine, tables: &Tables, files: &[(String, Vec<u8>)], args: &Args) -> Result<()> {
+    let names = control::names(machine, tables);
+    // the head may be another one: day and study
+    let values = |bytes: &[u8]| {
+        let text = source("restoring", String::from_utf8_lossy(bytes).into_owned());
+        backup::read(&text, &tables.backup, &names).ok()
+    };
+    let restoring = tables.file.iter().filter_map(|f| f.restore.as_ref());
+    for name in restoring.filter(|_| !args.force) {
+        let path = args.out.join(name);
+        let same = |old: &[u8]| {
+            let new = files.iter().find(|(n, _)| n == name).map(|(_, new)| new.as_slice());
+            new.is_some_and(|new| new == old || values(new).is_some_and(|v| Some(v) == values(old)))
+        };
+        if std::fs::read(&path).is_ok_and(|old| !same(&old)) {
+            return Err(Failure::new(
+                "export::restoring",
+                format!("{} of an earlier export holds other values than this one would write", path.display()),
+            )
+            .help("it brings back what the control held then: export into another folder, or --force writes over it"));
+        }
+    }
+    Ok(())
 }
 
 /// Is it a day of the calendar, YYYY-MM-DD?

@@ -10,7 +10,7 @@ use crate::design::{Known, Noise, Planned, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::files;
-use crate::fit::{self, Fit, effects_of};
+use crate::fit::{self, Fit, Settings, effects_of};
 use crate::machine::{Machine, Mounting};
 use crate::model::catalogue::Effect;
 use crate::post::Postprocessor;
@@ -66,6 +66,10 @@ pub struct Args {
     pub join: Option<PathBuf>,
 }
 
+fn warn<'a>(said: impl Iterator<Item = &'a String>, io: &Io) {
+    io.report(&said.map(|w| Finding::warning("next::left_out", w.clone())).collect::<Vec<_>>());
+}
+
 /// Runs `plan-next`.
 ///
 /// # Errors
@@ -86,18 +90,38 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.effects.retain(|e| !args.effects.contains(e));
     settings.quick = true;
     let named = effects_of(&args.effects, &loaded.catalogue, &loaded.machine)?;
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let look = |settings: &Settings| -> Result<(Fit, diagnose::Diagnosis)> {
+        let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), settings)?;
+        let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings, fit: &fit };
+        let found = diagnose(subject, &diagnose::Options { power: false, refit: false, ..Default::default() })?;
+        Ok((fit, found))
+    };
+    let (mut fit, mut found) = look(&settings)?;
+    let open = |d: &diagnose::Diagnosis| d.verdict == Verdict::MissingEffect && !d.open.suspects.is_empty();
+    if named.is_empty() && !open(&found) {
+        // what was added last may stand for others that the same touches could not tell from it: still an open question
+        let added = last_added(args, &loaded)?;
+        let mut before = settings.clone();
+        before.effects.retain(|e| !added.contains(e));
+        if before.effects.len() < settings.effects.len() {
+            let (fit_before, then) = look(&before)?;
+            let group = then.open.suspects.iter().any(|s| added.contains(&s.id)) && !then.open.pairs.is_empty();
+            if open(&then) && group {
+                (settings, fit, found) = (before, fit_before, then);
+            }
+        }
+    }
     let mut setting = Setting::new(&loaded, &settings.effects, &fit)?;
     let questions = if named.is_empty() {
-        let subject =
-            Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-        let found = diagnose(subject, &diagnose::Options { power: false, refit: false, ..Default::default() })?;
-        if found.verdict == Verdict::MissingEffect && !found.open.suspects.is_empty() {
+        warn(found.warnings.iter(), io);
+        if open(&found) {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
             Questions::left_open(found.open.suspects, &found.open.pairs)
         } else {
-            Questions::of_plan(&View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?)
+            let view = View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
+            warn(view.left_out.iter().map(|(_, says)| says).filter(|says| !found.warnings.contains(says)), io);
+            Questions::of_plan(&view)
         }
     } else {
         Questions::named(&args.effects)
@@ -114,6 +138,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let shape = questions.suspects.iter().find(|s| s.id == *id).and_then(|s| s.shape);
         let known = effects.iter().any(|(e, _)| e.id == *id);
         effects.extend(loaded.catalogue.get(id, &loaded.machine).filter(|_| !known).map(|e| (e, shape)));
+    }
+    let asked_of = View::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
+    if let Some((_, says)) = asked_of.left_out.first() {
+        return Err(Failure::new("next::no_value", says.clone())
+            .help("write its formula so that it holds at every touch, or ask for other effects"));
     }
     let budget_s = 60.0 * args.minutes;
     let stands = setting.stands(&loaded.machine, args.moved);
@@ -149,7 +178,26 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
         ));
     };
+    if chosen.separations.iter().all(|s| s.told < SAFELY) {
+        let says = format!(
+            "no program of {:.0} minutes that this machine can run tells any of these effects apart: {}",
+            args.minutes,
+            says(&questions)
+        );
+        io.say(&says);
+        io.say("  nothing is written: give more time (--minutes), let the blocks be put up anew (--moved), or confirm one of \
+                them at the machine");
+        io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": says }));
+        return Ok(Answer::No);
+    }
     write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
+}
+
+/// Effects of the study's model that the last step of its history put there.
+fn last_added(args: &Args, loaded: &Loaded) -> Result<Vec<String>> {
+    let history = super::add::read_history(&super::add::history_path(&args.study))?.unwrap_or_default();
+    let last = history.steps.last().filter(|s| s.effects == loaded.study.effects);
+    Ok(last.map_or_else(Vec::new, |s| s.added.clone()))
 }
 
 /// A program that was chosen and proven.

@@ -23,7 +23,7 @@ pub struct Args {
 /// Runs `sketch-effect`.
 ///
 /// # Errors
-/// When the study is unusable, or nothing is left over that a formula could say.
+/// When the study or the effects file is unusable. Where nothing is left over that a formula could say the answer is "no".
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
@@ -38,7 +38,17 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let taken = |id: &str| loaded.catalogue.knows(id) || own.knows(id);
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let made = sketch(subject, &taken)?;
+    let made = match sketch(subject, &taken) {
+        Ok(made) => made,
+        // the study is usable: the answer is "no"
+        Err(failure) if failure.0.iter().all(|f| ["sketch::nothing_left", "sketch::no_formula"].contains(&f.code)) => {
+            io.say(failure.to_string());
+            failure.0.iter().filter_map(|f| f.help.as_ref()).for_each(|help| io.say(format!("  {help}")));
+            io.answer(&json!({ "effect": null, "says": failure.to_string() }));
+            return Ok(Answer::No);
+        }
+        Err(failure) => return Err(failure),
+    };
     let gap = match before.trim_end() {
         "" => "",
         _ if before.ends_with('\n') => "\n",

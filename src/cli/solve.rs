@@ -42,6 +42,8 @@ struct Solution {
     verdict: Verdict,
     /// Effects that were added and say nothing beside the later ones: they were taken out again.
     dropped: Vec<String>,
+    /// Effects that were added and taken out again, because the end was not what they had promised.
+    taken_back: Vec<String>,
     /// What stays open.
     open: Vec<String>,
     rms_um: f64,
@@ -59,8 +61,11 @@ struct Step {
     p_adjusted: f64,
     rms_before_um: f64,
     rms_after_um: f64,
+    /// On touches that had no part in choosing the effect (the choice redone for each index visit left out).
     held_out_before_um: Option<f64>,
     held_out_after_um: Option<f64>,
+    /// Standard error of the difference.
+    held_out_se_um: Option<f64>,
 }
 
 /// What the user says to a proposal.
@@ -75,6 +80,7 @@ enum Reply {
 /// When the study is unusable, or nobody is there to agree.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut steps: Vec<Step> = Vec::new();
+    let mut taken_back: Vec<String> = Vec::new();
     let (loaded, fit, found, stopped) = loop {
         let (loaded, fit) = look(&args.study, io)?;
         let o = &fit.outcome;
@@ -84,7 +90,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             significant(o.rms_um),
             significant(o.noise_um),
             o.chi2_per_dof,
-            o.held_out_rms_um.map_or_else(String::new, |h| format!(", {} um on set-ups left out", significant(h)))
+            left_out(&fit)
         ));
         let mut settings = loaded.settings();
         settings.quick = true;
@@ -95,7 +101,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.say(&found.says);
         let stopped = match (&found.verdict, found.candidates.first()) {
             (Verdict::MissingEffect, Some(first)) if first.proposed => {
-                if steps.len() >= args.at_most {
+                if let Some(why) = unbelievable(first) {
+                    Some(why)
+                } else if steps.len() >= args.at_most {
                     Some(format!("{} effects were added, as many as --at-most allows", steps.len()))
                 } else {
                     propose(first, io);
@@ -103,19 +111,29 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                         Reply::Take(id) => {
                             let change =
                                 add::Args { study: args.study.clone(), effects: vec![id.clone()], dry_run: false };
-                            add::add(&change, &io.inner())?;
-                            let after = look(&args.study, io)?.1.outcome;
+                            add::add_chosen(&change, &io.inner(), first.held_out_after_um.filter(|_| first.nested))?;
+                            let after_fit = look(&args.study, io)?.1;
+                            let added: Vec<&str> =
+                                steps.iter().map(|s| s.added.as_str()).chain([id.as_str()]).collect();
+                            let refused = refused(&after_fit, &added);
+                            let after = after_fit.outcome;
                             let mut same_as: Vec<String> =
                                 std::iter::once(first.effect.clone()).chain(first.same_as.clone()).collect();
                             same_as.retain(|s| *s != id);
+                            if refused.is_some() {
+                                add::remove(&change, &io.inner())?;
+                                taken_back.push(id);
+                                break (loaded, fit, found, refused.unwrap_or_default());
+                            }
                             steps.push(Step {
                                 added: id,
                                 same_as,
                                 p_adjusted: first.p_adjusted,
                                 rms_before_um: o.rms_um,
                                 rms_after_um: after.rms_um,
-                                held_out_before_um: o.held_out_rms_um,
-                                held_out_after_um: after.held_out_rms_um,
+                                held_out_before_um: first.held_out_before_um,
+                                held_out_after_um: first.held_out_after_um,
+                                held_out_se_um: first.held_out_se_um,
                             });
                             None
                         }
@@ -131,20 +149,34 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 args.study.display()
             )),
             (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
+            (Verdict::MissingEffect, _) => {
+                Some("a gross mistake must be put right, and the touches made again".to_owned())
+            }
             _ => Some("nothing is left that these touches can show".to_owned()),
         };
         if let Some(stopped) = stopped {
             break (loaded, fit, found, stopped);
         }
     };
+    // names that end in something unexplained were names for a part of it, and may all be wrong
+    let unexplained = found.verdict == Verdict::Unexplained && !found.faint;
+    if unexplained && !steps.is_empty() {
+        let added: Vec<String> = steps.drain(..).map(|s| s.added).collect();
+        io.say(format!("what was added ({}) does not explain it: it is taken out again", added.join(", ")));
+        let change = add::Args { study: args.study.clone(), effects: added.clone(), dry_run: false };
+        add::remove(&change, &io.inner())?;
+        taken_back.extend(added);
+    }
     let dropped = drop_idle(args, &steps, &fit, io)?;
-    let fit = if dropped.is_empty() { fit } else { look(&args.study, io)?.1 };
+    let same = dropped.is_empty() && taken_back.is_empty();
+    let fit = if same { fit } else { look(&args.study, io)?.1 };
     let solution = Solution {
         format: "axiscal-solution/1",
         open: open(&steps, &found, &fit.outcome),
         verdict: found.verdict,
         stopped,
         dropped,
+        taken_back,
         rms_um: fit.outcome.rms_um,
         noise_um: fit.outcome.noise_um,
         held_out_rms_um: fit.outcome.held_out_rms_um,
@@ -163,6 +195,67 @@ fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
     Ok((loaded, fit))
 }
 
+/// What the model leaves of index visits that were left out of the fit, in words.
+fn left_out(fit: &Fit) -> String {
+    let Some(h) = fit::held_out::by_visit(fit) else { return String::new() };
+    let se = h.standard_error_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
+    format!(", {}{se} um on index visits left out", digits(h.rms_um, h.standard_error_um))
+}
+
+/// Why nobody should believe a proposal: a size far beyond what such an effect has, as names get that stand for another one.
+fn unbelievable(first: &Candidate) -> Option<String> {
+    (!first.plausible).then(|| {
+        format!(
+            "the first proposal ({}) would need more than {:.0} times its usual size: it is a name for something else. \
+             `axiscal add` puts it in if you know better",
+            first.effect,
+            crate::search::groups::PLAUSIBLE
+        )
+    })
+}
+
+/// Sizes of two added effects that go together like this are those of two names for one thing, or of two that cancel.
+const TOGETHER: f64 = 0.99;
+
+/// Why a model with these added effects is not to be believed, after the full fit.
+fn refused(fit: &Fit, added: &[&str]) -> Option<String> {
+    let of: Vec<usize> = fit
+        .free
+        .iter()
+        .copied()
+        .filter(|&i| added.contains(&fit.model.unknowns[i].effect.as_str()) && !fit.model.unknowns[i].shape)
+        .collect();
+    let last = added.last()?;
+    for &i in of.iter().filter(|&&i| fit.model.unknowns[i].effect == *last) {
+        let u = &fit.model.unknowns[i];
+        let times = (fit.theta[i] / u.typical).abs();
+        let sure = fit.theta[i].abs() > 2.0 * fit.covariance[(i, i)].max(0.0).sqrt();
+        if u.typical > 0.0 && sure && times > crate::search::groups::PLAUSIBLE {
+            return Some(format!(
+                "{last} is taken back: its {} would be {times:.0} times as large as such an effect usually is",
+                u.name
+            ));
+        }
+    }
+    for (k, &i) in of.iter().enumerate() {
+        for &j in &of[..k] {
+            let (a, b) = (&fit.model.unknowns[i], &fit.model.unknowns[j]);
+            let scale = (fit.covariance[(i, i)] * fit.covariance[(j, j)]).max(0.0).sqrt();
+            let r = if scale > 0.0 { fit.covariance[(i, j)] / scale } else { 0.0 };
+            if a.effect != b.effect && r.abs() > TOGETHER {
+                return Some(format!(
+                    "{last} is taken back: these touches cannot tell its size from that of {} ({} and {} go together with a \
+                     correlation of {r:.3}), so that the two may cancel",
+                    if a.effect == *last { &b.effect } else { &a.effect },
+                    a.name,
+                    b.name
+                ));
+            }
+        }
+    }
+    None
+}
+
 /// The proposal and its reason.
 fn propose(first: &Candidate, io: &Io) {
     let mut sizes: Vec<String> = first
@@ -174,9 +267,26 @@ fn propose(first: &Candidate, io: &Io) {
         })
         .collect();
     sizes.extend(first.not_told.iter().map(|name| format!("{name} ? (cannot be told by this plan)")));
-    io.say(format!("proposed: {} ({}): {}", first.effect, first.name, sizes.join(", ")));
+    if let (false, Some(most)) = (first.not_told.is_empty(), first.moves_um) {
+        sizes.push(format!("together up to {} um at a touch", significant(most)));
+    }
+    let which = match first.same_as.len() {
+        0 => String::new(),
+        n => format!(" or one of {n} others"),
+    };
+    io.say(format!("proposed: {}{which} ({}): {}", first.effect, first.name, sizes.join(", ")));
     io.say(format!("  {}", first.says));
     io.say(format!("  to confirm it: {}", first.look));
+    if let (Some(before), Some(after)) = (first.held_out_before_um, first.held_out_after_um) {
+        let se = first.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
+        let how = if first.nested { "the choice redone for each" } else { "the effect given" };
+        let fall = digits(before - after, first.held_out_se_um);
+        io.say(format!(
+            "  on index visits left out ({how}): {} um before, {} um with it: {fall}{se} um less",
+            significant(before),
+            significant(after)
+        ));
+    }
     if !first.same_as.is_empty() {
         io.say(format!("  these touches cannot tell it from: {}", first.same_as.join(", ")));
         io.say(format!("  to tell them apart: {}", first.tell_apart));
@@ -288,6 +398,9 @@ fn tell(s: &Solution, outcome: &Outcome, study: &Path, io: &Io) {
         s.held_out_rms_um
             .map_or_else(String::new, |h| format!("; {} um on set-ups left out of the fit", significant(h)))
     ));
+    for id in &s.taken_back {
+        io.say(format!("taken back: {id}"));
+    }
     for line in &s.open {
         io.say(format!("open: {line}"));
     }

@@ -37,8 +37,10 @@ fn known(p: &Parameter) -> Option<(f64, f64)> {
 }
 
 /// Compares two fits of the same touches.
+///
+/// `fall`: by how much the error on touches left out falls, with its standard error, µm.
 #[must_use]
-pub fn change(before: &Outcome, after: &Outcome) -> Change {
+pub fn change(before: &Outcome, after: &Outcome, fall: Option<(f64, f64)>) -> Change {
     let results =
         |o: &Outcome| -> Vec<Parameter> { o.parameters.iter().filter(|p| !p.name.contains('@')).cloned().collect() };
     let (was, is) = (results(before), results(after));
@@ -64,10 +66,9 @@ pub fn change(before: &Outcome, after: &Outcome) -> Change {
             _ => {}
         }
     }
-    if let (Some(b), Some(a)) = (before.held_out_rms_um, after.held_out_rms_um)
-        && a > b
-    {
-        remarks.push(format!("touches that were left out are predicted worse: {a:.3} um after {b:.3} um"));
+    if let Some((fall, se)) = fall.filter(|f| f.0 < 0.0) {
+        let much = if -fall > se { "" } else { ", which may be chance" };
+        remarks.push(format!("touches that were left out are predicted worse by {:.3} ± {se:.3} um{much}", -fall));
     }
     for u in after.undetermined.iter().filter(|u| !before.undetermined.iter().any(|b| b.says == u.says)) {
         remarks.push(format!("new, not told by this data: {}", u.says));

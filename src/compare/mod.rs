@@ -40,6 +40,15 @@ pub struct Comparison {
     pub noise_um: f64,
     /// Where that comes from: `repeats`, `declared`, `study`.
     pub noise_source: String,
+    /// Scatter of index visits, µm.
+    #[serde(default)]
+    pub visit_um: f64,
+    /// Where that comes from: `revisits`, `declared`, `study`, `one pose`.
+    #[serde(default)]
+    pub visit_source: String,
+    /// Both in a sentence.
+    #[serde(default)]
+    pub noise_says: String,
     /// Reduced chi-square.
     pub chi2_per_dof: f64,
     /// Degrees of freedom.
@@ -199,11 +208,14 @@ pub fn compare(fit: &Fit) -> Comparison {
     splits.sort_by(|a, b| rank(b).0.cmp(&rank(a).0).then(rank(b).1.total_cmp(&rank(a).1)));
     let rms_um = fit.outcome.rms_um;
     let noise_um = um_from_mm(fit.noise.sigma_mm);
+    // the misfit is held against both
+    let visits_um = um_from_mm(fit.noise.tau_mm);
+    let noise_words = noise_words(noise_um, visits_um);
     let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
     let says = match (fit.dof, explained_by_noise, first) {
         (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
         (_, true, _) => {
-            format!("what is left, {rms_um:.2} um, is what a noise of {noise_um:.2} um leaves: the model does not fail")
+            format!("what is left, {rms_um:.2} um, is what {noise_words} leaves: the model does not fail")
         }
         (_, false, Some(split)) => {
             format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says)
@@ -221,6 +233,9 @@ pub fn compare(fit: &Fit) -> Comparison {
         held_out_rms_um: fit.outcome.held_out_rms_um,
         noise_um,
         noise_source: fit.noise.source.into(),
+        visit_um: fit.outcome.visit_um,
+        visit_source: fit.noise.visit_source.into(),
+        noise_says: fit.noise.says(),
         chi2_per_dof,
         dof: fit.dof,
         explained_by_noise,
@@ -228,6 +243,15 @@ pub fn compare(fit: &Fit) -> Comparison {
         splits,
         worst: worst(fit, &points),
         points,
+    }
+}
+
+/// What the misfit is held against: the noise of a touch, and the scatter of index visits where it was measured.
+fn noise_words(noise_um: f64, visits_um: f64) -> String {
+    if visits_um > 0.0 {
+        format!("a noise of {noise_um:.2} um with index visits that scatter by {visits_um:.2} um")
+    } else {
+        format!("a noise of {noise_um:.2} um")
     }
 }
 
@@ -274,10 +298,14 @@ impl Comparison {
         }
         front.append(&mut self.splits);
         self.splits = front;
-        self.says = if self.explained_by_noise {
+        let noise_words = noise_words(self.noise_um, if self.visit_source == "declared" { 0.0 } else { self.visit_um });
+        self.says = if self.explained_by_noise && first.by == "visit" {
+            // the scatter of visits is the finding, and the model has no part in it
+            format!("what is left, {:.2} um, is what {noise_words} leaves. {}", self.rms_um, first.says)
+        } else if self.explained_by_noise {
             format!(
-                "as a whole what is left, {:.2} um, could be noise of {:.2} um, but not the way it is spread: {}",
-                self.rms_um, self.noise_um, first.says
+                "as a whole what is left, {:.2} um, could be {noise_words}, but not the way it is spread: {}",
+                self.rms_um, first.says
             )
         } else {
             format!("the model misses the touches by {:.1} times their noise; {}", self.chi2_per_dof.sqrt(), first.says)

@@ -1,10 +1,15 @@
 //! Two studies of one machine: which errors changed by more than their doubt, and did a compensation work?
 
 use crate::fit::outcome::{Outcome, Status};
+use crate::search::distributions::p_of_normal;
+use crate::search::multiplicity::{FAMILY_LEVEL, holm};
 use serde::{Deserialize, Serialize};
 
 /// The format line of a verification.
 pub const FORMAT: &str = "axiscal-verification/1";
+
+/// Two-sided 95 % of a normal value.
+const Z_95: f64 = 1.959_964;
 
 /// What was measured of one of the two studies.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -35,8 +40,20 @@ pub struct Row {
     pub difference: f64,
     /// Expanded uncertainty (95 %) of the difference.
     pub expanded: f64,
-    /// Is the difference larger than that?
+    /// Probability of a difference so large where nothing has changed, all errors compared counted in (Holm).
+    #[serde(default)]
+    pub p_adjusted: f64,
+    /// Is that below 5 %?
     pub changed: bool,
+}
+
+/// An error that only one of the two studies tells.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Alone {
+    /// ISO form.
+    pub name: String,
+    /// `before` or `after`: the study that tells it.
+    pub told_by: String,
 }
 
 /// What was done between the two.
@@ -80,6 +97,9 @@ pub struct Verification {
     pub after: Figures,
     /// Errors that both identify.
     pub parameters: Vec<Row>,
+    /// Errors that only one of them identifies: nothing is said of their change.
+    #[serde(default)]
+    pub not_compared: Vec<Alone>,
     /// In words.
     pub says: String,
     /// What a reader must not miss.
@@ -94,7 +114,7 @@ pub fn verify(
     question: Question,
     same_plans: bool,
 ) -> Verification {
-    let rows: Vec<Row> = before
+    let mut rows: Vec<Row> = before
         .parameters
         .iter()
         .filter(|p| !p.name.contains('@') && p.status == Status::Identified)
@@ -110,10 +130,31 @@ pub fn verify(
                 after: (a.value, sa),
                 difference,
                 expanded,
-                changed: difference.abs() > expanded,
+                // 95 % of a normal value lie within 1.96: the factor of few degrees of freedom is in the doubt already
+                p_adjusted: p_of_normal(Z_95 * difference / expanded),
+                changed: false,
             })
         })
         .collect();
+    // with eight errors side by side one of them differs by more than its 95 % in every third pair of equal machines
+    let adjusted = holm(&rows.iter().map(|r| r.p_adjusted).collect::<Vec<f64>>());
+    for (row, p) in rows.iter_mut().zip(adjusted) {
+        (row.p_adjusted, row.changed) = (p, p < FAMILY_LEVEL);
+    }
+    let not_compared = [(before, after, "before"), (after, before, "after")]
+        .into_iter()
+        .flat_map(|(one, other, word)| {
+            let told = |o: &Outcome, name: &str| {
+                o.parameters.iter().any(|p| p.name == name && p.status == Status::Identified && p.sigma.is_some())
+            };
+            let own = one.parameters.iter().filter(|p| !p.name.contains('@'));
+            let alone: Vec<Alone> = own
+                .filter(|p| told(one, &p.name) && !told(other, &p.name))
+                .map(|p| Alone { name: p.name.clone(), told_by: word.to_owned() })
+                .collect();
+            alone
+        })
+        .collect::<Vec<Alone>>();
     let n_changed = rows.iter().filter(|r| r.changed).count();
     // the mean square of ν normal residuals scatters by √(2/ν) of itself
     let scatter = |f: &Figures| (2.0 / f.readings_dof.max(1) as f64).sqrt();
@@ -146,6 +187,15 @@ pub fn verify(
     if !same_plans {
         remarks.push("the two studies touched other points: compare the errors, not the RMS of the readings".into());
     }
+    for (word, other) in [("before", "after"), ("after", "before")] {
+        let names: Vec<&str> = not_compared.iter().filter(|a| a.told_by == word).map(|a| a.name.as_str()).collect();
+        if !names.is_empty() {
+            remarks.push(format!(
+                "not compared, because only the study {word} tells them and the one {other} does not: {}",
+                names.join(", ")
+            ));
+        }
+    }
     if rows.is_empty() {
         remarks.push("no error is identified by both studies".into());
     }
@@ -166,7 +216,67 @@ pub fn verify(
         before: first,
         after: second,
         parameters: rows,
+        not_compared,
         says,
         remarks,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::outcome::Parameter;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const NAMES: [&str; 8] = ["EX0B", "EZ0B", "EA0B", "EC0B", "EX0C", "EY0C", "EA0C", "EB0C"];
+
+    fn outcome(values: &[f64], names: &[&str]) -> Outcome {
+        let parameter = |(name, value): (&&str, &f64)| Parameter {
+            name: (*name).to_owned(),
+            value: *value,
+            sigma: Some(1.0),
+            expanded: Some(Z_95),
+            status: Status::Identified,
+            alias: None,
+            effect: String::new(),
+            unit: "um".to_owned(),
+            sigma_noise: None,
+            sigma_type_b: None,
+            sigma_with_unmodelled: None,
+        };
+        Outcome { parameters: names.iter().zip(values).map(parameter).collect(), ..Outcome::default() }
+    }
+
+    fn compared(b: &Outcome, a: &Outcome) -> Verification {
+        let figures = Figures { readings_rms_um: 1.0, readings_dof: 300, fit_rms_um: 1.0, noise_um: 1.0 };
+        verify((b, figures), (a, figures), Question::Change, true)
+    }
+
+    #[test]
+    fn equal_machines_are_said_to_have_changed_in_five_of_a_hundred_pairs() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(31);
+        let mut draw = |more: f64| -> Outcome {
+            let mut values: Vec<f64> = (0..8).map(|_| StandardNormal.sample(&mut rng)).collect();
+            values[0] += more;
+            outcome(&values, &NAMES)
+        };
+        let pairs = 1000;
+        let changed = (0..pairs).filter(|_| compared(&draw(0.0), &draw(0.0)).verdict == Verdict::Changed).count();
+        // 5 % and three standard errors; without counting all eight in it is a third
+        assert!(changed < 71, "{changed} of {pairs}");
+        assert!(changed > 20, "{changed} of {pairs}: it must be able to say so");
+        let found = (0..100).filter(|_| compared(&draw(0.0), &draw(7.0)).parameters[0].changed).count();
+        assert!(found > 95, "{found}");
+    }
+
+    #[test]
+    fn what_one_study_alone_tells_is_listed() {
+        let (b, a) = (outcome(&[1.0, 2.0], &["EX0B", "EZ0B"]), outcome(&[1.0, 2.0], &["EX0B", "EB0C"]));
+        let v = compared(&b, &a);
+        assert_eq!(v.parameters.len(), 1);
+        let alone = |name: &str, told_by: &str| Alone { name: name.into(), told_by: told_by.into() };
+        assert_eq!(v.not_compared, [alone("EZ0B", "before"), alone("EB0C", "after")]);
+        assert!(v.remarks.iter().any(|r| r.contains("not compared") && r.contains("EZ0B")), "{:?}", v.remarks);
     }
 }

@@ -1,5 +1,6 @@
 //! What a plan will be able to tell, before the first touch.
 
+use super::explain::{Remedy, Results, part};
 use super::habits::{Habit, habits};
 use super::record::{Advice, Assessment, Expected, FORMAT, Seen};
 use super::score;
@@ -45,6 +46,7 @@ struct Tried {
     power: Vec<Power>,
     pairs: Vec<AliasPair>,
     nullity: usize,
+    remedy: Option<Remedy>,
 }
 
 /// Says what planned runs will be able to tell.
@@ -60,10 +62,15 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let parameters = parameters(task, &alone, &view);
     let observability = observe(&alone.jacobian);
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
-    let undetermined = observability.unseen.iter().map(|v| statement::undetermined(&free, &task.effects, v)).collect();
+    let mut undetermined: Vec<_> = observability
+        .unseen
+        .iter()
+        .map(|v| statement::undetermined(&free, &task.effects, v, &observability.scale))
+        .collect();
     let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();
+    let results = Results::new(&alone.model, &alone.free);
     let tried: Vec<Tried> = habits(task.machine, &request.runs, &view.model)
         .into_iter()
         .map(|habit| {
@@ -72,12 +79,16 @@ pub fn assess(request: &Request) -> Result<Assessment> {
             let pairs = alias_pairs(&varied.base, &varied.library);
             // further blocks bring further unknowns: only what was unknown before counts
             let nullity = (varied.jacobian.ncols() - varied.base.rank()).min(nullity);
-            Ok(Tried { habit, power, pairs, nullity })
+            let remedy = (!observability.unseen.is_empty()).then(|| Remedy::new(&habit, &varied, &results));
+            Ok(Tried { habit, power, pairs, nullity, remedy })
         })
         .collect::<Result<_>>()?;
+    let remedies: Vec<Remedy> = tried.iter().filter_map(|t| t.remedy.clone()).collect();
+    let parted_together = part(&results.directions(&observability), &remedies, &mut undetermined);
     let absorbed = Absorbed::new(&view);
     let mut effects: Vec<Seen> = Vec::new();
-    for (c, candidate) in view.library.candidates().iter().enumerate() {
+    let left_out = |id: &str| view.left_out.iter().any(|(left, _)| left == id);
+    for (c, candidate) in view.library.candidates().iter().enumerate().filter(|(_, x)| !left_out(&x.id)) {
         let name = task.catalogue.get(&candidate.id, task.machine).map_or_else(String::new, |e| e.name.clone());
         let id = |other: usize| view.library.candidates()[other].id.clone();
         let p = &seen[c];
@@ -125,12 +136,14 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         unknowns: alone.free.len(),
         rank: observability.rank,
         undetermined,
+        parted_together,
         parameters,
         effects,
         alias_groups: groups,
         alias_pairs: pairs.len(),
         advice,
         compared: Vec::new(),
+        warnings: view.left_out.iter().map(|(_, says)| says.clone()).collect(),
     };
     (out.score, out.says) = score::of(&out, task);
     Ok(out)

@@ -1,30 +1,133 @@
 //! Which touches would part what a fit cannot tell apart.
 
-use super::habits::habits;
+use super::habits::{Habit, habits};
 use super::view::{Known, Noise, Planned, Task, View};
 use crate::diag::Result;
-use crate::fit::solve::observe;
+use crate::fit::outcome::Undetermined;
+use crate::fit::solve::{Observability, observe};
 use crate::fit::{Fit, Knowledge, effects_of};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
 use nalgebra::{DMatrix, DVector};
 
-/// A direction is parted when less than this share of it is left among what leaves no trace.
+/// A direction is parted when less than this share of it (the cosine of an angle) is left among what leaves no trace.
 const LEFT: f64 = 0.9;
 
 /// Variations that are named at most.
 const MOST_NAMED: usize = 2;
 
+/// Results as they stand in a regression: their names, and their usual sizes.
+#[derive(Debug, Clone)]
+pub(super) struct Results {
+    columns: Vec<usize>,
+    names: Vec<String>,
+    typical: Vec<f64>,
+}
+
+impl Results {
+    /// Of the free unknowns of a model, those that are no set-up.
+    pub fn new(model: &crate::model::predict::Model, free: &[usize]) -> Self {
+        let unknown = |c: usize| &model.unknowns[free[c]];
+        let columns: Vec<usize> = (0..free.len()).filter(|&c| !unknown(c).nuisance).collect();
+        let names = columns.iter().map(|&c| unknown(c).name.clone()).collect();
+        let typical = columns.iter().map(|&c| unknown(c).typical).collect();
+        Self { columns, names, typical }
+    }
+
+    /// The results' part of each null direction, in units of their typical sizes; `None` where it has none.
+    pub fn directions(&self, seen: &Observability) -> Vec<Option<DVector<f64>>> {
+        let of = |scaled: &DVector<f64>| {
+            let own = self.columns.iter().zip(&self.typical).map(|(&c, typical)| scaled[c] / seen.scale[c] / typical);
+            let own = DVector::from_iterator(self.columns.len(), own);
+            self.columns.iter().any(|&c| scaled[c].abs() > 1e-6).then_some(own)
+        };
+        seen.unseen.iter().map(of).collect()
+    }
+}
+
+/// A variation of the touches, and what of the results it leaves without a trace.
+#[derive(Debug, Clone)]
+pub(super) struct Remedy {
+    says: String,
+    seconds: f64,
+    /// Orthonormal basis, in units of typical sizes.
+    left: DMatrix<f64>,
+}
+
+impl Remedy {
+    pub fn new(habit: &Habit, varied: &View, results: &Results) -> Self {
+        let minutes = (habit.seconds / 60.0).ceil();
+        let left = unseen(varied, &results.names, &results.typical);
+        Self { says: format!("{} (+{minutes} min)", habit.says), seconds: habit.seconds, left }
+    }
+}
+
+/// Adds to every null direction the variations that part it, cheapest first, and chooses those that together tell all.
+pub(super) fn part(
+    directions: &[Option<DVector<f64>>],
+    remedies: &[Remedy],
+    undetermined: &mut [Undetermined],
+) -> Vec<String> {
+    for (said, direction) in undetermined.iter_mut().zip(directions) {
+        let Some(direction) = direction else { continue };
+        let parts = |r: &&Remedy| r.left.tr_mul(direction).norm() < LEFT * direction.norm();
+        said.parted_by = remedies.iter().filter(parts).take(MOST_NAMED).map(|r| r.says.clone()).collect();
+        if !said.parted_by.is_empty() {
+            said.says = format!("{}; what parts them: {}", said.says, said.parted_by.join("; or "));
+        }
+    }
+    let own: Vec<DVector<f64>> = directions.iter().flatten().map(|d| d / d.norm().max(f64::MIN_POSITIVE)).collect();
+    if own.len() < 2 {
+        return Vec::new();
+    }
+    // each further variation for what the ones before it leave, the most for its time first
+    let mut open = orthonormal(&DMatrix::from_columns(&own), 1e-6);
+    let mut out = Vec::new();
+    while open.ncols() > 0 {
+        let tried = remedies.iter().map(|r| (r, common(&open, &r.left)));
+        let worth = |left: &DMatrix<f64>, r: &Remedy| (open.ncols() - left.ncols()) as f64 / r.seconds.max(60.0);
+        let best = tried.filter(|(_, left)| left.ncols() < open.ncols());
+        // ties go to the earlier, which is the cheaper
+        let Some((remedy, left)) = best.reduce(|a, b| if worth(&b.1, b.0) > worth(&a.1, a.0) { b } else { a }) else {
+            break;
+        };
+        out.push(remedy.says.clone());
+        open = left;
+    }
+    if open.ncols() > 0 && !out.is_empty() {
+        out.push(format!("{} combination(s) are left that no variation of these touches tells", open.ncols()));
+    }
+    out
+}
+
+/// What two spaces have in common, as far as their directions go together by more than [`LEFT`].
+fn common(open: &DMatrix<f64>, left: &DMatrix<f64>) -> DMatrix<f64> {
+    if left.ncols() == 0 || open.ncols() == 0 {
+        return DMatrix::zeros(open.nrows(), 0);
+    }
+    // square, so that there is a singular vector for every open direction
+    let shared = left.tr_mul(open);
+    let eigen = shared.tr_mul(&shared).symmetric_eigen();
+    let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|&k| eigen.eigenvalues[k] >= LEFT * LEFT).collect();
+    open * eigen.eigenvectors.select_columns(&kept)
+}
+
+/// An orthonormal basis of the columns' span.
+fn orthonormal(columns: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
+    let svd = columns.clone().svd(true, false);
+    let kept: Vec<usize> = (0..svd.singular_values.len()).filter(|&i| svd.singular_values[i] > tolerance).collect();
+    svd.u.map_or_else(|| DMatrix::zeros(columns.nrows(), 0), |u| u.select_columns(&kept))
+}
+
 /// Adds to every combination of results that the fit cannot tell the variations of the touches that part it, cheapest
-/// first. Nothing is computed where everything is told.
+/// first, and what tells all of them together. Nothing is computed where everything is told.
 ///
 /// # Errors
 /// When an effect of the fit is unknown.
 pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut Fit) -> Result<()> {
-    let results: Vec<usize> = (0..fit.free.len()).filter(|&c| !fit.model.unknowns[fit.free[c]].nuisance).collect();
-    let directions: Vec<Option<DVector<f64>>> =
-        fit.observability.unseen.iter().map(|v| of_results(fit, &results, v)).collect();
+    let results = Results::new(&fit.model, &fit.free);
+    let directions = results.directions(&fit.observability);
     if directions.iter().all(Option::is_none) {
         return Ok(());
     }
@@ -47,40 +150,15 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
         .iter()
         .map(|r| Planned { plan: r.plan.clone(), mounting: r.mounting.map(str::to_owned), started_s: r.started_s })
         .collect();
-    let names: Vec<String> = results.iter().map(|&c| name(fit.free[c])).collect();
-    let typical: Vec<f64> = results.iter().map(|&c| fit.model.unknowns[fit.free[c]].typical).collect();
-    for habit in habits(machine, &planned, &fit.model) {
-        let open = |k: usize| fit.outcome.undetermined.get(k).is_some_and(|u| u.parted_by.len() < MOST_NAMED);
-        if !(0..directions.len()).any(|k| directions[k].is_some() && open(k)) {
-            break;
-        }
-        let known: Vec<Known> = priors.iter().chain(&habit.known).cloned().collect();
-        let varied = View::of_model(&task, &habit.runs, &known, noise)?;
-        let left = unseen(&varied, &names, &typical);
-        let minutes = (habit.seconds / 60.0).ceil();
-        for (k, direction) in directions.iter().enumerate() {
-            let Some(direction) = direction else { continue };
-            let Some(said) = fit.outcome.undetermined.get_mut(k) else { continue };
-            if said.parted_by.len() < MOST_NAMED && left.tr_mul(direction).norm() < LEFT * direction.norm() {
-                said.parted_by.push(format!("{} (+{minutes} min)", habit.says));
-            }
-        }
-    }
-    for said in &mut fit.outcome.undetermined {
-        if !said.parted_by.is_empty() {
-            said.says = format!("{}; what parts them: {}", said.says, said.parted_by.join("; or "));
-        }
-    }
+    let remedies: Vec<Remedy> = habits(machine, &planned, &fit.model)
+        .into_iter()
+        .map(|habit| {
+            let known: Vec<Known> = priors.iter().chain(&habit.known).cloned().collect();
+            Ok(Remedy::new(&habit, &View::of_model(&task, &habit.runs, &known, noise)?, &results))
+        })
+        .collect::<Result<_>>()?;
+    fit.outcome.parted_together = part(&directions, &remedies, &mut fit.outcome.undetermined);
     Ok(())
-}
-
-/// A null direction's results in units of their typical sizes; `None` where it has none.
-fn of_results(fit: &Fit, results: &[usize], scaled: &DVector<f64>) -> Option<DVector<f64>> {
-    let own = DVector::from_iterator(
-        results.len(),
-        results.iter().map(|&c| scaled[c] / fit.observability.scale[c] / fit.model.unknowns[fit.free[c]].typical),
-    );
-    results.iter().any(|&c| scaled[c].abs() > 1e-6).then_some(own)
 }
 
 /// Orthonormal basis of what leaves no trace in a view, seen from the named unknowns in units of their typical sizes.
@@ -103,7 +181,5 @@ fn unseen(view: &View, names: &[String], typical: &[f64]) -> DMatrix<f64> {
     if all.ncols() == 0 {
         return all;
     }
-    let svd = all.svd(true, false);
-    let kept: Vec<usize> = (0..svd.singular_values.len()).filter(|&i| svd.singular_values[i] > 1e-6).collect();
-    svd.u.map_or_else(|| DMatrix::zeros(names.len(), 0), |u| u.select_columns(&kept))
+    orthonormal(&all, 1e-6)
 }

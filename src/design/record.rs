@@ -60,6 +60,9 @@ pub struct Assessment {
     pub rank: usize,
     /// Combinations that leave no trace.
     pub undetermined: Vec<Undetermined>,
+    /// What would tell all of them together: variations of the touches, chosen one after the other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parted_together: Vec<String>,
     /// The parameters that are no set-up of blocks.
     pub parameters: Vec<Expected>,
     /// Every effect that the model leaves out.
@@ -73,6 +76,9 @@ pub struct Assessment {
     /// Further plans, side by side with this one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub compared: Vec<Assessment>,
+    /// Remarks that a reader must not miss.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// What is to be expected of a parameter.

@@ -67,6 +67,18 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
             open.join(", ")
         ));
     }
+    // what no touches of any kind tell from another effect is no fault of the plan, but it is no good value either
+    let excused: Vec<String> = {
+        let over = judged.iter().filter(|p| {
+            !p.holds.is_empty() && p.sigma_with_unmodelled.is_none_or(|s| s > UNMODELLED_SHARE * typical(p))
+        });
+        over.map(|p| format!("{} holds {} as well", p.name, p.holds.join(", "))).collect()
+    };
+    let not_for = if excused.is_empty() {
+        not_for
+    } else {
+        format!("; whatever is touched, {}: known no better than that{not_for}", excused.join(", "))
+    };
     let equal = |id: &str| a.parameters.iter().any(|p| p.holds.iter().any(|h| h == id));
     let invisible = a.effects.iter().filter(|e| !e.visible && e.typical_um > 0.0 && !equal(&e.effect)).count();
     if invisible > MOST_INVISIBLE {

@@ -2,7 +2,7 @@
 
 use crate::axes::AxisName;
 use crate::diag::{Failure, Result};
-use crate::fit::candidates::columns;
+use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
 use crate::log::{Status, Touch};
@@ -11,7 +11,7 @@ use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::{Data, Run, assemble};
 use crate::model::predict::Model;
 use crate::program::plan::{Plan, PlanTouch};
-use crate::search::{Basis, KEPT, Library, Origin};
+use crate::search::{Basis, KEPT, Library, Origin, without_rounding};
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -109,6 +109,9 @@ pub struct View {
     pub raw_um: DMatrix<f64>,
     /// Value of the scanned shape at which each candidate stands; `None` where it has none.
     pub shapes: Vec<Option<f64>>,
+    /// Effects whose formula has no value at some of these touches, with what is said of them: they stand in the library with
+    /// columns of nothing.
+    pub left_out: Vec<(String, String)>,
     /// The noise.
     pub noise: Noise,
     /// When the last touch is made, s.
@@ -175,7 +178,8 @@ impl View {
         let base = Basis::new(&jacobian);
         let library = Library::new(jacobian.nrows());
         let raw_um = DMatrix::zeros(jacobian.nrows(), 0);
-        Ok(Self { data, model, free, jacobian, base, library, raw_um, shapes: Vec::new(), noise, end_s })
+        let (shapes, left_out) = (Vec::new(), Vec::new());
+        Ok(Self { data, model, free, jacobian, base, library, raw_um, shapes, left_out, noise, end_s })
     }
 
     /// Puts effects into the library, each at the given shape; else at its usual one, or where that leaves no trace at the
@@ -186,10 +190,17 @@ impl View {
         let rows = self.jacobian.nrows();
         let mut raw = Vec::new();
         for (effect, given) in effects {
+            let bad = if effect.built_in { Vec::new() } else { without_value(effect, &self.data.nominal) };
+            if let Some(bad) = bad.first() {
+                self.left_out.push((effect.id.clone(), NoValue::left_out(bad)));
+            }
             let own: Vec<usize> = (0..all.unknowns.len())
                 .filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape)
                 .collect();
             let scaled = |values: &DMatrix<f64>, which: &[usize], unknowns: &[crate::model::predict::Unknown]| {
+                if !bad.is_empty() {
+                    return DMatrix::zeros(rows, which.len());
+                }
                 let mut out = values.select_columns(which).resize_vertically(rows, 0.0);
                 for (mut column, &i) in out.column_iter_mut().zip(which) {
                     column *= unknowns[i].typical;
@@ -248,6 +259,7 @@ impl View {
         let n = self.data.nominal.len();
         let mut touched = plain.rows(0, n).into_owned();
         whitening(&self.model, &self.data, &self.free, self.noise, |t| t.whiten(&mut touched));
+        without_rounding(&mut touched);
         touched.resize_vertically(plain.nrows(), 0.0)
     }
 

@@ -31,12 +31,19 @@ pub struct Diagnosis {
     /// With `unexplained`: the noise explains all that is left but for a pattern too faint to name. No reason to take the
     /// machine apart.
     pub faint: bool,
+    /// So many touches found nothing that the rest is no sample of the machine: the answer is "no", whatever it is.
+    #[serde(skip)]
+    pub most_missed: bool,
     /// √(Σr²/n) over the touches used, µm.
     pub rms_um: f64,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,
     /// Scatter of index visits that the tests allow for, µm.
     pub visit_um: f64,
+    /// Where the scatter of visits of the fit comes from: `revisits`, `declared`, `study`, `one pose`.
+    pub visit_source: String,
+    /// Noise and scatter of visits with their sources, in a sentence.
+    pub noise_says: String,
     /// Probability of so much misfit where the model holds.
     pub lack_of_fit_p: f64,
     /// On what the misfit depends, best first.
@@ -80,6 +87,9 @@ pub struct Where {
     pub says: String,
     /// The generic shape that shows it best.
     pub id: String,
+    /// The same variable as shapes call it.
+    #[serde(skip)]
+    pub on: String,
 }
 
 /// The misfit against a variable.
@@ -122,11 +132,21 @@ pub struct Candidate {
     pub held_out_before_um: Option<f64>,
     /// The same with it.
     pub held_out_after_um: Option<f64>,
+    /// Standard error of the difference of the two, µm.
+    pub held_out_se_um: Option<f64>,
+    /// Was the choice redone for each group of touches left out? Else the effect was given.
+    pub nested: bool,
     /// Expected sizes of what these touches can tell.
     pub parameters: Vec<Parameter>,
     /// Parameters that these touches cannot tell: they have no size here.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_told: Vec<String>,
+    /// By how much it moves the touch that it moves most, µm: the size of all its parameters together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moves_um: Option<f64>,
+    /// Standard uncertainty of that, µm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moves_sigma_um: Option<f64>,
     /// Effects that these touches cannot tell from it.
     pub same_as: Vec<String>,
     /// Which touches would tell them apart.

@@ -4,6 +4,7 @@
 use crate::fit::Fit;
 use crate::search::{Basis, PureError, Question};
 use nalgebra::{DMatrix, DVector};
+use std::collections::HashMap;
 
 /// The regression that all tests share.
 #[derive(Debug, Clone)]
@@ -72,6 +73,30 @@ impl Evidence {
     #[must_use]
     pub fn question(&self) -> Question<'_> {
         Question { residual: &self.residual, base: &self.base, pure: self.pure }
+    }
+
+    /// What turns whitened errors of a visit's rows back into µm of its touches, by number of the visit. Whitening mixes
+    /// touches of one visit only, so that one column for each place in a visit shows it whole.
+    #[must_use]
+    pub fn colours_um(&self, fit: &Fit) -> HashMap<usize, DMatrix<f64>> {
+        let mut rows: HashMap<usize, Vec<usize>> = HashMap::new();
+        for (row, visit) in self.visits.iter().enumerate() {
+            rows.entry(*visit).or_default().push(row);
+        }
+        let longest = rows.values().map(Vec::len).max().unwrap_or(0);
+        let mut units = DMatrix::zeros(fit.data.observations.len(), longest);
+        for of in rows.values() {
+            for (k, &row) in of.iter().enumerate() {
+                units[(self.used[row], k)] = crate::units::mm_from_um(1.0);
+            }
+        }
+        let white = self.whiten(fit, units);
+        let each = rows.into_iter().filter_map(|(visit, of)| {
+            let n = of.len();
+            let block = DMatrix::from_fn(n, n, |a, b| white[(of[a], b)]);
+            Some((visit, block.try_inverse()?))
+        });
+        each.collect()
     }
 
     /// Columns of gaps (all observations × columns, mm) as rows of this regression.

@@ -1,12 +1,13 @@
 //! From tests to the answer: candidates with sizes in their units, what was not found, touches that come back.
 
 use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Power, Shape, Verdict, Weakened, Where};
-use super::verdict::Decision;
+use super::evidence::Evidence;
+use super::verdict::{Beside, Decision};
 use super::{Examination, Subject, gross, noise_um, tell, words};
 use crate::fit::Fit;
 use crate::search::generic::{Features, Kind};
 use crate::search::groups::Group;
-use crate::search::held_out::{Choice, held_out};
+use crate::search::held_out::{Choice, held_out_in};
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::power;
 use crate::units::um_from_mm;
@@ -25,7 +26,7 @@ pub(super) fn put_together(
     subject: Subject,
     seen: &Examination,
     features: &Features,
-    decision: Decision,
+    (decision, beside): (Decision, &Beside),
     gross: Vec<Gross>,
     options: &super::Options,
 ) -> Diagnosis {
@@ -33,7 +34,7 @@ pub(super) fn put_together(
     let mut verdict = decision.verdict;
     let open = if verdict == Verdict::MissingEffect { super::open::open(seen) } else { super::open::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
-    let gross_found = gross.first().is_some_and(|g| g.rms_um < 0.1 * fit.outcome.rms_um);
+    let gross_found = gross.first().is_some_and(|g| g.rms_um < gross::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
         && let Some(candidate) = gross::candidate(subject, first)
     {
@@ -83,13 +84,14 @@ pub(super) fn put_together(
         significant()
             .take(MOST_WHERE)
             .map(|d| {
-                let share = beyond_the_noise(seen, d.share, d.terms.len());
+                let share = beyond_the_noise(seen.evidence, d.share, d.terms.len());
                 Where {
                     by: by(&d.on),
                     share,
                     p_adjusted: d.p_adjusted,
                     says: words::says(d, share, fit, subject.machine),
                     id: d.id.clone(),
+                    on: d.on.clone(),
                 }
             })
             .collect()
@@ -102,7 +104,7 @@ pub(super) fn put_together(
         && let Some(on) =
             effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))
     {
-        let share = beyond_the_noise(seen, first.share, first.parameters.len() + first.not_told.len());
+        let share = beyond_the_noise(seen.evidence, first.share, first.parameters.len() + first.not_told.len());
         depends.retain(|w| w.by != by(on));
         depends.insert(
             0,
@@ -111,15 +113,24 @@ pub(super) fn put_together(
                 share,
                 p_adjusted: first.p_adjusted,
                 says: format!(
-                    "{:.0} % of what is left changes with {} as {} would make it ({})",
+                    "{:.0} % of what is left changes with {} as {} would make it",
                     100.0 * share,
                     words::plain(&by(on)),
-                    effect.id,
-                    effect.name
+                    match &first.same_as[..] {
+                        [] => format!("{} ({})", effect.id, effect.name),
+                        others => words::list(&[&[effect.id.clone()], others].concat()),
+                    }
                 ),
                 id: effect.id.clone(),
+                on: on.to_owned(),
             },
         );
+    }
+    beside_the_tests(&mut depends, seen, fit, (beside, verdict == Verdict::MissingEffect));
+    // as the splits of `compare` and the sentences count: of what the noise does not explain
+    let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == gross::EFFECT));
+    for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
+        c.share = beyond_the_noise(seen.evidence, c.share, seen.order.scores[group.first()].n_parameters);
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
@@ -141,7 +152,8 @@ pub(super) fn put_together(
             x: d.curve.iter().map(|p| to_deg(p.x)).collect(),
             y: d.curve.iter().map(|p| p.y).collect(),
             band: d.curve.iter().map(|p| 1.96 * p.sigma).collect(),
-            kind: words::kind(d),
+            // where an effect is named, its own words say what does that
+            kind: if candidates.iter().any(|c| c.proposed) { String::new() } else { words::kind(d) },
         })
     });
     let outliers = fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).map(|(&i, reason)| {
@@ -153,9 +165,12 @@ pub(super) fn put_together(
         verdict,
         says: String::new(),
         faint: false,
+        most_missed: false,
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
+        visit_source: fit.noise.visit_source.to_owned(),
+        noise_says: noise_says(seen, fit),
         lack_of_fit_p: seen.lack_of_fit.p,
         depends,
         shape,
@@ -171,17 +186,71 @@ pub(super) fn put_together(
             .filter(|s| !s.visible())
             .map(|s| seen.named.effects[s.candidate].id.clone())
             .collect(),
-        warnings: Vec::new(),
+        warnings: seen.named.left_out.clone(),
         open,
     }
 }
 
+/// What is no shape and no effect, but a finding: scatter of visits, and bad touches that lie together.
+fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (beside, named): (&Beside, bool)) {
+    if let Some((tau_mm, declared_mm)) = beside.scatter {
+        let (sigma2, tau2) = (fit.noise.sigma_mm.powi(2), tau_mm.powi(2));
+        let finding = Where {
+            by: "visit".to_owned(),
+            share: tau2 / (sigma2 + tau2),
+            p_adjusted: 0.0,
+            says: format!(
+                "Each time an axis is clamped anew it stands elsewhere: looseness or indexing scatter of {:.1} um for each visit \
+                 (from revisited poses; the machine file declares {:.1} um)",
+                um_from_mm(tau_mm),
+                um_from_mm(declared_mm)
+            ),
+            id: "scatter:visit".to_owned(),
+            on: "visit".to_owned(),
+        };
+        depends.retain(|w| w.by != "visit");
+        depends.insert(if named { depends.len() } else { 0 }, finding);
+    }
+    // an effect that is missing makes good touches look bad: those come back with it
+    if let Some(g) = beside.gathered.as_ref().filter(|g| !named && depends.iter().all(|w| w.by != g.by)) {
+        let residual2 = |i: usize| fit.residual_mm[i].powi(2);
+        let all: f64 = (0..fit.residual_mm.len()).map(residual2).sum();
+        let rejected: f64 = fit.rejected.keys().map(|&i| residual2(i)).sum();
+        let finding = Where {
+            by: g.by.to_owned(),
+            share: if all > 0.0 { rejected / all } else { 0.0 },
+            p_adjusted: g.p,
+            says: format!("{} ({})", g.says(fit), g.kind()),
+            id: format!("not-used:{}", g.by),
+            on: g.by.to_owned(),
+        };
+        let strong = depends.first().is_some_and(|w| w.p_adjusted < FAMILY_LEVEL);
+        if strong && seen.dependences.first().is_some_and(|d| d.p_adjusted < g.p) {
+            depends.push(finding);
+        } else {
+            depends.insert(0, finding);
+        }
+    }
+}
+
+/// Noise and scatter with their sources, and what the tests take of it.
+fn noise_says(seen: &Examination, fit: &Fit) -> String {
+    let mut out = fit.noise.says();
+    if seen.evidence.tau_mm < fit.noise.tau_mm {
+        out += &format!(
+            "; what is found explains that, and the tests allow for the declared {:.2} um",
+            um_from_mm(seen.evidence.tau_mm)
+        );
+    }
+    out
+}
+
 /// A share of the misfit as one of what the noise does not explain: what functions of no meaning would take away is taken off
 /// on both sides. As `compare` counts its shares.
-fn beyond_the_noise(seen: &Examination, share: f64, n_parameters: usize) -> f64 {
-    let question = seen.evidence.question();
+pub(super) fn beyond_the_noise(evidence: &Evidence, share: f64, n_parameters: usize) -> f64 {
+    let question = evidence.question();
     let total = question.base.project(question.residual).norm_squared();
-    let (dof, q) = (seen.evidence.dof() as f64, n_parameters as f64);
+    let (dof, q) = (evidence.dof() as f64, n_parameters as f64);
     let taken = share * total;
     let per_dof = ((total - taken) / (dof - q).max(1.0)).max(1.0);
     ((taken - q * per_dof) / (total - dof).max(4.0 * (2.0 * dof).sqrt())).clamp(0.0, 1.0)
@@ -205,11 +274,16 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
     let p = tests().map(|s| s.p).fold(1.0, f64::min);
     let p_adjusted = tests().map(|s| s.p_adjusted).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
-    let um = noise_um(fit);
     let held = if first && seen.search.leader().is_some() {
         seen.nested.clone()
     } else {
-        held_out(seen.evidence.question(), &seen.named.library, &seen.evidence.visits, Choice::Given(chosen))
+        held_out_in(
+            seen.evidence.question(),
+            &seen.named.library,
+            &seen.evidence.visits,
+            Choice::Given(chosen),
+            &|visit, e| seen.colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e),
+        )
     };
     let told = told(&score.covariance);
     let names = seen.named.columns[chosen].iter().zip(&told);
@@ -237,6 +311,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
             sigma: None,
         });
     }
+    let moves = moves(seen, chosen);
     let question = seen.order.question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
     let left = (1.0 - score.delta_ss / total).max(0.0);
@@ -248,10 +323,14 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         p_adjusted,
         proposed: first && borne_out && p_adjusted < FAMILY_LEVEL,
         rms_after_um: fit.outcome.rms_um * left.sqrt(),
-        held_out_before_um: Some(um * held.before).filter(|x| x.is_finite()),
-        held_out_after_um: Some(um * held.after).filter(|x| x.is_finite()),
+        held_out_before_um: Some(held.before).filter(|x| x.is_finite()),
+        held_out_after_um: Some(held.after).filter(|x| x.is_finite()),
+        held_out_se_um: Some(held.fall_error).filter(|x| x.is_finite()),
+        nested: first && seen.search.leader().is_some(),
         parameters,
         not_told,
+        moves_um: moves.map(|m| m.0),
+        moves_sigma_um: moves.map(|m| m.1),
         same_as: group
             .members
             .iter()
@@ -266,6 +345,18 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         weakens: weakened(fit, seen, chosen),
         remains: None,
     }
+}
+
+/// By how much an effect of the expected size moves the touch that it moves most, with its standard uncertainty, µm: told
+/// where its parameters are not told one by one.
+fn moves(seen: &Examination, chosen: usize) -> Option<(f64, f64)> {
+    let score = &seen.order.scores[chosen];
+    let span = seen.named.library.candidates()[chosen].variants[score.variant].columns.clone();
+    let columns = seen.named.raw_um.columns(span.start, span.len());
+    let at = &columns * &score.estimate;
+    let most = seen.evidence.used.iter().copied().max_by(|&a, &b| at[a].abs().total_cmp(&at[b].abs()))?;
+    let row = columns.row(most).transpose();
+    Some((at[most].abs(), row.dot(&(&score.covariance * &row)).max(0.0).sqrt()))
 }
 
 /// Which parameters of an effect have a size: those whose direction lies within what the plan sees of it. The covariance

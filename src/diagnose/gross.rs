@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// Above this RMS something is wrong that is no error of a machine, µm.
 pub const GROSS_UM: f64 = 50.0;
 
+/// A supposition that leaves less than this share of the error is right.
+pub(super) const RIGHT: f64 = 0.1;
+
 /// Effect of the catalogue whose parameters are the suppositions.
 pub(super) const EFFECT: &str = "sign-or-axis-swap";
 
@@ -79,14 +82,17 @@ fn units(subject: Subject) -> Vec<Gross> {
     .filter_map(|(hypothesis, factor, says)| {
         let data = scaled(&subject.fit.data, factor);
         let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
-        Some(Gross {
-            hypothesis: hypothesis.to_owned(),
-            says: says.to_owned(),
-            rms_um: fit.outcome.rms_um,
-            agrees: None,
-        })
+        let rms_um = fair(fit.outcome.rms_um, factor, subject.fit.outcome.rms_um);
+        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um, agrees: None })
     })
     .collect()
+}
+
+/// Dividing all lengths by 25.4 divides every error by 25.4, whatever is wrong. What is left is therefore measured in the
+/// scaled noise; only where it is still next to nothing then is the supposition true, and the RMS what it says.
+fn fair(rms_um: f64, factor: f64, now_um: f64) -> f64 {
+    let as_it_was_um = rms_um / factor.min(1.0);
+    if as_it_was_um < RIGHT * now_um { rms_um } else { as_it_was_um }
 }
 
 fn scaled(data: &Data, factor: f64) -> Data {
@@ -123,6 +129,19 @@ fn elsewhere(subject: Subject) -> Option<Gross> {
     })
 }
 
+/// Suppositions that hits and misses speak for alike, as one candidate without a size.
+pub(super) fn of_misses(subject: Subject, alike: &[&Gross]) -> Option<Candidate> {
+    let mut out = candidate(subject, alike.first()?)?;
+    out.name = alike.iter().map(|g| g.says.as_str()).collect::<Vec<_>>().join(", or ");
+    // nothing was fitted with it, and nothing is to be added before the touches are made again
+    (out.proposed, out.remains, out.share) = (false, None, 0.0);
+    if alike.len() > 1 {
+        out.parameters.clear();
+        out.not_told = alike.iter().map(|g| g.hypothesis.clone()).collect();
+    }
+    Some(out)
+}
+
 /// A supposition of the catalogue as a candidate.
 pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
     let effect = subject.catalogue.get(EFFECT, subject.machine)?;
@@ -136,8 +155,12 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         rms_after_um: gross.rms_um,
         held_out_before_um: None,
         held_out_after_um: None,
+        held_out_se_um: None,
+        nested: false,
         parameters: vec![Parameter { name: gross.hypothesis.clone(), value: 1.0, unit: "1".into(), sigma: None }],
         not_told: Vec::new(),
+        moves_um: None,
+        moves_sigma_um: None,
         same_as: Vec::new(),
         tell_apart: String::new(),
         says: effect.says.clone(),
@@ -147,4 +170,20 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         weakens: Vec::new(),
         remains: Some(gross.rms_um > GROSS_UM),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inches_do_not_win_by_shrinking_everything() {
+        // an axis the wrong way round: 80 mm; the other unit leaves 1/25.4 of the same error
+        let (now, shrunk) = (80_000.0, 80_000.0 / 25.4);
+        assert!((fair(shrunk, 1.0 / 25.4, now) - now).abs() < 1.0);
+        // and where it is true, the noise is left
+        assert!((fair(1.1, 1.0 / 25.4, now) - 1.1).abs() < 1e-12);
+        assert!((fair(1.1, 25.4, now) - 1.1).abs() < 1e-12);
+        assert!((fair(now * 25.4, 25.4, now) - now * 25.4).abs() < 1e-6);
+    }
 }

@@ -9,12 +9,14 @@ pub mod answer;
 pub mod evidence;
 pub mod features;
 mod findings;
+mod gathered;
 pub mod gross;
 mod missed;
 pub mod named;
 mod nothing;
 pub mod open;
 pub mod places;
+mod rivals;
 pub mod sketch;
 mod tell;
 mod verdict;
@@ -26,16 +28,16 @@ use crate::fit::{Fit, Settings, declared_tau_mm, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
-use crate::search::forward::forward;
 use crate::search::generic::{Features, Generics};
 use crate::search::groups::Group;
-use crate::search::held_out::{Choice, HeldOut, held_out};
+use crate::search::held_out::{Choice, HeldOut, held_out_in};
 use crate::search::{LackOfFit, Question, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::{Diagnosis, Verdict};
 use evidence::Evidence;
 use nalgebra::DMatrix;
 use named::Named;
+use std::collections::HashMap;
 
 /// What is diagnosed.
 #[derive(Debug, Clone, Copy)]
@@ -90,6 +92,8 @@ pub struct Examination<'a> {
     pub lack_of_fit: LackOfFit,
     /// The choice redone without the touches that judge it.
     pub nested: HeldOut,
+    /// Whitened errors of a visit into µm ([`Evidence::colours_um`]).
+    pub colours_um: HashMap<usize, DMatrix<f64>>,
 }
 
 /// The same touches with index visits that come back exactly.
@@ -135,6 +139,7 @@ impl<'c> Ordering<'c> {
 /// The tests of a fit without the answer in words.
 #[must_use]
 pub fn examine<'a>(
+    fit: &Fit,
     evidence: &'a Evidence,
     named: &'a Named<'a>,
     ordering: Option<&'a Ordering<'a>>,
@@ -143,6 +148,7 @@ pub fn examine<'a>(
     at_most: usize,
 ) -> Examination<'a> {
     let question = evidence.question();
+    let colours_um = evidence.colours_um(fit);
     let search = Search::new(question, &named.library);
     let (order, jacobian) = ordering
         .and_then(|o| Some((o.search(&search)?, &o.evidence.jacobian)))
@@ -153,7 +159,10 @@ pub fn examine<'a>(
         jacobian,
         dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),
-        nested: held_out(question, &named.library, &evidence.visits, Choice::Redone),
+        nested: held_out_in(question, &named.library, &evidence.visits, Choice::Redone, &|visit, e| {
+            colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e)
+        }),
+        colours_um,
         evidence,
         named,
         search,
@@ -166,16 +175,47 @@ pub fn examine<'a>(
 fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Features) -> Option<Evidence> {
     const AT_MOST: usize = 4;
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
-    if fit.noise.visit_source != "revisits" || declared_mm == 0.0 || fit.noise.tau_test_mm <= declared_mm {
+    // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
+    if fit.noise.visit_source != "revisits" || declared_mm == 0.0 || fit.noise.tau_mm <= declared_mm {
         return None;
     }
     let evidence = Evidence::with_visits(fit, declared_mm);
     let mut library = Named::of(fit, &evidence, machine, catalogue).library;
-    library.append(features::shapes(fit, &evidence, features).library);
+    // groups of visits are the scatter itself
+    library.append(features::shapes(fit, &evidence, features).without("visit"));
     let question = evidence.question();
-    let end = forward(question, &library, AT_MOST, None);
-    let rest = lack_of_fit(&Question { residual: &end.residual, base: &end.basis, ..question });
-    (!end.steps.is_empty() && rest.p > 0.05).then_some(evidence)
+    let (mut basis, mut residual) = (question.base.clone(), question.base.project(question.residual));
+    for _ in 0..AT_MOST {
+        let search = Search::new(Question { residual: &residual, base: &basis, ..question }, &library);
+        let passed = [search.leader(), search.leading_shape()].into_iter().flatten();
+        let best = passed.min_by(|&a, &b| search.scores[a].ln_p.total_cmp(&search.scores[b].ln_p))?;
+        if basis.extend(&search.columns(best), crate::search::KEPT) == 0 {
+            return None;
+        }
+        residual = basis.project(&residual);
+        if lack_of_fit(&Question { residual: &residual, base: &basis, ..question }).p > 0.05 {
+            return Some(evidence);
+        }
+    }
+    None
+}
+
+/// Scatter of index visits that revisits show, that is far above what the machine file declares, and that nothing else
+/// explains: τ and the declared one, mm.
+fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f64)> {
+    /// Probability of so much scatter where the declared one holds.
+    const LEVEL: f64 = 1e-3;
+    /// And so many times the declared one, or the noise of a touch where nothing is declared.
+    const TIMES: f64 = 2.0;
+    let noise = &fit.noise;
+    let declared_mm = declared_tau_mm(machine, &fit.data.observations);
+    let usual_mm = if declared_mm > 0.0 { declared_mm } else { noise.sigma_mm };
+    // where an effect explains it the tests were made with the declared one
+    let explained = evidence.tau_mm < noise.tau_mm;
+    let dof = noise.visit_dof.filter(|d| noise.visit_source == "revisits" && *d > 1.0 && !explained)?;
+    let times = noise.tau_mm / usual_mm;
+    let p = crate::search::distributions::p_of_chi2(dof * times * times, dof);
+    (times > TIMES && p < LEVEL).then_some((noise.tau_mm, declared_mm))
 }
 
 /// The diagnosis of a fit.
@@ -192,15 +232,25 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let named = Named::of(fit, &evidence, machine, catalogue);
     let generics = features::shapes(fit, &evidence, &features);
     let ordering = Ordering::of(fit, machine, catalogue);
-    let seen = examine(&evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
-    let verdict = verdict::of(&seen);
+    let seen = examine(fit, &evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
+    let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
+        Some(group) => rivals::weigh(evidence.question(), &named.library, &generics, group.first()),
+        None => rivals::Weighed::default(),
+    };
+    let beside = verdict::Beside {
+        shapes_win: weighed.shapes_win,
+        better: weighed.better.map(|shape| generics.shapes[shape].depends_on.clone()),
+        gathered: gathered::gathered(fit, &features),
+        scatter: scatter(fit, machine, &evidence),
+    };
+    let verdict = verdict::of(&seen, &beside);
     let mut gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
     if let Some(planned) = options.planned.filter(|_| missed::mostly(&fit.data)) {
         let missed = missed::hypotheses(subject, planned);
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);
     }
-    let mut out = findings::put_together(subject, &seen, &features, verdict, gross, options);
+    let mut out = findings::put_together(subject, &seen, &features, (verdict, &beside), gross, options);
     if options.refit
         && let Some(first) = out.candidates.first_mut()
         && (first.proposed || fit.outcome.rejected.iter().any(|r| !r.reason.starts_with("taken out")))
@@ -213,8 +263,8 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         }
         findings::outliers_again(&mut out, fit, &again);
     }
-    verdict::says(&mut out, fit);
-    verdict::not_when_touches_are_missing(&mut out, fit);
+    verdict::says(&mut out, fit, verdict, &beside);
+    verdict::not_when_touches_are_missing(&mut out, subject);
     Ok(out)
 }
 

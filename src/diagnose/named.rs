@@ -1,18 +1,16 @@
 //! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
 
 use super::evidence::Evidence;
-use crate::fit::Fit;
-use crate::fit::candidates::{Columns, Variant, variants};
+use crate::fit::candidates::{Columns, Variant, variants, with_values};
+use crate::fit::{Fit, scan};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::data::Data;
 use crate::model::formula::slot;
 use crate::model::predict::Observation;
 use crate::search::{Library, Origin};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
-
-/// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
-const LEAST_TRACE: f64 = 1e-6;
 
 /// A parameter of a candidate: one column.
 #[derive(Debug, Clone)]
@@ -47,6 +45,8 @@ pub struct Named<'c> {
     pub columns: Vec<Vec<Column>>,
     /// The scanned shape of each candidate.
     pub scanned: Vec<Option<Scanned>>,
+    /// What is said of effects that could not be tested.
+    pub left_out: Vec<String>,
 }
 
 /// Effects of catalogue and user that the model does not hold. Not the paper's sets, not whole hypotheses (gross
@@ -61,9 +61,9 @@ pub fn missing<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Ve
 }
 
 /// Index of the scanned shape among an effect's shape parameters, with the values.
-fn scan_of(effect: &Effect) -> Option<(usize, &[f64])> {
+fn scan_of(effect: &Effect, data: &Data) -> Option<(usize, Vec<f64>)> {
     let shapes = effect.parameters.iter().filter(|p| p.shape.is_some());
-    shapes.enumerate().find(|(_, p)| p.scan.len() > 1).map(|(i, p)| (i, &p.scan[..]))
+    shapes.enumerate().find_map(|(i, p)| Some((i, scan(p, data).filter(|s| s.len() > 1)?)))
 }
 
 /// The touches where the model expects them instead of where they were read: along its normal a reading carries the very
@@ -93,16 +93,18 @@ impl<'c> Named<'c> {
     #[must_use]
     pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
         let places = without_noise(fit);
-        let fixed = (0..effects.len()).filter(|i| scan_of(effects[*i]).is_none()).collect();
+        let (effects, left_out) = with_values(effects, &places);
+        let scans_of: Vec<Option<(usize, Vec<f64>)>> = effects.iter().map(|e| scan_of(e, &fit.data)).collect();
+        let fixed = (0..effects.len()).filter(|i| scans_of[*i].is_none()).collect();
         let mut wanted = vec![Variant { effects: fixed, shapes: Vec::new() }];
         let mut scanned_at = Vec::new();
         for (i, effect) in effects.iter().enumerate() {
-            let Some((which, values)) = scan_of(effect) else { continue };
+            let Some((which, values)) = &scans_of[i] else { continue };
             let starts: Vec<f64> =
                 effect.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect();
             for &value in values {
                 let mut shapes = starts.clone();
-                shapes[which] = value;
+                shapes[*which] = value;
                 wanted.push(Variant { effects: vec![i], shapes });
                 scanned_at.push((i, value));
             }
@@ -116,7 +118,7 @@ impl<'c> Named<'c> {
         let mut info: Vec<Vec<Column>> = Vec::new();
         let mut scanned = Vec::new();
         for (i, effect) in effects.iter().enumerate() {
-            let scan = scan_of(effect);
+            let scan = &scans_of[i];
             let mut push = |made: &Columns, shape: f64| -> Vec<Column> {
                 let own = |c: &usize| made.unknowns[*c].effect == effect.id && !made.unknowns[*c].shape;
                 let of: Vec<usize> = (0..made.unknowns.len()).filter(own).collect();
@@ -131,10 +133,6 @@ impl<'c> Named<'c> {
                     .collect();
                 for (mut column, c) in values.column_iter_mut().zip(&columns) {
                     column *= c.typical;
-                    // a formula without a value at some touch says nothing at all
-                    if column.iter().any(|v| !v.is_finite()) {
-                        column.fill(0.0);
-                    }
                 }
                 parts.push((i, shape, values));
                 columns
@@ -149,7 +147,9 @@ impl<'c> Named<'c> {
             }
             info.push(columns);
             let shapes: Vec<_> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
-            scanned.push(scan.map(|(k, _)| Scanned { name: shapes[k].name.clone(), unit: shapes[k].unit.clone() }));
+            scanned.push(
+                scan.as_ref().map(|(k, _)| Scanned { name: shapes[*k].name.clone(), unit: shapes[*k].unit.clone() }),
+            );
         }
         let n = fit.data.observations.len();
         let n_columns = parts.iter().map(|p| p.2.ncols()).sum();
@@ -170,20 +170,13 @@ impl<'c> Named<'c> {
             let mut variants = Vec::new();
             while part < parts.len() && parts[part].0 == i {
                 let width = parts[part].2.ncols();
-                let mut columns = white.columns(at, width).into_owned();
-                for mut column in columns.column_iter_mut() {
-                    // what is left of an effect of which no used touch has a part is rounding, and no trace
-                    if column.norm() < LEAST_TRACE {
-                        column.fill(0.0);
-                    }
-                }
-                variants.push((parts[part].1, columns));
+                variants.push((parts[part].1, white.columns(at, width).into_owned()));
                 at += width;
                 part += 1;
             }
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             library.push_scan(&effect.id, origin, variants, usize::from(scanned[i].is_some()));
         }
-        Self { effects, library, raw_um, columns: info, scanned }
+        Self { effects, library, raw_um, columns: info, scanned, left_out }
     }
 }

@@ -17,9 +17,12 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
             if n == 0 { String::new() } else { format!(", all {n} are taken out") }
         ),
         faint: false,
+        most_missed: false,
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),
         visit_um: 0.0,
+        visit_source: fit.noise.visit_source.to_owned(),
+        noise_says: fit.noise.says(),
         lack_of_fit_p: 1.0,
         depends: Vec::new(),
         shape: None,
@@ -32,6 +35,6 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         open: Open::default(),
         warnings: Vec::new(),
     };
-    verdict::not_when_touches_are_missing(&mut out, fit);
+    verdict::not_when_touches_are_missing(&mut out, subject);
     out
 }

@@ -40,13 +40,14 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
         return Err(Failure::new("sketch::nothing_left", "what is left over depends on nothing that can be seen")
             .help("`axiscal diagnose` says whether the model fits; more touches at more poses show smaller errors"));
     };
-    let writable = |d: &&&Dependence| d.terms.iter().all(|t| t.formula.is_some());
-    let Some(best) = significant.iter().find(writable) else {
+    // what `diagnose` names first, or nothing: the second would be sketched from what the first has left in it
+    let Some(best) = Some(*first).filter(|d| d.terms.iter().all(|t| t.formula.is_some())) else {
         return Err(Failure::new("sketch::no_formula", format!("formulas have no word for {}: {}", first.on, words::kind(first)))
             .help("a block that moved, a dirty face or a pose that does not come back is put right on the machine, not by a formula"));
     };
     let tried = places::tried(subject, &evidence, best);
-    Ok(write(subject, best, &tried, taken))
+    let share = super::findings::beyond_the_noise(&evidence, best.share, best.terms.len());
+    Ok(write(subject, (best, share), &tried, taken))
 }
 
 /// Six digits without an exponent.
@@ -55,12 +56,17 @@ fn plain(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-fn write(subject: Subject, d: &Dependence, tried: &[places::Tried], taken: &dyn Fn(&str) -> bool) -> Sketch {
+fn write(
+    subject: Subject,
+    (d, share): (&Dependence, f64),
+    tried: &[places::Tried],
+    taken: &dyn Fn(&str) -> bool,
+) -> Sketch {
     let stem: String = d.on.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
     let free = |n: usize| if n == 1 { format!("sketch-{stem}") } else { format!("sketch-{stem}-{n}") };
     let id = (1..).map(free).find(|id| !taken(id)).unwrap_or_else(|| format!("sketch-{stem}"));
     let prefix: String = id.replace('-', "_");
-    let says = words::says(d, d.share, subject.fit, subject.machine);
+    let says = words::says(d, share, subject.fit, subject.machine);
     let shape_name = d.shape.as_ref().map(|s| format!("{prefix}_{}", s.name));
     let own = places::Tried::of(d);
     let place = tried.first().unwrap_or(&own);

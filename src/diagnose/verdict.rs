@@ -2,6 +2,7 @@
 
 use super::Examination;
 use super::answer::{Candidate, Diagnosis, Verdict};
+use super::gathered::Gathered;
 use crate::fit::Fit;
 use crate::search::held_out::HeldOut;
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -14,7 +15,7 @@ pub const LACK_OF_FIT: f64 = 1e-3;
 const LEAST_DOF: usize = 8;
 
 /// With fewer index visits than this each of them bears something that the others do not tell, and the spread of the
-/// folds says little: the error may then rise by less than its standard error.
+/// folds says little: the error must then fall, by however little.
 const FEW_VISITS: usize = 15;
 
 /// What was decided.
@@ -24,32 +25,49 @@ pub struct Decision {
     pub verdict: Verdict,
     /// Does a candidate that passes Holm's test also pass the held-out touches?
     pub borne_out: bool,
+    /// Does one pass Holm's test at all?
+    pub named: bool,
 }
 
-/// Do held-out touches bear out a choice?
+/// What else the touches say, beside the tests of effects.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Beside {
+    /// Shapes without a name say what is left clearly better than names do.
+    pub shapes_win: bool,
+    /// What the best shape depends on, where it is better than the first effect.
+    pub better: Option<String>,
+    /// Touches that were not used and lie together.
+    pub gathered: Option<Gathered>,
+    /// Scatter of index visits that nothing explains, and the declared one, mm.
+    pub scatter: Option<(f64, f64)>,
+}
+
+/// Do held-out touches bear out a choice? With many visits their error must fall by more than its standard error, with
+/// few it must fall.
 #[must_use]
 pub fn bears_out(nested: &HeldOut) -> bool {
-    if nested.folds.len() < FEW_VISITS { nested.gain > -nested.standard_error } else { nested.falls() }
+    if nested.folds.len() < FEW_VISITS { nested.gain > 0.0 } else { nested.falls() }
 }
 
 /// From the tests.
 #[must_use]
-pub fn of(seen: &Examination) -> Decision {
+pub(super) fn of(seen: &Examination, beside: &Beside) -> Decision {
     let testable = seen.search.scores.iter().any(|s| s.visible());
     if seen.evidence.dof() < LEAST_DOF || !testable {
-        return Decision { verdict: Verdict::TooLittleData, borne_out: false };
+        return Decision { verdict: Verdict::TooLittleData, borne_out: false, named: false };
     }
     let named = seen.search.leader().is_some();
     let generic = seen.dependences.iter().any(|d| d.p_adjusted < FAMILY_LEVEL);
-    let borne_out = named && bears_out(&seen.nested);
+    let borne_out = named && bears_out(&seen.nested) && !beside.shapes_win;
+    let other = beside.gathered.is_some() || beside.scatter.is_some();
     let verdict = if borne_out {
         Verdict::MissingEffect
-    } else if named || generic || seen.lack_of_fit.p < LACK_OF_FIT {
+    } else if named || generic || other || seen.lack_of_fit.p < LACK_OF_FIT {
         Verdict::Unexplained
     } else {
         Verdict::Adequate
     };
-    Decision { verdict, borne_out }
+    Decision { verdict, borne_out, named }
 }
 
 /// Above this ratio of what is left to the noise nobody calls what is left faint.
@@ -62,8 +80,8 @@ fn faint(out: &Diagnosis, fit: &Fit) -> bool {
 }
 
 /// Says the verdict in a sentence: the terminal, the report and the workbench say it as it is said here.
-pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
-    out.faint = faint(out, fit);
+pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &Beside) {
+    out.faint = beside.gathered.is_none() && beside.scatter.is_none() && faint(out, fit);
     let against = format!("{:.2} um RMS against {:.2} um noise", out.rms_um, out.noise_um);
     out.says = match out.verdict {
         Verdict::Adequate => {
@@ -81,7 +99,14 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
             fit.n_used(),
             fit.free.len()
         ),
-        Verdict::MissingEffect => out.candidates.first().map_or_else(String::new, |c| missing(c, &against)),
+        Verdict::MissingEffect => {
+            let named = out.candidates.first().map_or_else(String::new, |c| missing(c, &against));
+            let better = beside.better.as_ref().and_then(|on| out.depends.iter().find(|w| w.on == *on));
+            let better = better.map_or_else(String::new, |w| {
+                format!(" A shape without a name describes it better, so that the name may be wrong: {}.", w.says)
+            });
+            named + &better
+        }
         Verdict::Unexplained if out.faint => {
             let first = out.depends.first().map_or_else(String::new, |w| format!(": {}", w.says));
             format!(
@@ -91,24 +116,57 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit) {
         }
         Verdict::Unexplained => {
             let first = out.depends.first().map_or_else(String::new, |w| format!(" {}.", w.says));
-            let gross = out.gross.first().filter(|g| g.rms_um < 0.1 * out.rms_um).map(|g| format!(" {}.", g.says));
-            format!("Something is missing ({against}), and no known effect explains it.{}", gross.unwrap_or(first))
+            let gross = out
+                .gross
+                .first()
+                .filter(|g| g.rms_um < super::gross::RIGHT * out.rms_um)
+                .map(|g| format!(" {}.", g.says));
+            let (effect, others) = match out.candidates.first() {
+                Some(c) => (c.effect.as_str(), c.same_as.len()),
+                None => ("an effect", 0),
+            };
+            let one = if others == 0 { effect.to_owned() } else { format!("{effect} or one of {others} others") };
+            match (beside.scatter, decision.named, beside.shapes_win) {
+                (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
+                (_, true, true) => format!(
+                    "Something is missing ({against}), and no known effect explains it: {one} would take a part of it, but a \
+                     shape without a name describes it clearly better.{}",
+                    gross.unwrap_or(first)
+                ),
+                (_, true, false) if gross.is_none() => format!(
+                    "Something is missing ({against}). {one} passes the test, but touches that had no part in choosing it are \
+                     not predicted better with it, so that nothing is named.{first} More index visits would tell."
+                ),
+                _ => format!(
+                    "Something is missing ({against}), and no known effect explains it.{}",
+                    gross.unwrap_or(first)
+                ),
+            }
         }
     };
 }
 
 /// Where many touches found nothing the rest is no sample of the machine: that is the finding, and it is said alone.
-pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, fit: &Fit) {
+pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::Subject) {
+    let fit = subject.fit;
     let (missed, made) = (fit.data.unusable.len(), fit.data.observations.len() + fit.data.unusable.len());
     if !super::missed::mostly(&fit.data) {
         return;
     }
-    out.verdict = Verdict::TooLittleData;
-    out.candidates.iter_mut().for_each(|c| c.proposed = false);
+    (out.most_missed, out.faint) = (true, false);
+    (out.verdict, out.shape) = (Verdict::TooLittleData, None);
+    // what was said of small effects was said of a sample that is none
+    out.candidates.clear();
+    out.depends.clear();
+    out.power.clear();
+    out.not_seen.clear();
+    out.outliers.clear();
     let named: Vec<&super::answer::Gross> = out.gross.iter().filter(|g| g.agrees.is_some()).collect();
     if let Some(first) = named.first() {
-        let as_good = named.iter().skip(1).filter(|g| g.agrees == first.agrees).map(|g| g.says.as_str());
-        let supposed: Vec<&str> = std::iter::once(first.says.as_str()).chain(as_good).collect();
+        let alike: Vec<&super::answer::Gross> = named.iter().copied().filter(|g| g.agrees == first.agrees).collect();
+        let supposed: Vec<&str> = alike.iter().map(|g| g.says.as_str()).collect();
+        out.candidates.extend(super::gross::of_misses(subject, &alike));
+        out.verdict = Verdict::MissingEffect;
         out.says = format!(
             "{missed} of {made} touches cannot be used, most of them because the search found nothing. It looks as if {}: that \
              would make {:.0} % of the touches hit or miss as they did. Correct it in the machine file or the log and measure \

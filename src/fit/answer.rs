@@ -26,10 +26,14 @@ pub(super) fn outcome(
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
     let type_b = uncertainty::type_b(fit, machine, catalogue, &settings.type_b)?;
-    let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
-        .then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
+    let (unmodelled, left_out) = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
+        .then(|| uncertainty::with_unmodelled(fit, machine, catalogue))
+        .unzip();
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
+    // what the file only declares of the visits is no noise of the probe
+    let declared_part = |c: usize| if fit.noise.visit_source == "declared" { by_visits[c] } else { 0.0 };
     let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
+    let moves = uncertainty::moves_with_unseen(fit);
     let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
     let parameters: Vec<Parameter> = (0..fit.theta.len())
         .map(|i| {
@@ -38,6 +42,8 @@ pub(super) fn outcome(
             let status = match (column, &fit.knowledge[i]) {
                 (None, _) => Status::Fixed,
                 (Some(c), _) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
+                // it follows what is not known by more than its uncertainty
+                (Some(c), _) if moves[c] * moves[c] > noise_variance(c) => Status::Undetermined,
                 // the data halve the prior's variance at least, or the value is the prior's rather than theirs
                 (Some(c), Some(Knowledge::Prior { sigma, .. })) if noise_variance(c) > 0.5 * sigma * sigma => {
                     Status::PriorDominated
@@ -45,7 +51,7 @@ pub(super) fn outcome(
                 _ => Status::Identified,
             };
             let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
-            let sigma = known.map(|c| (noise_variance(c) + b_variance[c]).sqrt());
+            let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
             let expanded = known.zip(sigma).map(|(c, s)| {
                 let share = if s > 0.0 { by_visits[c] / (s * s) } else { 0.0 };
                 s * fit.noise.coverage(share.clamp(0.0, 1.0))
@@ -58,8 +64,9 @@ pub(super) fn outcome(
                 unit: u.unit.clone(),
                 sigma,
                 expanded,
-                sigma_noise: known.map(|c| noise_variance(c).sqrt()),
+                sigma_noise: known.map(|c| (noise_variance(c) - declared_part(c)).max(0.0).sqrt()),
                 sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
+                moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
                 sigma_with_unmodelled: known
                     .zip(unmodelled.as_ref())
                     .map(|(c, all)| (all[c] * all[c] + b_variance[c]).sqrt())
@@ -97,7 +104,9 @@ pub(super) fn outcome(
         held_out_rms_um: if settings.quick { None } else { held_out::by_visit(fit).map(|h| h.rms_um) },
         noise_um: um_from_mm(fit.noise.sigma_mm),
         noise_source: fit.noise.source.into(),
-        visit_um: um_from_mm(fit.noise.visit_mm()),
+        noise_dof: fit.noise.dof,
+        visit_dof: fit.noise.visit_dof,
+        visit_um: um_from_mm(fit.noise.tau_mm),
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
@@ -105,9 +114,14 @@ pub(super) fn outcome(
             .observability
             .unseen
             .iter()
-            .map(|v| statement::undetermined(&free_unknowns, effects, v))
+            .map(|v| statement::undetermined(&free_unknowns, effects, v, &fit.observability.scale))
             .collect(),
-        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED { Vec::new() } else { uncertainty::weak(fit) },
+        parted_together: Vec::new(),
+        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {
+            Vec::new()
+        } else {
+            uncertainty::weak(fit, effects)
+        },
         parameters,
         correlations: uncertainty::correlations(fit),
         priors: uncertainty::priors(fit),
@@ -118,7 +132,12 @@ pub(super) fn outcome(
         reference_mm: fit.model.reference.into(),
         covariance: None,
         residuals: Some(residuals(fit)),
-        warnings: warnings(fit, effects, solution, chi2_per_dof),
+        warnings: [
+            warnings(fit, effects, solution, chi2_per_dof),
+            type_b.iter().filter_map(uncertainty::TypeB::warning).collect(),
+            left_out.unwrap_or_default(),
+        ]
+        .concat(),
     })
 }
 
@@ -149,6 +168,17 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
             "{} is more than {NOT_CREDIBLE} times its usual size: no machine is like that; is the plan, a unit or a sign wrong, or does a combination of the model leave hardly a trace?",
             fit.model.unknowns[i].name
         ));
+    }
+    let moves = uncertainty::moves_with_unseen(fit);
+    for (c, &i) in fit.free.iter().enumerate() {
+        let straight = fit.observability.unseen.iter().all(|v| v[c].abs() <= 1e-6);
+        let u = &fit.model.unknowns[i];
+        if straight && !u.nuisance && moves[c] * moves[c] > fit.covariance[(i, i)] {
+            out.push(format!(
+                "{} follows what these touches cannot tell by more than its own uncertainty, and is not determined either",
+                statement::meaning(u, effects)
+            ));
+        }
     }
     if !solution.converged {
         out.push(format!("the search did not converge: {}", solution.stopped));

@@ -88,3 +88,71 @@ pub fn variants(
     };
     variants.par_iter().map(make).collect()
 }
+
+/// A formula that gives no number somewhere.
+#[derive(Debug, Clone, Copy)]
+pub struct NoValue<'e> {
+    /// The effect.
+    pub effect: &'e Effect,
+    /// Its formula.
+    pub formula: &'e str,
+    /// How many touches.
+    pub n_touches: usize,
+    /// Number of the first one in its plan.
+    pub first: u64,
+}
+
+impl NoValue<'_> {
+    /// In words.
+    #[must_use]
+    pub fn says(&self) -> String {
+        let Self { effect, formula, n_touches, first } = self;
+        let (touches, which) = if *n_touches == 1 {
+            ("1 touch", "touch")
+        } else {
+            (&*format!("{n_touches} touches"), "the first is touch")
+        };
+        format!("formula {formula:?} of effect {} has no value at {touches}: {which} {first}", effect.id)
+    }
+
+    /// In words, for an effect that is only a candidate.
+    #[must_use]
+    pub fn left_out(&self) -> String {
+        format!("effect {} is left out of the candidates: {}", self.effect.id, self.says())
+    }
+}
+
+/// The formulas of an effect that have no value at some touch, at the shapes where it starts and at those that are tried.
+#[must_use]
+pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Vec<NoValue<'e>> {
+    let starts: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
+    let mut shapes = vec![starts.clone()];
+    for (i, p) in effect.parameters.iter().enumerate() {
+        shapes.extend(p.scan.iter().map(|value| {
+            let mut tried = starts.clone();
+            tried[i] = *value;
+            tried
+        }));
+    }
+    let of_term = |formula: &'e crate::model::formula::Formula| -> Option<NoValue<'e>> {
+        let tried = if formula.has_shape() { &shapes[..] } else { &shapes[..1] };
+        let bad = |o: &&Observation| tried.iter().any(|s| !formula.eval(&o.state, s).is_finite());
+        let mut bad = observations.iter().filter(bad);
+        let first = bad.next()?.id;
+        Some(NoValue { effect, formula: formula.text(), n_touches: 1 + bad.count(), first })
+    };
+    effect.terms.iter().filter_map(|t| of_term(&t.formula)).collect()
+}
+
+/// Candidates that have a value at every touch, and a sentence for each that is left out: its column would be no number, and
+/// would spoil what is said of all the others. The built-in ones have a value everywhere.
+#[must_use]
+pub fn with_values<'c>(effects: Vec<&'c Effect>, observations: &[Observation]) -> (Vec<&'c Effect>, Vec<String>) {
+    let mut left_out = Vec::new();
+    let kept = effects.into_iter().filter(|e| {
+        let bad = if e.built_in { Vec::new() } else { without_value(e, observations) };
+        left_out.extend(bad.first().map(NoValue::left_out));
+        bad.is_empty()
+    });
+    (kept.collect(), left_out)
+}

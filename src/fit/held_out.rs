@@ -22,6 +22,10 @@ const WIDE: f64 = 1000.0;
 pub struct HeldOut {
     /// Root mean square of the errors of prediction, µm.
     pub rms_um: f64,
+    /// Standard error of that from its spread over the groups, µm; none with a single group.
+    pub standard_error_um: Option<f64>,
+    /// Sum of squared errors, mm², and number of predicted touches of each group.
+    pub by_group: Vec<(f64, usize)>,
     /// Touches that could be predicted.
     pub scored: usize,
     /// Used touches that the rest cannot predict.
@@ -70,7 +74,7 @@ pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
     for (group, errors) in members.iter().zip(predicted) {
         group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
     }
-    collect(fit, error_mm, members.len(), 0)
+    collect(fit, error_mm, &members, 0)
 }
 
 /// The last run of a study of several, predicted from the others. Where its blocks were set up anew, their places are
@@ -98,17 +102,55 @@ pub fn later_run(fit: &Fit) -> Option<HeldOut> {
     let n_own = rows.without_own(&group, &own, &mut errors);
     let mut error_mm = vec![None; observations.len()];
     group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
-    let mut out = collect(fit, error_mm, 1, n_own)?;
+    let mut out = collect(fit, error_mm, &[group.clone()], n_own)?;
     out.unpredicted = group.len() - out.scored;
     Some(out)
 }
 
-fn collect(fit: &Fit, error_mm: Vec<Option<f64>>, groups: usize, n_own: usize) -> Option<HeldOut> {
+fn collect(fit: &Fit, error_mm: Vec<Option<f64>>, groups: &[Vec<usize>], n_own: usize) -> Option<HeldOut> {
     let scored = error_mm.iter().flatten().count();
     let dof = scored.checked_sub(n_own).filter(|d| *d > 0)?;
     let squares: f64 = error_mm.iter().flatten().map(|e| e * e).sum();
     let unpredicted = fit.n_used().saturating_sub(scored);
-    Some(HeldOut { rms_um: um_from_mm((squares / dof as f64).sqrt()), scored, unpredicted, groups, error_mm })
+    let by_group: Vec<(f64, usize)> = groups
+        .iter()
+        .map(|g| {
+            let errors = || g.iter().filter_map(|&i| error_mm[i]);
+            (errors().map(|e| e * e).sum(), errors().count())
+        })
+        .collect();
+    let rms_um = um_from_mm((squares / dof as f64).sqrt());
+    // of the mean square m, from how the groups differ from it; the root halves the relative error
+    let (n, mean) = (by_group.len() as f64, squares / dof as f64);
+    let spread: f64 = by_group.iter().map(|(ss, k)| (ss - mean * *k as f64).powi(2)).sum();
+    let of_mean = (n / (n - 1.0) * spread).sqrt() / dof as f64;
+    let standard_error_um = (by_group.len() > 1 && mean > 0.0).then(|| rms_um * 0.5 * of_mean / mean);
+    let groups = by_group.len();
+    Some(HeldOut { rms_um, standard_error_um, by_group, scored, unpredicted, groups, error_mm })
+}
+
+/// By how much the error on touches left out falls from one model to another one of the same touches, with the standard
+/// error of the fall, µm: touches that both predict, group by group, so that what both have in common takes no part.
+#[must_use]
+pub fn fall(before: &HeldOut, after: &HeldOut, groups: &[usize]) -> Option<(f64, f64)> {
+    let n_groups = groups.iter().max()? + 1;
+    let mut each = vec![(0.0, 0.0, 0usize); n_groups];
+    for ((b, a), &g) in before.error_mm.iter().zip(&after.error_mm).zip(groups) {
+        if let (Some(b), Some(a)) = (b, a) {
+            each[g] = (each[g].0 + b * b, each[g].1 + a * a, each[g].2 + 1);
+        }
+    }
+    each.retain(|e| e.2 > 0);
+    let (b, a, n) = each.iter().fold((0.0, 0.0, 0usize), |s, e| (s.0 + e.0, s.1 + e.1, s.2 + e.2));
+    if each.len() < 2 {
+        return None;
+    }
+    let (k, mean) = (each.len() as f64, (b - a) / n as f64);
+    let spread: f64 = each.iter().map(|e| (e.0 - e.1 - mean * e.2 as f64).powi(2)).sum();
+    let root = |ss: f64| um_from_mm((ss / n as f64).sqrt());
+    let of_squares = (k / (k - 1.0) * spread).sqrt() / n as f64;
+    let sum = root(b) + root(a);
+    (sum > 0.0).then(|| (root(b) - root(a), um_from_mm(um_from_mm(of_squares)) / sum))
 }
 
 /// The rows of a fit at its minimum.

@@ -1,11 +1,12 @@
 //! What the user said about a model: which effects, which parameters are held or known, and whether that makes sense.
 
 use super::Knowledge;
+use super::candidates::without_value;
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
-use crate::model::predict::{Observation, Unknown};
+use crate::model::predict::Unknown;
 use std::collections::BTreeMap;
 
 /// The effects of a model, in order.
@@ -51,21 +52,10 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
 /// A formula that gives no number at a touch would spoil the whole fit: say which, and where.
 pub(super) fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Result<()> {
     let mut findings = Vec::new();
-    for effect in effects {
-        let shapes: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
-        for term in &effect.terms {
-            let bad = |o: &&Observation| !term.formula.eval(&o.state, &shapes).is_finite();
-            let n_bad = data.observations.iter().filter(bad).count();
-            if let Some(first) = data.observations.iter().find(bad) {
-                findings.push(
-                    Finding::error(
-                        "model::no_value",
-                        format!("formula {:?} of effect {} has no value at {n_bad} touches, the first is touch {}", term.formula.text(), effect.id, first.id),
-                    )
-                    .help("a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch"),
-                );
-            }
-        }
+    for bad in effects.iter().flat_map(|e| without_value(e, &data.observations)) {
+        findings.push(Finding::error("model::no_value", bad.says()).help(
+            "a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
+        ));
     }
     if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
 }

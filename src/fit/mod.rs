@@ -19,7 +19,7 @@ pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
-pub use shapes::start_shapes;
+pub use shapes::{scan, start_shapes};
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
@@ -102,6 +102,8 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
     /// What the nominal touches say about the free unknowns.
     pub observability: solve::Observability,
+    /// The same at the solution, of equal rank: combinations that leave no trace bend with the machine's errors.
+    pub seen: solve::Observability,
     /// Indices of the free unknowns.
     pub free: Vec<usize>,
     /// Priors, by unknown.
@@ -268,14 +270,15 @@ fn identify_from(
     }
     let first = solve::Problem::normal(&touches, &start, true);
     let (observability, condition) = observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
-    let mut search = Search { data: &data, observability: &observability, touches, masked };
+    let mut search = Search { data: &data, observability: observability.clone(), touches, masked };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
+    let solution = search.settle(solution);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
     let solution = search.without_strangers(solution, 0.0);
     let noise = noise::estimate(&search.samples(&solution), &known);
     search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
     let first_steps = solution.iterations;
-    let solution = solve::minimise(&search.touches, solution.theta, &observability);
+    let solution = search.refit_here(solution.theta);
     let before = search.touches.weights().to_vec();
     let mut solution = search.without_strangers(solution, noise.dof.unwrap_or(0.0));
     let noise = if search.touches.weights() == before {
@@ -283,9 +286,10 @@ fn identify_from(
     } else {
         let noise = noise::estimate(&search.samples(&solution), &known);
         search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
-        solution = solve::minimise(&search.touches, solution.theta, &observability);
+        solution = search.refit_here(solution.theta);
         noise
     };
+    solution = search.settle(solution);
     solution.iterations += first_steps;
     let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
     let snoop = Snoop::new(
@@ -322,7 +326,8 @@ fn identify_from(
         }
     }
     let studentised = snoop.studentised();
-    drop(search);
+    let seen = search.observability;
+    drop(search.touches);
     drop(batch);
     let chi2 = solution.chi2;
     let mut fit = Fit {
@@ -335,6 +340,7 @@ fn identify_from(
         rejected,
         covariance,
         observability,
+        seen,
         free,
         priors,
         knowledge,
@@ -364,7 +370,8 @@ pub fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
 /// A fit that is being made.
 struct Search<'a> {
     data: &'a Data,
-    observability: &'a solve::Observability,
+    /// What is seen where the search stands.
+    observability: solve::Observability,
     touches: Touches<'a>,
     masked: Vec<bool>,
 }
@@ -410,7 +417,31 @@ impl Search<'_> {
 
     fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
         self.touches.set_weights(weights);
-        solve::minimise(&self.touches, from.theta.clone(), self.observability)
+        self.refit_here(from.theta.clone())
+    }
+
+    fn refit_here(&self, from: DVector<f64>) -> solve::Solution {
+        solve::minimise(&self.touches, from, &self.observability)
+    }
+
+    /// A combination that leaves no trace is straight to first order only: what is seen is looked at again where the search
+    /// has come to, and it goes on from there until it rests.
+    fn settle(&mut self, mut solution: solve::Solution) -> solve::Solution {
+        let rank = self.observability.rank;
+        if self.observability.full() || rank == 0 {
+            return solution;
+        }
+        for _ in 0..MOST_TURNS {
+            let jacobian = solve::Problem::jacobian(&self.touches, &solution.theta);
+            self.observability = solve::observe_of_rank(&jacobian, rank);
+            let next = self.refit_here(solution.theta);
+            let rests = next.iterations <= 1;
+            solution = solve::Solution { iterations: solution.iterations + next.iterations, ..next };
+            if rests {
+                break;
+            }
+        }
+        solution
     }
 
     /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do
@@ -511,6 +542,9 @@ impl Search<'_> {
             .collect()
     }
 }
+
+/// So often at most the directions that are seen are looked at again.
+const MOST_TURNS: usize = 8;
 
 /// Condition up to which the touches as they were made show the rank that the nominal ones have: the two Jacobians differ
 /// by what errors and set-ups of some tenths of a millimetre make of levers of some hundred.

@@ -29,8 +29,8 @@ pub struct Noise {
     pub source: &'static str,
     /// Degrees of freedom of σ; none where it is taken as known.
     pub dof: Option<f64>,
-    /// Standard deviation of each component of a visit's displacement, mm: what weights and uncertainties use. 0 where
-    /// nothing but a declaration is known of it: uncertainties then count the probe's noise alone, and say so.
+    /// Standard deviation of each component of a visit's displacement, mm: what weights and uncertainties use, from
+    /// whatever source.
     pub tau_mm: f64,
     /// `revisits`, `study`, `declared`, or `one pose`.
     pub visit_source: &'static str,
@@ -95,7 +95,7 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
             (tau, "revisits", Some(dof), upper)
         }
         None if n_poses < 2 => fixed(0.0, "one pose"),
-        None => (0.0, "declared", None, known.declared_tau_mm),
+        None => fixed(known.declared_tau_mm, "declared"),
     };
     Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm }
 }
@@ -110,26 +110,19 @@ impl Noise {
             _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
         };
         let tau = match (self.visit_source, self.visit_dof) {
-            ("revisits", Some(_)) => {
-                format!("from revisited poses, at most {:.2} um with 90 % certainty", um_from_mm(self.tau_test_mm))
-            }
+            ("revisits", Some(dof)) => format!(
+                "from revisited poses, {dof:.0} degrees of freedom, at most {:.2} um with 90 % certainty",
+                um_from_mm(self.tau_test_mm)
+            ),
             ("study", _) => "as the study states".to_owned(),
             ("one pose", _) => "only one pose was visited".to_owned(),
-            _ => "the axes' declared indexing repeatability, for tests only: the plan has too few revisits to measure it, \
-                  and the uncertainties count the probe's noise alone"
-                .to_owned(),
+            _ => "the axes' declared indexing repeatability: the plan has too few revisits to measure it".to_owned(),
         };
         format!(
             "touch {:.2} um ({sigma}); index visit {:.2} um ({tau})",
             um_from_mm(self.sigma_mm),
-            um_from_mm(self.visit_mm())
+            um_from_mm(self.tau_mm)
         )
-    }
-
-    /// Standard deviation of each component of a visit's displacement as it is known, mm.
-    #[must_use]
-    pub fn visit_mm(&self) -> f64 {
-        if self.visit_source == "declared" { self.tau_test_mm } else { self.tau_mm }
     }
 
     /// Two-sided 95 % factor for a standard uncertainty of which `visit_share` of the variance goes back to τ

@@ -42,11 +42,17 @@ pub struct Outcome {
     pub noise_um: f64,
     /// Where that comes from: `repeats`, `declared`, `study`.
     pub noise_source: String,
+    /// Degrees of freedom of that; none where it is taken as known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_dof: Option<f64>,
     /// Scatter per index visit, µm.
     pub visit_um: f64,
     /// Where that comes from: `revisits`, `declared`, `study`, `one pose`.
     #[serde(default)]
     pub visit_source: String,
+    /// Degrees of freedom of that; none where it is taken as known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visit_dof: Option<f64>,
     /// Both in a sentence.
     #[serde(default)]
     pub noise_says: String,
@@ -54,6 +60,9 @@ pub struct Outcome {
     pub chi2_per_dof: f64,
     /// Combinations that the data cannot tell.
     pub undetermined: Vec<Undetermined>,
+    /// What would tell all of them together: variations of the touches, chosen one after the other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parted_together: Vec<String>,
     /// Combinations that the data determine no better than their typical sizes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weak: Vec<Combination>,
@@ -191,12 +200,17 @@ pub struct Parameter {
     pub sigma: Option<f64>,
     /// Expanded uncertainty (95 %, Student's t with the degrees of freedom of the noise).
     pub expanded: Option<f64>,
-    /// Standard uncertainty from the noise alone.
+    /// Standard uncertainty from the noise alone, as the touches show it: a scatter of visits that is only declared has no
+    /// part in it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_noise: Option<f64>,
     /// Standard uncertainty from the type B rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_type_b: Option<f64>,
+    /// How far the value moves while the combinations that leave no trace move by their usual size: in `sigma`. Not there where
+    /// the value does not depend on them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moves_with_unseen: Option<f64>,
     /// Standard uncertainty when everything that the model leaves out acts at its typical size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_with_unmodelled: Option<f64>,

@@ -15,6 +15,9 @@ use nalgebra::{DMatrix, DVector};
 /// Values that are tried where the catalogue names none.
 const TRIED: usize = 12;
 
+/// More places of a jump than this are tried between index visits first.
+const MOST_PLACES: usize = 120;
+
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
 const LEAST_GAIN: f64 = 9.0;
 
@@ -70,14 +73,28 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
     // one after another, twice: shapes of one effect are few
     for _ in 0..if shaped.len() > 1 { 2 } else { 1 } {
         for (k, &i) in shaped.iter().enumerate() {
-            for value in tried(&effect.parameters[i]) {
-                let mut shapes = best.clone();
-                shapes[k] = value;
-                let now = judge(&shapes);
-                if now.0 > found.0 {
-                    (best, found) = (shapes, now);
+            let mut try_all = |values: &[f64], best: &mut Vec<f64>| {
+                for &value in values {
+                    let mut shapes = best.clone();
+                    shapes[k] = value;
+                    let now = judge(&shapes);
+                    if now.0 > found.0 {
+                        *best = shapes;
+                        found = now;
+                    }
                 }
-            }
+            };
+            let values = scan(&effect.parameters[i], &fit.data).unwrap_or_else(|| tried(&effect.parameters[i]));
+            try_all(&values, &mut best);
+            // a jump may also come in mid-visit: the touches around the best place between two visits
+            let around: Vec<f64> = match effect.parameters[i].between {
+                Some(variable) => places(&fit.data, variable, false),
+                None => Vec::new(),
+            };
+            let below = values.iter().copied().filter(|v| *v < best[k]).fold(f64::NEG_INFINITY, f64::max);
+            let above = values.iter().copied().filter(|v| *v > best[k]).fold(f64::INFINITY, f64::min);
+            let around: Vec<f64> = around.into_iter().filter(|v| (below..above).contains(v)).collect();
+            try_all(&around, &mut best);
         }
     }
     let (gain, size) = found;
@@ -104,12 +121,36 @@ pub(super) fn jumps<'e>(effect: &'e Effect, values: &[f64], data: &Data) -> Vec<
         .collect()
 }
 
+/// Values of a shape parameter to be scanned: those of the catalogue, or the places at which these touches would show a
+/// jump: between two index visits, where they are many.
+#[must_use]
+pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
+    if let (Some(variable), Some((_, low, high))) = (p.between, p.shape) {
+        let mut all = places(data, variable, false);
+        if all.len() > MOST_PLACES {
+            all = places(data, variable, true);
+        }
+        all.retain(|v| (low..=high).contains(v));
+        if !all.is_empty() {
+            return Some(all);
+        }
+    }
+    (!p.scan.is_empty()).then(|| p.scan.clone())
+}
+
+/// Half-way between successive values of a variable: of all touches, or where the next index visit begins.
+fn places(data: &Data, variable: usize, by_visit: bool) -> Vec<f64> {
+    let mut at: Vec<(f64, usize)> =
+        data.observations.iter().zip(&data.visits).map(|(o, v)| (o.state[variable], *v)).collect();
+    at.retain(|a| a.0.is_finite());
+    at.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let apart = at.windows(2).filter(|w| w[1].0 > w[0].0 && (!by_visit || w[1].1 != w[0].1));
+    apart.map(|w| 0.5 * (w[0].0 + w[1].0)).collect()
+}
+
 /// Values of a shape parameter that are tried.
 fn tried(p: &Parameter) -> Vec<f64> {
     let Some((start, low, high)) = p.shape else { return Vec::new() };
-    if !p.scan.is_empty() {
-        return p.scan.clone();
-    }
     let at = |k: usize| {
         let share = k as f64 / (TRIED - 1) as f64;
         if low > 0.0 && high > 10.0 * low { low * (high / low).powf(share) } else { low + (high - low) * share }

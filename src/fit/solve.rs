@@ -1,8 +1,7 @@
 //! Weighted Gauss-Newton, rank by singular values, and nothing about effects or machines.
 //!
 //! The unknowns are scaled by their columns' norms at the nominal touches; directions that leave no trace there
-//! (singular value below [`RANK_TOLERANCE`] of the largest) are gauges: they are taken out of the search, stay at
-//! their start, and are reported. Source of the method: Björck, Numerical Methods for Least Squares Problems, ch. 9.
+//! (singular value below [`RANK_TOLERANCE`] of the largest) are gauges: they are taken out of the search and reported. Source of the method: Björck, Numerical Methods for Least Squares Problems, ch. 9.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -33,6 +32,16 @@ pub struct Observability {
 /// Rank and null directions of a Jacobian (rows: touches, columns: unknowns).
 #[must_use]
 pub fn observe(jacobian: &DMatrix<f64>) -> Observability {
+    observe_with(jacobian, None)
+}
+
+/// The same where the rank is known already: the weakest directions, as many as that leaves, are the null directions.
+#[must_use]
+pub fn observe_of_rank(jacobian: &DMatrix<f64>, rank: usize) -> Observability {
+    observe_with(jacobian, Some(rank))
+}
+
+fn observe_with(jacobian: &DMatrix<f64>, rank: Option<usize>) -> Observability {
     let p = jacobian.ncols();
     if p == 0 || jacobian.nrows() == 0 {
         // every parameter is held, or nothing was touched: there is nothing to see
@@ -58,7 +67,12 @@ pub fn observe(jacobian: &DMatrix<f64>) -> Observability {
     }
     let (values, v) = singular(&scaled);
     let top = values.iter().copied().fold(0.0, f64::max);
-    let kept: Vec<usize> = (0..p).filter(|&i| values[i] > RANK_TOLERANCE * top && top > 0.0).collect();
+    let mut kept: Vec<usize> = (0..p).filter(|&i| values[i] > RANK_TOLERANCE * top && top > 0.0).collect();
+    if let Some(rank) = rank {
+        kept.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+        kept.truncate(rank);
+        kept.sort_unstable();
+    }
     let lost: Vec<usize> = (0..p).filter(|i| !kept.contains(i)).collect();
     let smallest = kept.iter().map(|&i| values[i]).fold(f64::INFINITY, f64::min);
     let seen = if lost.is_empty() { DMatrix::identity(p, p) } else { v.select_columns(&kept) };

@@ -10,48 +10,112 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Weights below this are not worth a word.
 const WORTH_NAMING: f64 = 0.05;
 
-/// A null direction (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `effects` the model's.
+/// A null direction (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `scale` what their scaled
+/// values are divided by, `effects` the model's.
 #[must_use]
-pub fn undetermined(unknowns: &[&Unknown], effects: &[&Effect], direction: &DVector<f64>) -> Undetermined {
+pub fn undetermined(
+    unknowns: &[&Unknown],
+    effects: &[&Effect],
+    direction: &DVector<f64>,
+    scale: &DVector<f64>,
+) -> Undetermined {
     let mut combination = BTreeMap::new();
     for (u, weight) in unknowns.iter().zip(direction.iter()) {
         if weight.abs() > 1e-6 {
             combination.insert(u.name.clone(), (weight * 1e6).round() / 1e6);
         }
     }
-    let mut physical: Vec<String> = Vec::new();
+    // results with how much of each the direction holds, in its own unit
+    let mut physical: Vec<(&Unknown, f64)> = Vec::new();
     let mut blocks: BTreeSet<String> = BTreeSet::new();
     let mut block_words: BTreeSet<String> = BTreeSet::new();
-    for (u, _) in unknowns.iter().zip(direction.iter()).filter(|(_, w)| w.abs() > WORTH_NAMING) {
+    let named = unknowns.iter().zip(direction.iter().zip(scale.iter())).filter(|(_, (w, _))| w.abs() > WORTH_NAMING);
+    for (u, (weight, scale)) in named {
         match u.name.split_once('@') {
             Some((word, block)) => {
                 blocks.insert(block.to_owned());
                 block_words.insert(word.to_owned());
             }
-            None => physical.push(meaning(u, effects)),
+            None => physical.push((u, weight / scale)),
         }
     }
-    let mut members = physical.clone();
+    let mut members: Vec<String> = physical.iter().map(|(u, _)| meaning(u, effects)).collect();
     if !blocks.is_empty() {
         let words: Vec<&str> = block_words.iter().map(|w| set_up_word(w)).collect();
         let of = if blocks.len() > 3 {
             format!("{} blocks", blocks.len())
         } else {
-            blocks.into_iter().collect::<Vec<_>>().join(", ")
+            blocks.iter().cloned().collect::<Vec<_>>().join(", ")
         };
         members.push(format!("the set-up of {of} ({})", words.join(", ")));
     }
-    let says = match &members[..] {
-        [] => "a combination of many parameters leaves no trace in these touches".to_owned(),
-        [one] => format!(
+    let convention = "by convention the part that leaves no trace is 0";
+    let says = match (&members[..], &physical[..]) {
+        ([], _) => "a combination of many parameters leaves no trace in these touches".to_owned(),
+        ([one], _) => format!(
             "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
         ),
-        several => format!(
-            "{} are one number with these touches: only their sum is seen, and by convention the part that leaves no trace is 0, so that each value holds a share of that sum",
-            join(several)
+        (_, [a, b]) if blocks.is_empty() => format!(
+            "{} are one number with these touches: only {} is seen, and {convention}, so that each value holds a share of that",
+            join(&members),
+            what_is_seen(*a, *b)
+        ),
+        (_, [one]) => format!(
+            "{} are one number with these touches: no touch notices a change of {} while the blocks go with it, and {convention}",
+            join(&members),
+            one.0.name
+        ),
+        _ => format!(
+            "{} are one number less than they seem with these touches: no touch notices {}, and {convention}",
+            join(&members),
+            trade(&physical, !blocks.is_empty())
         ),
     };
     Undetermined { combination, says, parted_by: Vec::new() }
+}
+
+/// An amount of an unknown with its unit; lengths all in mm, so that they compare.
+fn plain<'u>((unknown, amount): (&'u Unknown, f64)) -> (f64, &'u str) {
+    if unknown.unit == "um" { (crate::units::mm_from_um(amount), "mm") } else { (amount, &unknown.unit) }
+}
+
+/// What is seen of two results that trade against each other: "their sum (ey + EY0C)", "EX0B + 3.54 mm/deg · EB0B".
+fn what_is_seen(a: (&Unknown, f64), b: (&Unknown, f64)) -> String {
+    let ((in_a, unit_a), (in_b, unit_b)) = (plain(a), plain(b));
+    let factor = -in_a / in_b;
+    let sign = if factor < 0.0 { '-' } else { '+' };
+    if unit_a == unit_b && (factor.abs() - 1.0).abs() < 1e-3 {
+        let what = if factor < 0.0 { "difference" } else { "sum" };
+        return format!("their {what} ({} {sign} {})", a.0.name, b.0.name);
+    }
+    let unit = if unit_a == unit_b { String::new() } else { format!(" {unit_a}/{unit_b}") };
+    format!("{} {sign} {}{unit} * {}", a.0.name, digits(factor.abs()), b.0.name)
+}
+
+/// How results trade against each other: "+1 mm of EX0B with -0.283 deg of EB0B".
+fn trade(physical: &[(&Unknown, f64)], with_blocks: bool) -> String {
+    // the first is changed by one of its unit
+    let one = physical.first().map_or(1.0, |p| plain(*p).0);
+    let each: Vec<String> = physical
+        .iter()
+        .map(|p| {
+            let (amount, unit) = plain(*p);
+            let x = amount / one;
+            format!("{}{} {unit} of {}", if x < 0.0 { '-' } else { '+' }, digits(x.abs()), p.0.name)
+        })
+        .chain(with_blocks.then(|| "a set-up of the blocks that goes with it".to_owned()))
+        .collect();
+    match &each[..] {
+        [] => "a change of the set-ups together".to_owned(),
+        [first, rest @ ..] => format!("{first} with {}", join(rest)),
+    }
+}
+
+/// Three significant digits, no more zeros than needed.
+fn digits(x: f64) -> String {
+    let magnitude = if x > 0.0 { x.log10().floor() as i32 } else { 0 };
+    let text = format!("{x:.*}", (2 - magnitude).clamp(0, 12) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// What an unknown means at the machine, with its symbol: "the place of axis C in Y (EY0C)".
@@ -132,12 +196,15 @@ fn set_up_word(word: &str) -> &str {
     }
 }
 
-/// A combination that is known badly, in words.
-pub(super) fn weak(weights: &BTreeMap<String, f64>, times: f64) -> String {
-    let names: Vec<String> = weights.keys().cloned().collect();
-    let what = match &names[..] {
-        [one] => one.clone(),
-        several => format!("the combination of {}", join(several)),
+/// A combination that is known badly, in words: unknowns with their weights in units of their usual sizes.
+pub(super) fn weak(weights: &[(&Unknown, f64)], effects: &[&Effect], times: f64) -> String {
+    let what = match weights {
+        [(one, _)] => meaning(one, effects),
+        several => {
+            let each: Vec<String> =
+                several.iter().map(|(u, w)| format!("{w:+.2} of {}", meaning(u, effects))).collect();
+            format!("the combination {} (each in its usual size)", join(&each))
+        }
     };
-    format!("{what} is known to {times:.1} times its typical size only: these touches hardly see it")
+    format!("{what} is known to {} times its usual size only: these touches hardly see it", digits(times))
 }

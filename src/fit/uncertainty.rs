@@ -1,14 +1,16 @@
 //! Where the uncertainty of a parameter comes from, what it becomes with everything that the model leaves out, and which
 //! combinations are weak.
 
-use super::candidates::columns;
+use super::candidates::{columns, with_values, without_value};
 use super::normal::Touches;
 use super::outcome::{Combination, Correlation, Covariance};
+use super::solve::RANK_TOLERANCE;
 use super::{Fit, Knowledge};
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
-use crate::model::predict::Unknown;
+use crate::model::formula::slot;
+use crate::model::predict::{Observation, Unknown};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::collections::BTreeMap;
 
@@ -18,9 +20,9 @@ const WORTH_NAMING: f64 = 0.8;
 /// With more touches the columns of the whole catalogue would need gigabytes.
 pub(super) const MOST_UNMODELLED: usize = 20_000;
 
-/// Singular values of the combinations of results below this share of the largest are zero: projecting the set-ups out
-/// of a Gram matrix leaves some 1e-5, and what leaves no trace is said elsewhere.
-const NO_TRACE: f64 = 1e-4;
+/// Projecting the set-ups out of a Gram matrix leaves some 1e-5 of the largest singular value: below this share of it the
+/// rows themselves must tell.
+const GRAM_SEES: f64 = 1e-4;
 
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
@@ -60,6 +62,29 @@ pub fn free_covariance(fit: &Fit) -> DMatrix<f64> {
     DMatrix::from_fn(fit.free.len(), fit.free.len(), |a, b| fit.covariance[(fit.free[a], fit.free[b])])
 }
 
+/// How far each free unknown moves, in its unit, while what leaves no trace at the solution moves by its usual size. 0 for
+/// what does not depend on it at all: combinations without a trace bend, and a value that has no part in them where everything
+/// is nominal may have a small one where the machine stands.
+pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
+    let p = fit.free.len();
+    if fit.seen.unseen.is_empty() {
+        return DVector::zeros(p);
+    }
+    let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
+    let each: Vec<DVector<f64>> = fit
+        .seen
+        .unseen
+        .iter()
+        .map(|v| DVector::from_fn(p, |c, _| v[c] / fit.seen.scale[c] / typical(c)).normalize())
+        .collect();
+    let svd = DMatrix::from_columns(&each).svd(true, false);
+    let kept: Vec<usize> = (0..each.len()).filter(|&k| svd.singular_values[k] > 1e-9).collect();
+    let Some(basis) = svd.u.map(|u| u.select_columns(&kept)) else { return DVector::zeros(p) };
+    // less than this is the rounding of a value that stays where it is
+    const LEAST: f64 = 1e-11;
+    DVector::from_fn(p, |c, _| Some(basis.row(c).norm() * typical(c)).filter(|m| *m > LEAST).unwrap_or(0.0))
+}
+
 /// A source of uncertainty that the touches cannot show.
 #[derive(Debug, Clone)]
 pub(super) struct TypeB {
@@ -68,6 +93,21 @@ pub(super) struct TypeB {
     pub sigma: f64,
     /// What it makes of each free unknown: standard uncertainty, in the unknown's unit.
     pub makes: DVector<f64>,
+    /// It goes with the temperature, and no touch carries one: it is counted for a room 1 K off 20 °C.
+    pub per_kelvin: bool,
+}
+
+impl TypeB {
+    /// What a reader must not miss.
+    pub fn warning(&self) -> Option<String> {
+        self.per_kelvin.then(|| {
+            format!(
+                "type B: {} goes with the temperature, and no touch carries one: it is counted as if everything had been \
+                 touched 1 K off 20 °C; multiply its uncertainty by the kelvins that the room may be off, or log the temperature",
+                self.name
+            )
+        })
+    }
 }
 
 /// Type B rows as the user states them: by name of a parameter of an effect that is not in the model.
@@ -108,13 +148,34 @@ pub(super) fn type_b(
             );
             continue;
         }
-        let column = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, None)
+        if let Some(bad) = without_value(effect, &fit.data.observations).first() {
+            findings.push(
+                Finding::error("model::no_value", format!("{word} cannot be a type B row: {}", bad.says()))
+                    .help("write the formula so that it holds at every touch"),
+            );
+            continue;
+        }
+        let with_t = effect.terms.iter().any(|t| t.parameter == which && t.formula.variables().contains(&"T"));
+        let per_kelvin = with_t && fit.data.observations.iter().all(|o| !o.has_temperature);
+        let at = |o: &Observation| {
+            let mut warm = o.clone();
+            warm.state[slot::TEMPERATURE] += f64::from(u8::from(per_kelvin));
+            warm
+        };
+        let observations: Vec<Observation> = fit.data.observations.iter().map(at).collect();
+        let column = columns(machine, &[effect], &fit.data, &observations, fit.model.reference, None)
             .values
             .column(which)
             .into_owned();
         let moved = sensitivity(fit, column);
         let p = &effect.parameters[which];
-        out.push(TypeB { name: p.name.clone(), unit: p.unit.clone(), sigma, makes: moved.map(|m| (m * sigma).abs()) });
+        out.push(TypeB {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            sigma,
+            makes: moved.map(|m| (m * sigma).abs()),
+            per_kelvin,
+        });
     }
     if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
 }
@@ -128,33 +189,30 @@ fn sensitivity(fit: &Fit, column: DVector<f64>) -> DVector<f64> {
     -(free_covariance(fit) * linear.jacobian.rows(0, n).tr_mul(&whitened.column(0)))
 }
 
-/// Effects that may act although the model does not hold them: all of the catalogue but those that share a parameter with
-/// the model, the paper's sets, whole hypotheses and the set-up of blocks.
-#[must_use]
-pub fn unmodelled<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
-    unmodelled_by(&fit.model.unknowns, machine, catalogue).into_iter().filter(|e| !e.per_block).collect()
-}
-
-/// As [`unmodelled`], of a model with these unknowns; effects with parameters for each block are among them.
+/// Effects that may act although a model with these unknowns does not hold them: all of the catalogue but those that share a
+/// parameter with the model, the paper's sets and whole hypotheses.
 #[must_use]
 pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
     let held = |e: &Effect| e.parameters.iter().any(|p| unknowns.iter().any(|u| u.effect == e.id || u.name == p.name));
     catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.discrete && !held(e)).collect()
 }
 
-/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size,
-/// and the ball's place scatters from one index to the next as far as that is known.
-pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> DVector<f64> {
-    let effects = unmodelled(fit, machine, catalogue);
+/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size (not the
+/// set-up of blocks), and the ball's place scatters from one index to the next as far as that is known; and what is said of
+/// effects that could not be counted.
+pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> (DVector<f64>, Vec<String>) {
+    let mut effects = unmodelled_by(&fit.model.unknowns, machine, catalogue);
+    effects.retain(|e| !e.per_block);
+    let (effects, left_out) = with_values(effects, &fit.data.observations);
     let all = columns(machine, &effects, &fit.data, &fit.data.observations, fit.model.reference, None);
-    let tau_mm = fit.noise.visit_mm();
+    let tau_mm = fit.noise.tau_mm;
     let linear = fit.linear(tau_mm);
     let mut b = all.values;
     for (mut column, u) in b.column_iter_mut().zip(&all.unknowns) {
         column *= u.typical;
     }
     fit.with_touches(tau_mm, |t| t.whiten(&mut b));
-    expected(&linear.jacobian, Some(&b), &fit.observability)
+    (expected(&linear.jacobian, Some(&b), &fit.seen), left_out)
 }
 
 /// Standard uncertainty of each unknown of a whitened regression, in its unit, while effects that are not solved for act
@@ -216,27 +274,71 @@ pub(super) fn correlations(fit: &Fit) -> Vec<Correlation> {
 }
 
 /// Combinations of results that these touches determine no better than their typical sizes: columns scaled by typical
-/// size, nuisance projected out, singular values below 1 (in units of the noise). Without those that leave no trace.
-pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
-    let is_nuisance = |i: usize| fit.model.unknowns[i].nuisance;
-    let physical: Vec<usize> = (0..fit.free.len()).filter(|&c| !is_nuisance(fit.free[c])).collect();
-    let nuisance: Vec<usize> = (0..fit.free.len()).filter(|&c| is_nuisance(fit.free[c])).collect();
+/// size, nuisance projected out, singular values below 1 (in units of the noise). Without those that leave no trace, which
+/// are said elsewhere.
+pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
+    let is_nuisance = |c: &usize| fit.model.unknowns[fit.free[*c]].nuisance;
+    let (nuisance, physical): (Vec<usize>, Vec<usize>) = (0..fit.free.len()).partition(is_nuisance);
     if physical.is_empty() {
         return Vec::new();
     }
-    let linear = fit.linear(fit.noise.tau_mm);
-    let gram = linear.jacobian.tr_mul(&linear.jacobian);
-    // every unknown in its typical size; the set-ups by the norms of their columns, which leaves their span as it is
-    let scale = |c: usize| match is_nuisance(fit.free[c]) {
-        true if gram[(c, c)] > 0.0 => gram[(c, c)].sqrt().recip(),
-        true => 0.0,
-        false => fit.model.unknowns[fit.free[c]].typical,
+    let jacobian = only_seen(fit.linear(fit.noise.tau_mm).jacobian, &fit.seen);
+    let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
+    let (values, directions) = match from_gram(&jacobian, &physical, &nuisance, typical) {
+        Some(found) if fit.seen.full() => found,
+        _ => from_rows(&jacobian, &physical, &nuisance, typical),
     };
-    let part = |rows: &[usize], columns: &[usize]| {
-        DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
-            gram[(rows[i], columns[j])] * scale(rows[i]) * scale(columns[j])
-        })
+    let top = values.max();
+    let mut out = Vec::new();
+    for (s, direction) in values.iter().zip(directions.column_iter()) {
+        if *s >= 1.0 || *s <= RANK_TOLERANCE * top {
+            continue;
+        }
+        let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
+        let all = physical.iter().zip(direction.iter()).filter(|(_, w)| w.abs() > 0.05);
+        let weights: Vec<(&Unknown, f64)> = all.map(|(&c, w)| (unknown(c), (w * 1e3).round() / 1e3)).collect();
+        out.push(Combination {
+            says: super::statement::weak(&weights, effects, 1.0 / s),
+            combination: weights.iter().map(|(u, w)| (u.name.clone(), *w)).collect(),
+            times_typical: (1e3 / s).round() / 1e3,
+        });
+    }
+    out
+}
+
+/// A Jacobian without what it shows of combinations that count as leaving no trace.
+fn only_seen(mut jacobian: DMatrix<f64>, seen: &super::solve::Observability) -> DMatrix<f64> {
+    if seen.full() {
+        return jacobian;
+    }
+    for (mut column, s) in jacobian.column_iter_mut().zip(seen.scale.iter()) {
+        column /= *s;
+    }
+    let mut left = (jacobian * &seen.seen) * seen.seen.transpose();
+    for (mut column, s) in left.column_iter_mut().zip(seen.scale.iter()) {
+        column *= *s;
+    }
+    left
+}
+
+/// Singular values and directions of the physical columns, each per typical size, with the nuisance projected out.
+type Spectrum = (DVector<f64>, DMatrix<f64>);
+
+/// From the Gram matrix: quick, and good to some 1e-5 of the largest; `None` where one is below that.
+fn from_gram(
+    jacobian: &DMatrix<f64>,
+    physical: &[usize],
+    nuisance: &[usize],
+    typical: impl Fn(usize) -> f64,
+) -> Option<Spectrum> {
+    let gram = jacobian.tr_mul(jacobian);
+    // the set-ups by the norms of their columns, which leaves their span as it is
+    let norm = |c: usize| if gram[(c, c)] > 0.0 { gram[(c, c)].sqrt().recip() } else { 0.0 };
+    let part = |rows: &[(usize, f64)], columns: &[(usize, f64)]| {
+        DMatrix::from_fn(rows.len(), columns.len(), |i, j| gram[(rows[i].0, columns[j].0)] * rows[i].1 * columns[j].1)
     };
+    let physical: Vec<(usize, f64)> = physical.iter().map(|&c| (c, typical(c))).collect();
+    let nuisance: Vec<(usize, f64)> = nuisance.iter().map(|&c| (c, norm(c))).collect();
     let mut own = part(&physical, &physical);
     if !nuisance.is_empty() {
         // what the set-ups can follow is projected out
@@ -249,27 +351,44 @@ pub(super) fn weak(fit: &Fit) -> Vec<Combination> {
         }
     }
     let eigen = own.symmetric_eigen();
-    let top = eigen.eigenvalues.max().max(0.0).sqrt();
-    let mut out = Vec::new();
-    for (k, value) in eigen.eigenvalues.iter().enumerate() {
-        let s = value.max(0.0).sqrt();
-        if s >= 1.0 || s <= NO_TRACE * top {
-            continue;
-        }
-        let direction = eigen.eigenvectors.column(k);
-        let weights = physical
-            .iter()
-            .zip(direction.iter())
-            .filter(|(_, w)| w.abs() > 0.05)
-            .map(|(&c, w)| (fit.model.unknowns[fit.free[c]].name.clone(), (w * 1e3).round() / 1e3))
-            .collect();
-        out.push(Combination {
-            says: super::statement::weak(&weights, 1.0 / s),
-            combination: weights,
-            times_typical: (1e3 / s).round() / 1e3,
-        });
+    let values = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    (values.min() > GRAM_SEES * values.max()).then_some((values, eigen.eigenvectors))
+}
+
+/// From the rows themselves: good to rounding.
+fn from_rows(
+    jacobian: &DMatrix<f64>,
+    physical: &[usize],
+    nuisance: &[usize],
+    typical: impl Fn(usize) -> f64,
+) -> Spectrum {
+    let mut own = jacobian.select_columns(physical);
+    for (mut column, &c) in own.column_iter_mut().zip(physical) {
+        column *= typical(c);
     }
-    out
+    let mut set_ups = jacobian.select_columns(nuisance);
+    for mut column in set_ups.column_iter_mut() {
+        let norm = column.norm();
+        column /= if norm > 0.0 { norm } else { 1.0 };
+    }
+    if !nuisance.is_empty() {
+        let svd = set_ups.svd(true, false);
+        let top = svd.singular_values.max();
+        let kept: Vec<usize> =
+            (0..svd.singular_values.len()).filter(|&k| svd.singular_values[k] > RANK_TOLERANCE * top).collect();
+        let basis = svd.u.map_or_else(|| DMatrix::zeros(own.nrows(), 0), |u| u.select_columns(&kept));
+        // once more: what is left is far smaller than what was there
+        for _ in 0..2 {
+            own -= &basis * basis.tr_mul(&own);
+        }
+    }
+    let p = own.ncols();
+    let mut square = DMatrix::zeros(p, p);
+    let r = if own.nrows() > p { own.qr().r() } else { own };
+    square.rows_mut(0, r.nrows()).copy_from(&r);
+    let svd = square.svd(false, true);
+    let directions = svd.v_t.map_or_else(|| DMatrix::identity(p, p), |v| v.transpose());
+    (svd.singular_values, directions)
 }
 
 /// Covariance of the results (no set-ups of blocks), type A.

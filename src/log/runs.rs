@@ -60,7 +60,9 @@ impl Run {
     }
 
     fn complete(&self) -> bool {
-        self.end.is_some() && self.count() > 0 && self.header.as_ref().is_none_or(|h| h.setup <= 1)
+        // an end alone is not enough: lines may have been lost on the way
+        let whole = self.end.is_some_and(|(planned, _)| self.count() as u64 >= planned);
+        whole && self.count() > 0 && self.header.as_ref().is_none_or(|h| h.setup <= 1)
     }
 
     /// The run's touches, out of all of the log.

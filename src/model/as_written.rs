@@ -156,6 +156,10 @@ pub struct ShapeAsWritten {
     pub max: Option<f64>,
     /// Values to be tried where a search from `start` alone would not find the right one.
     pub scan: Option<Scan>,
+    /// A variable at whose value something jumps: with touches at hand, what is tried are the places half-way between
+    /// successive touches, in place of `scan`.
+    #[schemars(with = "Option<String>")]
+    pub between: Option<Spanned<String>>,
     /// Where the start comes from.
     pub source: Option<String>,
 }

@@ -66,6 +66,8 @@ pub struct Parameter {
     pub shape: Option<(f64, f64, f64)>,
     /// Values of a shape parameter to be tried; empty where the search from its start is enough.
     pub scan: Vec<f64>,
+    /// Index of the variable of formulas at whose value something jumps.
+    pub between: Option<usize>,
 }
 
 /// A checked effect.

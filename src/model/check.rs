@@ -3,6 +3,7 @@
 use super::as_written::{EffectAsWritten, File, Frame, Per, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten};
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{FUNCTIONS, Formula, VARIABLES};
+use super::mistake;
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
@@ -11,6 +12,9 @@ use toml::Spanned;
 
 /// Name of the file's format.
 const FORMAT: &str = "axiscal-effects/1";
+
+/// Variables of formulas that are lengths, mm.
+const LENGTHS: [&str; 9] = ["X", "Y", "Z", "L", "L0", "px", "py", "pz", "edge"];
 
 /// Source of a size that no publication stands behind.
 const ASSUMED: &str = "assumed";
@@ -68,21 +72,37 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// A constant displacement is a length or an angle; with variables in it the formula may carry the rest of the unit.
-    fn unit_fits(&mut self, t: &TermAsWritten) {
+    /// A displacement is a length and a turn an angle. With variables in it the formula may carry the rest of the unit, but
+    /// only one that holds a length makes a turn of a length, or a length of a turn.
+    fn unit_fits(&mut self, w: &EffectAsWritten, t: &TermAsWritten) {
         let unit = t.unit.get_ref().as_str();
-        let constant = Formula::parse(t.formula.get_ref(), &[]).is_ok_and(|f| f.constant().is_some());
-        let wrong = match t.dof.get_ref().as_str() {
-            "dx" | "dy" | "dz" | "r" | "X" | "Y" | "Z" => !matches!(unit, "um" | "mm"),
-            "rx" | "ry" | "rz" | "A" | "B" | "C" => !matches!(unit, "urad" | "mrad" | "deg"),
-            _ => false,
+        let shapes: Vec<&str> = w.shape.iter().map(|s| s.parameter.get_ref().as_str()).collect();
+        let Ok(formula) = Formula::parse(t.formula.get_ref(), &shapes) else { return };
+        let (is_length, is_turn) = match t.dof.get_ref().as_str() {
+            "dx" | "dy" | "dz" | "r" | "X" | "Y" | "Z" => (true, false),
+            "rx" | "ry" | "rz" | "A" | "B" | "C" => (false, true),
+            _ => return,
         };
-        if constant && wrong && unit_factor(unit).is_some() {
+        if unit_factor(unit).is_none() {
+            return;
+        }
+        let fits = if formula.constant().is_some() {
+            if is_length { matches!(unit, "um" | "mm") } else { matches!(unit, "urad" | "mrad" | "deg") }
+        } else {
+            let of_length = is_turn && matches!(unit, "um" | "mm" | "um/h" | "um/K");
+            let of_turn = is_length && matches!(unit, "urad" | "mrad" | "deg" | "um/m" | "ppm/K");
+            let carries = formula.variables().iter().any(|v| LENGTHS.contains(v))
+                || w.shape.iter().any(|s| matches!(s.unit.get_ref().as_str(), "um" | "mm"));
+            carries || !(of_length || of_turn)
+        };
+        if !fits {
+            let what = if is_length { "a length" } else { "a turn" };
+            let constant = if formula.constant().is_some() { "constant " } else { "" };
             self.error(
                 &t.unit.span(),
                 "effects::unit",
-                format!("a constant {} cannot be in {unit}", t.dof.get_ref()),
-                "lengths in um or mm, angles in urad, mrad or deg",
+                format!("a {constant}{} cannot be in {unit}: it is {what}", t.dof.get_ref()),
+                "lengths in um or mm, angles in urad, mrad or deg; or a formula with a length in it (X, px, L, edge …)",
             );
         }
     }
@@ -92,7 +112,7 @@ impl<'a> Check<'a> {
         let before = self.findings.0.len();
         let mut parameters: Vec<Parameter> = Vec::new();
         for t in &w.terms {
-            self.factor(t, &mut parameters);
+            self.factor(w, t, &mut parameters);
         }
         for s in &w.shape {
             self.shape(s, &mut parameters);
@@ -135,14 +155,14 @@ impl<'a> Check<'a> {
     }
 
     /// The parameter that a term is multiplied by; one parameter may stand before several terms.
-    fn factor(&mut self, t: &TermAsWritten, parameters: &mut Vec<Parameter>) {
+    fn factor(&mut self, w: &EffectAsWritten, t: &TermAsWritten, parameters: &mut Vec<Parameter>) {
         let name = t.parameter.get_ref();
         let unit = t.unit.get_ref();
         let factor = unit_factor(unit);
         let typical = t.typical.unwrap_or_else(|| default_typical(unit));
         if !self.built_in {
             self.name(name, &t.parameter.span());
-            self.unit_fits(t);
+            self.unit_fits(w, t);
         }
         if factor.is_none() {
             self.unknown_unit(&t.unit);
@@ -171,6 +191,7 @@ impl<'a> Check<'a> {
                 source: t.source.clone().unwrap_or_else(|| ASSUMED.to_owned()),
                 shape: None,
                 scan: Vec::new(),
+                between: None,
             }),
         }
     }
@@ -208,6 +229,16 @@ impl<'a> Check<'a> {
                 "write scan = [5, 10, 20] or scan = { from = 0.1, to = 5, points = 12, log = true }, from min to max",
             );
         }
+        let place = |word: &Spanned<String>| VARIABLES.iter().position(|v| v == word.get_ref());
+        let between = s.between.as_ref().and_then(place);
+        if let Some(word) = s.between.as_ref().filter(|_| between.is_none()) {
+            self.error(
+                &word.span(),
+                "effects::between",
+                format!("{:?} is no variable of formulas", word.get_ref()),
+                "write the variable at whose value something jumps, for instance between = \"t\"",
+            );
+        }
         parameters.push(Parameter {
             name: name.clone(),
             alias: None,
@@ -218,6 +249,7 @@ impl<'a> Check<'a> {
             source: s.source.clone().unwrap_or_else(|| ASSUMED.to_owned()),
             shape: Some((s.start, low, high)),
             scan: scan.flatten().unwrap_or_default(),
+            between,
         });
     }
 
@@ -278,13 +310,23 @@ impl<'a> Check<'a> {
         let text = t.formula.get_ref();
         let formula = if self.built_in { Ok(Formula::unchecked(text, names)) } else { Formula::parse(text, names) };
         match formula {
+            Ok(formula) if !self.built_in && formula.constant().is_some_and(|c| !c.is_finite()) => {
+                self.error(
+                    &t.formula.span(),
+                    "effects::no_value",
+                    format!("formula {text:?} of {:?} has no value", w.id.get_ref()),
+                    "a division by zero, or a root or logarithm of a negative number",
+                );
+                None
+            }
             Ok(formula) => {
                 let parameter = names.iter().position(|name| name == t.parameter.get_ref())?;
                 Some(Term { parameter, place, component, formula })
             }
             Err(message) => {
+                let place = mistake::find(text, names).and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
-                    &t.formula.span(),
+                    &place.unwrap_or_else(|| t.formula.span()),
                     "effects::formula",
                     format!("formula of {:?}: {message}", w.id.get_ref()),
                     "angles A B C are radians inside a formula; unary minus binds tighter than ^: write -(x^2)",
@@ -292,6 +334,14 @@ impl<'a> Check<'a> {
                 None
             }
         }
+    }
+
+    /// Where a part of a formula stands in the file; `None` where it is not written there as it reads.
+    fn inside(&self, formula: &Spanned<String>, part: std::ops::Range<usize>) -> Option<std::ops::Range<usize>> {
+        let span = formula.span();
+        let written = self.source.inner().get(span.clone())?;
+        let from = span.start + written.find(formula.get_ref().as_str())?;
+        (!part.is_empty()).then_some(from + part.start..from + part.end)
     }
 
     fn unknown_unit(&mut self, unit: &Spanned<String>) {

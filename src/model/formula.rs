@@ -123,6 +123,9 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
+        if let Some(wrong) = super::mistake::find(text, shapes) {
+            return Err(wrong.says);
+        }
         let parts = OnceLock::from(Some(Arc::new(compile(text, shapes)?)));
         Ok(Self { parts, ..Self::unchecked(text, shapes) })
     }
@@ -201,7 +204,7 @@ fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     let plain = plain_numbers(text)?;
     known_functions(&plain)?;
     let expression =
-        Expression::parse(&plain).map_err(|e| format!("{} (functions: {})", e.msg(), FUNCTIONS.join(" ")))?;
+        Expression::parse(&plain).map_err(|_| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
     let origins = origins(&expression, shapes)?;
     let mut partials = Vec::new();
     for (at, origin) in origins.iter().enumerate() {

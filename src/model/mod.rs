@@ -6,5 +6,6 @@ pub mod catalogue;
 mod check;
 pub mod data;
 pub mod formula;
+pub mod mistake;
 pub mod predict;
 pub mod traces;

@@ -189,14 +189,13 @@ impl<'a> Writer<'a> {
                     .help("number the touches of the plan from 1: 0 means \"all is well\" at the control"));
             }
         }
-        for (entry, why) in &self.post.unverified {
-            self.findings.push(
-                Finding::warning(
-                    "post::unverified",
-                    format!("[{entry}] of controller {} was never tried on a real control: {why}", self.post.name),
-                )
-                .help("run the program in the control's simulation first, and with the feed override down"),
-            );
+        for (n, (entry, why)) in self.post.unverified.iter().enumerate() {
+            let says = format!("[{entry}] of controller {} was never tried on a real control: {why}", self.post.name);
+            let finding = Finding::warning("post::unverified", says);
+            // what to do is the same for all of them, and said once
+            let is_last = n + 1 == self.post.unverified.len();
+            let help = "run the program in the control's simulation first, and with the feed override down";
+            self.findings.push(if is_last { finding.help(help) } else { finding });
         }
         Ok(())
     }

@@ -226,6 +226,9 @@ pub struct GridForm {
     pub most_points: usize,
     /// How the control calls an axis, from `{axis}` and `{number}` (its place among the machine's axes, from 1).
     pub axis: String,
+    /// How the control calls a point, from `{table}` and `{point}`: what its backup is searched for.
+    #[serde(default)]
+    pub point: String,
     /// Document and page.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -306,6 +309,18 @@ impl GridForm {
     #[must_use]
     pub fn axis_name(&self, axis: AxisName, number: usize) -> String {
         self.axis.replace("{axis}", &axis.to_string()).replace("{number}", &number.to_string())
+    }
+
+    /// The control's name of a point; `None` where the file does not say it.
+    pub fn point_name(&self, table: usize, point: usize) -> Option<String> {
+        let name = self.point.replace("{table}", &table.to_string()).replace("{point}", &point.to_string());
+        (!name.is_empty()).then_some(name)
+    }
+
+    /// Names of all points of all tables.
+    pub fn point_names(&self) -> impl Iterator<Item = String> + '_ {
+        let tables = self.first..self.first + self.most;
+        tables.flat_map(move |t| (0..self.most_points).filter_map(move |p| self.point_name(t, p)))
     }
 }
 

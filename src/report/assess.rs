@@ -20,6 +20,12 @@ pub fn assessment(a: &Assessment, paper: Paper) -> String {
     } else {
         side_by_side(a, paper, &mut out);
     }
+    let each = std::iter::once(a).chain(&a.compared);
+    let mut said: Vec<&String> = each.flat_map(|a| &a.warnings).collect();
+    said.dedup();
+    for w in said {
+        out += &format!("warning: {w}\n");
+    }
     paper.plain(out)
 }
 
@@ -55,6 +61,9 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     );
     for u in &a.undetermined {
         *out += &format!("cannot be told: {}\n", u.says);
+    }
+    if !a.parted_together.is_empty() {
+        *out += &format!("what tells all of it together: {}\n", a.parted_together.join("; and "));
     }
     let visible = a.effects.iter().filter(|e| e.visible).count();
     *out += &format!("\neffects that are not in the model: {visible} of {} leave a trace\n", a.effects.len());

@@ -23,7 +23,8 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
         c.chi2_per_dof
     );
     out += &c.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on touches left out", significant(h)));
-    out += &format!("\n{}\n\n", c.says);
+    let noise = super::prose::sentence(&format!("noise: {}", c.noise_says), paper.width, 0, 2);
+    out += &format!("\n{noise}\n{}\n\n", c.says);
     let mut t = table(&["split by", "share", "groups", "what it says"]);
     for s in &c.splits {
         t.add_row(vec![

@@ -27,6 +27,7 @@ fn wrapped(text: &str, indent: usize, paper: Paper) -> String {
 pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
     let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
     let mut out = wrapped(&d.says, 0);
+    out += &wrapped(&format!("noise: {}", d.noise_says), 2);
     if !d.candidates.is_empty() {
         out += &candidates(d, paper);
     }
@@ -41,10 +42,18 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
     }
     if let Some(shape) = &d.shape {
         out += &plot(shape, paper);
-        out += &wrapped(&format!("what does that: {}", shape.kind), 2);
+        if !shape.kind.is_empty() {
+            out += &wrapped(&format!("what does that: {}", shape.kind), 2);
+        }
     }
     for g in d.gross.iter().take(3) {
-        out += &wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2);
+        out += &match g.agrees {
+            Some(agrees) => wrapped(
+                &format!("tried: {}: {:.0} % of the touches would hit or miss as they did", g.says, 100.0 * agrees),
+                2,
+            ),
+            None => wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2),
+        };
     }
     for o in &d.outliers {
         let back = if o.comes_back { "; it belongs to the rest once the first candidate is in the model" } else { "" };
@@ -77,12 +86,13 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         let held = match (c.held_out_before_um, c.held_out_after_um) {
             // nothing could be predicted: 0 against 0 says nothing
             (Some(before), Some(after)) if before > 0.0 || after > 0.0 => {
-                format!("{} > {}", significant(before), significant(after))
+                let se = c.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
+                format!("{} > {}{se}", significant(before), significant(after))
             }
             _ => "-".into(),
         };
         t.add_row(vec![
-            Cell::new(if c.proposed { format!("* {}", c.effect) } else { c.effect.clone() }),
+            Cell::new(if c.proposed { format!("* {}", one_of(c)) } else { one_of(c) }),
             number(probability(c.p_adjusted)),
             number(significant(c.rms_after_um)),
             number(held),
@@ -94,18 +104,22 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     out += &format!("{t}\n");
     if d.candidates.iter().any(|c| c.proposed) {
         out += &wrapped(
-            "* passes the test with all candidates counted in, and predicts touches that had no part in choosing it",
+            "* passes the test with all candidates counted in, and touches that had no part in choosing it are predicted \
+             better with it (± one standard error of the difference)",
             2,
         );
     }
     for c in d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0) {
-        out += &wrapped(&format!("{}: {}", c.effect, sizes(c)), 2);
+        let which = if c.same_as.is_empty() { c.effect.clone() } else { format!("if it is {}", c.effect) };
+        out += &wrapped(&format!("{which}: {}", sizes(c)), 2);
         if !c.same_as.is_empty() {
             out += &wrapped(&format!("  cannot be told from {}", c.same_as.join(", ")), 4);
         }
     }
-    if let Some(first) = d.candidates.first().filter(|_| missing) {
-        out += &wrapped(&format!("{}: {}", first.name, first.says), 2);
+    // what nothing speaks for is not explained, and nobody is sent to look for it
+    if let Some(first) = d.candidates.first().filter(|c| missing && (c.proposed || d.most_missed)) {
+        let which = if first.same_as.is_empty() { String::new() } else { format!("if it is {}: ", first.effect) };
+        out += &wrapped(&format!("{which}{}: {}", first.name, first.says), 2);
         out += &wrapped(&format!("  look: {}", first.look), 4);
         if !first.tell_apart.is_empty() {
             out += &wrapped(&format!("  to tell apart: {}", first.tell_apart), 4);
@@ -132,7 +146,8 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     out
 }
 
-fn probability(p: f64) -> String {
+/// A p-value.
+pub(super) fn probability(p: f64) -> String {
     // what is smaller is no number of the computer's any more
     if p < 1e-300 {
         "< 1e-300".to_owned()
@@ -140,6 +155,15 @@ fn probability(p: f64) -> String {
         format!("{p:.0e}")
     } else {
         format!("{p:.3}")
+    }
+}
+
+/// A candidate in a cell: never one name where these touches cannot tell it from others.
+fn one_of(c: &Candidate) -> String {
+    match c.same_as.len() {
+        0 => c.effect.clone(),
+        1 => format!("{} or 1 other", c.effect),
+        n => format!("{} or {n} others", c.effect),
     }
 }
 
@@ -163,7 +187,11 @@ fn sizes(c: &Candidate) -> String {
         let unknown: Vec<String> = c.not_told.iter().take(MOST).map(|name| format!("{name} ?")).collect();
         let gap = if text.is_empty() { "" } else { ", " };
         let more = if c.not_told.len() > MOST { ", …" } else { "" };
-        text += &format!("{gap}{}{more} (cannot be told by this plan)", unknown.join(", "));
+        text += &format!("{gap}{}{more} (cannot be told one by one by this plan)", unknown.join(", "));
+        if let (Some(most), Some(sigma)) = (c.moves_um, c.moves_sigma_um) {
+            let size = digits(most, Some(sigma));
+            text += &format!("; together they move a touch by up to {size} ± {} um", significant(sigma));
+        }
     }
     text
 }

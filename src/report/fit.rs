@@ -118,6 +118,9 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     for u in &o.undetermined {
         out += &format!("not told by this data: {}\n", u.says);
     }
+    if !o.parted_together.is_empty() {
+        out += &format!("what tells all of it together: {}\n", o.parted_together.join("; and "));
+    }
     for r in &o.rejected {
         out += &format!("not used: touch {} of run {}: {}\n", r.id, r.run, r.reason);
     }

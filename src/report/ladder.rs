@@ -2,6 +2,7 @@
 
 use super::fit::{digits, number, significant, table};
 use super::plot::{Paper, line};
+use super::prose::sentence;
 use crate::compare::change::Change;
 use crate::compare::verify::Verification;
 use crate::fit::outcome::Outcome;
@@ -16,13 +17,39 @@ fn stated(value: Option<(f64, f64)>) -> String {
     value.map_or_else(|| "?".into(), |(v, s)| format!("{} ± {}", digits(v, Some(s)), significant(s)))
 }
 
+/// How far figures of touches left out can be trusted.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct HeldOutDoubt {
+    /// Standard errors before and after, µm.
+    pub standard_errors: (Option<f64>, Option<f64>),
+    /// By how much it falls, with the standard error, µm.
+    pub fall: Option<(f64, f64)>,
+    /// The same error where the choice was redone for each group left out, µm; none where a person chose.
+    pub nested_rms_um: Option<f64>,
+    /// Groups of touches that were left out in turn.
+    pub n_groups: usize,
+}
+
+/// A standard error: two digits, as many as it knows itself.
+fn two_digits(se: f64) -> String {
+    digits(se, Some(se))
+}
+
+/// A figure with its standard error.
+fn with_error(value: Option<f64>, se: Option<f64>) -> String {
+    match (value, se) {
+        (Some(v), Some(s)) => format!("{} ± {}", digits(v, Some(s)), two_digits(s)),
+        (value, _) => or_dash(value),
+    }
+}
+
 /// Before and after a change of the model.
 #[must_use]
 pub fn change(
-    before: &Outcome,
-    after: &Outcome,
+    (before, after): (&Outcome, &Outcome),
     c: &Change,
     later: (Option<f64>, Option<f64>),
+    doubt: &HeldOutDoubt,
     paper: Paper,
 ) -> String {
     let mut t = table(&["", "before", "after"]);
@@ -30,7 +57,14 @@ pub fn change(
         t.add_row(vec![Cell::new(what), number(b), number(a)]);
     };
     row("error left, um RMS", significant(before.rms_um), significant(after.rms_um));
-    row("on touches left out, um RMS", or_dash(before.held_out_rms_um), or_dash(after.held_out_rms_um));
+    row(
+        "on touches left out, um RMS",
+        with_error(before.held_out_rms_um, doubt.standard_errors.0),
+        with_error(after.held_out_rms_um, doubt.standard_errors.1),
+    );
+    if doubt.nested_rms_um.is_some() {
+        row("  choice redone each time, um RMS", "-".into(), or_dash(doubt.nested_rms_um));
+    }
     if later.0.is_some() || later.1.is_some() {
         row("on the last run, um RMS", or_dash(later.0), or_dash(later.1));
     }
@@ -42,6 +76,16 @@ pub fn change(
     }
     t.set_width(paper.width.min(100) as u16);
     let mut out = format!("{t}\n");
+    if let Some((fall, se)) = doubt.fall {
+        let how = if doubt.nested_rms_um.is_some() { "" } else { "; you chose the effect knowing all touches" };
+        out += &format!(
+            "on touches left out it {} by {} ± {} um (one standard error, {} index visits in turn{how})\n",
+            if fall < 0.0 { "rises" } else { "falls" },
+            digits(fall.abs(), Some(se)),
+            two_digits(se),
+            doubt.n_groups
+        );
+    }
     if !c.new.is_empty() {
         let mut t = table(&["new", "value", "unit", "std. unc.", "95 %"]);
         for p in &c.new {
@@ -64,27 +108,43 @@ pub fn change(
 /// The ladder as a table and a chart.
 #[must_use]
 pub fn history(h: &History, paper: Paper) -> String {
-    let mut t = table(&["step", "change", "effects", "left um", "held out um", "later run um", "chi2/dof"]);
+    // only where the search chose there is a nested figure
+    let nested = h.steps.iter().any(|s| s.nested_rms_um.is_some());
+    let mut head = vec!["step", "change", "left um", "held out um", "later run um", "chi2/dof"];
+    if nested {
+        head.insert(4, "nested um");
+    }
+    let mut t = table(&head);
     for s in &h.steps {
         let signed = |sign: &str, ids: &[String]| ids.iter().map(|e| format!("{sign}{e}")).collect::<Vec<_>>();
         let mut what = signed("+", &s.added);
         what.extend(signed("-", &s.removed));
         let first = if s.step == 1 { s.effects.join(" ") } else { what.join(" ") };
-        t.add_row(vec![
+        let mut row = vec![
             number(s.step),
             Cell::new(first),
-            number(s.effects.len()),
             number(significant(s.rms_um)),
-            number(or_dash(s.held_out_rms_um)),
+            number(with_error(s.held_out_rms_um, s.held_out_se_um)),
             number(or_dash(s.later_run_rms_um)),
             number(format!("{:.3}", s.chi2_per_dof)),
-        ]);
+        ];
+        if nested {
+            row.insert(4, number(or_dash(s.nested_rms_um)));
+        }
+        t.add_row(row);
     }
     t.set_width(paper.width.min(120) as u16);
+    let note = if nested {
+        "held out: each index visit is left out of the fit in turn, ± one standard error; nested: the choice of the effect is \
+         redone each time as well (-: a person chose it, knowing all touches)"
+    } else {
+        "held out: each index visit is left out of the fit in turn, ± one standard error; the effects were chosen knowing all \
+         touches"
+    };
     let points = |value: &dyn Fn(&crate::study::history::Step) -> Option<f64>| -> Vec<(f64, f64)> {
         h.steps.iter().filter_map(|s| Some((s.step as f64, value(s)?))).collect()
     };
-    let mut out = format!("{t}\n");
+    let mut out = format!("{t}\n{}\n", sentence(note, paper.width, 0, 0));
     for (title, p) in [
         ("error left, um RMS, by step", points(&|s| Some(s.rms_um))),
         ("error on touches left out, um RMS, by step", points(&|s| s.held_out_rms_um)),

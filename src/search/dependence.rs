@@ -4,7 +4,9 @@ use super::distributions::p_of_t;
 use super::generic::{Features, Generics, Shape};
 use super::groups::Member;
 use super::score::{Question, Score, Search};
+use super::shapes::Function;
 use nalgebra::DVector;
+use std::ops::Range;
 
 /// Points of a curve.
 const POINTS: usize = 121;
@@ -87,14 +89,18 @@ pub struct Dependence {
 #[must_use]
 pub fn dependences(question: Question, features: &Features, generics: &Generics) -> Vec<Dependence> {
     let search = Search::new(question, &generics.library);
-    let ranking = search.ranking();
+    let mut ranking = search.ranking();
+    // what passes goes before what does not: of one variable the first entry speaks
+    ranking.sort_by_key(|&c| !search.scores[c].proposed());
     let mut order = Vec::new();
     if let Some(&leader) = ranking.first() {
+        let passes = search.scores[leader].proposed();
         let group = search.group_of(leader, &ranking);
         let key = |m: &Member| {
             (generics.shapes[m.candidate].depends_on.matches('*').count(), search.scores[m.candidate].ln_p)
         };
-        let simplest = group.members.iter().min_by(|a, b| {
+        let alike = group.members.iter().filter(|m| search.scores[m.candidate].proposed() == passes);
+        let simplest = alike.min_by(|a, b| {
             let ((n, p), (k, q)) = (key(a), key(b));
             n.cmp(&k).then(p.total_cmp(&q))
         });
@@ -114,16 +120,24 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
 
 fn dependence(score: &Score, shape: &Shape, features: &Features, generics: &Generics, total: f64) -> Dependence {
     let candidate = &generics.library.candidates()[score.candidate];
-    let direction = &features.directions[shape.direction];
-    let functions = &shape.functions[score.variant];
+    let all = &shape.functions[score.variant];
+    // of a shape in several directions at once, the one that shows it best speaks for it
+    let told = |i: usize| score.estimate[i].abs() / score.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
+    let main = (0..all.len()).max_by(|&a, &b| told(a).total_cmp(&told(b))).unwrap_or(0);
+    let (of_shape, kept) = match (shape.direction, all.get(main)) {
+        (None, Some(Function::Along { direction, .. })) => (*direction, main..main + 1),
+        (direction, _) => (direction.unwrap_or(0), 0..all.len()),
+    };
+    let direction = &features.directions[of_shape];
+    let functions = &all[kept.clone()];
     let free = functions.first().and_then(|f| f.free_parameter(features));
     let terms = functions
         .iter()
         .enumerate()
         .map(|(i, f)| SketchTerm {
             formula: f.formula(features, free.map(|(name, _, _)| name)),
-            size: score.estimate[i],
-            sigma: score.covariance[(i, i)].max(0.0).sqrt(),
+            size: score.estimate[kept.start + i],
+            sigma: score.covariance[(kept.start + i, kept.start + i)].max(0.0).sqrt(),
         })
         .collect();
     let scanned = candidate.variants[score.variant].shape;
@@ -153,16 +167,18 @@ fn dependence(score: &Score, shape: &Shape, features: &Features, generics: &Gene
                 max: if above.is_finite() { above } else { start + start.abs().max(1e-3) },
             }
         }),
-        curve: curve(score, shape, features),
+        curve: curve(score, shape, features, &kept),
     }
 }
 
-fn curve(score: &Score, shape: &Shape, features: &Features) -> Vec<CurvePoint> {
-    let functions = &shape.functions[score.variant];
+fn curve(score: &Score, shape: &Shape, features: &Features, kept: &Range<usize>) -> Vec<CurvePoint> {
+    let functions = &shape.functions[score.variant][kept.clone()];
+    let estimate = score.estimate.rows(kept.start, kept.len());
+    let covariance = score.covariance.view((kept.start, kept.start), (kept.len(), kept.len())).into_owned();
     let point = |x: f64, values: DVector<f64>| CurvePoint {
         x,
-        y: score.estimate.dot(&values),
-        sigma: values.dot(&(&score.covariance * &values)).max(0.0).sqrt(),
+        y: estimate.dot(&values),
+        sigma: values.dot(&(&covariance * &values)).max(0.0).sqrt(),
     };
     match shape.variables[..] {
         [] => (0..functions.len())

@@ -26,6 +26,12 @@ pub fn p_of_t(t: f64, dof: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |d| 2.0 * d.sf(t.abs()))
 }
 
+/// P(|Z| > |z|) of a normal value.
+#[must_use]
+pub fn p_of_normal(z: f64) -> f64 {
+    p_of_chi2(z * z, 1.0)
+}
+
 /// P(χ² > x) with `dof` degrees of freedom.
 #[must_use]
 pub fn p_of_chi2(x: f64, dof: f64) -> f64 {

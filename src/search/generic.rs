@@ -18,6 +18,9 @@ const FREQUENCIES: usize = 120;
 const PLACES: usize = 12;
 const CHANGE_POINTS: usize = 48;
 
+/// Most moments at which one block moves.
+const BLOCK_CHANGE_POINTS: usize = 24;
+
 /// Most groups that get a constant each.
 const GROUPS: usize = 40;
 
@@ -147,8 +150,8 @@ pub struct Shape {
     pub variables: Vec<usize>,
     /// What it depends on, in a word: `C`, `t`, `X*B`, `block`, `face`, `visit`.
     pub depends_on: String,
-    /// Index of the direction.
-    pub direction: usize,
+    /// Index of the direction; `None`: each function has its own.
+    pub direction: Option<usize>,
     /// One list of functions per variant.
     pub(super) functions: Vec<Vec<Function>>,
 }
@@ -160,6 +163,26 @@ pub struct Generics {
     pub library: Library,
     /// What they are.
     pub shapes: Vec<Shape>,
+}
+
+impl Generics {
+    /// The candidates that do not depend on something.
+    #[must_use]
+    pub fn without(&self, depends_on: &str) -> Library {
+        let mut out = Library::new(self.library.n_rows());
+        for (candidate, shape) in self.library.candidates().iter().zip(&self.shapes) {
+            if shape.depends_on != depends_on {
+                let of =
+                    |v: &super::library::Variant| self.library.matrix().columns_range(v.columns.clone()).into_owned();
+                let variants = candidate.variants.iter().map(|v| (v.shape, of(v)));
+                out.push_scan(candidate.id.clone(), Origin::Generic, variants, candidate.n_scanned);
+                if candidate.expected {
+                    out.expect_last();
+                }
+            }
+        }
+        out
+    }
 }
 
 /// All generic shapes of a table. `whiten` turns columns of gaps (touches × columns, µm) into whitened rows, prior rows
@@ -184,11 +207,12 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
     let mut raw = DMatrix::zeros(n, n_columns);
     let mut columns = raw.column_iter_mut();
     for (_, shape, _, _) in &plan.shapes {
-        let weight = &features.directions[shape.direction].weight;
+        let weight = shape.direction.map(|d| &features.directions[d].weight);
         for function in shape.functions.iter().flatten() {
             if let Some(mut column) = columns.next() {
-                for (i, value) in column.iter_mut().enumerate().filter(|(i, _)| weight[*i] != 0.0) {
-                    *value = weight[i] * function.at_row(features, i);
+                for (i, value) in column.iter_mut().enumerate() {
+                    let weight = weight.map_or(1.0, |w| w[i]);
+                    *value = if weight == 0.0 { 0.0 } else { weight * function.at_row(features, i) };
                 }
             }
         }
@@ -207,8 +231,11 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
                 (value, part)
             })
             .collect();
-        let id = format!("{id}:{}", features.directions[shape.direction].name);
-        out.library.push_scan(id, Origin::Generic, variants, n_scanned);
+        let direction = shape.direction.map_or("any", |d| features.directions[d].name.as_str());
+        out.library.push_scan(format!("{id}:{direction}"), Origin::Generic, variants, n_scanned);
+        if shape.direction.is_none() {
+            out.library.expect_last();
+        }
         out.shapes.push(shape);
     }
     out
@@ -224,7 +251,7 @@ struct Plan {
 
 impl Plan {
     fn put(&mut self, id: String, depends_on: &str, variables: &[usize], direction: usize, functions: Vec<Function>) {
-        self.scan(id, depends_on, variables, direction, vec![(0.0, functions)], 0);
+        self.scan(id, depends_on, variables, Some(direction), vec![(0.0, functions)], 0);
     }
 
     fn scan(
@@ -232,7 +259,7 @@ impl Plan {
         id: String,
         depends_on: &str,
         variables: &[usize],
-        direction: usize,
+        direction: Option<usize>,
         variants: Vec<(f64, Vec<Function>)>,
         n_scanned: usize,
     ) {
@@ -268,20 +295,20 @@ impl Plan {
                 self.put(id(""), name, &[v], d, (1..=3).flat_map(waves).collect());
                 self.put(id("-cubic"), name, &[v], d, powers(3));
                 let orders = (1..=ORDERS).map(|k| (f64::from(k), waves(k))).collect();
-                self.scan(id("-order"), name, &[v], d, orders, 1);
+                self.scan(id("-order"), name, &[v], Some(d), orders, 1);
                 self.breaks(d, v, variable, &values);
             }
             Kind::Time => {
                 self.put(id(""), name, &[v], d, powers(4));
                 let steps = thinned(&middles(&values), CHANGE_POINTS);
                 let steps = steps.iter().map(|&at| (at, vec![Function::Step { variable: v, at }])).collect();
-                self.scan(id("-step"), name, &[v], d, steps, 1);
+                self.scan(id("-step"), name, &[v], Some(d), steps, 1);
                 let constants = [0.03, 0.06, 0.12, 0.25, 0.5, 1.0].map(|share| {
                     let constant = share * (high - low);
                     (constant, vec![Function::Exponential { variable: v, from: low, constant }])
                 });
-                self.scan(id("-exponential"), name, &[v], d, constants.to_vec(), 1);
-                self.scan(id("-period"), name, &[v], d, periods(v, low, high, values.len()), 1);
+                self.scan(id("-exponential"), name, &[v], Some(d), constants.to_vec(), 1);
+                self.scan(id("-period"), name, &[v], Some(d), periods(v, low, high, values.len()), 1);
             }
             Kind::Temperature => self.put(id(""), name, &[v], d, powers(2)),
             Kind::Approach if along_approach => {
@@ -298,10 +325,10 @@ impl Plan {
         let scale = 0.5 * (values[values.len() - 1] - values[0]);
         let steps = thinned(&middles(values), PLACES);
         let steps = steps.iter().map(|&at| (at, vec![Function::Step { variable: v, at }])).collect();
-        self.scan(format!("shape:{name}-step"), name, &[v], d, steps, 1);
+        self.scan(format!("shape:{name}-step"), name, &[v], Some(d), steps, 1);
         let kinks = thinned(&values[1..values.len() - 1], PLACES);
         let kinks = kinks.iter().map(|&at| (at, vec![Function::Kink { variable: v, at, scale }])).collect();
-        self.scan(format!("shape:{name}-kink"), name, &[v], d, kinks, 1);
+        self.scan(format!("shape:{name}-kink"), name, &[v], Some(d), kinks, 1);
     }
 
     fn product(&mut self, d: usize, (v, a): (usize, &Variable), (w, b): (usize, &Variable)) {
@@ -353,6 +380,7 @@ impl Plan {
         }
         let Some(time) = features.variables.iter().position(|v| v.kind == Kind::Time) else { return };
         let clock = &features.variables[time];
+        self.jumps(features, time);
         for number in distinct(&features.block) {
             let own = Variable {
                 values: clock
@@ -365,6 +393,7 @@ impl Plan {
                 ..clock.clone()
             };
             let places = thinned(&middles(&own.distinct()), PLACES);
+            self.moved_block(features, time, number, &middles(&own.distinct()));
             for d in (0..features.directions.len()).filter(|&d| features.directions[d].at == "workpiece") {
                 let moved = |at: f64| {
                     let after = Function::Step { variable: time, at };
@@ -372,9 +401,54 @@ impl Plan {
                 };
                 let variants = places.iter().map(|&at| (at, moved(at))).collect();
                 let depends = format!("{}*block", clock.name);
-                self.scan(format!("shape:{}-step-block-{number}", clock.name), &depends, &[time], d, variants, 1);
+                self.scan(format!("shape:{}-step-block-{number}", clock.name), &depends, &[time], Some(d), variants, 1);
             }
         }
+    }
+}
+
+/// What is looked for before all other shapes: something that jumps at one moment, in whatever direction. A knock has no
+/// axis, and one direction at a time would see a part of it each.
+impl Plan {
+    fn jumps(&mut self, features: &Features, time: usize) {
+        let values = features.variables[time].distinct();
+        let places = thinned(&middles(&values), CHANGE_POINTS);
+        let after = |at: f64| Function::Step { variable: time, at };
+        let name = features.variables[time].name.clone();
+        self.in_all_directions(features, "machine", format!("shape:{name}-step"), &name, time, &places, &after);
+    }
+
+    fn moved_block(&mut self, features: &Features, time: usize, number: usize, places: &[f64]) {
+        let places = thinned(places, BLOCK_CHANGE_POINTS);
+        let after = |at: f64| {
+            let member = Function::Member { of: Grouping::Block, number };
+            Function::Product(Box::new(member), Box::new(Function::Step { variable: time, at }))
+        };
+        let name = &features.variables[time].name;
+        let (id, depends) = (format!("shape:{name}-step-block-{number}"), format!("{name}*block"));
+        self.in_all_directions(features, "table", id, &depends, time, &places, &after);
+    }
+
+    #[allow(clippy::too_many_arguments)] // all of them say which shape it is
+    fn in_all_directions(
+        &mut self,
+        features: &Features,
+        frame: &str,
+        id: String,
+        depends: &str,
+        time: usize,
+        places: &[f64],
+        after: &dyn Fn(f64) -> Function,
+    ) {
+        let own = |d: &usize| features.directions[*d].name.split('-').next() == Some(frame);
+        let directions: Vec<usize> = (0..features.directions.len()).filter(own).collect();
+        if directions.len() < 2 {
+            return;
+        }
+        let along =
+            |at: f64| directions.iter().map(|&d| Function::Along { direction: d, of: Box::new(after(at)) }).collect();
+        let variants = places.iter().map(|&at| (at, along(at))).collect();
+        self.scan(id, depends, &[time], None, variants, 1);
     }
 }
 

@@ -31,10 +31,13 @@ pub enum Choice {
 /// Squared error on held-out touches, with and without the term.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
-    /// Root mean square error of the base model on held-out touches, in standard deviations of a touch.
+    /// Root mean square error of the base model on held-out touches, in the unit of [`Colour`] (standard deviations of a
+    /// whitened row without one); not a number where no touch could be predicted.
     pub before: f64,
     /// The same with the chosen terms.
     pub after: f64,
+    /// Standard error of before less after, from its spread over groups.
+    pub fall_error: f64,
     /// Touches that could be predicted by both.
     pub scored: usize,
     /// Touches in groups.
@@ -54,8 +57,10 @@ pub struct Fold {
     pub group: usize,
     /// Candidate that was chosen without it; `None`: nothing passed.
     pub chosen: Option<usize>,
-    /// By how much the sum of squared errors of its touches falls.
+    /// By how much the sum of squared whitened errors of its touches falls.
     pub gain: f64,
+    /// The same in the unit of [`Colour`].
+    pub gain_coloured: f64,
     /// Touches of it that could be predicted by both.
     pub scored: usize,
 }
@@ -68,10 +73,19 @@ impl HeldOut {
     }
 }
 
+/// Turns the whitened errors of a group's rows back into those of its touches: group number, errors.
+pub type Colour<'a> = &'a (dyn Fn(usize, &DVector<f64>) -> DVector<f64> + Sync);
+
+/// Errors as they are.
+#[must_use]
+pub fn held_out(question: Question, library: &Library, groups: &[usize], choice: Choice) -> HeldOut {
+    held_out_in(question, library, groups, choice, &|_, e| e.clone())
+}
+
 /// Leaves out each group in turn. `groups[i]` is the group of row i; rows beyond its end (priors) are always known.
 /// Rows that whitening has mixed must stand in one group.
 #[must_use]
-pub fn held_out(question: Question, library: &Library, groups: &[usize], choice: Choice) -> HeldOut {
+pub fn held_out_in(question: Question, library: &Library, groups: &[usize], choice: Choice, colour: Colour) -> HeldOut {
     let moments = Moments::new(question.residual, question.base, library);
     let residual = question.base.project(question.residual);
     let mut numbers: Vec<usize> = groups.to_vec();
@@ -81,30 +95,36 @@ pub fn held_out(question: Question, library: &Library, groups: &[usize], choice:
         .par_iter()
         .map(|&group| {
             let rows: Vec<usize> = (0..groups.len()).filter(|&i| groups[i] == group).collect();
-            fold(question, library, &moments, &residual, group, &rows, choice)
+            fold(question, library, (&moments, &residual), (group, &rows), choice, colour)
         })
         .collect();
     let scored: usize = results.iter().map(|r| r.fold.scored).sum();
-    let (before, after): (f64, f64) =
-        results.iter().fold((0.0, 0.0), |(b, a), r| (b + r.before, a + r.before - r.fold.gain));
-    let gain = before - after;
+    let gain: f64 = results.iter().map(|r| r.fold.gain).sum();
+    let before: f64 = results.iter().map(|r| r.before).sum();
+    let fall: f64 = results.iter().map(|r| r.fold.gain_coloured).sum();
     let folds: Vec<Fold> = results.into_iter().map(|r| r.fold).collect();
     let n = folds.len() as f64;
-    let spread: f64 = folds.iter().map(|f| (f.gain - gain / n).powi(2)).sum();
-    let root = |ss: f64| (ss / (scored as f64).max(1.0)).sqrt();
+    let error_of = |total: f64, each: &dyn Fn(&Fold) -> f64| -> f64 {
+        let spread: f64 = folds.iter().map(|f| (each(f) - total / n).powi(2)).sum();
+        if n > 1.0 { (n / (n - 1.0) * spread).sqrt() } else { f64::INFINITY }
+    };
+    let root = |ss: f64| if scored == 0 { f64::NAN } else { (ss.max(0.0) / scored as f64).sqrt() };
+    let (before, after) = (root(before), root(before - fall));
     HeldOut {
-        before: root(before),
-        after: root(after),
+        before,
+        after,
+        fall_error: error_of(fall, &|f| f.gain_coloured) / (scored as f64 * (before + after)),
         scored,
         touches: groups.len(),
         gain,
-        standard_error: if n > 1.0 { (n / (n - 1.0) * spread).sqrt() } else { f64::INFINITY },
+        standard_error: error_of(gain, &|f| f.gain),
         folds,
     }
 }
 
 struct Result {
     fold: Fold,
+    /// Sum of squares without the term, in the unit of the colour.
     before: f64,
 }
 
@@ -124,11 +144,10 @@ fn at_rows(library: &Library, rows: &[usize]) -> DMatrix<f64> {
 fn fold(
     question: Question,
     library: &Library,
-    whole: &Moments,
-    residual: &DVector<f64>,
-    group: usize,
-    rows: &[usize],
+    (whole, residual): (&Moments, &DVector<f64>),
+    (group, rows): (usize, &[usize]),
     choice: Choice,
+    colour: Colour,
 ) -> Result {
     let base: &Basis = question.base;
     let p = base.rank();
@@ -181,8 +200,8 @@ fn fold(
         .collect();
     let base_error = &r_g - seen_g.tr_mul(&qr);
     let Some(c) = chosen else {
-        let (before, scored) = sum(&base_error, &known);
-        return Result { fold: Fold { group, chosen, gain: 0.0, scored }, before };
+        let (before, scored) = sum(&colour(group, &base_error), &known);
+        return Result { fold: Fold { group, chosen, gain: 0.0, gain_coloured: 0.0, scored }, before };
     };
     let variant = scores[c].variant;
     let span = library.candidates()[c].variants[variant].columns.clone();
@@ -200,7 +219,10 @@ fn fold(
         .collect();
     let (before, scored) = sum(&base_error, &known);
     let (after, _) = sum(&error, &known);
-    Result { fold: Fold { group, chosen, gain: before - after, scored }, before }
+    let coloured = |e: &DVector<f64>| sum(&colour(group, e), &known).0;
+    let (before_coloured, after_coloured) = (coloured(&base_error), coloured(&error));
+    let fold = Fold { group, chosen, gain: before - after, gain_coloured: before_coloured - after_coloured, scored };
+    Result { fold, before: before_coloured }
 }
 
 fn sum(error: &DVector<f64>, known: &[bool]) -> (f64, usize) {

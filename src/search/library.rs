@@ -3,6 +3,19 @@
 use nalgebra::{DMatrix, DMatrixView};
 use std::ops::Range;
 
+/// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
+const LEAST_TRACE: f64 = 1e-6;
+
+/// Whitened columns, per typical size, with those that are only rounding set to nothing: the sine of twice C at C = 0 and 90
+/// leaves 1e-16, which is no direction and explains no other effect.
+pub fn without_rounding(columns: &mut DMatrix<f64>) {
+    for mut column in columns.column_iter_mut() {
+        if column.norm() < LEAST_TRACE {
+            column.fill(0.0);
+        }
+    }
+}
+
 /// Where a candidate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
@@ -34,6 +47,8 @@ pub struct Candidate {
     pub variants: Vec<Variant>,
     /// Shape parameters that the scan searches: each counts as a parameter.
     pub n_scanned: usize,
+    /// One of a few shapes that are looked for before all others, with a share of the level of their own.
+    pub expected: bool,
 }
 
 /// Candidates with their columns: derivative of the whitened gap by each parameter in units of its typical size.
@@ -57,7 +72,7 @@ impl Library {
     }
 
     /// Adds a candidate with a scanned shape; `variants` gives the shape's value and N × q columns. Matrices with
-    /// another number of rows, and candidates without a variant, are passed over.
+    /// another number of rows, and candidates without a variant, are passed over; columns that are only rounding are nothing.
     pub fn push_scan(
         &mut self,
         id: impl Into<String>,
@@ -66,7 +81,8 @@ impl Library {
         n_scanned: usize,
     ) {
         let mut spans = Vec::new();
-        for (shape, columns) in variants {
+        for (shape, mut columns) in variants {
+            without_rounding(&mut columns);
             if columns.nrows() != self.n_rows {
                 continue;
             }
@@ -75,7 +91,14 @@ impl Library {
             spans.push(Variant { shape, columns: first..first + columns.ncols() });
         }
         if !spans.is_empty() {
-            self.candidates.push(Candidate { id: id.into(), origin, variants: spans, n_scanned });
+            self.candidates.push(Candidate { id: id.into(), origin, variants: spans, n_scanned, expected: false });
+        }
+    }
+
+    /// The last candidate is one of the few shapes that are looked for before all others.
+    pub(super) fn expect_last(&mut self) {
+        if let Some(last) = self.candidates.last_mut() {
+            last.expected = true;
         }
     }
 

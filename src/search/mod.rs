@@ -27,6 +27,6 @@ mod testing;
 mod tests;
 
 pub use basis::Basis;
-pub use library::{Candidate, Library, Origin, Variant};
+pub use library::{Candidate, Library, Origin, Variant, without_rounding};
 pub use moments::KEPT;
 pub use score::{LackOfFit, PureError, Question, Score, Search, lack_of_fit};

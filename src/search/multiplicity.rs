@@ -12,8 +12,22 @@ pub const FAMILY_LEVEL: f64 = 0.05;
 /// The part of it that effects with a name may use.
 pub const NAMED_LEVEL: f64 = 0.04;
 
-/// The part of it that generic shapes may use.
-pub const GENERIC_LEVEL: f64 = 0.01;
+/// The part of it that generic shapes may use: most of them …
+pub const GENERIC_LEVEL: f64 = 0.006;
+
+/// … and the few that are looked for before all others.
+pub const EXPECTED_LEVEL: f64 = 0.004;
+
+/// Which candidates share a part of the level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// Effects with a name.
+    Named,
+    /// Shapes.
+    Generic,
+    /// The few shapes that are looked for first.
+    Expected,
+}
 
 /// Share of false ones among the candidates that are worth a look.
 pub const WORTH_A_LOOK: f64 = 0.10;
@@ -51,11 +65,13 @@ fn ascending(p: &[f64]) -> Vec<usize> {
 }
 
 /// Fills in the adjusted p-values; what the plan cannot see was not tested and does not count.
-pub(super) fn adjust(scores: &mut [Score], generic: impl Fn(&Score) -> bool) {
-    for family in [false, true] {
-        let share = if family { GENERIC_LEVEL } else { NAMED_LEVEL } / FAMILY_LEVEL;
+pub(super) fn adjust(scores: &mut [Score], family_of: impl Fn(&Score) -> Family) {
+    for (family, level) in
+        [(Family::Named, NAMED_LEVEL), (Family::Generic, GENERIC_LEVEL), (Family::Expected, EXPECTED_LEVEL)]
+    {
+        let share = level / FAMILY_LEVEL;
         let members: Vec<usize> =
-            (0..scores.len()).filter(|&i| scores[i].visible() && generic(&scores[i]) == family).collect();
+            (0..scores.len()).filter(|&i| scores[i].visible() && family_of(&scores[i]) == family).collect();
         let p: Vec<f64> = members.iter().map(|&i| scores[i].p).collect();
         for ((&i, adjusted), q_value) in members.iter().zip(holm(&p)).zip(benjamini_hochberg(&p)) {
             scores[i].p_adjusted = (adjusted / share).min(1.0);

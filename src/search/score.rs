@@ -4,7 +4,7 @@ use super::basis::Basis;
 use super::distributions::{ln_p_of_f, ln_p_of_scan, p_of_chi2};
 use super::library::{Library, Origin};
 use super::moments::{Block, Moments};
-use super::multiplicity;
+use super::multiplicity::{self, Family};
 use nalgebra::{DMatrix, DVector};
 
 /// A variance of the touches that does not rest on the model, in units of the variance used for whitening.
@@ -263,7 +263,14 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
             }
         });
     }
-    multiplicity::adjust(&mut scores, |s| library.candidates()[s.candidate].origin == Origin::Generic);
+    multiplicity::adjust(&mut scores, |s| {
+        let candidate = &library.candidates()[s.candidate];
+        match (candidate.origin == Origin::Generic, candidate.expected) {
+            (false, _) => Family::Named,
+            (true, false) => Family::Generic,
+            (true, true) => Family::Expected,
+        }
+    });
     scores
 }
 

@@ -20,6 +20,8 @@ pub(super) enum Function {
     Exponential { variable: usize, from: f64, constant: f64 },
     /// Product of two functions.
     Product(Box<Function>, Box<Function>),
+    /// A function in a direction of its own, where several act at once.
+    Along { direction: usize, of: Box<Function> },
     /// 1 on the touches of a group, else 0.
     Member { of: Grouping, number: usize },
 }
@@ -45,6 +47,7 @@ impl Function {
     pub fn at_row(&self, features: &Features, row: usize) -> f64 {
         match self {
             Self::Product(a, b) => a.at_row(features, row) * b.at_row(features, row),
+            Self::Along { direction, of } => features.directions[*direction].weight[row] * of.at_row(features, row),
             Self::Member { of, number } => {
                 let groups = match of {
                     Grouping::Block => &features.block,
@@ -66,6 +69,7 @@ impl Function {
             Self::Step { at, .. } => f64::from(u8::from(x >= at)),
             Self::Kink { at, scale, .. } => (x - at).abs() / scale,
             Self::Exponential { from, constant, .. } => 1.0 - (-(x - from) / constant).exp(),
+            Self::Along { ref of, .. } => of.at(x),
             Self::Product(..) | Self::Member { .. } => 1.0,
         }
     }
@@ -78,6 +82,7 @@ impl Function {
             | Self::Step { variable, .. }
             | Self::Kink { variable, .. }
             | Self::Exponential { variable, .. } => Some(variable),
+            Self::Along { ref of, .. } => of.variable(),
             Self::Product(..) | Self::Member { .. } => None,
         }
     }
@@ -110,6 +115,7 @@ impl Function {
                 format!("1 - exp(0 - {}/{})", less(word(*variable)?, *from), given(*constant))
             }
             Self::Product(a, b) => format!("({})*({})", a.formula(features, None)?, b.formula(features, None)?),
+            Self::Along { of, .. } => return of.formula(features, free),
             Self::Member { .. } => return None,
         })
     }

@@ -32,6 +32,12 @@ pub struct Step {
     pub rms_um: f64,
     /// RMS on index visits that were left out of the fit, µm.
     pub held_out_rms_um: Option<f64>,
+    /// Standard error of that, µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out_se_um: Option<f64>,
+    /// Where the search chose what was added: the same with the choice redone for each visit left out, µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nested_rms_um: Option<f64>,
     /// RMS on the study's last run when the others alone are fitted, µm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub later_run_rms_um: Option<f64>,
@@ -84,7 +90,9 @@ impl History {
     pub fn push(&mut self, mut step: Step) {
         if let Some(last) = self.steps.last_mut() {
             if last.effects == step.effects && last.data_sha256 == step.data_sha256 {
-                step = Step { step: last.step, added: last.added.clone(), removed: last.removed.clone(), ..step };
+                let nested_rms_um = step.nested_rms_um.or(last.nested_rms_um);
+                let (added, removed) = (last.added.clone(), last.removed.clone());
+                step = Step { step: last.step, added, removed, nested_rms_um, ..step };
                 *last = step;
                 return;
             }

@@ -78,6 +78,8 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     let open = untried(d);
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
+        // a gross mistake that made touches miss: there is nothing to compare its error with
+        Verdict::MissingEffect if d.most_missed => (Level::Act, d.says.clone()),
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
         Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
         Verdict::Unexplained if !open.is_empty() => (Level::Act, one_of(m, &open)),
@@ -100,7 +102,7 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     };
     let detail = match d.verdict {
         Verdict::TooLittleData => String::new(),
-        Verdict::MissingEffect => first.map_or_else(|| d.says.clone(), |c| falls(m, c)),
+        Verdict::MissingEffect if !d.most_missed => first.map_or_else(|| d.says.clone(), |c| falls(m, c)),
         Verdict::Unexplained if !d.faint && !open.is_empty() => format!(
             "The touches miss the model by {}, and the probe's noise is {}. No touches are left over to try one of them on.",
             um(d.rms_um),
@@ -306,6 +308,10 @@ mod tests {
             rms_after_um: 1.0,
             held_out_before_um: held_out,
             held_out_after_um: held_out,
+            held_out_se_um: None,
+            nested: true,
+            moves_um: None,
+            moves_sigma_um: None,
             parameters: Vec::new(),
             not_told: Vec::new(),
             same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
@@ -327,7 +333,10 @@ mod tests {
             faint: false,
             rms_um: 5.0,
             noise_um: 1.0,
+            most_missed: false,
             visit_um: 0.0,
+            visit_source: String::new(),
+            noise_says: String::new(),
             lack_of_fit_p: 0.0,
             depends: Vec::new(),
             shape: None,

@@ -86,7 +86,12 @@ fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &m
 }
 
 fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out: &mut Vec<Next>) {
-    out.push(Next::new("Look at the machine", first.look.clone(), ""));
+    if m.diagnosis.most_missed {
+        out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
+        return;
+    }
+    let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
+    out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
     if !first.same_as.is_empty() {
         out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
     }
@@ -97,7 +102,7 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
     ));
     let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
     if !mends.is_empty() {
-        out.push(Next::new("What mends it", mends, ""));
+        out.push(Next::new("What mends it", format!("{one_of_several}{mends}"), ""));
     }
     let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
     let beyond = known.iter().filter(|p| p.judgement == Judgement::Beyond);
@@ -134,7 +139,8 @@ fn unexplained(m: &Material, out: &mut Vec<Next>) {
     }
     if let Some(shape) = &d.shape {
         let depends = d.depends.first().map_or("", |w| w.says.as_str());
-        out.push(Next::new("Look for it on the machine", format!("{}. {depends}.", capital(&shape.kind)), ""));
+        let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
+        out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
     }
     out.push(Next::new(
         "Write down its formula",

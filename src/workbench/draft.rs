@@ -4,6 +4,7 @@ use super::session::Refused;
 use crate::diag::{Failure, Finding, source};
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::{Formula, VARIABLES};
+use crate::model::mistake;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
@@ -218,7 +219,8 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
     for (i, t) in draft.terms.iter().enumerate() {
         if let Err(message) = Formula::parse(t.formula.trim(), &shapes) {
             let lead = t.formula.len() - t.formula.trim_start().len();
-            let at = place(t.formula.trim(), &message);
+            let at =
+                mistake::find(t.formula.trim(), &shapes).map_or_else(|| place(t.formula.trim(), &message), |m| m.at);
             let signs = |byte: usize| t.formula.get(..lead + byte).map_or(0, |text| text.chars().count());
             let (from, to) = (signs(at.start), signs(at.end));
             mistakes.push(Mistake {

@@ -30,16 +30,28 @@ pub struct Case {
     /// Noise of a touch and of a visit, mm.
     pub sigma_mm: f64,
     pub tau_mm: f64,
+    /// What the study says of the scatter of visits, mm; `None`: revisits tell it, or the machine's file declares it.
+    pub stated_tau_mm: Option<f64>,
 }
 
 /// The cases of the documentation.
-pub const CASES: [Case; 6] = [
+pub const CASES: [Case; 8] = [
     Case {
         machine: "swivel-head",
         programs: &["head", "table"],
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.0,
+        stated_tau_mm: Some(0.0),
+    },
+    // no revisits: both rotary axes scatter as the machine's file declares it
+    Case {
+        machine: "swivel-head",
+        programs: &["head", "table"],
+        effects: &["location-b", "location-c", "block-setup", "pretravel"],
+        sigma_mm: 1e-3,
+        tau_mm: std::f64::consts::FRAC_1_SQRT_2 * 1e-3,
+        stated_tau_mm: None,
     },
     Case {
         machine: "swivel-head",
@@ -47,6 +59,7 @@ pub const CASES: [Case; 6] = [
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.0,
+        stated_tau_mm: None,
     },
     Case {
         machine: "swivel-head",
@@ -54,6 +67,7 @@ pub const CASES: [Case; 6] = [
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
+        stated_tau_mm: None,
     },
     Case {
         machine: "trunnion",
@@ -61,6 +75,7 @@ pub const CASES: [Case; 6] = [
         effects: &["location-a", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.0,
+        stated_tau_mm: Some(0.0),
     },
     Case {
         machine: "trunnion",
@@ -68,6 +83,7 @@ pub const CASES: [Case; 6] = [
         effects: &["location-a", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
+        stated_tau_mm: None,
     },
     Case {
         machine: "double-head",
@@ -75,6 +91,15 @@ pub const CASES: [Case; 6] = [
         effects: &["location-b", "location-a", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
+        stated_tau_mm: None,
+    },
+    Case {
+        machine: "swivel-table-b",
+        programs: &["full"],
+        effects: &["location-b", "location-c", "block-setup", "pretravel"],
+        sigma_mm: 1e-3,
+        tau_mm: 0.5e-3,
+        stated_tau_mm: None,
     },
 ];
 
@@ -134,7 +159,12 @@ fn wrong(machine: &Machine, case: &Case, rng: &mut ChaCha8Rng) -> Scenario {
 }
 
 fn settings(case: &Case) -> Settings {
-    Settings { effects: case.effects.iter().map(|e| (*e).to_owned()).collect(), quick: true, ..Settings::default() }
+    Settings {
+        effects: case.effects.iter().map(|e| (*e).to_owned()).collect(),
+        visit_sigma_mm: case.stated_tau_mm,
+        quick: true,
+        ..Settings::default()
+    }
 }
 
 /// The same touches with fresh noise.

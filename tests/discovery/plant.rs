@@ -127,6 +127,8 @@ pub struct Hidden {
     values: Vec<(String, f64, String, bool)>,
     /// Harmonics of a rotary axis besides.
     harmonics: Vec<Harmonic>,
+    /// Id of the effect of the catalogue that they are.
+    pub admixture: Option<String>,
     /// A file of own effects with one effect `planted` and its parameters.
     own: String,
     own_parameters: Vec<(String, f64)>,
@@ -218,6 +220,7 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
         other_shape: false,
         values,
         harmonics: Vec::new(),
+        admixture: None,
         own: String::new(),
         own_parameters: Vec::new(),
     }
@@ -252,10 +255,15 @@ pub fn bent(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
     match (words[0], words.get(2).and_then(|k| k.parse::<u32>().ok())) {
         ("warm" | "spindle", _) => {
             let tau = f64::exp(rng.random_range(f64::ln(0.13)..f64::ln(2.0)));
-            out.values.iter_mut().filter(|v| v.0 == "tau").for_each(|v| v.1 = tau);
+            let mut shapes = out.values.iter_mut().filter(|v| v.3).peekable();
+            assert!(shapes.peek().is_some(), "{id} has no time constant to bend");
+            shapes.for_each(|v| v.1 = tau);
         }
         ("pitch", _) => {
-            out.values.iter_mut().filter(|v| v.0 == "pitch").for_each(|v| v.1 = rng.random_range(5.0..18.0))
+            let pitch = rng.random_range(5.0..18.0);
+            let mut shapes = out.values.iter_mut().filter(|v| v.3).peekable();
+            assert!(shapes.peek().is_some(), "{id} has no pitch to bend");
+            shapes.for_each(|v| v.1 = pitch);
         }
         ("head", _) => {
             out.values.clear();
@@ -283,10 +291,12 @@ pub fn bent(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
             };
             let typical = out.values[0].1.abs().max(1.0);
             for dof in dofs {
+                let other = if k == 1 { 2 } else { 1 };
+                out.admixture = Some(format!("{family}-{}-{other}", words[1]));
                 out.harmonics.push(Harmonic {
                     axis: axis.clone(),
                     dof,
-                    k: if k == 1 { 2 } else { 1 },
+                    k: other,
                     cos: 0.25 * typical * normal(rng),
                     sin: 0.25 * typical * normal(rng),
                 });

@@ -16,6 +16,7 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
             expanded: Some(0.0004),
             sigma_noise: None,
             sigma_type_b: None,
+            moves_with_unseen: None,
             sigma_with_unmodelled: None,
             status: *status,
         })

@@ -297,6 +297,10 @@ impl Dialect for Heidenhain {
         self.own.insert(Var::Number(first + 3), if outcome.hit { 0.0 } else { -1.0 });
     }
 
+    fn latches(&self) -> bool {
+        false
+    }
+
     fn settings(&self) -> BTreeMap<String, String> {
         let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
         let on = |yes: bool| if yes { "on" } else { "off" }.to_owned();

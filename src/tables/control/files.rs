@@ -30,7 +30,8 @@ fn entry(value: &Entry, spelling: Option<&str>, restore: bool, always_mark: bool
     };
     let show = |v: f64| digits(v, value.decimals, always_mark);
     let (now, other) = if restore { (value.old, value.new) } else { (value.new, value.old) };
-    let change = digits(value.new - value.old, value.decimals, false);
+    // from what the control then holds to what this file brings
+    let change = digits(if restore { value.old - value.new } else { value.new - value.old }, value.decimals, false);
     Some(context! {
         id => value.id.clone(), name, value => show(now), other => show(other), old => show(value.old), new => show(value.new),
         change, says => one_line(&value.says), unit => value.unit, changed => value.new != value.old,
@@ -82,6 +83,11 @@ pub(super) fn write(
     let grids = record.map(|r| r.grids).unwrap_or_default();
     let active = correction.active.as_ref().and_then(|a| a.tables.clone()).map(|t| t.grids).unwrap_or_default();
     let none = |g: &Grid| Grid { values: vec![0.0; g.values.len()], ..g.clone() };
+    let before = |g: &Grid| {
+        let same = |o: &&Grid| (o.input, o.output, o.sense) == (g.input, g.output, g.sense);
+        active.iter().find(same).cloned().unwrap_or_else(|| none(g))
+    };
+    let grids_known = tables.grid.as_ref().is_some_and(|form| super::grids::known(form, &grids, &options.old));
     let unit = match options.unit {
         LengthUnit::Mm => context! { name => "mm", letter => "M" },
         LengthUnit::Inch => context! { name => "inch", letter => "I" },
@@ -90,14 +96,9 @@ pub(super) fn write(
         let spelling = form.or(tables.file.first()).and_then(|f| f.spelling.as_deref());
         let entries: Vec<Value> =
             export.values.iter().filter_map(|v| entry(v, spelling, restore, tables.always_mark)).collect();
-        let shown: Vec<Value> = grids
-            .iter()
-            .map(|g| {
-                let same = |o: &&Grid| (o.input, o.output, o.sense) == (g.input, g.output, g.sense);
-                let old = active.iter().find(same).cloned().unwrap_or_else(|| none(g));
-                grid(machine, tables, g, restore.then_some(&old))
-            })
-            .collect();
+        let shown: Vec<Value> = grids.iter().map(|g| grid(machine, tables, g, restore.then_some(&before(g)))).collect();
+        let of_grids = form.is_some_and(|f| f.grids);
+        let known = if of_grids { grids_known } else { known };
         context! {
             head => head.clone(), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
             axes => machine.rotary().map(|a| a.name.to_string()).collect::<Vec<_>>(),
@@ -138,6 +139,27 @@ pub(super) fn write(
     } else {
         correction.shapes.iter().chain(&correction.across).map(shape).collect()
     };
+    let decimals = |g: &Grid| {
+        super::fill::decimals(*if g.output.is_rotary() { tables.step_deg.get_ref() } else { tables.step_mm.get_ref() })
+    };
+    let points: Vec<Value> = grids
+        .iter()
+        .map(|g| {
+            let old = before(g);
+            let show = |v: f64| digits(v, decimals(g), false);
+            let rows: Vec<Value> = g
+                .values
+                .iter()
+                .enumerate()
+                .map(|(i, new)| {
+                    let at = g.min + g.step * i as f64;
+                    let was = old.at(at);
+                    context! { at => format!("{}", crate::tables::correction::rounded(at)), old => show(was), new => show(*new), change => show(new - was) }
+                })
+                .collect();
+            context! { number => g.number, input => g.input.to_string(), output => g.output.to_string(), rows }
+        })
+        .collect();
     let text = render(
         "readme",
         README,
@@ -147,7 +169,7 @@ pub(super) fn write(
                 files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
                 variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
                 reads => tables.reads.is_some(),
-                left, omitted => not, in_grids, radius => format!("{}", options.radius_mm),
+                left, omitted => not, in_grids, points, grids_known, radius => format!("{}", options.radius_mm),
                 rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
                 longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
                 shift => shift.map(|v| format!("{v:+.4}")).to_vec(), tool => correction.tool_length_mm.map(|v| format!("{v:+.4}")),

@@ -1,10 +1,12 @@
 //! Errors that depend on the position of one axis → tables of another one's (or its own) correction.
 
+use super::backup::Old;
 use crate::axes::AxisName;
+use crate::diag::Finding;
 use crate::machine::Machine;
 use crate::post::tables::GridForm;
 use crate::tables::compensation::Grid;
-use crate::tables::correction::{AxisShape, Correction, rounded};
+use crate::tables::correction::{AxisShape, Correction, Limits, rounded};
 use crate::units::um_from_mm;
 
 /// A table follows the error to this, mm or deg: a tenth of what a control resolves.
@@ -60,6 +62,67 @@ pub fn grids(
     }
     Ok(out)
 }
+
+/// Position tables with values that no correction should reach.
+#[must_use]
+pub fn beyond(grids: &[Grid], limits: &Limits) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for grid in grids {
+        let (limit, unit) = if grid.output.is_rotary() { (limits.deg, "deg") } else { (limits.mm, "mm") };
+        let largest = grid.values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        if largest > limit {
+            let says = format!(
+                "the position table of {} by the position of {} reaches {largest:.6} {unit}, above the limit of {limit} {unit}",
+                grid.output, grid.input
+            );
+            findings.push(
+                Finding::error("tables::too_large", says)
+                    .help("look for a set-up fault (wrong block, wrong sense, wrong length) first; --force exports it all the same"),
+            );
+        }
+    }
+    findings
+}
+
+/// What the user's backup says of a table: nothing, or its points.
+fn in_backup(form: &GridForm, number: usize, old: &Old) -> Option<Vec<(String, f64)>> {
+    let names = (0..form.most_points).filter_map(|p| form.point_name(number, p));
+    let found: Vec<(String, f64)> = names.filter_map(|n| old.values.get(&n).map(|(v, _)| (n.clone(), *v))).collect();
+    (!found.is_empty()).then_some(found)
+}
+
+/// Is what stood in every one of these tables known from the user's backup?
+#[must_use]
+pub fn known(form: &GridForm, grids: &[Grid], old: &Old) -> bool {
+    grids.iter().all(|g| in_backup(form, g.number, old).is_some())
+}
+
+/// Tables that hold something else than what axiscal has written into them: they would be written over.
+#[must_use]
+pub fn occupied(form: &GridForm, grids: &[Grid], active: &[Grid], old: &Old) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for grid in grids {
+        let Some(points) = in_backup(form, grid.number, old) else { continue };
+        let own = active.iter().find(|a| a.number == grid.number);
+        let as_written = |i: usize, value: f64| {
+            (own.and_then(|a| a.values.get(i)).copied().unwrap_or(0.0) - value).abs() <= SAME_POINT
+        };
+        let other = points.iter().enumerate().find(|(i, (_, value))| !as_written(*i, *value));
+        if let Some((_, (name, value))) = other {
+            let says = format!(
+                "position table {} of the control is in use: {name} = {value} is not axiscal's, and would be written over",
+                grid.number
+            );
+            findings.push(Finding::error("tables::occupied", says).help(
+                "write the first free number into a file of your own ([tables.grid] first = …): the tables of one axis add up; --force writes over it",
+            ));
+        }
+    }
+    findings
+}
+
+/// Points of a table that differ by less are the same, mm or deg.
+const SAME_POINT: f64 = 1e-6;
 
 /// First point, distance and values: as few as follow the value to [`CLOSE_ENOUGH`].
 fn points(

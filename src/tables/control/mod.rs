@@ -81,7 +81,9 @@ pub struct Export {
 pub fn names(machine: &Machine, tables: &Tables) -> BTreeSet<String> {
     let Ok(kind) = kind_of(machine, tables) else { return BTreeSet::new() };
     let vectors = kind.vector.iter().flat_map(|v| v.names.values().flatten().cloned());
-    vectors.chain(kind.angle.iter().flat_map(|a| a.names.values().cloned())).filter(|n| !n.is_empty()).collect()
+    let angles = kind.angle.iter().flat_map(|a| a.names.values().cloned());
+    let points = tables.grid.iter().flat_map(crate::post::tables::GridForm::point_names);
+    vectors.chain(angles).chain(points).filter(|n| !n.is_empty()).collect()
 }
 
 /// The control's kind for the machine.
@@ -233,6 +235,10 @@ pub fn export(
                     .help("take the smallest effects out of the study's model, one by one"),
             ),
         }
+    }
+    if let (Some(form), Some(list)) = (&tables.grid, &grid_list) {
+        findings.0.extend(grids::beyond(list, &options.limits));
+        findings.0.extend(grids::occupied(form, list, old_grids, &options.old));
     }
     if options.unit == LengthUnit::Inch && grid_list.as_ref().is_some_and(|g| !g.is_empty()) {
         // a forced export leaves them out too: in the wrong unit they would be wrong

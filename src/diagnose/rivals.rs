@@ -1,0 +1,101 @@
+//! Do shapes without a name say what is left better than effects with names do?
+//!
+//! A jump at one moment is followed a good part of the way by a warm-up, and the rest of it by a drift: each of them passes
+//! its test, and all of them are wrong. So what the effects with names come to, one after another, is held against what
+//! shapes come to, by what they leave and what they cost (Schwarz's criterion).
+
+use crate::search::generic::Generics;
+use crate::search::{Basis, KEPT, Library, Question, Search};
+use nalgebra::DVector;
+
+/// Steps on either side.
+const MOST_STEPS: usize = 2;
+
+/// A difference of the criterion beyond which there is no doubt which side is better.
+const CLEARLY: f64 = 10.0;
+
+/// A difference beyond which a single shape is said to be better: an effect with a name and the shape that it has by itself
+/// are equally good, and the name says more.
+const BETTER: f64 = 4.0;
+
+/// What a shape still takes after the first effect counts when it is so much of all that there was to explain.
+const SHARE: f64 = 0.1;
+
+/// What came of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Weighed {
+    /// Shapes are clearly better: the name is one for a part of it.
+    pub shapes_win: bool,
+    /// Index of the first shape, where it alone is better than the first effect alone.
+    pub better: Option<usize>,
+}
+
+/// Where a way ends.
+struct End {
+    basis: Basis,
+    residual: DVector<f64>,
+    /// Parameters that it costs.
+    cost: usize,
+    steps: Vec<usize>,
+    /// Schwarz's criterion after the first step, and at the end.
+    after_first: f64,
+    criterion: f64,
+}
+
+/// Adds what passes its test, the first candidate given or found.
+fn way(question: Question, library: &Library, generic: bool, first: Option<usize>) -> End {
+    let n = question.residual.len() as f64;
+    let mut end = End {
+        residual: question.base.project(question.residual),
+        basis: question.base.clone(),
+        cost: 0,
+        steps: Vec::new(),
+        after_first: f64::INFINITY,
+        criterion: f64::INFINITY,
+    };
+    while end.steps.len() < MOST_STEPS {
+        let search = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, library);
+        let found = if generic { search.leading_shape() } else { search.leader() };
+        let Some(next) = first.filter(|_| end.steps.is_empty()).or(found) else { break };
+        let (columns, cost) = (search.columns(next), search.scores[next].n_parameters);
+        if end.basis.extend(&columns, KEPT) == 0 {
+            break;
+        }
+        end.residual = end.basis.project(&end.residual);
+        end.cost += cost;
+        end.steps.push(next);
+        end.criterion = n * end.residual.norm_squared().max(f64::MIN_POSITIVE).ln() + end.cost as f64 * n.ln();
+        if end.steps.len() == 1 {
+            end.after_first = end.criterion;
+        }
+    }
+    end
+}
+
+/// Holds effects, `first` in front, against shapes.
+pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, first: usize) -> Weighed {
+    let names = way(question, named, false, Some(first));
+    let shapes = way(question, &generics.library, true, None);
+    let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
+    let better = (shapes.after_first + BETTER < names.after_first).then_some(shape);
+    // together they leave less and cost less
+    let beaten = shapes.criterion + CLEARLY < names.criterion;
+    Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }
+}
+
+/// Is much of it left to a shape once the first effect is in the model, and to no second effect?
+fn left_to_shapes(question: Question, named: &Library, generics: &Generics, first: usize) -> bool {
+    let residual = question.base.project(question.residual);
+    let dof = question.residual.len() as f64 - question.base.rank() as f64;
+    let before = Search::new(question, named);
+    let mut basis = question.base.clone();
+    basis.extend(&before.columns(first), KEPT);
+    let left = basis.project(&residual);
+    let now = Question { residual: &left, base: &basis, ..question };
+    let after = Search::new(now, &generics.library);
+    let Some(shape) = after.leading_shape() else { return false };
+    let second = Search::new(now, named);
+    let name_ln_p = second.leader().map_or(0.0, |l| second.scores[l].ln_p);
+    let share = after.scores[shape].delta_ss / (residual.norm_squared() - dof).max(1.0);
+    share > SHARE && after.scores[shape].ln_p + CLEARLY < name_ln_p
+}
