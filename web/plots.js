@@ -139,7 +139,7 @@ globalThis.axiscalPlots = (() => {
     }
     traces.push({
       type: 'scatter', mode: 'markers', x: shown.map((p) => p.at_radius_um), y,
-      error_x: { type: 'data', array: shown.map((p) => p.at_radius_expanded_um), color: c.ink, thickness: 2, width: 5 },
+      error_x: { type: 'data', array: shown.map((p) => p.at_radius_expanded_um), color: c.ink, thickness: 2, width: 0 },
       marker: { symbol: kinds.map((k) => k.symbol), size: 10, color: kinds.map((k) => k.colour) },
       customdata: shown.map((p) => [`${valued(p.value, p.sigma)} ± ${digits(p.expanded, 2)} ${p.unit}`, JUDGEMENTS[p.judgement].word]),
       hovertemplate: '%{y}: %{x:.2f} µm at the radius, %{customdata[0]} (95 %), %{customdata[1]}<extra></extra>',

@@ -25,6 +25,14 @@ async function opensFromDisk(t) {
     await page.evaluate(() => new Promise((done) => setTimeout(done, 150)));
   }
   holds(await page.locator(".js-plotly-plot").count() >= 5, "too few plots");
+  // what passes the test is never called chance
+  const cards = await page.evaluate(() => {
+    const { candidates } = JSON.parse(document.querySelector("#view").textContent).diagnosis;
+    return [...document.querySelectorAll(".card h3 .badge")].map((b, k) => [b.textContent, candidates[k].proposed, candidates[k].p_adjusted < 0.05]);
+  });
+  holds(cards.length > 1 && cards[0][0] === "proposed", JSON.stringify(cards));
+  for (const [word, proposed, passes] of cards) equal([word === "proposed", word === "no more than chance"], [proposed, !passes], word);
+  holds(!(await page.textContent("#compensation-title >> xpath=..")).includes("The touches are then missed"), "the figure of another model");
   await page.screenshot({ path: join(out, "report-whole.png"), fullPage: true });
   equal(seen.errors, [], "errors in the console");
   equal(seen.asked.filter((url) => url !== address && !/^(data|blob):/.test(url)), [], "addresses that were asked for");
@@ -72,6 +80,7 @@ async function printed(t) {
     const titles = [...document.querySelectorAll(".js-plotly-plot")].flatMap((plot) => [...plot.querySelectorAll(".xtitle")].map((title) => [title.textContent, title.getBoundingClientRect().left - plot.getBoundingClientRect().left, plot.getBoundingClientRect().right - title.getBoundingClientRect().right]));
     return { width, wide: [...document.querySelectorAll("figure, table, .card")].filter((e) => e.getBoundingClientRect().right > width + 1).map((e) => e.outerHTML.slice(0, 80)), cut: titles.filter(([, left, right]) => left < -1 || right < -1), undrawn: [...document.querySelectorAll(".plot")].filter((p) => !p.querySelector(".main-svg")).map((p) => p.id) };
   });
+  holds(/The 50 largest of \d+ touches/.test(await page.textContent("#touches-title >> xpath=..")), "which touches are printed is not said");
   equal([paper.wide, paper.cut, paper.undrawn], [[], [], []], "wider than the paper, titles that are cut, plots that are not drawn");
   equal(seen.errors, [], "errors in the console");
 }

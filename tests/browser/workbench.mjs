@@ -53,6 +53,7 @@ async function wholeLoop(t) {
   // the first candidate is opened: what it is, and its curve over the touches
   const first = page.locator("#candidates > li").first();
   equal(await first.getAttribute("data-effect"), "squareness-xy", "the first candidate");
+  holds((await first.textContent()).includes("passes the test: proposed"), "colour alone says that it passes");
   await first.locator(".open").click();
   await page.waitForSelector("#previewed:not([hidden])");
   const curve = await page.evaluate(() => document.querySelector("#residuals .plot[data-version]").data.slice(3, 6).reduce((n, d) => n + d.y.length, 0));
@@ -173,9 +174,20 @@ async function formulaBox(t) {
   equal(await page.isHidden("#previewed"), false, "the curve");
   equal(await page.textContent("#draft .caret"), "");
   holds(!text(folder).includes("my-square"), "drawing a curve writes nothing");
+  // a formula without a value at some touches is a mistake in its field
+  await formula.fill("1 / (X - X)");
+  await page.waitForFunction(() => document.querySelector("#draft .mistake").textContent.includes("has no value at"));
+  equal(await formula.getAttribute("aria-invalid"), "true", "the field without a value");
+  // saved with a slip, and saved again: one effect, as it was typed last
+  await formula.fill("Y");
+  await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it"));
+  await after(page, () => page.click("#draft-save"));
+  await formula.fill("-Y");
+  await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it"));
   await after(page, () => page.click("#draft-save-on"));
   const own = readFileSync(join(folder, "my-effects.toml"), "utf8");
   holds(own.includes('id = "my-square"') && own.includes('formula = "-Y"'), own);
+  equal([own.split('id = "my-square"').length, own.includes('formula = "Y"')], [2, false], own);
   holds(text(folder).includes('effects_file = ["my-effects.toml"]') && text(folder).includes('"my-square"'), text(folder));
   holds(await number(page, "rms") < 0.4 * before, "the effect of one's own explains nothing");
   // the words of a formula are at hand, as the guide has them
