@@ -322,3 +322,43 @@ fn a_file_of_zeros_is_refused() {
     let out = job.parse("huge.log");
     expect(&out, 2, &["huge.log"]);
 }
+
+/// Every touch is taken out: too little data, said before any search, and no panic.
+#[test]
+fn a_study_without_a_touch_that_is_used() {
+    let job = Job::new();
+    let made = job.call(&[
+        "new",
+        "--machine",
+        "swivel-head",
+        "--plan",
+        "table.plan.json",
+        "--log",
+        "good.log",
+        "--controller",
+        "linuxcnc",
+        "--out",
+        "study.toml",
+    ]);
+    expect(&made, 0, &[]);
+    let plan: serde_json::Value = serde_json::from_str(&job.read("table.plan.json")).unwrap();
+    let masks: String = plan["touches"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|t| format!("\n[[mask]]\nrun = 1\nid = {}\nreason = \"knocked\"\n", t["id"]))
+        .collect();
+    job.write("study.toml", job.read("study.toml") + &masks);
+    for verb in [
+        &["diagnose", "study.toml"][..],
+        &["compare", "study.toml"],
+        &["report", "study.toml", "--out", "r.html", "--plots", "plots"],
+    ] {
+        let out = job.call(verb);
+        job.unbroken(&out);
+        assert_ne!(out.status.code(), Some(2), "{verb:?}: {}", said(&out));
+        if verb[0] != "compare" {
+            assert!(said(&out).contains("Too few touches to judge"), "{verb:?}: {}", said(&out));
+        }
+    }
+}

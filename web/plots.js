@@ -30,7 +30,7 @@ globalThis.axiscalPlots = (() => {
   /** A value with the digits that its uncertainty leaves. */
   function valued(x, sigma) {
     if (x === null || x === undefined) return '–';
-    if (!sigma) return digits(x);
+    if (!sigma || !Number.isFinite(sigma)) return digits(x);
     const places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
     return (Number(x.toFixed(places)) + 0).toFixed(places).replace(/^-(?=[0.]*$)/, '').replace('-', '−');
   }
@@ -84,7 +84,8 @@ globalThis.axiscalPlots = (() => {
       { i: after, name: proposed ? `after, with<br>${safe(view.ladder[after].added.join(', '))}` : 'after (what the<br>model leaves)', colour: OKABE.blue },
     ].filter((r, k, all) => k === 0 || r.i !== all[0].i);
     const values = rows.map((r) => view.ladder[r.i].rms_um);
-    rows.forEach((r, k) => { r.name = `${r.name}<br><b>${digits(values[k])} µm</b>`; });
+    // as many unknowns as touches leave nothing but the computer's rounding
+    rows.forEach((r, k) => { r.name = `${r.name}<br><b>${values[k] < 5e-4 ? '0' : digits(values[k])} µm</b>`; });
     const top = Math.max(...values, noise);
     const traces = [{
       type: 'bar', orientation: 'h', y: rows.map((r) => r.name), x: values,
@@ -120,6 +121,10 @@ globalThis.axiscalPlots = (() => {
     const shown = [...sized].sort((a, b) => ratio(b) - ratio(a)).slice(0, most);
     shown.sort((a, b) => sized.indexOf(a) - sized.indexOf(b));
     const name = (p) => `${safe(p.says)} <b>${safe(p.name)}</b>`;
+    if (!shown.length) {
+      const none = layout(el, { xaxis: { visible: false }, yaxis: { visible: false }, annotations: [{ x: 0.5, y: 0.5, xref: 'paper', yref: 'paper', showarrow: false, text: 'these touches tell no error' }] });
+      return draw(el, [], none, 'These touches tell no error of the machine.');
+    }
     const y = shown.map(name);
     const kinds = shown.map((p) => JUDGEMENTS[p.judgement]);
     const traces = [];
@@ -127,7 +132,8 @@ globalThis.axiscalPlots = (() => {
       const now = shown.map((p) => view.parameters.find((q) => q.name === p.name));
       traces.push({
         type: 'scatter', mode: 'markers', x: now.map((p) => (p ? p.at_radius_um : null)), y,
-        marker: { symbol: 'circle-open', size: 10, color: c.muted, line: { width: 2 } },
+        // a tick, which no judgement's mark looks like, and which none covers
+        marker: { symbol: 'line-ns-open', size: 18, color: c.ink, line: { width: 2 } },
         hovertemplate: 'with the model as it is: %{x:.2f} µm<extra></extra>',
       });
     }
@@ -166,10 +172,10 @@ globalThis.axiscalPlots = (() => {
     const wide = Math.max(...all) / Math.min(...all) > 12;
     const lay = layout(el, {
       showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
-      xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], title: { text: 'model, step by step' } },
+      xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], zeroline: false, title: { text: 'model, step by step' } },
       yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
-      annotations: [{ x: 1, xref: 'paper', xanchor: 'right', y: wide ? Math.log10(noise) : noise, yanchor: 'top', showarrow: false, text: `probe's noise ${digits(noise)} µm` }],
+      annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'bottom', bgcolor: c.paper, borderpad: 1, yshift: 2, showarrow: false, text: `probe's noise ${digits(noise)} µm` }],
     });
     return draw(el, traces, lay, `Error left by each model: ${view.ladder.map((r) => `${r.label} ${digits(r.rms_um)} µm`).join(', ')}; the probe's noise is ${digits(noise)} µm.`);
   }
@@ -351,6 +357,23 @@ globalThis.axiscalPlots = (() => {
     return webgl;
   }
 
+  /** More arrows than this have no heads: they would take too long. */
+  const MOST_HEADS = 2500;
+
+  /** The heads of arrows: cones whose point is the arrow's end. */
+  function arrowHeads(view, rung, arrows, colour, extent) {
+    const t = view.touches;
+    const length = arrows.shafts.map(([a, b]) => Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]));
+    // a third of its arrow, at most
+    const size = length.map((l) => Math.min(l / 2.5, 0.04 * extent));
+    const of = (k) => arrows.tips.map((p) => p[k]);
+    const along = (k) => arrows.which.map((i, n) => size[n] * t.normal[i][k] * Math.sign(t.residual_um[rung][i]));
+    return {
+      type: 'cone', x: of(0), y: of(1), z: of(2), u: along(0), v: along(1), w: along(2), anchor: 'tip', sizemode: 'raw', sizeref: 1,
+      colorscale: [[0, colour], [1, colour]], showscale: false, legendgroup: arrows.name, showlegend: false, hoverinfo: 'skip',
+    };
+  }
+
   /** The machine with the miss of every touch as an arrow. options: rung, flat (drawn without a graphics card). */
   function machine(el, view, options = {}) {
     const c = colours(el);
@@ -376,7 +399,10 @@ globalThis.axiscalPlots = (() => {
     parts.arrows.forEach((a, k) => {
       const colour = STAGES[k % STAGES.length];
       traces.push(lines(a.shafts, { color: colour, width: flat ? 1.5 : 4 }, { name: safe(a.name), legendgroup: a.name, showlegend: true }));
-      traces.push(marks(a.tips, { size: flat ? 5 : 3, color: colour, symbol: 'diamond' }, {
+      const heads = !flat && a.tips.length <= MOST_HEADS;
+      if (heads) traces.push(arrowHeads(view, rung, a, colour, parts.extent));
+      // what is pointed at; seen only where there are no heads
+      traces.push(marks(a.tips, { size: flat ? 5 : 4, color: colour, symbol: 'diamond', opacity: heads ? 0 : 1 }, {
         legendgroup: a.name, customdata: a.which, text: a.which.map((i) => `${about(view, i)}<br>misses by ${digits(view.touches.residual_um[rung][i])} µm`), hovertemplate: '%{text}<extra></extra>',
       }));
     });
@@ -394,10 +420,11 @@ globalThis.axiscalPlots = (() => {
     const common = { margin: { l: 0, r: 0, t: 4, b: 4 }, showlegend: true, legend: { title: { text: 'stage (click hides)' }, x: 0, y: 1, bgcolor: 'rgba(0,0,0,0)' } };
     const off = { visible: false, showgrid: false, zeroline: false };
     const side = (title) => ({ title: { text: title }, color: c.ink, gridcolor: c.grid, zerolinecolor: c.grid, backgroundcolor: 'rgba(0,0,0,0)', range: undefined });
-    const r = 1.05 * parts.extent;
+    // the touches fill the picture; the table may be cut
+    const r = flat ? 1.05 * parts.extent : 0.76 * parts.extent;
     const lay = flat
       ? layout(el, { ...common, xaxis: { ...off, range: undefined }, yaxis: { ...off, scaleanchor: 'x' } })
-      : layout(el, { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 0.85, y: -1.15, z: 0.6 } },
+      : layout(el, { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 1.1, y: -1.47, z: 0.74 }, center: { x: 0, y: 0, z: -0.18 } },
         xaxis: { ...side('X, mm'), range: [parts.centre[0] - r, parts.centre[0] + r] },
         yaxis: { ...side('Y, mm'), range: [parts.centre[1] - r, parts.centre[1] + r] },
         zaxis: { ...side('Z, mm'), range: [parts.centre[2] - r, parts.centre[2] + r] } } });
@@ -419,11 +446,23 @@ globalThis.axiscalPlots = (() => {
       type: 'heatmap', x: names, y: names, z: matrix, zmin: -1, zmax: 1,
       // blue to orange over the paper: told apart by everybody
       colorscale: [[0, OKABE.blue], [0.5, c.paper], [1, OKABE.red]], colorbar: { title: { text: 'correlation' }, thickness: 12, tickvals: [-1, -0.5, 0, 0.5, 1] },
-      text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2)))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
+      text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2).replace('-0.00', '0.00').replace('-', '−')))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
       hovertemplate: '%{y} and %{x}: %{z:.2f}<extra></extra>',
     }];
     const lay = layout(el, { margin: { l: 8, r: 10, t: 10, b: 8 }, yaxis: { autorange: 'reversed', ticks: '' }, xaxis: { ticks: '', tickangle: -45, automargin: true } });
-    return draw(el, traces, lay, `Correlation of the results, from −1 to 1: ${names.join(', ')}.`);
+    return draw(el, traces, lay, `Correlation of the results of the model now, from −1 to 1: ${names.join(', ')}.`);
+  }
+
+  /** How a candidate stands: passed, tried on touches left out, first of all; in words, and as a mark. */
+  const LEVEL = 0.05;
+  const tried = (k) => k.held_out_before_um > 0 || k.held_out_after_um > 0;
+  function standing(d, k) {
+    if (k.proposed) return { word: 'proposed', symbol: 'circle', proposed: true };
+    if (!(k.p_adjusted < LEVEL)) return { word: 'no more than chance', symbol: 'x-thin-open' };
+    const part = { symbol: 'circle-open' };
+    if (d.verdict === 'too-little-data') return { word: 'cannot be judged yet', ...part };
+    if (d.verdict === 'unexplained' && !tried(k)) return { word: 'may be it: these poses cannot tell', ...part };
+    return { word: k === d.candidates[0] ? 'explains part, but not of touches left out' : 'explains part, less than the first', ...part };
   }
 
   /** What each candidate would leave. */
@@ -432,8 +471,8 @@ globalThis.axiscalPlots = (() => {
     const list = view.diagnosis.candidates;
     const y = list.map((k) => safe(k.name).slice(0, 44));
     const traces = [
-      { type: 'scatter', mode: 'markers', x: list.map((k) => k.rms_after_um), y, marker: { size: 12, symbol: list.map((k) => (k.proposed ? 'circle' : 'circle-open')), color: OKABE.blue, line: { width: 2, color: OKABE.blue } }, name: 'error left with it', hovertemplate: '%{x:.2f} µm<extra>left with it</extra>' },
-      { type: 'scatter', mode: 'markers', x: list.map((k) => k.held_out_after_um), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'on touches left out', hovertemplate: '%{x:.2f} µm<extra>touches left out</extra>' },
+      { type: 'scatter', mode: 'markers', x: list.map((k) => k.rms_after_um), y, marker: { size: 12, symbol: list.map((k) => standing(view.diagnosis, k).symbol), color: OKABE.blue, line: { width: 2, color: OKABE.blue } }, name: 'error left with it', hovertemplate: '%{x:.2f} µm<extra>left with it</extra>' },
+      { type: 'scatter', mode: 'markers', x: list.map((k) => (tried(k) ? k.held_out_after_um : null)), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'on touches left out', hovertemplate: '%{x:.2f} µm<extra>touches left out</extra>' },
     ];
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });
@@ -449,5 +488,5 @@ globalThis.axiscalPlots = (() => {
     return draw(el, traces, lay, `Error left with each candidate: ${list.map((k) => `${k.name} ${digits(k.rms_after_um)} µm`).join(', ')}.`);
   }
 
-  return { errors, parameters, ladder, residuals, machine, correlation, candidates, digits, valued, source, about, column, rungName, DIRECTION, JUDGEMENTS, OKABE };
+  return { errors, parameters, ladder, residuals, machine, correlation, candidates, standing, tried, digits, valued, source, about, column, rungName, DIRECTION, JUDGEMENTS, OKABE };
 })();

@@ -75,6 +75,7 @@
     before = document.documentElement.dataset.theme ?? '';
     document.documentElement.dataset.theme = 'light';
     document.documentElement.classList.add('printing');
+    for (const el of document.querySelectorAll('details:not([open])')) { el.open = true; el.dataset.opened = ''; }
     state.flat = true;
     [...waiting.keys()].forEach(drawNow);
     redraw.forEach((job) => job());
@@ -83,6 +84,7 @@
     if (before) document.documentElement.dataset.theme = before;
     else delete document.documentElement.dataset.theme;
     document.documentElement.classList.remove('printing');
+    for (const el of document.querySelectorAll('details[data-opened]')) { el.open = false; delete el.dataset.opened; }
     state.flat = false;
     redraw.forEach((job) => job());
   });
@@ -90,12 +92,13 @@
   // ---------------------------------------------------------------- the first screen
   const proposed = view.proposed.length > 0;
   plot(id('errors'), () => P.errors(id('errors'), view), true);
-  id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: touches that had no part in the fit' : ''}. Touches cannot miss by less than about the probe's noise.`;
+  id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: touches that had no part in the fit, each index visit left out in turn' : ''}. Touches cannot miss by less than about the probe's noise.`;
   plot(id('parameters'), () => P.parameters(id('parameters'), view), true);
   const t = view.tolerance;
   const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (nobody stated one: this is the default; [tolerance] in the study changes it)'}.`;
   id('parameters-says').append(
-    proposed ? make('span.warn', {}, 'Values with the missing error in the model; hollow: without it, and wrong. ') : '',
+    proposed ? make('span.warn', {}, 'Values with the missing error in the model. Tick: without it; these values hold part of what is missing. ')
+      : view.diagnosis.verdict !== 'adequate' && view.parameters.some((p) => p.status !== 'undetermined') ? make('span.warn', {}, `These values ${view.diagnosis.faint || view.diagnosis.verdict === 'too-little-data' ? 'may hold' : 'hold'} part of what is missing. `) : '',
     `Circle: within, diamond: too large, square: uncertain. ${limit}`,
   );
   const copy = (text) => make('button.noprint', { type: 'button', 'aria-label': `copy the command ${text}`, onclick: (ev) => {
@@ -124,7 +127,7 @@
     });
     s.append(make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': 'table of the results' }, make('table', {}, make('thead', {}, make('tr', {}, ...head.map((h, k) => make(k >= 3 && k !== 6 ? 'th.n' : 'th', { scope: 'col' }, h || 'verdict')))), make('tbody', {}, ...body))));
     s.append(make('p.muted', {}, `${e.noise_says}. ${e.used} of ${e.touches} touches used, ${e.unknowns} unknowns. Model: ${view.study.effects.join(', ')}.`));
-    for (const w of view.warnings) s.append(make('p.warn', {}, w));
+    for (const w of new Set(view.warnings)) s.append(make('p.warn', {}, w));
   }
 
   // ---------------------------------------------------------------- candidates
@@ -132,21 +135,23 @@
   if (d.candidates.length || d.where.length) {
     const s = section('candidates', d.verdict === 'adequate' ? 'What was looked for' : 'What may be missing', d.verdict === 'adequate'
       ? `${d.tested} known effects were tried on what is left over, and none of them is there. These would be the next best; they do not pass.`
-      : d.says);
-    if (d.where.length) s.append(make('p', {}, d.where[0].says));
+      : view.headline.detail || d.says);
+    if (d.where.length && !view.headline.detail.includes(d.where[0].says)) s.append(make('p', {}, d.where[0].says));
     if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it goes with (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
     if (d.candidates.length) {
-      const [f, div] = figure('candidates-plot', 'Filled: proposed. A candidate that is not proposed takes away less than chance may.');
+      const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: takes away no more than chance may. Diamond: the same on touches left out.');
       plot(div, () => P.candidates(div, view));
       const cards = make('div.grid');
       d.candidates.forEach((c, k) => {
+        const stands = P.standing(d, c);
+        const least = c.p_adjusted < 1e-300 ? 'p below 10⁻³⁰⁰' : `p = ${digits(c.p_adjusted, 2)}`;
         const p = c.p_adjusted < 1e-4 ? 'less than 1 in 10 000' : c.p_adjusted > 0.5 ? 'as good as certain' : `1 in ${Math.round(1 / c.p_adjusted)}`;
         const fact = (name, value) => [make('dt', {}, name), make('dd', {}, value)];
         const mends = d.effects[c.effect]?.mends;
-        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(c.proposed ? 'span.badge.act' : 'span.badge', {}, c.proposed ? 'proposed' : 'not shown by this data')),
+        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('on touches left out', `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm)`),
-            ...fact('chance alone does as well', `${p} (p = ${digits(c.p_adjusted, 2)}, all ${d.tested} effects counted in)`),
+            ...fact('on touches left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm), of those that both models can predict` : 'cannot be tried with these poses'),
+            ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(c.same_as.length ? fact('cannot be told from', c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)).join('; ')) : []),
             ...(c.tell_apart ? fact('what tells them apart', c.tell_apart) : []),
@@ -160,15 +165,15 @@
 
   // ---------------------------------------------------------------- the ladder
   {
-    const s = section('ladder', 'Step by step to the noise', 'What each model leaves. The lower the better, and nothing is gained below the noise; a model that falls on its own touches and not on those left out only learns by heart.', true);
-    const [f, div] = figure('ladder-plot', view.ladder_notes.join(' '));
+    const s = section('ladder', 'Step by step to the noise', 'What each model leaves. The lower the better, and nothing is gained below the noise; a model that falls on its own touches and not on those left out only learns by heart.');
+    const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Touches left out are here all that the model itself can predict, each index visit left out in turn; the cards of the candidates count only those that the model without the candidate can predict, too, and weigh the scatter of the visits: their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
     plot(div, () => P.ladder(div, view));
     s.append(f);
   }
 
   // ---------------------------------------------------------------- residuals
   const select = (label, value, change) => {
-    const el = make('select', { 'aria-label': label }, ...view.ladder.map((r, k) => make('option', { value: k, selected: k === value }, `${k}: ${r.label}`)));
+    const el = make('select.noprint', { 'aria-label': label }, ...view.ladder.map((r, k) => make('option', { value: k, selected: k === value }, `${k}: ${r.label}`)));
     el.addEventListener('change', () => change(Number(el.value)));
     return el;
   };
@@ -186,8 +191,12 @@
       });
       return b;
     });
-    s.append(make('div.controls', {}, make('span.noprint', {}, 'before: '), select('model shown as before', state.from, (v) => { state.from = v; again(); }),
-      make('span.noprint', {}, 'after: '), select('model shown as after', state.to, (v) => { state.to = v; again(); }), ...toggles));
+    const chosen = make('p.onlyprint.muted', {});
+    const words = () => { chosen.textContent = `before: ${view.ladder[state.from].label}; after: ${view.ladder[state.to].label}`; };
+    words();
+    const change = (key) => (v) => { state[key] = v; words(); again(); };
+    s.append(make('div.controls', {}, make('span.noprint', {}, 'before: '), select('model shown as before', state.from, change('from')),
+      make('span.noprint', {}, 'after: '), select('model shown as after', state.to, change('to')), ...toggles), chosen);
     const grid = make('div.grid');
     for (const v of [...view.variables].sort((a, b) => (b.share ?? -1) - (a.share ?? -1))) {
       const share = v.share !== null && d.verdict !== 'adequate' && v.share >= 0.05 ? `${Math.round(100 * v.share)} % of what the model does not explain goes with this` : '';
@@ -197,17 +206,17 @@
       plot(div, job);
       grid.append(f);
     }
-    s.append(grid);
-    s.append(make('p', {}, view.comparison_says));
+    // before the plots: on paper it would stand alone on a page behind them
+    s.append(make('p', {}, view.comparison_says), grid);
   }
 
   // ---------------------------------------------------------------- the machine
   {
-    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch points the way the touched face seems to stand off.', true);
+    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch points the way the touched face seems to stand off.');
     const [f, div] = figure('machine-plot', '', true);
     const scale = make('figcaption', {});
     const job = () => P.machine(div, view, state).then((parts) => {
-      scale.textContent = `Arrows are drawn ${parts.magnification.toLocaleString('en')} times as long as the misses are; the thick bar is ${digits(parts.scale.um, 1)} µm. ${view.machine.says}.`;
+      scale.textContent = `Misses of the model: ${view.ladder[state.rung].label}. Arrows are drawn ${parts.magnification.toLocaleString('en')} times as long as the misses are; the thick bar is ${digits(parts.scale.um, 1)} µm. ${view.machine.says}.`;
     });
     plot(div, job);
     f.append(scale);
@@ -216,16 +225,27 @@
 
   // ---------------------------------------------------------------- what is not told
   {
-    const s = section('doubt', 'What this data cannot tell', '', true);
+    const s = section('doubt', 'What this data cannot tell', '');
     const list = make('ul.plain');
-    for (const u of view.undetermined) list.append(make('li', {}, u.says, u.parted_by?.length ? ` ${u.parted_by.length ? `It would take: ${u.parted_by.join('; or ')}.` : ''}` : ''));
-    for (const w of view.weak) list.append(make('li', {}, w.says));
-    if (d.not_seen.length) list.append(make('li', {}, `These effects leave no trace in these touches, so nobody can say whether the machine has them: ${d.not_seen.map((n) => d.effects[n]?.name ?? n).join(', ')}.`));
+    const effectName = (n) => d.effects[n]?.name ?? n;
+    // what is said of several alike is said once
+    const NO_TRACE = ' leaves no trace in these touches';
+    const untold = view.undetermined.map((u) => ({ says: u.says.split('; what parts them:')[0], takes: u.parted_by?.length ? u.parted_by.join('; or ') : '' }));
+    const silent = untold.filter((u) => u.says.includes(NO_TRACE));
+    const many = silent.length > 2 ? [{ says: `These leave no trace in these touches, so that their values are not known and stand at their start by convention: ${silent.map((u) => u.says.split(NO_TRACE)[0]).join('; ')}.`, takes: [...new Set(silent.map((u) => u.takes).filter(Boolean))].join('; or ') }] : silent;
+    const said = new Set();
+    const lines = [...untold.filter((u) => !silent.includes(u)), ...many].map((u) => {
+      const takes = !u.takes ? '' : said.has(u.takes) ? ' It would take the same.' : ` It would take: ${u.takes}.`;
+      if (u.takes) said.add(u.takes);
+      return u.says.replace(/\.?$/, '.') + takes;
+    });
+    for (const text of new Set([...lines, ...view.weak.map((w) => w.says)])) list.append(make('li', {}, text));
+    if (d.not_seen.length) list.append(make('li', {}, `These effects leave no trace in these touches, so nobody can say whether the machine has them: ${d.not_seen.map(effectName).join(', ')}.`));
     const seen = [...d.power].sort((a, b) => b.minimal_detectable_um - a.minimal_detectable_um).slice(0, 8);
-    if (seen.length) list.append(make('li', {}, `Effects that would have been found only from this size on: ${seen.map((q) => `${q.effect} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));
+    if (seen.length) list.append(make('li', {}, `Effects that would have been found only from this size on: ${seen.map((q) => `${effectName(q.effect)} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));
     s.append(list.children.length ? list : make('p', {}, 'Every result of the model is told by these touches.'));
     if (view.correlation.names.length > 1) {
-      const [f, div] = figure('correlation-plot', 'How the results hang together: near 0 they are told apart, near 1 or −1 only their difference or sum is known well.');
+      const [f, div] = figure('correlation-plot', proposed ? 'How the results of the model now (without what is proposed) hang together: near 0 they are told apart, near 1 or −1 only their difference or sum is known well.' : 'How the results of the model hang together: near 0 they are told apart, near 1 or −1 only their difference or sum is known well.');
       div.style.height = `${Math.min(640, 160 + 34 * view.correlation.names.length)}px`;
       f.style.maxWidth = '760px';
       plot(div, () => P.correlation(div, view));
@@ -241,13 +261,19 @@
     if (c.refused) s.append(make('p.warn', {}, c.refused));
     const table = (name, head, rows, from) => make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': name }, make('table', {}, make('thead', {}, make('tr', {}, ...head.map((h, k) => make(k >= from[0] && k <= from[1] ? 'th.n' : 'th', { scope: 'col' }, h)))),
       make('tbody', {}, ...rows.map((r) => make('tr', {}, ...r.map((v, k) => make(k >= from[0] && k <= from[1] ? 'td.n' : 'td', {}, v)))))));
+    const component = (q) => {
+      if (q.place === 'zero') return 'where its zero is';
+      const along = q.dof.at(-1).toUpperCase();
+      const turns = q.place === 'after' ? `turns with ${q.axis}` : `does not turn with ${q.axis}`;
+      return `${q.dof.startsWith('d') ? `place in ${along}` : `tilt about ${along}`}, ${turns}`;
+    };
     const fixed = (v) => v.toFixed(5).replace('-', '−');
-    if (c.terms.length) s.append(table('what the control is given', ['carried', 'axis', 'component', 'active before', 'found', 'given to the control', 'std. unc.', 'unit'], c.terms.map((q) => [q.parameter, q.axis, `${q.place} ${q.dof}`, fixed(q.active_before), fixed(q.identified), fixed(q.value), digits(q.sigma, 2), q.unit]), [3, 6]));
+    if (c.terms.length) s.append(table('what the control is given', ['carried', 'axis', 'component', 'active before', 'found', 'given to the control', 'std. unc.', 'unit'], c.terms.map((q) => [q.parameter, q.axis, component(q), fixed(q.active_before), fixed(q.identified), fixed(q.value), digits(q.sigma, 2), q.unit]), [3, 6]));
     for (const q of c.shapes) s.append(make('p', {}, `${q.parameter} (${q.effect}): into the table of axis ${q.axis}.`));
     if (c.tool_length_mm !== null) s.append(make('p', {}, `Tool table: the tool is ${digits(c.tool_length_mm)} mm longer than was assumed.`));
     s.append(make('h3', {}, 'What it leaves'));
     s.append(c.left.length ? table('what the compensation leaves', ['not carried', 'effect', 'value', 'unit', `leaves at ${t.radius_mm} mm, µm`, 'why'], c.left.map((q) => [q.parameter, q.effect, digits(q.value), q.unit, q.left_um === null ? '–' : digits(q.left_um), q.why]), [2, 2])
-      : make('p', {}, `Nothing of what was found, whatever the control can carry: axiscal export says what its tables leave. The touches are then missed by about ${digits(view.ladder[e.after].rms_um)} µm, and the noise is ${digits(e.noise_um)} µm.`));
+      : make('p', {}, `Nothing of what was found, whatever the control can carry: axiscal export says what its tables leave.${proposed ? '' : ` The touches are then missed by about ${digits(view.ladder[e.after].rms_um)} µm, and the noise is ${digits(e.noise_um)} µm.`}`));
   }
 
   // ---------------------------------------------------------------- every touch
@@ -258,17 +284,20 @@
     const rows = q.id.map((_, i) => i).map((i) => ({ i, run: q.run[i], id: q.id[i], stage: q.words[q.stage[i]], block: q.words[q.block[i]], face: q.words[q.face[i]], ...Object.fromEntries(letters.map((l) => [l, q.axes[l][i]])), time: q.time_h[i],
       before: q.residual_um[e.before][i], after: q.residual_um[e.after][i], std: q.standardised[i], why: q.rejected[i] ?? '', source: P.source(view, i) }));
     for (const u of view.unusable) rows.push({ i: -1, run: u.run, id: u.id, stage: '', block: '', face: '', time: null, before: null, after: null, std: null, why: u.reason, source: `${view.study.runs[u.run - 1]?.log ?? 'log'}:${u.line}` });
-    const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? 'deg' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ['after', 'after, µm', 1], ['std', 'in noise units', 1], ['why', 'not used because'], ['source', 'source line']];
+    // of the study's own model, whose miss stands beside it
+    const unusual = ['std', 'how unusual', 1, `The miss ${proposed ? 'before' : 'after'}, over the standard deviation that the other touches let expect (studentised): beyond 4 chance alone seldom makes it`];
+    const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? 'deg' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ...(proposed ? [unusual] : []), ['after', 'after, µm', 1], ...(proposed ? [] : [unusual]), ['why', 'not used because'], ['source', 'source line']];
     const SIZE = 50;
     const sort = { by: 'after', down: true };
     let filter = '';
     let page = 0;
     const body = make('tbody');
     const count = make('span', { role: 'status' });
+    const printed = make('p.onlyprint.muted', {});
     const previous = make('button', { type: 'button', onclick: () => { page -= 1; show(); } }, 'previous');
     const next = make('button', { type: 'button', onclick: () => { page += 1; show(); } }, 'next');
-    const heads = columns.map(([key, title, number]) => {
-      const th = make(number ? 'th.n' : 'th', { scope: 'col' }, make('button', { type: 'button', onclick: () => {
+    const heads = columns.map(([key, title, number, says]) => {
+      const th = make(number ? 'th.n' : 'th', { scope: 'col', title: says }, make('button', { type: 'button', onclick: () => {
         sort.down = sort.by === key ? !sort.down : Boolean(number);
         sort.by = key;
         page = 0;
@@ -298,6 +327,8 @@
       const pages = Math.max(1, Math.ceil(kept.length / SIZE));
       page = Math.min(Math.max(0, page), pages - 1);
       body.replaceChildren(...kept.slice(page * SIZE, (page + 1) * SIZE).map((r) => make(r.why ? 'tr.off' : 'tr', {}, ...columns.map(([k, , number]) => make(number ? 'td.n' : 'td', {}, text(k, r[k]))))));
+      const ways = ['before', 'after', 'std'].includes(sort.by) && sort.down;
+      printed.textContent = kept.length > SIZE ? `${ways && page === 0 ? `The ${SIZE} largest` : `${Math.min(SIZE, kept.length - page * SIZE)}`} of ${rows.length} touches; all of them are in the page on the screen.` : '';
       count.textContent = `${kept.length} of ${rows.length} touches, page ${page + 1} of ${pages}`;
       previous.disabled = page === 0;
       next.disabled = page === pages - 1;
@@ -309,7 +340,7 @@
     }
     const input = make('input', { type: 'search', id: 'filter', placeholder: 'block, face, line …' });
     input.addEventListener('input', () => { filter = input.value; page = 0; show(); });
-    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest misses first; the source line is the touch's place in the log.`),
+    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest misses first; the source line is the touch's place in the log. How unusual: the miss ${proposed ? 'before' : 'after'} over what the other touches let expect; beyond 4 chance alone seldom makes it.`), printed,
       make('div.controls.noprint', {}, make('label', { for: 'filter' }, 'show only'), input, previous, next, count),
       make('div.scroll', { id: 'touches-table', tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
     show();

@@ -13,6 +13,7 @@ mod gathered;
 pub mod gross;
 mod missed;
 pub mod named;
+mod nothing;
 pub mod open;
 pub mod places;
 mod rivals;
@@ -223,6 +224,9 @@ fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f6
 /// When a refit is impossible.
 pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let Subject { machine, catalogue, fit, .. } = subject;
+    if fit.n_used() == 0 {
+        return Ok(nothing::used(subject, options));
+    }
     let features = features::features(fit, machine);
     let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
     let named = Named::of(fit, &evidence, machine, catalogue);

@@ -4,6 +4,7 @@
 //! and without `<`, `>` and `&` where it stands in the data, so that nothing in it can end the script element.
 
 use crate::diag::{Failure, Result};
+use crate::diagnose::Verdict;
 use crate::view::Level;
 use crate::view::View;
 
@@ -39,13 +40,21 @@ pub fn page(view: &View) -> Result<String> {
         Level::Unknown => ("unknown", "? Not told yet"),
     };
     let title = format!("{} – {}", view.machine.name, view.study.name);
-    let parts: [(&str, &str); 10] = [
+    // where the sentence says the figures, they are not said twice
+    let detail = match view.diagnosis.answer.verdict {
+        Verdict::MissingEffect | Verdict::Unexplained if view.headline.detail != view.headline.sentence => {
+            view.headline.detail.as_str()
+        }
+        _ => "",
+    };
+    let parts: [(&str, &str); 11] = [
         ("title", &text(&title)),
         ("style", STYLE),
         ("about", &text(&about)),
         ("level", level),
         ("word", word),
         ("sentence", &text(&view.headline.sentence)),
+        ("detail", &text(detail)),
         ("view", &data),
         ("plotly", PLOTLY),
         ("plots", PLOTS),

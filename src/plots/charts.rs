@@ -3,8 +3,10 @@
 use super::chart::{Axis, Chart, Colour, Look, Mark, Point, Shape};
 use super::machine;
 use crate::compare::rungs::Kind;
+use crate::diagnose::Verdict;
 use crate::fit::outcome::Status;
 use crate::report::fit::significant;
+use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::view::View;
 use crate::view::record::{Judgement, Variable};
 
@@ -125,9 +127,15 @@ fn results(view: &View) -> Chart {
                 .map(|p| p.at_radius_um.unwrap_or(0.0).abs() + p.at_radius_expanded_um.unwrap_or(0.0))
                 .chain(shown.iter().filter_map(|p| p.tolerance_um)),
         );
-    let names: Vec<String> = shown.iter().map(|p| format!("{} {}", p.says, p.name)).collect();
+    let names: Vec<String> = shown.iter().map(|p| format!("{} ({})", p.says, p.name)).collect();
     let x = Axis::new(format!("error at {} mm, µm (bar: 95 %)", view.tolerance.radius_mm), (-reach, reach));
-    let mut c = chart("results", "The machine's errors against the tolerance", x, Axis::named(names));
+    let partly = view.diagnosis.answer.verdict != Verdict::Adequate && view.proposed.is_empty();
+    let title = if partly {
+        "The machine's errors against the tolerance: these values hold part of what is missing"
+    } else {
+        "The machine's errors against the tolerance"
+    };
+    let mut c = chart("results", title, x, Axis::named(names));
     c.downwards = true;
     c.aspect = (0.22 + 0.032 * shown.len() as f64).clamp(0.4, 1.1);
     for (i, p) in shown.iter().enumerate() {
@@ -329,6 +337,17 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
     c
 }
 
+/// How a candidate stands to the test with all of them counted in.
+fn standing(k: &crate::diagnose::answer::Candidate) -> &'static str {
+    if k.proposed {
+        "proposed"
+    } else if k.p_adjusted < FAMILY_LEVEL {
+        "explains part"
+    } else {
+        "no more than chance"
+    }
+}
+
 fn candidates(view: &View) -> Chart {
     let d = &view.diagnosis.answer;
     let top = 1.12
@@ -340,22 +359,31 @@ fn candidates(view: &View) -> Chart {
     let mut c = chart("candidates", "Error left with each candidate", Axis::new("error left (RMS), µm", (0.0, top)), y);
     c.downwards = true;
     c.aspect = 0.45;
-    for (proposed, name) in [(true, "proposed"), (false, "not shown by this data")] {
+    let standings = [
+        ("proposed", Shape::Circle, true),
+        ("explains part", Shape::Circle, false),
+        ("no more than chance", Shape::Square, false),
+    ];
+    for (name, shape, filled) in standings {
         let of = |(i, k): (usize, &crate::diagnose::answer::Candidate)| {
             let note = if k.same_as.is_empty() {
                 String::new()
             } else {
                 format!("cannot be told from {}", k.same_as.join(" "))
             };
-            (k.proposed == proposed).then_some(Point { x: k.rms_after_um, y: i as f64, note })
+            (standing(k) == name).then_some(Point { x: k.rms_after_um, y: i as f64, note })
         };
         let points: Vec<Point> = d.candidates.iter().enumerate().filter_map(of).collect();
         if !points.is_empty() {
-            c.marks.push(Mark::Points { series: name.to_owned(), look: look(BLUE, Shape::Circle, proposed), points });
+            c.marks.push(Mark::Points { series: name.to_owned(), look: look(BLUE, shape, filled), points });
         }
     }
-    let held: Vec<Point> =
-        d.candidates.iter().enumerate().filter_map(|(i, k)| Some(point(k.held_out_after_um?, i as f64))).collect();
+    let held: Vec<Point> = d
+        .candidates
+        .iter()
+        .enumerate()
+        .filter_map(|(i, k)| Some(point(k.held_out_after_um.filter(|h| *h > 0.0)?, i as f64)))
+        .collect();
     c.marks.push(Mark::Points {
         series: "touches left out".to_owned(),
         look: look(RED, Shape::Diamond, false),

@@ -84,7 +84,8 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     let mut t = table(&["candidate", "p (Holm)", "error um", "held out um", "share"]);
     for c in &d.candidates {
         let held = match (c.held_out_before_um, c.held_out_after_um) {
-            (Some(before), Some(after)) => {
+            // nothing could be predicted: 0 against 0 says nothing
+            (Some(before), Some(after)) if before > 0.0 || after > 0.0 => {
                 let se = c.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
                 format!("{} > {}{se}", significant(before), significant(after))
             }
@@ -147,7 +148,14 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
 
 /// A p-value.
 pub(super) fn probability(p: f64) -> String {
-    if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
+    // what is smaller is no number of the computer's any more
+    if p < 1e-300 {
+        "< 1e-300".to_owned()
+    } else if p < 1e-3 {
+        format!("{p:.0e}")
+    } else {
+        format!("{p:.3}")
+    }
 }
 
 /// A candidate in a cell: never one name where these touches cannot tell it from others.

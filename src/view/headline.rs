@@ -3,9 +3,10 @@
 use super::Material;
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
-use crate::diagnose::answer::Candidate;
+use crate::diagnose::answer::{Candidate, Diagnosis};
 use crate::fit::outcome::Status;
 use crate::model::catalogue::Place;
+use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::units::um_from_mm;
 use serde::Serialize;
 
@@ -30,23 +31,6 @@ pub struct Headline {
     pub sentence: String,
     /// What stands behind it, in a second one.
     pub detail: String,
-}
-
-/// A thing to do.
-#[derive(Debug, Clone, Serialize)]
-pub struct Next {
-    /// What to do.
-    pub what: String,
-    /// How, or why.
-    pub how: String,
-    /// What to type; empty where nothing is typed.
-    pub command: String,
-}
-
-impl Next {
-    fn new(what: impl Into<String>, how: impl Into<String>, command: impl Into<String>) -> Self {
-        Self { what: what.into(), how: how.into(), command: command.into() }
-    }
 }
 
 /// Three digits that a person reads, µm.
@@ -77,7 +61,8 @@ fn largest(parameters: &[ParameterRecord], judgement: Judgement) -> Option<&Para
     those.max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
 }
 
-fn size(p: &ParameterRecord, m: &Material) -> String {
+/// How large a result is, as a length where it does one at the tolerance's radius.
+pub(super) fn size(p: &ParameterRecord, m: &Material) -> String {
     let own = || format!("{} {}", crate::report::fit::digits(p.value, p.sigma), p.unit);
     match (p.at_radius_um, p.unit.as_str()) {
         (Some(size), "mm" | "um") => um(size),
@@ -90,12 +75,14 @@ fn size(p: &ParameterRecord, m: &Material) -> String {
 pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> Headline {
     let d = m.diagnosis;
     let first = d.candidates.first().filter(|c| c.proposed || d.verdict == Verdict::MissingEffect);
+    let open = untried(d);
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
         // a gross mistake that made touches miss: there is nothing to compare its error with
         Verdict::MissingEffect if d.most_missed => (Level::Act, d.says.clone()),
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
         Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
+        Verdict::Unexplained if !open.is_empty() => (Level::Act, one_of(m, &open)),
         Verdict::Unexplained => (
             Level::Act,
             format!(
@@ -115,21 +102,88 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     };
     let detail = match d.verdict {
         Verdict::TooLittleData => String::new(),
+        Verdict::MissingEffect if d.most_missed => String::new(),
+        Verdict::MissingEffect => first.map_or_else(|| d.says.clone(), |c| falls(m, c)),
+        Verdict::Unexplained if !d.faint && !open.is_empty() => format!(
+            "The touches miss the model by {}, and the probe's noise is {}. No touches are left over to try one of them on.",
+            um(d.rms_um),
+            um(d.noise_um)
+        ),
+        Verdict::Unexplained if !d.faint => {
+            d.depends.first().map_or_else(String::new, |w| format!("{}.", super::record::in_words(&w.says)))
+        }
         _ => d.says.clone(),
     };
     // the rooms write um in plain letters
-    Headline { level, sentence: sentence.replace(" um ", " µm "), detail }
+    let plain = |text: String| text.replace(" um ", " µm ");
+    Headline { level, sentence: plain(sentence), detail: plain(detail) }
 }
 
-fn missing(m: &Material, c: &Candidate) -> String {
-    let name = |id: &str| m.catalogue.get(id, m.machine).map_or_else(|| id.to_owned(), |e| e.name.clone());
+/// Could a candidate be tried on touches that had no part in choosing it? With few poses none can be predicted.
+fn tried(c: &Candidate) -> bool {
+    match (c.held_out_before_um, c.held_out_after_um) {
+        (Some(before), Some(after)) => before.is_finite() && after.is_finite() && (before > 0.0 || after > 0.0),
+        _ => false,
+    }
+}
+
+/// The effects that pass the test with all of them counted in, where nothing is proposed only because these poses leave
+/// no touches to try the choice on: ids, the first one first.
+pub(super) fn untried(d: &Diagnosis) -> Vec<&str> {
+    let passes = |c: &&Candidate| c.p_adjusted < FAMILY_LEVEL;
+    let leads = d.candidates.first().is_some_and(|c| passes(&c) && !c.proposed && !tried(c));
+    if d.verdict != Verdict::Unexplained || !leads {
+        return Vec::new();
+    }
+    let each = d.candidates.iter().filter(passes).filter(|c| !tried(c));
+    let mut out: Vec<&str> = Vec::new();
+    for id in each.flat_map(|c| std::iter::once(&c.effect).chain(&c.same_as)) {
+        if !out.contains(&id.as_str()) {
+            out.push(id);
+        }
+    }
+    out
+}
+
+/// The name of an effect.
+pub(super) fn named(m: &Material, id: &str) -> String {
+    m.catalogue.get(id, m.machine).map_or_else(|| id.to_owned(), |e| e.name.clone())
+}
+
+/// Several effects would do, and nothing tells which.
+fn one_of(m: &Material, open: &[&str]) -> String {
+    match open {
+        [one] => format!(
+            "Something is missing in the model, and one known effect explains it ({}), but these poses cannot tell whether it is the right one.",
+            named(m, one)
+        ),
+        _ => format!(
+            "Something is missing in the model: one of {} known effects explains it; these poses cannot tell which.",
+            open.len()
+        ),
+    }
+}
+
+/// What the missing effect does to the touches, in figures.
+fn falls(m: &Material, c: &Candidate) -> String {
     let d = m.diagnosis;
-    let falls = format!(
-        "The touches miss by {}, and by {} once it is in the model; the probe's noise is {}.",
+    let moves = if is_one_size(c) { None } else { most_moved_um(m) };
+    let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
+    let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
+    format!(
+        "The touches miss by {}, and by {} once it is in the model; the probe's noise is {}.{moves}{rest}",
         um(d.rms_um),
         um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         um(d.noise_um)
-    );
+    )
+}
+
+/// Does a number or two say how large it is? Where not, the touches do.
+fn is_one_size(c: &Candidate) -> bool {
+    c.parameters.iter().any(|p| p.sigma.is_some()) && c.parameters.len() <= 2 && c.same_as.is_empty()
+}
+
+fn missing(m: &Material, c: &Candidate) -> String {
     let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
     let sizes: Vec<String> = c
         .parameters
@@ -141,19 +195,14 @@ fn missing(m: &Material, c: &Candidate) -> String {
             None => format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit),
         })
         .collect();
-    let one = !sizes.is_empty() && c.parameters.len() <= 2 && c.same_as.is_empty();
-    let size = if one { format!(" ({})", sizes.join(", ")) } else { String::new() };
-    // where no single number says how large it is, the touches do
-    let moves = if one { None } else { most_moved_um(m) };
-    let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
+    let size = if is_one_size(c) { format!(" ({})", sizes.join(", ")) } else { String::new() };
     let what = match &c.same_as[..] {
         [] => format!("{}{size}", c.name),
-        [one] => format!("{}, or {}: these touches cannot tell which", c.name, name(one)),
+        [one] => format!("{}, or {}: these touches cannot tell which", c.name, named(m, one)),
         several => format!("{}, or one of {} others that these touches cannot tell from it", c.name, several.len()),
     };
-    let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
     let (whose, has) = whose(m, &c.effect);
-    format!("{whose} {has} an error that is not in the model yet: {what}. {falls}{moves}{rest}")
+    format!("{whose} {has} an error that is not in the model yet: {what}.")
 }
 
 /// The most that the proposed effect takes away from a touch that both fits use, µm.
@@ -239,188 +288,86 @@ fn all(n: usize) -> String {
     }
 }
 
-fn capital(text: &str) -> String {
+/// With a capital letter.
+pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |c| c.to_uppercase().collect::<String>() + letters.as_str())
 }
 
-/// What to do, the first thing first.
-pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation) -> Vec<Next> {
-    let mut out = Vec::new();
-    let study = m.study;
-    let controller = m.runs.iter().map(|r| r.controller).find(|c| *c != "csv").unwrap_or("YOUR-CONTROLLER");
-    let plan_next = format!("axiscal plan-next {study} --controller {controller} --out next");
-    let d = m.diagnosis;
-    match d.verdict {
-        Verdict::TooLittleData => out.push(Next::new(
-            "Measure more touches",
-            "A richer program sees what this one cannot. First make sure that the log belongs to the plan and that the blocks stand where it says.",
-            format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
-        )),
-        Verdict::MissingEffect => {
-            if let Some(first) = d.candidates.first() {
-                found(m, first, &plan_next, &mut out);
-            }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::open::Open;
+
+    fn candidate(effect: &str, p_adjusted: f64, held_out: Option<f64>, same_as: &[&str]) -> Candidate {
+        Candidate {
+            effect: effect.into(),
+            name: effect.into(),
+            p: p_adjusted,
+            p_adjusted,
+            proposed: false,
+            rms_after_um: 1.0,
+            held_out_before_um: held_out,
+            held_out_after_um: held_out,
+            held_out_se_um: None,
+            nested: true,
+            moves_um: None,
+            moves_sigma_um: None,
+            parameters: Vec::new(),
+            not_told: Vec::new(),
+            same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
+            tell_apart: String::new(),
+            says: String::new(),
+            look: String::new(),
+            share: 0.9,
+            plausible: true,
+            weakens: Vec::new(),
+            remains: None,
         }
-        Verdict::Unexplained if d.faint => out.push(Next::new(
-            "Measure more touches",
-            "Repeats and further poses say whether the weak pattern is there at all.",
-            plan_next.clone(),
-        )),
-        Verdict::Unexplained => unexplained(m, &mut out),
-        Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
     }
-    if d.verdict != Verdict::TooLittleData
-        && !m.fit.outcome.undetermined.is_empty()
-        && (d.verdict == Verdict::Adequate || d.faint)
-    {
-        let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
-        let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);
-        out.push(Next::new("Measure what is not told yet", capital(&how), plan_next));
-    }
-    odd_touches(m, &mut out);
-    out
-}
 
-fn found(m: &Material, first: &Candidate, plan_next: &str, out: &mut Vec<Next>) {
-    if m.diagnosis.most_missed {
-        out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
-        return;
+    fn diagnosis(candidates: Vec<Candidate>) -> Diagnosis {
+        Diagnosis {
+            format: crate::diagnose::answer::FORMAT,
+            verdict: Verdict::Unexplained,
+            says: String::new(),
+            faint: false,
+            most_missed: false,
+            visit_source: "none".into(),
+            noise_says: String::new(),
+            rms_um: 5.0,
+            noise_um: 1.0,
+            visit_um: 0.0,
+            lack_of_fit_p: 0.0,
+            depends: Vec::new(),
+            shape: None,
+            candidates,
+            gross: Vec::new(),
+            outliers: Vec::new(),
+            tested: 50,
+            power: Vec::new(),
+            not_seen: Vec::new(),
+            open: Open::default(),
+            warnings: Vec::new(),
+        }
     }
-    let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
-    out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
-    if !first.same_as.is_empty() {
-        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
-    }
-    out.push(Next::new(
-        "Put it into the model",
-        "The error falls, the other values become right, and this page says what comes next.",
-        format!("axiscal add {} {}", m.study, first.effect),
-    ));
-    let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
-    if !mends.is_empty() {
-        out.push(Next::new("What mends it", format!("{one_of_several}{mends}"), ""));
-    }
-}
 
-fn unexplained(m: &Material, out: &mut Vec<Next>) {
-    let d = m.diagnosis;
-    if let Some(gross) = d.gross.first() {
-        out.push(Next::new("Check for a gross mistake", gross.says.clone(), ""));
+    #[test]
+    fn what_cannot_be_tried_is_not_unexplained() {
+        // no figure, no number, 0 against 0: no touch could be predicted without its visit
+        for held_out in [None, Some(f64::NAN), Some(0.0)] {
+            let all = vec![
+                candidate("a", 1e-9, held_out, &["b", "c"]),
+                candidate("d", 1e-3, held_out, &["b"]),
+                candidate("e", 0.4, held_out, &[]),
+            ];
+            let mut d = diagnosis(all);
+            assert_eq!(untried(&d), ["a", "b", "c", "d"]);
+            d.verdict = Verdict::MissingEffect;
+            assert!(untried(&d).is_empty());
+        }
+        // tried and not borne out: no known effect explains it
+        assert!(untried(&diagnosis(vec![candidate("a", 1e-9, Some(2.0), &[])])).is_empty());
+        assert!(untried(&diagnosis(vec![candidate("a", 0.2, None, &[])])).is_empty());
     }
-    if let Some(shape) = &d.shape {
-        let depends = d.depends.first().map_or("", |w| w.says.as_str());
-        let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
-        out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
-    }
-    out.push(Next::new(
-        "Write down its formula",
-        "A starting formula for what no known effect explains; then put it into the model.",
-        format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
-    ));
-}
-
-fn settled(
-    m: &Material,
-    headline: &Headline,
-    parameters: &[ParameterRecord],
-    c: &Compensation,
-    controller: &str,
-    out: &mut Vec<Next>,
-) {
-    if let Some(why) = &c.refused {
-        out.push(Next::new(
-            "Do not compensate yet",
-            format!(
-                "{}. Such values are faults of the set-up: look for a wrong block, sense or length first.",
-                capital(why)
-            ),
-            "",
-        ));
-        return;
-    }
-    let beyond: Vec<&ParameterRecord> = parameters.iter().filter(|p| p.judgement == Judgement::Beyond).collect();
-    // what the probe or the blocks do is no error of the machine, and no table holds it
-    let carried = |p: &&&ParameterRecord| {
-        let left = c.left.iter().any(|l| l.known && crate::symbols::same(&l.parameter, &p.name));
-        let term = c.terms.iter().any(|t| t.effect.split('+').any(|e| e == p.effect));
-        let shape = c.shapes.iter().any(|s| s.parameter == p.name);
-        !left && (term || shape || (c.tool_length_mm.is_some() && p.effect == "tool-length"))
-    };
-    if beyond.iter().any(|p| carried(&p)) {
-        out.push(Next::new(
-            "Load the compensation",
-            "The values go into the control as its own tables; the README beside them says how, and what must be set again.",
-            format!("axiscal export {} --controller {controller} --out compensation", m.study),
-        ));
-        out.push(Next::new(
-            "Measure again and compare",
-            "Run the same program with the compensation loaded; the two studies side by side say whether it works.",
-            format!("axiscal verify {} again.toml", m.study),
-        ));
-    }
-    for p in beyond.iter().filter(|p| !carried(p)).take(2) {
-        out.push(Next::new(format!("Mend {}", p.says), p.mends.clone(), ""));
-    }
-    if headline.level == Level::Good {
-        out.push(Next::new(
-            "Nothing needs to be done",
-            "Keep this page: the next measurement can be held against it.",
-            format!("axiscal verify {} LATER-STUDY.toml", m.study),
-        ));
-    }
-    if beyond.is_empty() && parameters.iter().any(|p| p.judgement == Judgement::Open) {
-        out.push(Next::new(
-            "Measure more touches",
-            "The uncertainty is larger than what the tolerance leaves: repeats and further poses make it smaller.",
-            format!("axiscal plan-next {} --controller {controller} --out next", m.study),
-        ));
-    }
-}
-
-/// Touches that do not belong to the rest are a finding of their own.
-fn odd_touches(m: &Material, out: &mut Vec<Next>) {
-    // touches that fit once the missing effect is in the model are no fault of theirs
-    let back = |i: usize| {
-        let o = &m.fit.data.observations[i];
-        m.diagnosis.outliers.iter().any(|x| x.comes_back && x.id == o.id && x.run == o.run + 1)
-    };
-    let odd: Vec<(&usize, &String)> =
-        m.fit.rejected.iter().filter(|(i, reason)| !reason.starts_with("taken out") && !back(**i)).collect();
-    if odd.is_empty() {
-        return;
-    }
-    let named: Vec<String> = odd
-        .iter()
-        .take(4)
-        .map(|(i, _)| {
-            let o = &m.fit.data.observations[**i];
-            let origin = &m.fit.data.origins[**i];
-            let file = m.runs.get(o.run).map_or("log", |r| r.log);
-            format!(
-                "touch {} ({} {}, {file}:{}, {} off)",
-                o.id,
-                origin.block,
-                origin.face,
-                origin.line,
-                um(um_from_mm(m.fit.residual_mm[**i]))
-            )
-        })
-        .collect();
-    let more = odd.len().saturating_sub(named.len());
-    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-    out.push(Next::new(
-        format!(
-            "Look at {} {} that do not belong to the rest",
-            odd.len(),
-            if odd.len() == 1 { "touch" } else { "touches" }
-        )
-        .replace("1 touch that do not belong", "1 touch that does not belong"),
-        format!(
-            "Chips, dirt, a false trigger? {}{rest}. {} not used.",
-            named.join(", "),
-            if odd.len() == 1 { "It is" } else { "They are" }
-        ),
-        "",
-    ));
 }

@@ -6,12 +6,14 @@
 
 mod headline;
 mod machine;
+mod next;
 mod parameters;
 pub mod record;
 mod touches;
 
-pub use headline::{Headline, Level, Next};
-pub use parameters::correlation;
+pub use headline::{Headline, Level};
+pub use next::Next;
+pub use parameters::{correlation, results};
 pub use record::View;
 
 use crate::compare::Comparison;
@@ -80,7 +82,7 @@ pub fn gather(m: &Material) -> View {
     let parameters = parameters::parameters(m, fit);
     let compensation = parameters::compensation(m);
     let headline = headline::headline(m, &parameters, &compensation);
-    let next = headline::next(m, &headline, &parameters, &compensation);
+    let next = next::next(m, &headline, &parameters, &compensation);
     let at = |kind: Kind| m.ladder.rungs.iter().position(|r| r.kind == kind);
     let (before, after) = match (at(Kind::Current), at(Kind::Proposed)) {
         (Some(current), Some(proposed)) => (current, proposed),
@@ -131,7 +133,7 @@ pub fn gather(m: &Material) -> View {
         ladder_notes: m.ladder.notes.clone(),
         diagnosis: record::diagnosis(m),
         splits: m.comparison.splits.clone(),
-        comparison_says: m.comparison.says.clone(),
+        comparison_says: record::in_words(&m.comparison.says),
         correlation: parameters::correlation(fit),
         undetermined: fit.outcome.undetermined.clone(),
         weak: fit.outcome.weak.clone(),

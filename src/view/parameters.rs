@@ -4,18 +4,28 @@ use super::Material;
 use super::record::{Compensation, Correlation, Judgement, LeftRecord, ParameterRecord, ShapeRecord};
 use crate::fit::outcome::{Parameter, Status};
 use crate::fit::{Fit, effects_of, statement, uncertainty};
-use crate::model::catalogue::Effect;
+use crate::machine::Machine;
+use crate::model::catalogue::{Catalogue, Effect};
+use crate::study::tolerance::Tolerance;
 use crate::tables::correction::left_um;
 
-/// The results: everything that is no set-up of a block and no other unknown of the measurement.
+/// The results of a fit of the study's touches.
 pub(super) fn parameters(m: &Material, fit: &Fit) -> Vec<ParameterRecord> {
-    let effects = effects_of(&fit.outcome.effects, m.catalogue, m.machine).unwrap_or_default();
-    let each = fit.outcome.parameters.iter().zip(&fit.model.unknowns);
-    each.filter(|(_, u)| !u.nuisance).map(|(p, u)| record(m, p, &statement::meaning(u, &effects), &effects)).collect()
+    results(fit, m.catalogue, m.machine, m.tolerance)
 }
 
-fn record(m: &Material, p: &Parameter, meaning: &str, effects: &[&Effect]) -> ParameterRecord {
-    let t = m.tolerance;
+/// The results of a fit in words, against a tolerance: everything that is no set-up of a block and no other unknown of
+/// the measurement.
+#[must_use]
+pub fn results(fit: &Fit, catalogue: &Catalogue, machine: &Machine, tolerance: &Tolerance) -> Vec<ParameterRecord> {
+    let effects = effects_of(&fit.outcome.effects, catalogue, machine).unwrap_or_default();
+    let each = fit.outcome.parameters.iter().zip(&fit.model.unknowns);
+    each.filter(|(_, u)| !u.nuisance)
+        .map(|(p, u)| record(tolerance, p, &statement::meaning(u, &effects), &effects))
+        .collect()
+}
+
+fn record(t: &Tolerance, p: &Parameter, meaning: &str, effects: &[&Effect]) -> ParameterRecord {
     let effect = effects.iter().find(|e| e.id == p.effect);
     // a shape parameter (a period, a time constant) scales nothing: it has no size as an error
     let is_shape = effect.is_some_and(|e| e.parameters.iter().any(|q| q.name == p.name && q.shape.is_some()));

@@ -3,7 +3,8 @@
 //! Touches stand column by column, because there may be ten thousand of them and the page that holds them is mailed.
 
 use super::Material;
-use super::headline::{Headline, Next};
+use super::headline::Headline;
+use super::next::Next;
 use crate::compare::Split;
 use crate::compare::rungs::{Curve, Kind};
 use crate::diagnose::Diagnosis;
@@ -432,6 +433,8 @@ pub(super) fn diagnosis(m: &Material) -> DiagnosisRecord {
         ids.extend(c.same_as.iter().map(String::as_str));
     }
     ids.extend(m.ladder.rungs.iter().flat_map(|r| r.effects.iter().map(String::as_str)));
+    ids.extend(d.not_seen.iter().map(String::as_str));
+    ids.extend(d.power.iter().map(|p| p.effect.as_str()));
     let mut effects = BTreeMap::new();
     for id in ids {
         if let Some(e) = m.catalogue.get(id, m.machine) {
@@ -443,5 +446,34 @@ pub(super) fn diagnosis(m: &Material) -> DiagnosisRecord {
             });
         }
     }
-    DiagnosisRecord { answer: d.clone(), effects }
+    let mut answer = d.clone();
+    answer.says = in_words(&answer.says);
+    answer.depends.iter_mut().for_each(|w| w.says = in_words(&w.says));
+    DiagnosisRecord { answer, effects }
+}
+
+/// Variables of formulas that stand alone in a sentence (`sZ`, `B*sB`), as a machinist says them.
+pub(super) fn in_words(text: &str) -> String {
+    let word = |piece: &str| {
+        let rest = piece.trim_end_matches([',', '.', ';', ':', ')']);
+        let axis = rest.strip_prefix('s').filter(|a| matches!(*a, "X" | "Y" | "Z" | "A" | "B" | "C"));
+        match (axis, rest.split_once('*')) {
+            (Some(axis), _) => format!("the sense of {axis}'s last motion{}", &piece[rest.len()..]),
+            (None, Some((a, b))) if !a.is_empty() && !b.is_empty() => in_words(&piece.replace('*', " and ")),
+            _ => piece.to_owned(),
+        }
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_words;
+
+    #[test]
+    fn variables_of_formulas_are_words() {
+        assert_eq!(in_words("40 % goes with sZ (up)"), "40 % goes with the sense of Z's last motion (up)");
+        assert_eq!(in_words("with B*sB, along"), "with B and the sense of B's last motion, along");
+        assert_eq!(in_words("(0.50 um, 3 * 4) as is"), "(0.50 um, 3 * 4) as is");
+    }
 }

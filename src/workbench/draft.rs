@@ -1,5 +1,6 @@
 //! The formula box: an effect as a person types it, checked with the place of each mistake in the line that was typed.
 
+use super::session::Refused;
 use crate::diag::{Failure, Finding, source};
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::{Formula, VARIABLES};
@@ -95,6 +96,14 @@ impl Mistake {
 /// The row of the effects file.
 #[must_use]
 pub fn row(draft: &Draft) -> String {
+    let mut tables = ArrayOfTables::new();
+    tables.push(table(draft));
+    let mut doc = DocumentMut::new();
+    doc["effect"] = Item::ArrayOfTables(tables);
+    doc.to_string()
+}
+
+fn table(draft: &Draft) -> Table {
     let mut table = Table::new();
     table["id"] = value(&draft.id);
     for (word, text) in [("name", &draft.name), ("says", &draft.says), ("look", &draft.look)] {
@@ -128,11 +137,38 @@ pub fn row(draft: &Draft) -> String {
     if !shapes.is_empty() {
         table["shape"] = value(in_lines(shapes));
     }
-    let mut tables = ArrayOfTables::new();
-    tables.push(table);
-    let mut doc = DocumentMut::new();
-    doc["effect"] = Item::ArrayOfTables(tables);
-    doc.to_string()
+    table
+}
+
+/// The effects file with the draft in the place of the row of that id; what the form does not ask for stays as it is.
+/// Nothing where no single row has that id.
+#[must_use]
+pub fn replaced(before: &str, draft: &Draft) -> Option<String> {
+    let mut doc: DocumentMut = before.parse().ok()?;
+    let rows = doc.get_mut("effect")?.as_array_of_tables_mut()?;
+    let is_own = |row: &Table| row.get("id").and_then(Item::as_str) == Some(draft.id.as_str());
+    if rows.iter().filter(|row| is_own(row)).count() != 1 {
+        return None;
+    }
+    let row = rows.iter_mut().find(|row| is_own(row))?;
+    let typed = table(draft);
+    if typed.get("shape").is_none() {
+        row.remove("shape");
+    }
+    for (word, item) in typed {
+        let same = row.get(&word).is_some_and(|old| old.to_string().trim() == item.to_string().trim());
+        if !same {
+            row.insert(&word, item);
+        }
+    }
+    Some(doc.to_string())
+}
+
+/// The row of that id stands in a file that the form does not write.
+#[must_use]
+pub fn elsewhere(draft: &Draft, file: &str) -> Mistake {
+    let message = format!("effect {:?} exists already, and not once in {file}", draft.id);
+    Mistake::of("id", message, "choose another short name, or change it in its own file")
 }
 
 /// One item a line, as a person would write it.
@@ -156,12 +192,29 @@ pub fn appended(before: &str, draft: &Draft) -> String {
     format!("{before}{gap}{}", row(draft))
 }
 
-/// The catalogue with the draft in it.
+/// A draft that can be fitted.
+#[derive(Debug)]
+pub struct Typed {
+    /// The catalogue with the draft in it.
+    pub catalogue: Catalogue,
+    /// The id under which it stands there.
+    pub id: String,
+    /// Is it a new form of an effect of the user's own?
+    pub replaces: bool,
+}
+
+/// The catalogue with the draft in it. An effect of the user's own that is not in the model may be typed anew: it then
+/// stands there under another id, beside the old one.
 ///
 /// # Errors
 /// What is wrong with it, each with its field.
-pub fn check(draft: &Draft, catalogue: &Catalogue) -> Result<Catalogue, Vec<Mistake>> {
+pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<Typed, Vec<Mistake>> {
     let mut mistakes = words(draft);
+    let replaces = catalogue.iter().any(|e| e.id == draft.id && !e.built_in);
+    if replaces && model.contains(&draft.id) {
+        let help = "switch it off to change it, or choose another short name";
+        mistakes.push(Mistake::of("id", format!("effect {:?} is in the model", draft.id), help));
+    }
     let shapes: Vec<&str> = draft.shape.iter().map(|s| s.parameter.trim()).collect();
     for (i, t) in draft.terms.iter().enumerate() {
         if let Err(message) = Formula::parse(t.formula.trim(), &shapes) {
@@ -182,11 +235,30 @@ pub fn check(draft: &Draft, catalogue: &Catalogue) -> Result<Catalogue, Vec<Mist
     if !mistakes.is_empty() {
         return Err(mistakes);
     }
-    let text = row(draft);
+    let mut id = draft.id.clone();
+    while replaces && catalogue.knows(&id) {
+        id += "-typed";
+    }
+    let text = row(&Draft { id: id.clone(), ..draft.clone() });
     let mut all = catalogue.clone();
     match all.add_file(&source("formula box", text.clone())) {
-        Ok(_) => Ok(all),
+        Ok(_) => Ok(Typed { catalogue: all, id, replaces }),
         Err(Failure(findings)) => Err(findings.iter().map(|f| from_finding(f, &text, draft)).collect()),
+    }
+}
+
+/// Why a draft cannot be fitted: a formula without a value at some touches is a mistake in its field.
+#[must_use]
+pub fn of_the_fit(failure: Failure, draft: &Draft, id: &str) -> Refused {
+    let about = |f: &Finding| {
+        let formula = |t: &DraftTerm| f.message.starts_with(&format!("formula {:?} of", t.formula.trim()));
+        let i = draft.terms.iter().position(formula).filter(|_| f.code == "model::no_value")?;
+        let message = f.message.replace(&format!("of effect {id} "), "");
+        Some(Mistake { field: format!("terms.{i}.formula"), from: None, to: None, message, help: f.help.clone() })
+    };
+    match failure.0.iter().map(about).collect::<Option<Vec<Mistake>>>() {
+        Some(mistakes) if !mistakes.is_empty() => Refused::Mistakes(mistakes),
+        _ => Refused::Unusable(failure),
     }
 }
 
@@ -360,7 +432,7 @@ mod tests {
     #[test]
     fn a_good_draft_is_a_row_of_an_effects_file() {
         let built_in = Catalogue::built_in().unwrap();
-        let all = check(&draft("1 - cos(B)"), &built_in).unwrap();
+        let all = check(&draft("1 - cos(B)"), &built_in, &[]).unwrap().catalogue;
         assert!(all.knows("my-sag") && !built_in.knows("my-sag"));
         let two = appended(
             "# mine\n[[effect]]\nid = \"other\"\nat = \"B\"\nterms = [{ parameter = \"p\", unit = \"um\", dof = \"dx\", formula = \"B\" }]",
@@ -369,6 +441,47 @@ mod tests {
         let mut read = Catalogue::default();
         read.add_file(&source("f", two.clone())).unwrap();
         assert!(read.knows("my-sag") && read.knows("other") && two.starts_with("# mine"), "{two}");
+    }
+
+    #[test]
+    fn an_effect_of_ones_own_is_typed_anew_while_it_is_out_of_the_model() {
+        let mut all = Catalogue::built_in().unwrap();
+        let before = appended("# mine\n", &draft("1 - cos(B)")).replace("at = ", "mends = \"oil\"\nat = ");
+        all.add_file(&source("f", before.clone())).unwrap();
+        let typed = check(&draft("sin(B)"), &all, &[]).unwrap();
+        assert!(typed.replaces && typed.id != "my-sag" && typed.catalogue.knows(&typed.id));
+        assert_eq!(check(&draft("sin(B)"), &all, &["my-sag".to_owned()]).unwrap_err()[0].field, "id");
+        // the same again changes nothing; another formula takes the place of the old one, and the rest stays
+        let mut same = draft("1 - cos(B)");
+        assert_eq!(replaced(&before, &same).unwrap(), before);
+        same.terms[0].formula = "sin(B)".into();
+        let after = replaced(&before, &same).unwrap();
+        assert!(
+            after.starts_with("# mine\n") && after.contains("mends = \"oil\"") && after.contains("\"sin(B)\""),
+            "{after}"
+        );
+        assert!(!after.contains("cos") && after.matches("[[effect]]").count() == 1, "{after}");
+        Catalogue::built_in().unwrap().add_file(&source("f", after)).unwrap();
+        assert_eq!(replaced("# none\n", &same), None);
+        assert_eq!(replaced(&format!("{before}\n{before}"), &same), None);
+    }
+
+    #[test]
+    fn a_formula_without_a_value_has_its_field() {
+        let mut d = draft("1");
+        d.terms.push(DraftTerm { formula: " 1 / 0 ".into(), ..d.terms[0].clone() });
+        let finding = |formula: &str| {
+            Finding::error(
+                "model::no_value",
+                format!("formula {formula:?} of effect my-sag-typed has no value at 7 touches, the first is touch 1"),
+            )
+        };
+        let Refused::Mistakes(mistakes) = of_the_fit(Failure(vec![finding("1 / 0")]), &d, "my-sag-typed") else {
+            panic!("no mistake")
+        };
+        assert_eq!(mistakes[0].field, "terms.1.formula");
+        assert!(mistakes[0].message.contains("has no value at 7 touches") && !mistakes[0].message.contains("typed"));
+        assert!(matches!(of_the_fit(Failure(vec![finding("B")]), &d, "my-sag-typed"), Refused::Unusable(_)));
     }
 
     #[test]
@@ -384,7 +497,7 @@ mod tests {
             ("B ° 2", 2, 3),
             ("BB + B + Ω", 0, 2),
         ] {
-            let mistakes = check(&draft(formula), &built_in).unwrap_err();
+            let mistakes = check(&draft(formula), &built_in, &[]).unwrap_err();
             let first = &mistakes[0];
             assert_eq!(first.field, "terms.0.formula", "{formula}");
             assert_eq!((first.from, first.to), (Some(from), Some(to)), "{formula}: {}", first.message);
@@ -398,7 +511,7 @@ mod tests {
         let with = |change: &dyn Fn(&mut Draft)| {
             let mut d = good.clone();
             change(&mut d);
-            check(&d, &built_in).unwrap_err()[0].field.clone()
+            check(&d, &built_in, &[]).unwrap_err()[0].field.clone()
         };
         assert_eq!(with(&|d| d.id = "../evil".into()), "id");
         assert_eq!(with(&|d| d.id = "location-b".into()), "id");

@@ -22,8 +22,8 @@ pub struct Scored {
     pub ln_p: f64,
     /// The same, with all effects that were tested counted in (Holm).
     pub p_adjusted: f64,
-    /// Does it pass Holm's test?
-    pub proposed: bool,
+    /// Does it pass Holm's test? Whether it is proposed the diagnosis says, which also looks at touches left out.
+    pub passes: bool,
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
     /// Expected sizes.
@@ -68,7 +68,7 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
             p: s.p,
             ln_p: s.ln_p,
             p_adjusted: s.p_adjusted,
-            proposed: s.proposed(),
+            passes: s.proposed(),
             share: (s.delta_ss / total).clamp(0.0, 1.0),
             // sets of many blocks say nothing to a reader
             parameters: if columns.len() > 12 { Vec::new() } else { sizes.collect() },

@@ -16,6 +16,7 @@ use crate::fit::{self, noise};
 use crate::machine::{Machine, Shape};
 use crate::model::formula::FUNCTIONS;
 use crate::study::history::History;
+use crate::study::tolerance::Tolerance;
 use crate::units::um_from_mm;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -112,7 +113,8 @@ struct Live<'a> {
     used: usize,
     unknowns: usize,
     dof: usize,
-    parameters: Vec<&'a Parameter>,
+    parameters: Vec<crate::view::record::ParameterRecord>,
+    tolerance: &'a Tolerance,
     undetermined: &'a [Undetermined],
     weak: &'a [Combination],
     correlation: crate::view::record::Correlation,
@@ -146,7 +148,6 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
     let masks = &now.opened.study.masked;
     let masked: std::collections::HashSet<(usize, u64)> = masks.iter().map(|m| (m.run, m.id)).collect();
     let observations = &fit.data.observations;
-    let nuisance: Vec<bool> = fit.model.unknowns.iter().map(|u| u.nuisance).collect();
     bytes(&Live {
         format: FORMAT,
         version: now.version,
@@ -169,7 +170,8 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         used: fit.n_used(),
         unknowns: o.unknowns,
         dof: fit.dof,
-        parameters: o.parameters.iter().zip(nuisance).filter(|(_, n)| !n).map(|(p, _)| p).collect(),
+        parameters: crate::view::results(fit, &now.opened.catalogue, &now.opened.machine, &now.opened.study.tolerance),
+        tolerance: &now.opened.study.tolerance,
         undetermined: &o.undetermined,
         weak: &o.weak,
         correlation: crate::view::correlation(fit),
@@ -505,10 +507,10 @@ struct Tried<'a> {
 pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<&Draft>) -> Result<Vec<u8>, Refused> {
     let opened = &*now.opened;
     let typed = match draft {
-        Some(draft) => Some(draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?),
+        Some(draft) => Some(draft::check(draft, &opened.catalogue, &opened.study.effects).map_err(Refused::Mistakes)?),
         None => None,
     };
-    let id = draft.map(|d| d.id.as_str()).or(effect).ok_or_else(|| {
+    let id = typed.as_ref().map(|t| t.id.as_str()).or(effect).ok_or_else(|| {
         Refused::Unusable(Failure::new("workbench::nothing", "no effect is named").help("choose one of the list"))
     })?;
     let mut settings = shelf::settings(opened);
@@ -517,19 +519,20 @@ pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<
         return Err(Refused::Unusable(Failure::new("study::in_model", says)));
     }
     settings.effects.push(id.to_owned());
-    let fit = match typed {
+    let fit = match (&typed, draft) {
         // what is only typed is in no catalogue, and so on no shelf
-        Some(catalogue) => {
+        (Some(typed), Some(draft)) => {
             let data = crate::model::data::Data::clone(&opened.data);
-            Arc::new(fit::identify_data(&opened.machine, &catalogue, data, &settings)?)
+            let fitted = fit::identify_data(&opened.machine, &typed.catalogue, data, &settings);
+            Arc::new(fitted.map_err(|failure| draft::of_the_fit(failure, draft, &typed.id))?)
         }
-        None => shelf.fit(opened, now.inputs, settings)?.0,
+        _ => shelf.fit(opened, now.inputs, settings)?.0,
     };
     let before = &now.fit.residual_mm;
     let own = fit.outcome.parameters.iter().filter(|p| p.effect == id);
     Ok(bytes(&Tried {
         version: now.version,
-        effect: id,
+        effect: draft.map_or(id, |d| d.id.as_str()),
         rms_before_um: now.fit.outcome.rms_um,
         rms_after_um: fit.outcome.rms_um,
         chi2_per_dof: fit.outcome.chi2_per_dof,

@@ -284,12 +284,16 @@ impl Session {
     /// Writes the effect into the user's file and names that file in the study.
     fn save(&mut self, draft: &Draft, on: bool) -> std::result::Result<(), Refused> {
         let opened = &self.state.opened;
-        draft::check(draft, &opened.catalogue).map_err(Refused::Mistakes)?;
+        let typed = draft::check(draft, &opened.catalogue, &opened.study.effects).map_err(Refused::Mistakes)?;
         let file = self.host.effects_file(&opened.study);
         let before = self.host.read(Place::Effects)?;
         let old = String::from_utf8(before.clone().unwrap_or_default())
             .map_err(|_| Failure::new("workbench::effects", format!("{file} is not text")).help("save it as UTF-8"))?;
-        let new = draft::appended(&old, draft);
+        let new = if typed.replaces {
+            draft::replaced(&old, draft).ok_or_else(|| Refused::Mistakes(vec![draft::elsewhere(draft, &file)]))?
+        } else {
+            draft::appended(&old, draft)
+        };
         // the file as a whole must be readable, or the study that names it is not
         crate::model::catalogue::Catalogue::built_in()?.add_file(&source(&file, new.clone()))?;
         let mut text = mask::name_effects_file(&self.text()?, &file)?;

@@ -2,7 +2,7 @@
 
 import { later, never } from "./later.js";
 import { state, on, setPreview, step, trouble, tryOut } from "./talk.js";
-import { byId, chance, element, show, significant, stated } from "./words.js";
+import { byId, chance, element, show, significant, sized, stated } from "./words.js";
 
 const FEW = 12;
 let all = false;
@@ -21,6 +21,16 @@ function toggle(effect, isOn, disabled) {
   }, element("span", { "aria-hidden": "true" }));
 }
 
+/** How an effect stands to the test with all of them counted in, and beside the first candidate. */
+function standing(id, score) {
+  if (!score.passes) return "no more than chance";
+  const found = state.behind?.diagnosis;
+  if (candidate(id)?.proposed) return "passes the test: proposed";
+  const first = found?.candidates[0];
+  if (!found || first?.effect === id || first?.same_as.includes(id)) return "passes the test";
+  return first?.proposed ? "passes the test: explains part, less than the first" : "passes the test";
+}
+
 /** What the diagnosis adds to the score of an effect. */
 function candidate(id) {
   return state.behind?.diagnosis?.candidates.find((c) => c.effect === id);
@@ -29,7 +39,7 @@ function candidate(id) {
 function row(effect, score) {
   const { live } = state;
   const isOn = live.effects.includes(effect.id);
-  const item = element("li", { "data-effect": effect.id, class: score?.proposed ? "proposed" : null });
+  const item = element("li", { "data-effect": effect.id, class: score?.passes ? "proposed" : null });
   const isOpen = opened === effect.id;
   const open = element("button", {
     type: "button", class: "open", "aria-expanded": String(isOpen), click: () => (opened === effect.id ? close() : look(effect.id)),
@@ -38,14 +48,14 @@ function row(effect, score) {
   item.append(element("div", { class: "head" }, toggle(effect, isOn, isOn && live.effects.length === 1), what));
   if (isOn) {
     const own = live.parameters.filter((p) => p.effect === effect.id).slice(0, 6);
-    if (own.length) what.append(element("small", {}, own.map((p) => `${p.name} ${stated(p.value, p.sigma)} ${p.unit}`).join(", ")));
+    if (own.length) what.append(element("small", {}, own.map((p) => (p.sigma || p.status === "fixed" ? `${p.name} ${stated(p.value, p.sigma)} ${p.unit}` : `${p.name} not told`)).join(", ")));
   } else if (score) {
     const strength = score.visible ? Math.min(1, Math.max(0, -score.ln_p / Math.LN10 / 20)) : 0;
     const bar = element("i");
     bar.style.width = `${100 * strength}%`;
     const first = score.parameters[0];
     const words = score.visible
-      ? `chance ${chance(score.p_adjusted)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
+      ? `${standing(effect.id, score)}; chance ${chance(score.p_adjusted, score.ln_p)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
       : "leaves no trace in these touches";
     const same = candidate(effect.id)?.same_as ?? [];
     what.append(element("div", { class: "bar", "aria-hidden": "true" }, bar), element("small", {}, words));
@@ -65,7 +75,7 @@ function details(effect, isOn) {
   line("What would tell", found?.tell_apart);
   const preview = state.preview;
   if (!isOn && preview?.effect === effect.id) {
-    const sizes = preview.parameters.map((p) => `${p.name} = ${stated(p.value, p.sigma)} ${p.sigma ? `± ${significant(p.sigma, 2)} ` : ""}${p.unit}`).join(", ");
+    const sizes = preview.parameters.map((p) => sized(p)).join(", ");
     line("With it", `${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS${sizes ? `; ${sizes}` : ""}`);
   }
   return box;

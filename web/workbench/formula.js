@@ -1,7 +1,7 @@
 // The formula box: an effect as a person types it, its curve over the residual, and the way into the effects file.
 
 import { state, on, setPreview, step, tryOut } from "./talk.js";
-import { byId, element, show, significant, stated } from "./words.js";
+import { byId, element, show, significant, sized } from "./words.js";
 
 let terms = 0;
 let timer = null;
@@ -119,7 +119,7 @@ async function look() {
   try {
     const found = await tryOut({ draft: draft() });
     if (mine !== looks) return;
-    const sizes = found.parameters.map((p) => `${p.name} = ${stated(p.value, p.sigma)} ${p.sigma ? `± ${significant(p.sigma, 2)} ` : ""}${p.unit}`);
+    const sizes = found.parameters.map(sized);
     show("draft-answer", `with it ${significant(found.rms_before_um)} → ${significant(found.rms_after_um)} µm RMS; ${sizes.join(", ")}`);
   } catch (error) {
     if (mine === looks) failed(error);

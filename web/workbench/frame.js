@@ -10,8 +10,8 @@ function triangle(pen, x, y, r) {
   pen.lineTo(x - r, y + 0.6 * r);
 }
 
-/** Marks up to this size, px, are drawn as squares. */
-const SMALL = 3;
+/** Marks up to this size, px, are drawn as squares: the library follows at once with their own shapes. */
+const SMALL = 5;
 
 const SHAPES = {
   circle: (pen, x, y, r) => { pen.moveTo(x + r, y); pen.arc(x, y, r, 0, 2 * Math.PI); },
@@ -59,7 +59,7 @@ export function frame(plot, box, traces, band) {
     const some = trace.selectedpoints ? new Set(trace.selectedpoints) : null;
     const shape = SHAPES[marker.symbol];
     const thin = marker.symbol === "x-thin-open";
-    // of ten thousand small dots nobody sees whether they are round
+    // thousands of them, for a moment
     const dot = marker.size <= SMALL;
     pen.fillStyle = marker.color;
     pen.strokeStyle = marker.color;

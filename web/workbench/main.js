@@ -48,11 +48,18 @@ function verdict() {
     : noise ? "What is left is as small as noise; whether it depends on something is being worked out …"
     : `The model misses the touches by ${ratio} times their noise; what is missing is being worked out …`;
   // the rooms write um in plain letters
-  show("verdict", found?.says.replace(/(\d )um\b/g, "$1µm") ?? soFar);
   const first = found?.candidates[0];
+  // several effects would do, and no touches are left over to try one of them on
+  const untried = (c) => c.p_adjusted < 0.05 && !(c.held_out_before_um > 0 || c.held_out_after_um > 0);
+  const open = found?.verdict === "unexplained" && !found.faint && first && !first.proposed && untried(first)
+    ? new Set(found.candidates.filter(untried).flatMap((c) => [c.effect, ...c.same_as])) : new Set();
+  const which = open.size > 1 ? `one of ${open.size} known effects explains it; these poses cannot tell which.` : `one known effect explains it (${first?.name}); these poses cannot tell whether it is the right one.`;
+  const says = open.size ? `Something is missing in the model (${found.rms_um.toFixed(2)} µm RMS against ${found.noise_um.toFixed(2)} µm noise): ${which}` : found?.says;
+  show("verdict", says?.replace(/(\d )um\b/g, "$1µm") ?? soFar);
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${first.same_as.join(", ")}: a further program would.` : ""}`
     : found.faint ? "What is left is as small as the noise, but for a faint pattern: write the program that tells more."
+    : open.size ? "Measure further poses: write the program that tells more, or run the full program."
     : found.verdict === "unexplained" ? "No known effect explains what is left: try a formula of your own, or look at the touches that stand out."
     : found.verdict === "adequate" ? "Nothing is missing that these touches can show: write the compensation." : "There are too few touches to judge: write a further program.");
   if (behind?.version === live.version && behind.failed.length) trouble({ messages: behind.failed });
@@ -60,17 +67,20 @@ function verdict() {
 
 function parameters(live) {
   const table = byId("parameters");
-  const head = ["result", "value", "±, 95 %", "unit", ""].map((h) => element("th", { scope: "col" }, h || "as bar"));
+  const VERDICTS = { within: "within", beyond: "too large", open: "uncertain", none: "" };
+  const t = live.tolerance;
+  table.caption.textContent = `Results with their 95 % uncertainty, against ${t.error_um} µm at ${t.radius_mm} mm`;
+  const head = ["result", "what it is", "value", "±, 95 %", "unit", "tolerance", "against it", "as bar"].map((h) => element("th", { scope: "col" }, h));
   const size = (p) => Math.abs(p.value) + (p.expanded ?? 0);
   const top = {};
   for (const p of live.parameters) top[p.unit] = Math.max(top[p.unit] ?? 0, size(p));
   const rows = live.parameters.map((p) => {
     const told = p.sigma !== null;
-    return element("tr", {}, element("td", {}, p.name), element("td", {}, told || p.status === "fixed" ? stated(p.value, p.sigma) : "not told"),
-      element("td", {}, significant(p.expanded, 2)), element("td", { class: "word" }, p.unit), element("td", {}, told ? bar(p, top[p.unit]) : ""));
+    return element("tr", {}, element("td", {}, p.name), element("td", { class: "word" }, p.says), element("td", {}, told || p.status === "fixed" ? stated(p.value, p.sigma) : "not told"),
+      element("td", {}, significant(p.expanded, 2)), element("td", { class: "word" }, p.unit), element("td", {}, p.tolerance === null ? "–" : significant(p.tolerance)), element("td", { class: "word" }, told ? VERDICTS[p.judgement] : ""), element("td", {}, told ? bar(p, top[p.unit]) : ""));
   });
   table.replaceChildren(table.caption, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows));
-  const remarks = [...live.warnings, ...live.undetermined.map((u) => `not told by this data: ${u.says}`)];
+  const remarks = [...live.warnings, ...live.undetermined.map((u) => `not told by this data: ${u.says}`)].filter((r, i, all) => all.indexOf(r) === i);
   byId("warnings").replaceChildren(...remarks.map((r) => element("li", {}, r)));
 }
 

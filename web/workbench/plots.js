@@ -153,7 +153,7 @@ function traces(cell) {
     shown.push({
       type: marks, mode: "markers", name, customdata: own, selectedpoints: selected,
       x: own.map((i) => x[i]), y: own.map((i) => live.residual_um[i] * sides[i].sign),
-      marker: { color: colour(name.toLowerCase()), symbol: many ? "circle" : SYMBOLS[d], size: many ? 3 : 6, opacity: many ? 0.6 : 0.8 },
+      marker: { color: colour(name.toLowerCase()), symbol: SYMBOLS[d], size: many ? 5 : 6, opacity: many ? 0.6 : 0.8 },
       hovertemplate: `%{y:.2f} µm in ${name}<extra></extra>`,
     });
   }
@@ -205,7 +205,7 @@ function draw(cell) {
   const layout = layoutOf({
     dragmode: "zoom", uirevision: "keep", selectionrevision: live.version,
     xaxis: { title: { text: cell.variable.title } },
-    yaxis: { title: { text: "µm" }, range: [-scale, scale] },
+    yaxis: { title: { text: "miss, µm" }, range: [-scale, scale] },
     shapes: [{ type: "rect", layer: "below", xref: "paper", x0: 0, x1: 1, y0: -band, y1: band, fillcolor: colour("band"), line: { width: 0 } }],
   });
   const config = { ...CONFIG, modeBarButtonsToAdd: ["select2d", "lasso2d"] };
@@ -314,7 +314,7 @@ function ladder(live) {
     xaxis: { tickangle: -20, type: "category", automargin: true },
     yaxis: { title: { text: "µm RMS" }, type: "log" },
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: live.noise_um, y1: live.noise_um, line: { dash: "dot", color: colour("soft") } }],
-    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: Math.log10(live.noise_um), yanchor: "bottom", text: "noise of a touch", showarrow: false }],
+    annotations: [{ xref: "paper", x: 0, xanchor: "left", y: Math.log10(live.noise_um), yanchor: "bottom", bgcolor: colour("paper"), text: "noise of a touch", showarrow: false }],
   });
   Plotly.react(byId("ladder"), [line("error left", "rms_um", "solid", "circle"), line("on touches left out", "held_out_rms_um", "dash", "square")], layout, { ...CONFIG, displayModeBar: false });
   const head = element("tr", {}, ["model", "error left, µm", "on touches left out, µm", "χ²/dof"].map((h) => element("th", { scope: "col" }, h)));

@@ -14,7 +14,7 @@ let rows = new Map();
 const COLUMNS = [
   ["touch", (t, i) => `${t.run[i]}/${t.id[i]}`, (t, i) => t.run[i] * 1e9 + t.id[i]],
   ["residual, µm", (t, i) => significant(state.live.residual_um[i]), (t, i) => -Math.abs(state.live.residual_um[i]), "worst"],
-  ["in noise", (t, i) => significant(state.live.standardised[i]), (t, i) => -Math.abs(state.live.standardised[i])],
+  ["how unusual", (t, i) => significant(state.live.standardised[i]), (t, i) => -Math.abs(state.live.standardised[i])],
   ["block", (t, i) => t.words[t.block[i]], (t, i) => t.words[t.block[i]]],
   ["face", (t, i) => t.words[t.face[i]], (t, i) => t.words[t.face[i]]],
   ["stage", (t, i) => t.words[t.stage[i]], (t, i) => t.words[t.stage[i]]],
@@ -34,7 +34,7 @@ function draw() {
   const out = new Map(state.live.rejected);
   const picked = chosen();
   const table = byId("touch-table");
-  const head = COLUMNS.map(([name, , , id]) => element("th", { scope: "col", "aria-sort": by === (id ?? name) ? "ascending" : null },
+  const head = COLUMNS.map(([name, , , id]) => element("th", { scope: "col", "aria-sort": by === (id ?? name) ? "ascending" : null, title: name === "how unusual" ? "the residual over what the other touches let expect (studentised): beyond 4 chance alone seldom makes it" : null },
     element("button", { type: "button", click: () => { by = id ?? name; page = 0; sort(); draw(); } }, name)));
   rows = new Map();
   const body = order.slice(page * PAGE, (page + 1) * PAGE).map((i) => {

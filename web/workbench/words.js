@@ -17,10 +17,18 @@ export function significant(value, digits = 3) {
   return size < -5 || size > 6 ? value.toExponential(digits - 1) : value.toFixed(Math.max(0, digits - 1 - size));
 }
 
+/** A result with its uncertainty; without one it is none. */
+export function sized(p) {
+  return p.sigma ? `${p.name} = ${stated(p.value, p.sigma)} ± ${significant(p.sigma, 2)} ${p.unit}` : `${p.name}: not told by these touches`;
+}
+
+/** A probability; its natural logarithm where it is too small to be a number. */
 export function chance(p, lnP) {
   if (p === null || p === undefined) return "–";
   if (p >= 0.0001) return p.toFixed(4);
-  const power = Math.floor((lnP ?? Math.log(p)) / Math.LN10);
+  const power = Math.floor((p > 0 ? Math.log(p) : lnP ?? -Infinity) / Math.LN10);
+  // smaller than any number that the computer knows
+  if (!(power > -300)) return "below 10⁻³⁰⁰";
   return `10${[...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("")}`;
 }
 

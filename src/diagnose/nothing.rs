@@ -1,0 +1,40 @@
+//! A study of which no touch is used: there is nothing to search in, and nothing to be said but that.
+
+use super::answer::{Diagnosis, FORMAT, Verdict};
+use super::open::Open;
+use super::{Options, Subject, missed, noise_um, verdict};
+
+/// The answer, before any search.
+pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
+    let fit = subject.fit;
+    let planned = options.planned.filter(|_| missed::mostly(&fit.data));
+    let n = fit.data.observations.len();
+    let mut out = Diagnosis {
+        format: FORMAT,
+        verdict: Verdict::TooLittleData,
+        says: format!(
+            "Too few touches to judge: none is used{}. Take touches back in, or measure again.",
+            if n == 0 { String::new() } else { format!(", all {n} are taken out") }
+        ),
+        faint: false,
+        most_missed: false,
+        rms_um: fit.outcome.rms_um,
+        noise_um: noise_um(fit),
+        visit_um: 0.0,
+        visit_source: fit.noise.visit_source.to_owned(),
+        noise_says: String::new(),
+        lack_of_fit_p: 1.0,
+        depends: Vec::new(),
+        shape: None,
+        candidates: Vec::new(),
+        gross: planned.map(|p| missed::hypotheses(subject, p)).unwrap_or_default(),
+        outliers: Vec::new(),
+        tested: 0,
+        power: Vec::new(),
+        not_seen: Vec::new(),
+        open: Open::default(),
+        warnings: Vec::new(),
+    };
+    verdict::not_when_touches_are_missing(&mut out, subject);
+    out
+}

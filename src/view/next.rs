@@ -1,0 +1,248 @@
+//! What to do next, the first thing first.
+
+use super::Material;
+use super::headline::{Headline, Level, capital, named, size, um, untried};
+use super::record::{Compensation, Judgement, ParameterRecord};
+use crate::diagnose::Verdict;
+use crate::diagnose::answer::Candidate;
+use crate::units::um_from_mm;
+use serde::Serialize;
+
+/// A thing to do.
+#[derive(Debug, Clone, Serialize)]
+pub struct Next {
+    /// What to do.
+    pub what: String,
+    /// How, or why.
+    pub how: String,
+    /// What to type; empty where nothing is typed.
+    pub command: String,
+}
+
+impl Next {
+    fn new(what: impl Into<String>, how: impl Into<String>, command: impl Into<String>) -> Self {
+        Self { what: what.into(), how: how.into(), command: command.into() }
+    }
+}
+
+/// What to do, the first thing first.
+pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation) -> Vec<Next> {
+    let mut out = Vec::new();
+    let study = m.study;
+    let controller = m.runs.iter().map(|r| r.controller).find(|c| *c != "csv").unwrap_or("YOUR-CONTROLLER");
+    let plan_next = format!("axiscal plan-next {study} --controller {controller} --out next");
+    let d = m.diagnosis;
+    match d.verdict {
+        Verdict::TooLittleData => out.push(Next::new(
+            "Measure more touches",
+            "A richer program sees what this one cannot. First make sure that the log belongs to the plan and that the blocks stand where it says.",
+            format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
+        )),
+        Verdict::MissingEffect => {
+            if let Some(first) = d.candidates.first() {
+                found(m, first, &plan_next, c, &mut out);
+            }
+        }
+        Verdict::Unexplained if d.faint => out.push(Next::new(
+            "Measure more touches",
+            "Repeats and further poses say whether the weak pattern is there at all.",
+            plan_next.clone(),
+        )),
+        Verdict::Unexplained if !untried(d).is_empty() => {
+            which(m, &untried(d), &plan_next, controller, &mut out);
+        }
+        Verdict::Unexplained => unexplained(m, &mut out),
+        Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
+    }
+    if d.verdict != Verdict::TooLittleData
+        && !m.fit.outcome.undetermined.is_empty()
+        && (d.verdict == Verdict::Adequate || d.faint)
+    {
+        let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
+        let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);
+        out.push(Next::new("Measure what is not told yet", capital(&how), plan_next));
+    }
+    odd_touches(m, &mut out);
+    out
+}
+
+/// Where several effects explain it and these poses cannot tell which: touches that can.
+fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &mut Vec<Next>) {
+    const MOST: usize = 4;
+    let mut names: Vec<String> = open.iter().take(MOST).map(|id| named(m, id)).collect();
+    if open.len() > MOST {
+        names.push(format!("{} more", open.len() - MOST));
+    }
+    out.push(Next::new(
+        "Measure further poses",
+        format!("The touches that tell most of what may be missing: {}.", names.join("; ")),
+        plan_next,
+    ));
+    out.push(Next::new(
+        "Or run the full program",
+        "It has the poses in which every known effect shows, and some to try the answer on.",
+        format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
+    ));
+}
+
+fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out: &mut Vec<Next>) {
+    if m.diagnosis.most_missed {
+        out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
+        return;
+    }
+    let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
+    out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
+    if !first.same_as.is_empty() {
+        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
+    }
+    out.push(Next::new(
+        "Put it into the model",
+        "The error falls, the other values become right, and this page says what comes next.",
+        format!("axiscal add {} {}", m.study, first.effect),
+    ));
+    let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
+    if !mends.is_empty() {
+        out.push(Next::new("What mends it", format!("{one_of_several}{mends}"), ""));
+    }
+    let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
+    let beyond = known.iter().filter(|p| p.judgement == Judgement::Beyond);
+    let large: Vec<&ParameterRecord> = beyond.filter(|p| p.effect != first.effect && is_carried(c, p)).collect();
+    let ratio = |p: &ParameterRecord| p.tolerance.map_or(0.0, |t| p.value.abs() / t);
+    if let Some(worst) = large.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
+        let n = large.len();
+        out.push(Next::new(
+            "Then compensate",
+            format!(
+                "{n} {} larger than the tolerance, the largest {} {}.",
+                if n == 1 { "error is" } else { "errors are" },
+                worst.name,
+                worst.at_radius_um.map_or_else(|| size(worst, m), um)
+            )
+            .replace("1 error is larger than the tolerance, the largest", "One error is larger than the tolerance:"),
+            "",
+        ));
+    }
+}
+
+/// Does a compensation hold it? What the probe or the blocks do is no error of the machine, and no table holds it.
+fn is_carried(c: &Compensation, p: &ParameterRecord) -> bool {
+    let left = c.left.iter().any(|l| l.known && crate::symbols::same(&l.parameter, &p.name));
+    let term = c.terms.iter().any(|t| t.effect.split('+').any(|e| e == p.effect));
+    let shape = c.shapes.iter().any(|s| s.parameter == p.name);
+    !left && (term || shape || (c.tool_length_mm.is_some() && p.effect == "tool-length"))
+}
+
+fn unexplained(m: &Material, out: &mut Vec<Next>) {
+    let d = m.diagnosis;
+    if let Some(gross) = d.gross.first() {
+        out.push(Next::new("Check for a gross mistake", gross.says.clone(), ""));
+    }
+    if let Some(shape) = &d.shape {
+        let depends = d.depends.first().map_or("", |w| w.says.as_str());
+        let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
+        out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
+    }
+    out.push(Next::new(
+        "Write down its formula",
+        "A starting formula for what no known effect explains; then put it into the model.",
+        format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
+    ));
+}
+
+fn settled(
+    m: &Material,
+    headline: &Headline,
+    parameters: &[ParameterRecord],
+    c: &Compensation,
+    controller: &str,
+    out: &mut Vec<Next>,
+) {
+    if let Some(why) = &c.refused {
+        out.push(Next::new(
+            "Do not compensate yet",
+            format!(
+                "{}. Such values are faults of the set-up: look for a wrong block, sense or length first.",
+                capital(why)
+            ),
+            "",
+        ));
+        return;
+    }
+    let beyond: Vec<&ParameterRecord> = parameters.iter().filter(|p| p.judgement == Judgement::Beyond).collect();
+    if beyond.iter().any(|p| is_carried(c, p)) {
+        out.push(Next::new(
+            "Load the compensation",
+            "The values go into the control as its own tables; the README beside them says how, and what must be set again.",
+            format!("axiscal export {} --controller {controller} --out compensation", m.study),
+        ));
+        out.push(Next::new(
+            "Measure again and compare",
+            "Run the same program with the compensation loaded; the two studies side by side say whether it works.",
+            format!("axiscal verify {} again.toml", m.study),
+        ));
+    }
+    for p in beyond.iter().filter(|p| !is_carried(c, p)).take(2) {
+        out.push(Next::new(format!("Mend {}", p.says), p.mends.clone(), ""));
+    }
+    if headline.level == Level::Good {
+        out.push(Next::new(
+            "Nothing needs to be done",
+            "Keep this page: the next measurement can be held against it.",
+            format!("axiscal verify {} LATER-STUDY.toml", m.study),
+        ));
+    }
+    if beyond.is_empty() && parameters.iter().any(|p| p.judgement == Judgement::Open) {
+        out.push(Next::new(
+            "Measure more touches",
+            "The uncertainty is larger than what the tolerance leaves: repeats and further poses make it smaller.",
+            format!("axiscal plan-next {} --controller {controller} --out next", m.study),
+        ));
+    }
+}
+
+/// Touches that do not belong to the rest are a finding of their own.
+fn odd_touches(m: &Material, out: &mut Vec<Next>) {
+    // touches that fit once the missing effect is in the model are no fault of theirs
+    let back = |i: usize| {
+        let o = &m.fit.data.observations[i];
+        m.diagnosis.outliers.iter().any(|x| x.comes_back && x.id == o.id && x.run == o.run + 1)
+    };
+    let odd: Vec<(&usize, &String)> =
+        m.fit.rejected.iter().filter(|(i, reason)| !reason.starts_with("taken out") && !back(**i)).collect();
+    if odd.is_empty() {
+        return;
+    }
+    let named: Vec<String> = odd
+        .iter()
+        .take(4)
+        .map(|(i, _)| {
+            let o = &m.fit.data.observations[**i];
+            let origin = &m.fit.data.origins[**i];
+            let file = m.runs.get(o.run).map_or("log", |r| r.log);
+            format!(
+                "touch {} ({} {}, {file}:{}, {} off)",
+                o.id,
+                origin.block,
+                origin.face,
+                origin.line,
+                um(um_from_mm(m.fit.residual_mm[**i]))
+            )
+        })
+        .collect();
+    let more = odd.len().saturating_sub(named.len());
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    out.push(Next::new(
+        format!(
+            "Look at {} {} that do not belong to the rest",
+            odd.len(),
+            if odd.len() == 1 { "touch" } else { "touches" }
+        )
+        .replace("1 touch that do not belong", "1 touch that does not belong"),
+        format!(
+            "Chips, dirt, a false trigger? {}{rest}. {} not used.",
+            named.join(", "),
+            if odd.len() == 1 { "It is" } else { "They are" }
+        ),
+        "",
+    ));
+}
