@@ -150,7 +150,7 @@
         const mends = d.effects[c.effect]?.mends;
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('on touches left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm), of those that both models can predict` : 'cannot be tried with these poses'),
+            ...fact('on touches left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the fall is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
             ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(c.same_as.length ? fact('cannot be told from', c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)).join('; ')) : []),
@@ -166,7 +166,7 @@
   // ---------------------------------------------------------------- the ladder
   {
     const s = section('ladder', 'Step by step to the noise', 'What each model leaves. The lower the better, and nothing is gained below the noise; a model that falls on its own touches and not on those left out only learns by heart.');
-    const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Touches left out are here all that the model itself can predict, each index visit left out in turn; the cards of the candidates count only those that the model without the candidate can predict, too, and weigh the scatter of the visits: their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
+    const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Touches left out are here all that the model itself can predict, each index visit left out in turn; the cards of the candidates count only those that the model without the candidate can predict, too: their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
     plot(div, () => P.ladder(div, view));
     s.append(f);
   }

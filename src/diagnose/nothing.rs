@@ -22,7 +22,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         noise_um: noise_um(fit),
         visit_um: 0.0,
         visit_source: fit.noise.visit_source.to_owned(),
-        noise_says: String::new(),
+        noise_says: fit.noise.says(),
         lack_of_fit_p: 1.0,
         depends: Vec::new(),
         shape: None,

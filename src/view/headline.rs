@@ -102,8 +102,7 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     };
     let detail = match d.verdict {
         Verdict::TooLittleData => String::new(),
-        Verdict::MissingEffect if d.most_missed => String::new(),
-        Verdict::MissingEffect => first.map_or_else(|| d.says.clone(), |c| falls(m, c)),
+        Verdict::MissingEffect if !d.most_missed => first.map_or_else(|| d.says.clone(), |c| falls(m, c)),
         Verdict::Unexplained if !d.faint && !open.is_empty() => format!(
             "The touches miss the model by {}, and the probe's noise is {}. No touches are left over to try one of them on.",
             um(d.rms_um),
@@ -332,12 +331,12 @@ mod tests {
             verdict: Verdict::Unexplained,
             says: String::new(),
             faint: false,
-            most_missed: false,
-            visit_source: "none".into(),
-            noise_says: String::new(),
             rms_um: 5.0,
             noise_um: 1.0,
+            most_missed: false,
             visit_um: 0.0,
+            visit_source: String::new(),
+            noise_says: String::new(),
             lack_of_fit_p: 0.0,
             depends: Vec::new(),
             shape: None,
