@@ -500,8 +500,8 @@ impl<'p, D: Dialect> Run<'p, D> {
         let touched = outcome.hit && outcome.part > 0.0 && probe.toward;
         let latches = self.dialect.latches();
         // under a transformation an angle's last digits would move the linear axes by more than those of the log
-        let rotary = latches && !self.vm.world.is_tcp();
-        let latched = if touched { latched(&stands, &self.vm.axes, rotary) } else { stands };
+        let rotary = !self.vm.world.is_tcp();
+        let latched = if touched && latches { latched(&stands, &self.vm.axes, rotary) } else { stands };
         self.vm.at = if touched && latches { beyond(&probe, &stands) } else { stands };
         self.vm.note(Event::Probe { probe: probe.clone(), outcome, latched });
         self.dialect.probed(&probe, outcome, &latched);

@@ -244,6 +244,7 @@ mod tests {
             sigma_noise: None,
             sigma_type_b: None,
             sigma_with_unmodelled: None,
+            moves_with_unseen: None,
         };
         Outcome { parameters: names.iter().zip(values).map(parameter).collect(), ..Outcome::default() }
     }

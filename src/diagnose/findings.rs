@@ -209,6 +209,8 @@ fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (be
             on: "visit".to_owned(),
         };
         depends.retain(|w| w.by != "visit");
+        // what makes most of the misfit by itself makes the visits differ, too
+        let named = named || depends.first().is_some_and(|w| w.share > 0.5);
         depends.insert(if named { depends.len() } else { 0 }, finding);
     }
     // an effect that is missing makes good touches look bad: those come back with it

@@ -15,7 +15,7 @@ pub const LACK_OF_FIT: f64 = 1e-3;
 const LEAST_DOF: usize = 8;
 
 /// With fewer index visits than this each of them bears something that the others do not tell, and the spread of the
-/// folds says little: the error must then fall, by however little.
+/// folds says little: the error may then rise by less than its standard error.
 const FEW_VISITS: usize = 15;
 
 /// What was decided.
@@ -43,10 +43,10 @@ pub(super) struct Beside {
 }
 
 /// Do held-out touches bear out a choice? With many visits their error must fall by more than its standard error, with
-/// few it must fall.
+/// few it must not rise by as much: the report then says that they speak neither for nor against it.
 #[must_use]
 pub fn bears_out(nested: &HeldOut) -> bool {
-    if nested.folds.len() < FEW_VISITS { nested.gain > 0.0 } else { nested.falls() }
+    if nested.folds.len() < FEW_VISITS { nested.gain > -nested.standard_error } else { nested.falls() }
 }
 
 /// From the tests.
@@ -126,7 +126,8 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
                 None => ("an effect", 0),
             };
             let one = if others == 0 { effect.to_owned() } else { format!("{effect} or one of {others} others") };
-            match (beside.scatter, decision.named, beside.shapes_win) {
+            let scatter_first = out.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
+            match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
                 (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
                 (_, true, true) => format!(
                     "Something is missing ({against}), and no known effect explains it: {one} would take a part of it, but a \

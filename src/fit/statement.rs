@@ -76,7 +76,7 @@ pub fn undetermined(
 
 /// An amount of an unknown with its unit; lengths all in mm, so that they compare.
 fn plain<'u>((unknown, amount): (&'u Unknown, f64)) -> (f64, &'u str) {
-    if unknown.unit == "um" { (crate::units::mm_from_um(amount), "mm") } else { (amount, &unknown.unit) }
+    if unknown.unit == "um" { (crate::units::mm_from_um(amount), "mm") } else { (amount, unknown.unit.as_str()) }
 }
 
 /// What is seen of two results that trade against each other: "their sum (ey + EY0C)", "EX0B + 3.54 mm/deg · EB0B".
