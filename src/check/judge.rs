@@ -451,7 +451,8 @@ impl<'a, 'b> Walk<'a, 'b> {
         let back = -way.dot(&contact.along);
         let aside = (way + contact.along * back).norm();
         let left = (from.xyz_mm() - contact.start.xyz_mm()).dot(&contact.along);
-        if !rotary.is_empty() || aside > 10.0 * self.case.same || back < -self.case.same {
+        // the place of contact has its own last digits in each axis
+        if !rotary.is_empty() || aside > (10.0 * self.case.same).max(SIDEWAYS_MM) || back < -self.case.same {
             self.say(
                 "check::in_contact",
                 at,
@@ -525,7 +526,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             return;
         }
         let aside = (way - contact.along * onward).norm();
-        if aside > 10.0 * self.case.same || !probe.toward {
+        if aside > (10.0 * self.case.same).max(SIDEWAYS_MM) || !probe.toward {
             self.say("check::in_contact", at, "a second search goes in another direction than the first".into(), "");
         }
         if !contact.made.backed_off {

@@ -318,6 +318,10 @@ pub trait Dialect: Clone + Send + Sync {
     fn latches(&self) -> bool {
         true
     }
+    /// It latches the rotary axes too.
+    fn latches_rotary(&self) -> bool {
+        true
+    }
     /// A subroutine was entered.
     fn entered(&mut self) {}
     /// A subroutine was left, with its value.
@@ -500,7 +504,7 @@ impl<'p, D: Dialect> Run<'p, D> {
         let touched = outcome.hit && outcome.part > 0.0 && probe.toward;
         let latches = self.dialect.latches();
         // under a transformation an angle's last digits would move the linear axes by more than those of the log
-        let rotary = !self.vm.world.is_tcp();
+        let rotary = self.dialect.latches_rotary() && !self.vm.world.is_tcp();
         let latched = if touched && latches { latched(&stands, &self.vm.axes, rotary) } else { stands };
         self.vm.at = if touched && latches { beyond(&probe, &stands) } else { stands };
         self.vm.note(Event::Probe { probe: probe.clone(), outcome, latched });

@@ -495,7 +495,8 @@ mod tests {
             ("B +", 2, 3),
             ("", 0, 0),
             ("B ° 2", 2, 3),
-            ("BB + B + Ω", 0, 2),
+            ("BB + B", 0, 2),
+            ("BB + B + Ω", 9, 10),
         ] {
             let mistakes = check(&draft(formula), &built_in, &[]).unwrap_err();
             let first = &mistakes[0];

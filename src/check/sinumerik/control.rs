@@ -456,6 +456,11 @@ impl Dialect for Sinumerik {
         }
     }
 
+    /// MEAS latches the axes of its block.
+    fn latches_rotary(&self) -> bool {
+        false
+    }
+
     /// M30 and a reset bring back the modes that the machine's own data name; what is written into R parameters stays.
     fn settings(&self) -> BTreeMap<String, String> {
         let is_r = |v: &Var| matches!(v, Var::Name(n) if n.strip_prefix('R').is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit())));
