@@ -70,14 +70,14 @@ function parameters(live) {
   const VERDICTS = { within: "within", beyond: "too large", open: "uncertain", none: "" };
   const t = live.tolerance;
   table.caption.textContent = `Results with their 95 % uncertainty, against ${t.error_um} µm at ${t.radius_mm} mm`;
-  const head = ["result", "what it is", "value", "±, 95 %", "unit", "tolerance", "against it", "as bar"].map((h) => element("th", { scope: "col" }, h));
+  const head = ["result", "value", "±, 95 %", "unit", "against the tolerance", "as bar"].map((h) => element("th", { scope: "col" }, h));
   const size = (p) => Math.abs(p.value) + (p.expanded ?? 0);
   const top = {};
   for (const p of live.parameters) top[p.unit] = Math.max(top[p.unit] ?? 0, size(p));
   const rows = live.parameters.map((p) => {
     const told = p.sigma !== null;
-    return element("tr", {}, element("td", {}, p.name), element("td", { class: "word" }, p.says), element("td", {}, told || p.status === "fixed" ? stated(p.value, p.sigma) : "not told"),
-      element("td", {}, significant(p.expanded, 2)), element("td", { class: "word" }, p.unit), element("td", {}, p.tolerance === null ? "–" : significant(p.tolerance)), element("td", { class: "word" }, told ? VERDICTS[p.judgement] : ""), element("td", {}, told ? bar(p, top[p.unit]) : ""));
+    return element("tr", {}, element("td", { class: "word" }, p.name, element("small", {}, p.says)), element("td", {}, told || p.status === "fixed" ? stated(p.value, p.sigma) : "not told"),
+      element("td", {}, significant(p.expanded, 2)), element("td", { class: "word" }, p.unit), element("td", { class: "word" }, p.tolerance === null ? "–" : `${told && VERDICTS[p.judgement] ? `${VERDICTS[p.judgement]}: ` : ""}${significant(p.tolerance)}`), element("td", {}, told ? bar(p, top[p.unit]) : ""));
   });
   table.replaceChildren(table.caption, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows));
   const remarks = [...live.warnings, ...live.undetermined.map((u) => `not told by this data: ${u.says}`)].filter((r, i, all) => all.indexOf(r) === i);
@@ -87,7 +87,7 @@ function parameters(live) {
 /** Value and 95 % band on a line from −top to +top. */
 function bar(p, top) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  for (const [k, v] of Object.entries({ viewBox: "-100 -8 200 16", width: 140, height: 14, "aria-hidden": "true" })) svg.setAttribute(k, v);
+  for (const [k, v] of Object.entries({ viewBox: "-100 -8 200 16", width: 90, height: 14, "aria-hidden": "true" })) svg.setAttribute(k, v);
   const scaled = (v) => (95 * v) / (top || 1);
   const draw = (tag, attributes) => {
     const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
