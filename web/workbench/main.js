@@ -62,15 +62,16 @@ function verdict() {
     : open.size ? "Measure further poses: write the program that tells more, or run the full program."
     : found.verdict === "unexplained" ? "No known effect explains what is left: try a formula of your own, or look at the touches that stand out."
     : found.verdict === "adequate" ? "Nothing is missing that these touches can show: write the compensation." : "There are too few touches to judge: write a further program.");
+  const t = live.tolerance;
+  const partly = !found || found.verdict === "adequate" ? "" : `; these values ${found.faint || found.verdict === "too-little-data" ? "may hold" : "hold"} part of what is missing`;
+  byId("parameters").caption.textContent = `Results with their 95 % uncertainty, against ${t.error_um} µm at ${t.radius_mm} mm${partly}`;
   if (behind?.version === live.version && behind.failed.length) trouble({ messages: behind.failed });
 }
 
 function parameters(live) {
   const table = byId("parameters");
   const VERDICTS = { within: "within", beyond: "too large", open: "uncertain", none: "" };
-  const t = live.tolerance;
-  table.caption.textContent = `Results with their 95 % uncertainty, against ${t.error_um} µm at ${t.radius_mm} mm`;
-  const head = ["result", "value", "±, 95 %", "unit", "against the tolerance", "as bar"].map((h) => element("th", { scope: "col" }, h));
+  const head = ["result", "value", "±, 95 %", "unit", "tolerance", "as bar"].map((h) => element("th", { scope: "col" }, h));
   const size = (p) => Math.abs(p.value) + (p.expanded ?? 0);
   const top = {};
   for (const p of live.parameters) top[p.unit] = Math.max(top[p.unit] ?? 0, size(p));
@@ -87,7 +88,7 @@ function parameters(live) {
 /** Value and 95 % band on a line from −top to +top. */
 function bar(p, top) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  for (const [k, v] of Object.entries({ viewBox: "-100 -8 200 16", width: 90, height: 14, "aria-hidden": "true" })) svg.setAttribute(k, v);
+  for (const [k, v] of Object.entries({ viewBox: "-100 -8 200 16", width: 80, height: 14, "aria-hidden": "true" })) svg.setAttribute(k, v);
   const scaled = (v) => (95 * v) / (top || 1);
   const draw = (tag, attributes) => {
     const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
