@@ -371,7 +371,7 @@ fn beyond(probe: &Probe, contact: &Position) -> Position {
 /// What the encoders of a real machine say at a contact: each axis off by its own fraction of a least step, another one at each
 /// place. A reading that is left over from another touch, or that nobody has made, shows.
 fn latched(contact: &Position, axes: &[bool; 6], rotary: bool) -> Position {
-    const OFF: [f64; 6] = [0.9e-3, 0.8e-3, 0.7e-3, 0.4e-3, 0.5e-3, 0.6e-3];
+    const OFF: [f64; 6] = [0.5e-3, 0.45e-3, 0.4e-3, 0.4e-3, 0.5e-3, 0.6e-3];
     // the same place has the same reading, whatever came before it
     let phase = contact.0.iter().zip([12.9898, 78.233, 37.719, 4.581, 9.137, 7.313]).map(|(x, f)| x * f).sum::<f64>();
     let mut at = *contact;
