@@ -118,7 +118,7 @@ pub(super) fn put_together(
                     words::plain(&by(on)),
                     match &first.same_as[..] {
                         [] => format!("{} ({})", effect.id, effect.name),
-                        others => words::list(&[&[effect.id.clone()], others].concat()),
+                        others => words::list(&[std::slice::from_ref(&effect.id), others].concat()),
                     }
                 ),
                 id: effect.id.clone(),
@@ -355,7 +355,7 @@ fn moves(seen: &Examination, chosen: usize) -> Option<(f64, f64)> {
     let score = &seen.order.scores[chosen];
     let span = seen.named.library.candidates()[chosen].variants[score.variant].columns.clone();
     let columns = seen.named.raw_um.columns(span.start, span.len());
-    let at = &columns * &score.estimate;
+    let at = columns * &score.estimate;
     let most = seen.evidence.used.iter().copied().max_by(|&a, &b| at[a].abs().total_cmp(&at[b].abs()))?;
     let row = columns.row(most).transpose();
     Some((at[most].abs(), row.dot(&(&score.covariance * &row)).max(0.0).sqrt()))

@@ -102,7 +102,7 @@ pub fn later_run(fit: &Fit) -> Option<HeldOut> {
     let n_own = rows.without_own(&group, &own, &mut errors);
     let mut error_mm = vec![None; observations.len()];
     group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
-    let mut out = collect(fit, error_mm, &[group.clone()], n_own)?;
+    let mut out = collect(fit, error_mm, std::slice::from_ref(&group), n_own)?;
     out.unpredicted = group.len() - out.scored;
     Some(out)
 }

@@ -75,7 +75,7 @@ pub fn undetermined(
 }
 
 /// An amount of an unknown with its unit; lengths all in mm, so that they compare.
-fn plain<'u>((unknown, amount): (&'u Unknown, f64)) -> (f64, &'u str) {
+fn plain((unknown, amount): (&Unknown, f64)) -> (f64, &str) {
     if unknown.unit == "um" { (crate::units::mm_from_um(amount), "mm") } else { (amount, unknown.unit.as_str()) }
 }
 
