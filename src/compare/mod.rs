@@ -53,7 +53,7 @@ pub struct Comparison {
     pub chi2_per_dof: f64,
     /// Degrees of freedom.
     pub dof: usize,
-    /// True when the noise explains what is left (99.9 %).
+    /// True when the noise explains what is left (99.9 %), its size and the way it is spread.
     pub explained_by_noise: bool,
     /// All in a sentence.
     pub says: String,
@@ -302,7 +302,8 @@ impl Comparison {
         self.says = if self.explained_by_noise && first.by == "visit" {
             // the scatter of visits is the finding, and the model has no part in it
             format!("what is left, {:.2} um, is what {noise_words} leaves. {}", self.rms_um, first.says)
-        } else if self.explained_by_noise {
+        } else if std::mem::take(&mut self.explained_by_noise) {
+            // the size alone would do, the way it is spread does not
             format!(
                 "as a whole what is left, {:.2} um, could be {noise_words}, but not the way it is spread: {}",
                 self.rms_um, first.says

@@ -12,6 +12,7 @@ mod knowledge;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
+pub mod quantiles;
 pub mod shapes;
 pub mod snoop;
 pub mod solve;

@@ -6,9 +6,10 @@
 //! ZZᵀ has eigenvalues λₖ, and yₖ² has the expectation σ² + τ²·λₖ. τ̂ solves Σ yₖ²/(σ² + τ²λₖ) = K (Paule and Mandel's
 //! estimator, exact in its degrees of freedom), and its 90 % bound solves the same sum for the 10 % quantile of χ²(K).
 
+use super::quantiles;
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::HashMap;
 
 /// Fewer degrees of freedom than this say too little: their 95 % interval for σ spans more than a factor of two.
@@ -263,8 +264,7 @@ fn root(f: impl Fn(f64) -> f64, value: f64) -> f64 {
 
 /// Two-sided 95 % factor of Student's t, or of the normal distribution where the uncertainty is taken as known.
 fn coverage(dof: Option<f64>) -> f64 {
-    let t = dof.and_then(|d| StudentsT::new(0.0, 1.0, d.max(1.0)).ok());
-    t.map_or(1.959_963_984_540_054, |t| t.inverse_cdf(0.975))
+    quantiles::student_95(dof.unwrap_or(f64::INFINITY))
 }
 
 /// χ²/dof above this has a probability below 0.1 % when the model holds and σ is known; `dof_noise` of σ widen it.
@@ -272,8 +272,7 @@ fn coverage(dof: Option<f64>) -> f64 {
 pub fn chi2_limit(dof: usize, dof_noise: Option<f64>) -> f64 {
     match dof_noise {
         None => ChiSquared::new(dof as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(0.999) / dof as f64),
-        Some(nu) => statrs::distribution::FisherSnedecor::new(dof as f64, nu.max(1.0))
-            .map_or(f64::INFINITY, |d| d.inverse_cdf(0.999)),
+        Some(nu) => quantiles::fisher_999(dof as f64, nu.max(1.0)),
     }
 }
 
