@@ -452,6 +452,10 @@ impl<'a> Study<'a> {
             let _ = writeln!(text, "[model.parameters.{name}]\nvalue = 0.0\nfixed = true");
         }
         let _ = writeln!(text, "[noise]\ntouch_um = {}", self.noise_um);
+        // the axes of the virtual probe's machine come back exactly, and without revisits the program would take the declared scatter
+        if self.programs != ["full"] {
+            text += "visit_um = 0.0\n";
+        }
         text
     }
 }

@@ -6,7 +6,7 @@ use super::{Answer, Io, add};
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
 use crate::diagnose::{Options, Subject, Verdict, diagnose};
-use crate::fit::outcome::{Outcome, Parameter};
+use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::fit::{self, Fit};
 use crate::report::fit::{digits, significant};
 use nalgebra::{DMatrix, DVector};
@@ -219,11 +219,18 @@ const TOGETHER: f64 = 0.99;
 
 /// Why a model with these added effects is not to be believed, after the full fit.
 fn refused(fit: &Fit, added: &[&str]) -> Option<String> {
+    // where a combination leaves no trace the values of its members are a convention, and no sizes
+    let is_told = |i: usize| {
+        let u = &fit.model.unknowns[i];
+        let is = |p: &Parameter| p.name == u.name && p.effect == u.effect && p.status == Status::Identified;
+        fit.outcome.parameters.iter().any(is)
+    };
     let of: Vec<usize> = fit
         .free
         .iter()
         .copied()
         .filter(|&i| added.contains(&fit.model.unknowns[i].effect.as_str()) && !fit.model.unknowns[i].shape)
+        .filter(|&i| is_told(i))
         .collect();
     let last = added.last()?;
     for &i in of.iter().filter(|&&i| fit.model.unknowns[i].effect == *last) {
