@@ -60,3 +60,20 @@ fn the_commands_of_the_story_do_what_it_says() {
     }
     assert!(n_commands >= 12, "{n_commands}");
 }
+
+/// The README's main command: it ends well, with a compensation and the page.
+#[test]
+fn the_demo_goes_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("demo");
+    let run = Command::cargo_bin("axiscal").unwrap().arg("demo").arg("--out").arg(&out).output().unwrap();
+    let said = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success(), "{said}\n{}", String::from_utf8_lossy(&run.stderr));
+    assert!(
+        said.contains("what the demo has shown") && said.contains("zero-b") && said.contains("radial-c-1"),
+        "{said}"
+    );
+    for name in ["compensation/compensation.json", "report.html", "study.toml"] {
+        assert!(std::fs::metadata(out.join(name)).is_ok_and(|m| m.len() > 0), "{name}");
+    }
+}
