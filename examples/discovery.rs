@@ -1,5 +1,6 @@
 //! Hidden effects at full count: `cargo run --release --example discovery [-- PART COUNT]`. The table stands in
-//! docs/discovery.md. Parts: planted, clean, two, strange, speed; all of them without an argument.
+//! docs/discovery.md. Parts: planted (paper, full), clean (clean-paper,
+//! clean-paper-visits, clean-full, clean-full-visits), two, strange; all of them without an argument.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a measurement that cannot be made shall stop
 #![allow(missing_docs)]
 
@@ -123,17 +124,19 @@ fn main() {
         report_planted("full", &planted(&Bench::full(), count(400), 2));
         println!("  [{:.0} s]", began.elapsed().as_secs_f64());
     }
-    if wanted("clean") {
-        let n = count(2000) as u64;
-        report_clean("paper's plan", &clean(&Bench::paper(), n, None, 3));
-        // two axes with 0.5 um each, as the machine file declares
-        report_clean(
-            "paper's plan, 0.7 um per visit as declared",
-            &clean(&Bench::paper().with_visits(0.5f64.hypot(0.5)), n, None, 5),
-        );
-        report_clean("full", &clean(&Bench::full(), n, None, 4));
-        report_clean("full, 0.5 um per visit", &clean(&Bench::full().with_visits(0.5), n, None, 6));
-        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+    // two axes with 0.5 um each, as the machine file declares
+    let declared_um = 0.5f64.hypot(0.5);
+    let clean_cases: [(&str, &str, fn() -> Bench, f64, u64); 4] = [
+        ("clean-paper", "paper's plan", Bench::paper, 0.0, 3),
+        ("clean-paper-visits", "paper's plan, 0.7 um per visit as declared", Bench::paper, declared_um, 5),
+        ("clean-full", "full", Bench::full, 0.0, 4),
+        ("clean-full-visits", "full, 0.5 um per visit", Bench::full, 0.5, 6),
+    ];
+    for (name, says, bench, visit_um, seed) in clean_cases {
+        if wanted("clean") || part == name {
+            report_clean(says, &clean(&bench().with_visits(visit_um), count(2000) as u64, None, seed));
+            println!("  [{:.0} s]", began.elapsed().as_secs_f64());
+        }
     }
     if wanted("strange") {
         let bench = Bench::full();

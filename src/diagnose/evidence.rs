@@ -44,7 +44,7 @@ impl Evidence {
         let residual = DVector::from_iterator(rows.len(), rows.iter().map(|&i| linear.residual[i]));
         let jacobian = linear.jacobian.select_rows(&rows);
         // σ was estimated from repeats that are rows of this regression
-        let pure = fit.noise.dof.map(|dof| PureError { variance: 1.0, dof, within: true });
+        let pure = fit.noise.dof.map(|dof| PureError { variance: 1.0, dof, within: true, floor: tau_mm > 0.0 });
         Self {
             base: Basis::new(&jacobian),
             visits: used.iter().map(|&i| fit.data.visits[i]).collect(),

@@ -150,7 +150,7 @@ pub fn wald(question: Question, effects: &[DMatrix<f64>]) -> Vec<f64> {
     };
     let (ss, rank) = without(None);
     let (pure_ss, pure_dof) = match question.pure {
-        Some(PureError { variance, dof, within: false }) => (variance * dof, dof),
+        Some(PureError { variance, dof, within: false, .. }) => (variance * dof, dof),
         _ => (0.0, 0.0),
     };
     (0..effects.len())

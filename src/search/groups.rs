@@ -5,7 +5,7 @@ use super::apart::adds_nothing;
 use super::distributions::ln_p_of_f;
 use super::library::Origin;
 use super::moments::{Block, Moments};
-use super::score::Search;
+use super::score::{Search, held_against};
 use nalgebra::{DMatrix, DVector};
 
 /// A rival explains at least this share of the leader's trace: a leader that is hardly there adds nothing after anything.
@@ -154,7 +154,7 @@ impl Search<'_> {
         };
         let rest = (self.moments.rr - along.norm_squared() - delta).max(0.0) + pure_ss;
         let dof = (self.moments.n - self.moments.p) as f64 - (self.scores[j].n_parameters + q) as f64 + pure_dof;
-        if dof < 1.0 { 1.0 } else { ln_p_of_f(delta, q as f64, rest, dof).exp() }
+        if dof < 1.0 { 1.0 } else { ln_p_of_f(delta, q as f64, held_against(self.question.pure, rest, dof), dof).exp() }
     }
 }
 

@@ -16,6 +16,17 @@ pub struct PureError {
     pub dof: f64,
     /// True when the repeats are rows of the regression: its residual holds them already.
     pub within: bool,
+    /// What is left per degree of freedom counts as no less than this variance. Rows that were whitened with the upper bound
+    /// of the scatter of visits are left with less than there is within a visit, and would make what changes there look sure.
+    pub floor: bool,
+}
+
+/// What an effect's sum of squares is held against: what is left of `ss` without it, on `dof` degrees of freedom.
+pub(super) fn held_against(pure: Option<PureError>, ss: f64, dof: f64) -> f64 {
+    match pure {
+        Some(e) if e.floor => ss.max(e.variance * dof),
+        _ => ss,
+    }
 }
 
 /// One linearised regression at the minimum of its base model.
@@ -201,7 +212,7 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
             let along = block.whitener.tr_mul(&moments.jr.rows(variant.columns.start, variant.columns.len()));
             // rounding may take away more than there is
             let delta = along.norm_squared().min(moments.rr);
-            let ln_p = ln_p_of_f(delta, q as f64, total - delta, dof);
+            let ln_p = ln_p_of_f(delta, q as f64, held_against(pure, total - delta, dof), dof);
             scan.push(delta);
             ln_each.push(ln_p);
             if best.as_ref().is_none_or(|b| ln_p < b.3) {
@@ -213,10 +224,11 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
                 let q = block.rank();
                 let delta_ss = along.norm_squared().min(moments.rr);
                 let dof = free - (q + n_scanned) as f64;
-                let variance = (total - delta_ss) / dof;
+                let rest = held_against(pure, total - delta_ss, dof);
+                let variance = rest / dof;
                 // a scanned shape is a parameter, and a long scan is bounded besides
                 let ln_p = if n_scanned > 0 {
-                    let counted = ln_p_of_f(delta_ss, (q + n_scanned) as f64, total - delta_ss, dof);
+                    let counted = ln_p_of_f(delta_ss, (q + n_scanned) as f64, rest, dof);
                     counted.max(ln_p_of_scan(&ln_each, q))
                 } else {
                     ln_p_of_scan(&ln_each, q)

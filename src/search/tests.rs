@@ -110,7 +110,7 @@ fn p_values_of_clean_data_are_uniform() {
         let r = noise(&mut rng, 60);
         // pure error from other touches joins in every other run
         let chi2: f64 = noise(&mut rng, 8).norm_squared();
-        let pure = PureError { variance: chi2 / 8.0, dof: 8.0, within: false };
+        let pure = PureError { variance: chi2 / 8.0, dof: 8.0, within: false, floor: false };
         let question = Question { residual: &r, base: &base, pure: (run % 2 == 0).then_some(pure) };
         for s in Search::new(question, &library).scores {
             p[2 * s.candidate + run % 2].push(s.p);
@@ -364,7 +364,7 @@ fn lack_of_fit_has_its_level() {
         let r = noise(&mut rng, 80);
         p[0].push(lack_of_fit(&ask(&r, &base)).p);
         let chi2: f64 = noise(&mut rng, 20).norm_squared();
-        let pure = PureError { variance: chi2 / 20.0, dof: 20.0, within: false };
+        let pure = PureError { variance: chi2 / 20.0, dof: 20.0, within: false, floor: false };
         p[1].push(lack_of_fit(&Question { pure: Some(pure), ..ask(&r, &base) }).p);
     }
     for p in p {
