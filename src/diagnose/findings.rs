@@ -10,8 +10,8 @@ use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out_in};
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::power;
-use crate::units::um_from_mm;
-use nalgebra::DMatrix;
+use crate::units::{mm_from_um, um_from_mm};
+use nalgebra::{DMatrix, DVector};
 
 /// A parameter is flagged when an added effect makes it this many times less certain.
 const WEAKENED: f64 = 3.0;
@@ -380,13 +380,30 @@ fn told(covariance: &DMatrix<f64>) -> Vec<bool> {
         .collect()
 }
 
-/// Results that an added effect makes less certain, from the one fit: C′ = C + G·C_c·Gᵀ with G how they move with it.
+/// Results that an added effect makes less certain, from the one fit: C' = C + G·C_c·Gᵀ with G how they move with it. In the
+/// weights of the fit, which a refit keeps, and not in those of the tests, which allow for more scatter or for none.
 fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
-    let score = &seen.order.scores[chosen];
-    let columns = seen.order.columns(chosen);
+    let variant = seen.order.scores[chosen].variant;
+    let span = seen.named.library.candidates()[chosen].variants[variant].columns.clone();
+    let weights = Evidence::with_visits(fit, fit.noise.tau_mm);
+    let raw_mm = seen.named.raw_um.columns(span.start, span.len()).map(mm_from_um);
+    let columns = weights.whiten(fit, raw_mm);
+    let left = weights.base.project_columns(&columns);
     let covariance = crate::fit::uncertainty::free_covariance(fit);
-    let moves = &covariance * seen.jacobian.tr_mul(&columns);
-    let added = &moves * &score.covariance * moves.transpose();
+    let moves = &covariance * weights.jacobian.tr_mul(&columns);
+    // C_c⁻¹ = JᵀPJ where the plan sees the effect; what it does not see moves nothing
+    let scale = columns.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE));
+    let scale = DVector::from_iterator(columns.ncols(), scale);
+    let gram = left.tr_mul(&left);
+    let scaled = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+    let eigen = scaled.symmetric_eigen();
+    let mut added = DVector::zeros(moves.nrows());
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > crate::search::KEPT {
+            let along = &moves * vector.component_div(&scale);
+            added += along.component_mul(&along) / *value;
+        }
+    }
     let mut out = Vec::new();
     for (c, &i) in fit.free.iter().enumerate() {
         let u = &fit.model.unknowns[i];
@@ -394,7 +411,7 @@ fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
         if u.nuisance || p.sigma.is_none() || p.status != crate::fit::outcome::Status::Identified {
             continue;
         }
-        let (before, after) = (covariance[(c, c)], covariance[(c, c)] + added[(c, c)].max(0.0));
+        let (before, after) = (covariance[(c, c)], covariance[(c, c)] + added[c]);
         if after > WEAKENED * WEAKENED * before {
             out.push(Weakened {
                 name: u.name.clone(),

@@ -2,13 +2,13 @@
 
 use super::evidence::Evidence;
 use crate::fit::candidates::{Columns, Variant, variants, with_values};
-use crate::fit::{Fit, scan};
+use crate::fit::{Fit, around, scan};
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
 use crate::model::formula::slot;
 use crate::model::predict::Observation;
-use crate::search::{Library, Origin};
+use crate::search::{Library, Origin, Search};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
 
@@ -66,6 +66,41 @@ fn scan_of(effect: &Effect, data: &Data) -> Option<(usize, Vec<f64>)> {
     shapes.enumerate().find_map(|(i, p)| Some((i, scan(p, data).filter(|s| s.len() > 1)?)))
 }
 
+/// The values of a scan and those around its best one: a jump that was tried between index visits only may come in mid-visit,
+/// and where an effect is large a number between two that were tried leaves so much that another effect seems better.
+fn closer(
+    fit: &Fit,
+    evidence: &Evidence,
+    machine: &Machine,
+    (effect, places): (&Effect, &[Observation]),
+    which: usize,
+    mut values: Vec<f64>,
+) -> Vec<f64> {
+    let shaped: Vec<&Parameter> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
+    let starts: Vec<f64> = shaped.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect();
+    let of = |value: f64| {
+        let mut shapes = starts.clone();
+        shapes[which] = value;
+        Variant { effects: vec![0], shapes }
+    };
+    let wanted: Vec<Variant> = values.iter().map(|v| of(*v)).collect();
+    let made = variants(machine, &[effect], &fit.data, places, fit.model.reference, &wanted);
+    let mut library = Library::new(evidence.n_rows());
+    let sizes = values.iter().zip(made).map(|(value, made)| {
+        let own: Vec<usize> = (0..made.unknowns.len()).filter(|&c| !made.unknowns[c].shape).collect();
+        let mut columns = made.values.select_columns(&own);
+        for (mut column, &c) in columns.column_iter_mut().zip(&own) {
+            column *= made.unknowns[c].typical.max(f64::MIN_POSITIVE);
+        }
+        (*value, evidence.whiten(fit, columns))
+    });
+    library.push_scan(&effect.id, Origin::Catalogue, sizes, 1);
+    let best = Search::new(evidence.question(), &library).scores[0].variant;
+    values.extend(around(shaped[which], &fit.data, &values, values[best]));
+    values.sort_by(f64::total_cmp);
+    values
+}
+
 /// The touches where the model expects them instead of where they were read: along its normal a reading carries the very
 /// noise that is to be explained, and a formula that is steep in a coordinate (a pitch error whose period the plan's
 /// coordinates keep) would explain the noise by itself.
@@ -94,7 +129,14 @@ impl<'c> Named<'c> {
     pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
         let places = without_noise(fit);
         let (effects, left_out) = with_values(effects, &places);
-        let scans_of: Vec<Option<(usize, Vec<f64>)>> = effects.iter().map(|e| scan_of(e, &fit.data)).collect();
+        let scans_of: Vec<Option<(usize, Vec<f64>)>> = effects
+            .iter()
+            .map(|e| {
+                let (which, values) = scan_of(e, &fit.data)?;
+                let values = closer(fit, evidence, machine, (e, &places), which, values);
+                Some((which, values))
+            })
+            .collect();
         let fixed = (0..effects.len()).filter(|i| scans_of[*i].is_none()).collect();
         let mut wanted = vec![Variant { effects: fixed, shapes: Vec::new() }];
         let mut scanned_at = Vec::new();

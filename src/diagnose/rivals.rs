@@ -2,11 +2,12 @@
 //!
 //! A jump at one moment is followed a good part of the way by a warm-up, and the rest of it by a drift: each of them passes
 //! its test, and all of them are wrong. So what the effects with names come to, one after another, is held against what
-//! shapes come to, by what they leave and what they cost (Schwarz's criterion).
+//! shapes come to, by what they leave and what they cost (Schwarz's criterion). Either side pays for the parameters that act
+//! and not for those that it has besides: a block that slips in X alone is a slip all the same.
 
 use crate::search::generic::Generics;
 use crate::search::{Basis, KEPT, Library, Question, Search};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Steps on either side.
 const MOST_STEPS: usize = 2;
@@ -57,12 +58,13 @@ fn way(question: Question, library: &Library, generic: bool, first: Option<usize
         let search = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, library);
         let found = if generic { search.leading_shape() } else { search.leader() };
         let Some(next) = first.filter(|_| end.steps.is_empty()).or(found) else { break };
-        let (columns, cost) = (search.columns(next), search.scores[next].n_parameters);
-        if end.basis.extend(&columns, KEPT) == 0 {
+        let score = &search.scores[next];
+        let acting = acting(&end, &search.columns(next));
+        if acting.ncols() == 0 || end.basis.extend(&acting, KEPT) == 0 {
             break;
         }
         end.residual = end.basis.project(&end.residual);
-        end.cost += cost;
+        end.cost += acting.ncols() + score.n_parameters - score.q;
         end.steps.push(next);
         end.criterion = n * end.residual.norm_squared().max(f64::MIN_POSITIVE).ln() + end.cost as f64 * n.ln();
         if end.steps.len() == 1 {
@@ -70,6 +72,35 @@ fn way(question: Question, library: &Library, generic: bool, first: Option<usize
         }
     }
     end
+}
+
+/// The columns of a candidate that pay for themselves by the criterion: the one that takes most away, then the one that takes
+/// most of what is left, as long as the criterion falls; at least one that is seen.
+fn acting(end: &End, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = end.residual.len() as f64;
+    let mut residual = end.residual.clone();
+    let mut left = end.basis.project_columns(columns);
+    let seen: Vec<f64> = columns.column_iter().map(|c| KEPT * c.norm_squared()).collect();
+    let mut kept: Vec<usize> = Vec::new();
+    loop {
+        let gain = |k: usize| {
+            let own = left.column(k).norm_squared();
+            if own > seen[k] { left.column(k).dot(&residual).powi(2) / own } else { 0.0 }
+        };
+        let free = (0..columns.ncols()).filter(|k| !kept.contains(k));
+        let Some((k, gained)) = free.map(|k| (k, gain(k))).max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+        let ss = residual.norm_squared();
+        let pays = n * (ss / (ss - gained).max(f64::MIN_POSITIVE)).ln() > n.ln();
+        if gained <= 0.0 || (!pays && !kept.is_empty()) {
+            break;
+        }
+        kept.push(k);
+        let unit = left.column(k).normalize();
+        residual -= &unit * unit.dot(&residual);
+        let along = left.tr_mul(&unit);
+        left -= &unit * along.transpose();
+    }
+    columns.select_columns(&kept)
 }
 
 /// Holds effects, `first` in front, against shapes.

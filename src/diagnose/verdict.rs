@@ -73,8 +73,15 @@ pub(super) fn of(seen: &Examination, beside: &Beside) -> Decision {
 /// Above this ratio of what is left to the noise nobody calls what is left faint.
 const FAINT: f64 = 1.2;
 
-/// Something passed a test and was not borne out, while the noise explains all that is left.
+/// What chance makes less often than this is no matter of chance, however small it is beside the noise.
+const CHANCE: f64 = 1e-3;
+
+/// Something passed a test and was not borne out, while the noise explains all that is left and chance might have made it.
 fn faint(out: &Diagnosis, fit: &Fit) -> bool {
+    let tests = out.candidates.iter().map(|c| c.p_adjusted).chain(out.depends.iter().map(|w| w.p_adjusted));
+    if tests.fold(1.0, f64::min) < CHANCE {
+        return false;
+    }
     let noise_does = fit.dof > 0 && fit.outcome.chi2_per_dof <= crate::fit::noise::chi2_limit(fit.dof, fit.noise.dof);
     out.verdict == Verdict::Unexplained && noise_does && out.rms_um <= FAINT * out.noise_um
 }
@@ -121,16 +128,21 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
                 .first()
                 .filter(|g| g.rms_um < super::gross::RIGHT * out.rms_um)
                 .map(|g| format!(" {}.", g.says));
-            let (effect, others) = match out.candidates.first() {
-                Some(c) => (c.effect.as_str(), c.same_as.len()),
-                None => ("an effect", 0),
+            let (effect, others, share) = match out.candidates.first() {
+                Some(c) => (c.effect.as_str(), c.same_as.len(), c.share),
+                None => ("an effect", 0, 0.0),
             };
-            let one = if others == 0 { effect.to_owned() } else { format!("{effect} or one of {others} others") };
+            let one = match others {
+                0 => effect.to_owned(),
+                1 => format!("{effect} or another one"),
+                _ => format!("{effect} or one of {others} others"),
+            };
+            let part = format!("{:.0} %", (100.0 * share).round());
             let scatter_first = out.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
             match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
                 (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
                 (_, true, true) => format!(
-                    "Something is missing ({against}), and no known effect explains it: {one} would take a part of it, but a \
+                    "Something is missing ({against}), and no known effect explains it: {one} would take {part} of it, but a \
                      shape without a name describes it clearly better.{}",
                     gross.unwrap_or(first)
                 ),

@@ -4,6 +4,7 @@ use super::features::direction_words;
 use crate::fit::Fit;
 use crate::machine::Machine;
 use crate::search::dependence::Dependence;
+use crate::search::generic::CONSTANT;
 use crate::units::deg_from_rad;
 
 /// `a`, `a or b`, `a, b or c`.
@@ -50,6 +51,7 @@ pub fn plain(by: &str) -> String {
             "spindle" => "the orientation of the spindle".to_owned(),
             "approach" => "the direction of approach".to_owned(),
             "X" | "Y" | "Z" => of("the position of", by),
+            CONSTANT => "what is the same at every touch".to_owned(),
             other => format!("the {other}"),
         },
     }
@@ -94,6 +96,9 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
     let percent = (100.0 * share).round();
     let rotary = machine.rotary().any(|a| a.name.to_string() == d.on) || d.on == "S";
     let direction = direction_words(&d.direction, machine);
+    if d.on == CONSTANT {
+        return format!("{percent} % of what is left is the same at every touch, {direction}");
+    }
     let (on, how) = match d.on.as_str() {
         "t" => (
             "time".to_owned(),
@@ -152,6 +157,7 @@ pub fn kind(d: &Dependence) -> String {
         ("t", "exponential") => "warming up: it moves fast at first and comes to rest",
         ("t", _) => "slow change: temperature, creep of a clamp",
         ("t*block", _) => "a moved block: loose, knocked, or dirt under it",
+        (CONSTANT, _) => "an offset that the model does not hold: a zero point, a length, a position error of an axis",
         ("block", _) => "a block that stands or measures otherwise than the rest: loose, tilted, another size",
         ("face", _) => "single faces that lie elsewhere: chips, burrs, coolant",
         ("visit", _) => "poses that do not come back: clamping or indexing scatter",

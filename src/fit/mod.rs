@@ -20,7 +20,7 @@ pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
-pub use shapes::{scan, start_shapes};
+pub use shapes::{around, scan, start_shapes};
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;

@@ -86,15 +86,8 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
             };
             let values = scan(&effect.parameters[i], &fit.data).unwrap_or_else(|| tried(&effect.parameters[i]));
             try_all(&values, &mut best);
-            // a jump may also come in mid-visit: the touches around the best place between two visits
-            let around: Vec<f64> = match effect.parameters[i].between {
-                Some(variable) => places(&fit.data, variable, false),
-                None => Vec::new(),
-            };
-            let below = values.iter().copied().filter(|v| *v < best[k]).fold(f64::NEG_INFINITY, f64::max);
-            let above = values.iter().copied().filter(|v| *v > best[k]).fold(f64::INFINITY, f64::min);
-            let around: Vec<f64> = around.into_iter().filter(|v| (below..above).contains(v)).collect();
-            try_all(&around, &mut best);
+            // a jump may also come in mid-visit, and a number lie between those that were tried
+            try_all(&around(&effect.parameters[i], &fit.data, &values, best[k]), &mut best);
         }
     }
     let (gain, size) = found;
@@ -136,6 +129,26 @@ pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
         }
     }
     (!p.scan.is_empty()).then(|| p.scan.clone())
+}
+
+/// Values between one of a scan's values and its neighbours, for a closer look: the places of a jump that the scan did not try,
+/// or so many steps of a number that changes smoothly.
+#[must_use]
+pub fn around(p: &Parameter, data: &Data, scanned: &[f64], best: f64) -> Vec<f64> {
+    /// Between two neighbours.
+    const STEPS: usize = 4;
+    let below = scanned.iter().copied().filter(|v| *v < best).fold(f64::NEG_INFINITY, f64::max);
+    let above = scanned.iter().copied().filter(|v| *v > best).fold(f64::INFINITY, f64::min);
+    let mut out = match p.between {
+        Some(variable) => places(data, variable, false),
+        None => [(below, best), (best, above)]
+            .into_iter()
+            .filter(|(from, to)| from.is_finite() && to.is_finite())
+            .flat_map(|(from, to)| (1..STEPS).map(move |i| from + (to - from) * i as f64 / STEPS as f64))
+            .collect(),
+    };
+    out.retain(|v| *v > below && *v < above && !scanned.contains(v));
+    out
 }
 
 /// Half-way between successive values of a variable: of all touches, or where the next index visit begins.

@@ -1,8 +1,11 @@
 //! On what the misfit depends: variables ranked, with the curve itself and a formula to start from.
 
+use super::KEPT;
 use super::distributions::p_of_t;
-use super::generic::{Features, Generics, Shape};
+use super::generic::{CONSTANT, Features, Generics, Shape};
 use super::groups::Member;
+use super::library::{Library, Origin};
+use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
 use super::score::{Question, Score, Search};
 use super::shapes::Function;
 use nalgebra::DVector;
@@ -85,10 +88,23 @@ pub struct Dependence {
 
 /// The generic search: what the misfit depends on, best first, one entry per variable or pair.
 ///
-/// The leader of the ranking goes first, unless a simpler shape (fewer variables, then smaller p) says the same.
+/// The leader of the ranking goes first, unless a simpler shape (fewer variables, then smaller p) says the same. What is the
+/// same at every touch depends on no variable: it is a finding of its own, and taken off before variables are looked at, or
+/// each group of touches and each step near an end of the run would be credited with it.
 #[must_use]
 pub fn dependences(question: Question, features: &Features, generics: &Generics) -> Vec<Dependence> {
-    let search = Search::new(question, &generics.library);
+    let total = question.base.project(question.residual).norm_squared();
+    let constants: Vec<usize> =
+        (0..generics.shapes.len()).filter(|&c| generics.shapes[c].depends_on == CONSTANT).collect();
+    let mut base = question.base.clone();
+    let mut library = Library::new(generics.library.n_rows());
+    for &c in &constants {
+        let columns = generics.library.columns(c, 0);
+        base.extend(&columns, KEPT);
+        library.push(&generics.library.candidates()[c].id, Origin::Generic, &columns);
+    }
+    let same = Search::new(question, &library);
+    let search = Search::new(Question { base: &base, ..question }, &generics.library);
     let mut ranking = search.ranking();
     // what passes goes before what does not: of one variable the first entry speaks
     ranking.sort_by_key(|&c| !search.scores[c].proposed());
@@ -107,13 +123,23 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
         order.extend(simplest.map(|m| m.candidate));
     }
     order.extend(ranking);
-    let total = question.base.project(question.residual).norm_squared();
     let mut out: Vec<Dependence> = Vec::new();
     for candidate in order {
         let shape = &generics.shapes[candidate];
         if out.iter().all(|d| d.on != shape.depends_on) {
             out.push(dependence(&search.scores[candidate], shape, features, generics, total));
         }
+    }
+    if let Some(mut score) = same.ranking().first().map(|&c| same.scores[c].clone()) {
+        // one family with all the shapes
+        let tested = search.scores.iter().filter(|s| s.visible()).count() + library.candidates().len();
+        score.p_adjusted = (score.p * tested as f64 * FAMILY_LEVEL / GENERIC_LEVEL).min(1.0);
+        score.candidate = constants[score.candidate];
+        let passes = |d: &Dependence| d.p_adjusted < FAMILY_LEVEL;
+        let constant = dependence(&score, &generics.shapes[score.candidate], features, generics, total);
+        // beside something that changes it is the level of that
+        let at = usize::from(out.first().is_some_and(passes) || !passes(&constant)).min(out.len());
+        out.insert(at, constant);
     }
     out
 }
@@ -181,6 +207,7 @@ fn curve(score: &Score, shape: &Shape, features: &Features, kept: &Range<usize>)
         sigma: values.dot(&(&covariance * &values)).max(0.0).sqrt(),
     };
     match shape.variables[..] {
+        [] if shape.depends_on == CONSTANT => Vec::new(),
         [] => (0..functions.len())
             .map(|i| point(i as f64, DVector::from_fn(functions.len(), |k, _| f64::from(u8::from(i == k)))))
             .collect(),

@@ -24,6 +24,9 @@ const BLOCK_CHANGE_POINTS: usize = 24;
 /// Most groups that get a constant each.
 const GROUPS: usize = 40;
 
+/// What a shape depends on that is the same at every touch.
+pub const CONSTANT: &str = "constant";
+
 /// What kind of quantity a variable is: it decides which shapes are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -192,6 +195,7 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
     let mut plan = Plan::default();
     for (d, direction) in features.directions.iter().enumerate() {
         let along_approach = direction.dof == "r";
+        plan.put(format!("shape:{CONSTANT}"), CONSTANT, &[], d, vec![Function::Constant]);
         for (v, variable) in features.variables.iter().enumerate() {
             plan.of_variable(d, v, variable, along_approach);
         }

@@ -6,6 +6,8 @@ use std::f64::consts::TAU;
 /// A function of one or two variables, or of a group of touches. Variables by index in the feature table.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Function {
+    /// 1 everywhere.
+    Constant,
     /// ((x − centre)/scale)^k
     Power { variable: usize, centre: f64, scale: f64, k: i32 },
     /// cos(k x) or sin(k x)
@@ -46,6 +48,7 @@ impl Function {
     /// Its value at a touch.
     pub fn at_row(&self, features: &Features, row: usize) -> f64 {
         match self {
+            Self::Constant => 1.0,
             Self::Product(a, b) => a.at_row(features, row) * b.at_row(features, row),
             Self::Along { direction, of } => features.directions[*direction].weight[row] * of.at_row(features, row),
             Self::Member { of, number } => {
@@ -70,7 +73,7 @@ impl Function {
             Self::Kink { at, scale, .. } => (x - at).abs() / scale,
             Self::Exponential { from, constant, .. } => 1.0 - (-(x - from) / constant).exp(),
             Self::Along { ref of, .. } => of.at(x),
-            Self::Product(..) | Self::Member { .. } => 1.0,
+            Self::Constant | Self::Product(..) | Self::Member { .. } => 1.0,
         }
     }
 
@@ -83,7 +86,7 @@ impl Function {
             | Self::Kink { variable, .. }
             | Self::Exponential { variable, .. } => Some(variable),
             Self::Along { ref of, .. } => of.variable(),
-            Self::Product(..) | Self::Member { .. } => None,
+            Self::Constant | Self::Product(..) | Self::Member { .. } => None,
         }
     }
 
@@ -94,6 +97,7 @@ impl Function {
         let given = |x: f64| free.map_or_else(|| number(x), str::to_owned);
         let less = |word: String, x: f64| if x == 0.0 { word } else { format!("({word} - {})", number(x)) };
         Some(match self {
+            Self::Constant => "1".to_owned(),
             Self::Power { variable, centre, scale, k } => {
                 let of = format!("{}/{}", less(word(*variable)?, *centre), number(*scale));
                 if *k == 1 { of } else { format!("({of})^{k}") }

@@ -37,7 +37,7 @@ pub fn sized(bench: &Bench, base: &str, hidden: Hidden, peak_um: f64) -> Sized {
     let difference = (with - without) * 1000.0;
     let size = peak_um / difference.amax();
     let difference_um = difference * size;
-    let own = hidden.without_harmonics().map(|own| {
+    let own = hidden.without_admixture().map(|own| {
         let (with, _) = gaps(&format!("{base}{}", own.written(1.0)), own.own());
         (with - &at_rest) * 1000.0 * size
     });

@@ -125,10 +125,10 @@ pub struct Hidden {
     pub other_shape: bool,
     /// Values of the catalogue's effect: name, value, unit; shapes do not scale.
     values: Vec<(String, f64, String, bool)>,
-    /// Harmonics of a rotary axis besides.
-    harmonics: Vec<Harmonic>,
-    /// Id of the effect of the catalogue that they are.
+    /// Id of an effect of the catalogue that is mixed in: another harmonic of the same motion.
     pub admixture: Option<String>,
+    /// Its values: name, value, unit.
+    mixed: Vec<(String, f64, String)>,
     /// A file of own effects with one effect `planted` and its parameters.
     own: String,
     own_parameters: Vec<(String, f64)>,
@@ -151,39 +151,23 @@ impl Hidden {
                 let _ = writeln!(out, "{name} = {:?}", size * value);
             }
         }
-        for h in &self.harmonics {
-            let unit = if h.dof.starts_with('d') { "um" } else { "urad" };
-            let _ = writeln!(
-                out,
-                "[[harmonic]]\naxis = \"{}\"\ndof = \"{}\"\nk = {}\ncos_{unit} = {:?}\nsin_{unit} = {:?}",
-                h.axis,
-                h.dof,
-                h.k,
-                size * h.cos,
-                size * h.sin
-            );
+        if let Some(admixture) = self.admixture.as_ref().filter(|_| !self.mixed.is_empty()) {
+            let _ = writeln!(out, "[effects.{admixture}]");
+            for (name, value, unit) in &self.mixed {
+                let _ = writeln!(out, "{name} = {{ value = {:?}, unit = \"{unit}\" }}", size * value);
+            }
         }
         out
     }
 
     /// The catalogue's part of a mixture; `None` where it is none.
-    pub fn without_harmonics(&self) -> Option<Self> {
-        (!self.harmonics.is_empty()).then(|| Self { harmonics: Vec::new(), ..self.clone() })
+    pub fn without_admixture(&self) -> Option<Self> {
+        (!self.mixed.is_empty()).then(|| Self { mixed: Vec::new(), ..self.clone() })
     }
 
     pub fn own(&self) -> &str {
         &self.own
     }
-}
-
-/// A harmonic error motion of a rotary axis, um or urad.
-#[derive(Clone)]
-struct Harmonic {
-    axis: String,
-    dof: &'static str,
-    k: u32,
-    cos: f64,
-    sin: f64,
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
@@ -219,8 +203,8 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
         truth: id.to_owned(),
         other_shape: false,
         values,
-        harmonics: Vec::new(),
         admixture: None,
+        mixed: Vec::new(),
         own: String::new(),
         own_parameters: Vec::new(),
     }
@@ -278,29 +262,13 @@ pub fn bent(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
             out.own_parameters = ["px", "py", "pz"].map(|p| (p.to_owned(), 5.0 * normal(rng))).to_vec();
         }
         (family, Some(k)) => {
-            let axis = words[1].to_uppercase();
-            let dofs: &[&'static str] = match (family, axis.as_str()) {
-                ("radial", "C") => &["dx", "dy"],
-                ("radial", _) => &["dx", "dz"],
-                ("axial", "C") => &["dz"],
-                ("axial", _) => &["dy"],
-                ("tilt", "C") => &["rx", "ry"],
-                ("tilt", _) => &["rx", "rz"],
-                ("positioning", "C") => &["rz"],
-                _ => &["ry"],
-            };
-            let typical = out.values[0].1.abs().max(1.0);
-            for dof in dofs {
-                let other = if k == 1 { 2 } else { 1 };
-                out.admixture = Some(format!("{family}-{}-{other}", words[1]));
-                out.harmonics.push(Harmonic {
-                    axis: axis.clone(),
-                    dof,
-                    k: other,
-                    cos: 0.25 * typical * normal(rng),
-                    sin: 0.25 * typical * normal(rng),
-                });
-            }
+            let other = format!("{family}-{}-{}", words[1], if k == 1 { 2 } else { 1 });
+            let catalogue = Catalogue::built_in().unwrap();
+            let effect = catalogue.get(&other, &bench.machine).unwrap();
+            let quarter = 0.25 * out.values[0].1.abs().max(1.0);
+            out.mixed =
+                effect.parameters.iter().map(|p| (p.name.clone(), quarter * normal(rng), p.unit.clone())).collect();
+            out.admixture = Some(other);
         }
         _ => {}
     }
