@@ -66,8 +66,8 @@ fn scan_of(effect: &Effect, data: &Data) -> Option<(usize, Vec<f64>)> {
     shapes.enumerate().find_map(|(i, p)| Some((i, scan(p, data).filter(|s| s.len() > 1)?)))
 }
 
-/// The values of a scan and those around its best one: a jump that was tried between index visits only may come in mid-visit,
-/// and where an effect is large a number between two that were tried leaves so much that another effect seems better.
+/// The values of a scan and a better one beside its best: a jump that was tried between index visits only may come in
+/// mid-visit, and where an effect is large a number between two that were tried leaves so much that another effect seems better.
 fn closer(
     fit: &Fit,
     evidence: &Evidence,
@@ -78,26 +78,33 @@ fn closer(
 ) -> Vec<f64> {
     let shaped: Vec<&Parameter> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
     let starts: Vec<f64> = shaped.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect();
-    let of = |value: f64| {
-        let mut shapes = starts.clone();
-        shapes[which] = value;
-        Variant { effects: vec![0], shapes }
+    let best_of = |values: &[f64]| -> Option<(f64, f64)> {
+        let of = |value: &f64| {
+            let mut shapes = starts.clone();
+            shapes[which] = *value;
+            Variant { effects: vec![0], shapes }
+        };
+        let wanted: Vec<Variant> = values.iter().map(of).collect();
+        let made = variants(machine, &[effect], &fit.data, places, fit.model.reference, &wanted);
+        let sizes = values.iter().zip(made).map(|(value, made)| {
+            let own: Vec<usize> = (0..made.unknowns.len()).filter(|&c| !made.unknowns[c].shape).collect();
+            let mut columns = made.values.select_columns(&own);
+            for (mut column, &c) in columns.column_iter_mut().zip(&own) {
+                column *= made.unknowns[c].typical.max(f64::MIN_POSITIVE);
+            }
+            (*value, evidence.whiten(fit, columns))
+        });
+        let mut library = Library::new(evidence.n_rows());
+        library.push_scan(&effect.id, Origin::Catalogue, sizes, 1);
+        let score = Search::new(evidence.question(), &library).scores.into_iter().next()?;
+        Some((values[score.variant], score.delta_ss))
     };
-    let wanted: Vec<Variant> = values.iter().map(|v| of(*v)).collect();
-    let made = variants(machine, &[effect], &fit.data, places, fit.model.reference, &wanted);
-    let mut library = Library::new(evidence.n_rows());
-    let sizes = values.iter().zip(made).map(|(value, made)| {
-        let own: Vec<usize> = (0..made.unknowns.len()).filter(|&c| !made.unknowns[c].shape).collect();
-        let mut columns = made.values.select_columns(&own);
-        for (mut column, &c) in columns.column_iter_mut().zip(&own) {
-            column *= made.unknowns[c].typical.max(f64::MIN_POSITIVE);
-        }
-        (*value, evidence.whiten(fit, columns))
-    });
-    library.push_scan(&effect.id, Origin::Catalogue, sizes, 1);
-    let best = Search::new(evidence.question(), &library).scores[0].variant;
-    values.extend(around(shaped[which], &fit.data, &values, values[best]));
-    values.sort_by(f64::total_cmp);
+    let Some((coarse, gain)) = best_of(&values) else { return values };
+    let around = around(shaped[which], &fit.data, &values, coarse);
+    if let Some((fine, _)) = best_of(&around).filter(|(_, better)| *better > gain) {
+        values.push(fine);
+        values.sort_by(f64::total_cmp);
+    }
     values
 }
 
