@@ -270,40 +270,37 @@ fn alias_sets_of_the_papers_plan() {
     assert!(a.alias_pairs > 150, "{}", a.alias_pairs);
 }
 
-/// Share of the growth of the spindle (time constant 0.5 h) that a warm-up of these time constants follows, beside the model of the
-/// paper's plan. `own_times`: as the plan predicts them, else 12 s a touch and 60 s an index.
-fn followed_by_warm_up(taus_h: &[f64], own_times: bool) -> f64 {
+/// Share of the growth of the spindle that a warm-up of the same time constant follows, beside the model of the paper's plan.
+/// `own_pace`: touches as far apart as the plan predicts them (all in 34 minutes), else 12 s a touch and 60 s an index (81 minutes).
+fn followed_by_warm_up(tau_h: f64, own_pace: bool) -> f64 {
     let machine = common::machine("swivel-head");
     let catalogue = Catalogue::built_in().unwrap();
     let mut runs = vec![plan(&machine, "head"), plan(&machine, "table")];
-    if !own_times {
+    if !own_pace {
         runs.iter_mut().flat_map(|r| &mut r.plan.touches).for_each(|t| t.time_s = None);
     }
-    let get = |id: &str| catalogue.get(id, &machine).unwrap();
-    let mut effects = vec![(get("spindle-growth"), Some(0.5))];
-    effects.extend(taus_h.iter().map(|tau| (get("warm-up"), Some(*tau))));
+    let effects = ["spindle-growth", "warm-up"].map(|id| (catalogue.get(id, &machine).unwrap(), Some(tau_h)));
     let view = View::with_effects(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE, &effects).unwrap();
     let columns = view.base.project_columns(&view.library.matrix());
-    let (growth, warm) = (columns.columns(0, 1).into_owned(), columns.columns(1, columns.ncols() - 1).into_owned());
+    let (growth, warm) = (columns.columns(0, 1).into_owned(), columns.columns(1, 3).into_owned());
     let left = axiscal::search::Basis::new(&warm).project_columns(&growth);
     1.0 - (left.norm() / growth.norm()).powi(2)
 }
 
+/// The design study has the growth of the spindle inside warm-up (nine tenths of it followed). So it is at the study's pace and
+/// a time constant of 0.2 or 0.3 h: 0.99 and 0.95. There the growth has come to rest before the head's last poses, and what is
+/// left of it in the first one is a ramp along Z, which warm-up has. At 0.5 h, the catalogue's start, 0.86 of it is followed. The
+/// program's own pace is more than twice the study's, every pose falls into the growth, and its direction turns with B where
+/// that of warm-up stays: 0.48 at 0.5 h. The plan tells the two apart because it is quick.
 #[test]
-fn growth_of_the_spindle_is_inside_warm_up() {
-    for own_times in [true, false] {
-        for taus in [
-            &[0.5][..],
-            &[0.25, 0.5],
-            &[0.1, 0.5],
-            &[0.5, 1.0],
-            &[0.1, 0.25, 0.5],
-            &[0.1, 0.5, 2.0],
-            &[0.1, 0.25, 0.5, 1.0, 2.0],
-        ] {
-            println!("own times {own_times}, tau {taus:?} h: {:.4}", followed_by_warm_up(taus, own_times));
-        }
-    }
+fn growth_of_the_spindle_is_inside_warm_up_at_the_pace_of_the_design_study() {
+    let found: Vec<f64> = [(0.2, false), (0.3, false), (0.5, false), (0.5, true)]
+        .into_iter()
+        .map(|(tau_h, own_pace)| followed_by_warm_up(tau_h, own_pace))
+        .collect();
+    println!("{found:.4?}");
+    assert!(found[0] > 0.95 && found[1] > 0.9, "{found:?}");
+    assert!((0.8..0.9).contains(&found[2]) && (0.4..0.6).contains(&found[3]), "{found:?}");
 }
 
 #[test]
