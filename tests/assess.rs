@@ -281,7 +281,7 @@ fn followed_by_warm_up(tau_h: f64, own_pace: bool) -> f64 {
     }
     let effects = ["spindle-growth", "warm-up"].map(|id| (catalogue.get(id, &machine).unwrap(), Some(tau_h)));
     let view = View::with_effects(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE, &effects).unwrap();
-    let columns = view.base.project_columns(&view.library.matrix());
+    let columns = view.base.project_columns(&view.library.matrix().into_owned());
     let (growth, warm) = (columns.columns(0, 1).into_owned(), columns.columns(1, 3).into_owned());
     let left = axiscal::search::Basis::new(&warm).project_columns(&growth);
     1.0 - (left.norm() / growth.norm()).powi(2)

@@ -189,9 +189,11 @@ fn what_follows_a_held_value_says_by_how_much() {
             let case = format!("{name} {programs:?} with {more:?}");
             for (parameter, planted) in truth.iter().chain(&planted) {
                 let p = fit.outcome.parameters.iter().find(|p| p.name == *parameter).unwrap();
+                // 1e-10 mm and deg
+                let exact = if p.unit == "um" { 1e-7 } else { 1e-10 };
                 let off = (p.value - planted).abs();
                 match (p.status, p.moves_with_unseen) {
-                    (Status::Identified, None) if off < 1e-10 => n_exact += 1,
+                    (Status::Identified, _) if off < exact => n_exact += 1,
                     (Status::Identified, Some(moves)) if off < 10.0 * moves && moves < p.sigma.unwrap() => {
                         (n_moved, farthest) = (n_moved + 1, farthest.max(off / moves));
                     }
