@@ -6,11 +6,13 @@
 
 mod problems;
 
+use axiscal::diag::source;
 use axiscal::fit;
 use axiscal::fit::normal::Touches;
 use axiscal::fit::solve::Problem as _;
 use axiscal::log::{self, Writer};
 use axiscal::post::{LogRecord, Postprocessor};
+use axiscal::program::plan::Plan;
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::DVector;
 use problems::{Problem, SIGMA_MM};
@@ -136,5 +138,20 @@ fn parse(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, prediction, jacobian, whole_fit, covariance, identify, parse);
+/// A plan's file to a plan: to be compared with the row of as many touches under `fit`.
+fn read_plan(c: &mut Criterion) {
+    let mut group = c.benchmark_group("read_plan");
+    each("read_plan", |problem, n_touches, n_unknowns| {
+        if n_unknowns != 60 {
+            return; // a plan knows no unknowns, but blocks: those of the middle size
+        }
+        let text = source("run.plan.json", problem.plan.to_json());
+        group.throughput(Throughput::Bytes(text.inner().len() as u64));
+        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
+            b.iter(|| Plan::parse(&text).unwrap());
+        });
+    });
+}
+
+criterion_group!(benches, prediction, jacobian, whole_fit, covariance, identify, parse, read_plan);
 criterion_main!(benches);

@@ -4,6 +4,7 @@
 //! to radians where it builds its transforms; nothing else holds an angle in degrees.
 
 use crate::units::rad_from_deg;
+use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, ser::SerializeMap};
 use std::fmt;
 
@@ -123,9 +124,23 @@ impl Serialize for AxisMap {
 
 impl<'de> Deserialize<'de> for AxisMap {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let map = std::collections::BTreeMap::<AxisName, f64>::deserialize(deserializer)?;
-        let mut out = Self::default();
-        for (axis, value) in map {
+        // straight into its place: a plan has five of these for every touch
+        deserializer.deserialize_map(Axes)
+    }
+}
+
+struct Axes;
+
+impl<'de> Visitor<'de> for Axes {
+    type Value = AxisMap;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a map of axis letters and positions")
+    }
+
+    fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<AxisMap, M::Error> {
+        let mut out = AxisMap::default();
+        while let Some((axis, value)) = map.next_entry::<AxisName, f64>()? {
             out.set(axis, value);
         }
         Ok(out)

@@ -254,11 +254,53 @@ fn alias_sets_of_the_papers_plan() {
     // a block that is not square goes round with the table: in the head's stage alone it cannot be told from the probe
     let head = assessed(&["head"]);
     assert!(of(&head, "block-shape").same_as.iter().any(|e| e == "lobing-2"), "{:?}", of(&head, "block-shape"));
+    // on the turntable it goes round, and the probe does not: at C = 90 the block's x faces look along Y. It stays one with the
+    // size of the block, of which it is a part
+    let table = assessed(&["table"]);
+    let turns = of(&table, "block-shape");
+    assert!(turns.visible && turns.same_as == ["block-size"], "{turns:?}");
+    for fixed in ["lobing-2", "backlash-x", "backlash-y", "pitch-x", "pitch-y"] {
+        assert!(!turns.contained_in.iter().any(|e| e == fixed), "{turns:?}");
+        assert!(!of(&table, fixed).same_as.iter().any(|e| e == "block-shape"), "{fixed}");
+    }
     assert!(inside("pitch-y", "lobing-2"), "{:?}", of(&a, "pitch-y"));
     assert!(inside("angular-ay", "tilt-c-1") && inside("angular-ay", "axial-c-2"), "{:?}", of(&a, "angular-ay"));
     assert!(inside("table-sag", "straightness-zx"));
     assert!(inside("backlash-x", "lobing-2") && inside("backlash-y", "lobing-2"));
     assert!(a.alias_pairs > 150, "{}", a.alias_pairs);
+}
+
+/// Share of the growth of the spindle that a warm-up of the same time constant follows, beside the model of the paper's plan.
+/// `own_pace`: touches as far apart as the plan predicts them (all in 34 minutes), else 12 s a touch and 60 s an index (81 minutes).
+fn followed_by_warm_up(tau_h: f64, own_pace: bool) -> f64 {
+    let machine = common::machine("swivel-head");
+    let catalogue = Catalogue::built_in().unwrap();
+    let mut runs = vec![plan(&machine, "head"), plan(&machine, "table")];
+    if !own_pace {
+        runs.iter_mut().flat_map(|r| &mut r.plan.touches).for_each(|t| t.time_s = None);
+    }
+    let effects = ["spindle-growth", "warm-up"].map(|id| (catalogue.get(id, &machine).unwrap(), Some(tau_h)));
+    let view = View::with_effects(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE, &effects).unwrap();
+    let columns = view.base.project_columns(&view.library.matrix().into_owned());
+    let (growth, warm) = (columns.columns(0, 1).into_owned(), columns.columns(1, 3).into_owned());
+    let left = axiscal::search::Basis::new(&warm).project_columns(&growth);
+    1.0 - (left.norm() / growth.norm()).powi(2)
+}
+
+/// The design study has the growth of the spindle inside warm-up (nine tenths of it followed). So it is at the study's pace and
+/// a time constant of 0.2 or 0.3 h: 0.99 and 0.95. There the growth has come to rest before the head's last poses, and what is
+/// left of it in the first one is a ramp along Z, which warm-up has. At 0.5 h, the catalogue's start, 0.86 of it is followed. The
+/// program's own pace is more than twice the study's, every pose falls into the growth, and its direction turns with B where
+/// that of warm-up stays: 0.48 at 0.5 h. The plan tells the two apart because it is quick.
+#[test]
+fn growth_of_the_spindle_is_inside_warm_up_at_the_pace_of_the_design_study() {
+    let found: Vec<f64> = [(0.2, false), (0.3, false), (0.5, false), (0.5, true)]
+        .into_iter()
+        .map(|(tau_h, own_pace)| followed_by_warm_up(tau_h, own_pace))
+        .collect();
+    println!("{found:.4?}");
+    assert!(found[0] > 0.95 && found[1] > 0.9, "{found:?}");
+    assert!((0.8..0.9).contains(&found[2]) && (0.4..0.6).contains(&found[3]), "{found:?}");
 }
 
 #[test]
@@ -318,24 +360,77 @@ fn null_directions_are_sentences_with_a_remedy() {
     assert!(about("latency").parted_by.iter().any(|h| h.contains("times the feed")), "{:?}", about("latency"));
 }
 
-/// What `full` cannot see on each machine: the zero of what bears the blocks and an unbalanced load are the set-up of the blocks,
-/// backlash of Z needs a face that looks down, the tool's length a setter; a swivel's zero is one number with a tilt of what it
-/// carries.
+/// An effect that `full` cannot see on a machine, and why no touch can show it: derived from the chain, not from an answer.
+type Blind = (&'static str, &'static str);
+
+/// C carries blocks: Rz(C)·Rz(ζ)·block = Rz(C)·(block turned by ζ about C's line), for all of them and at every C. Each block's
+/// set-up has that turn and shift.
+const ZERO_C: Blind = ("zero-c", "one turn of every block on C about C's line");
+
+/// A load beside C's line bends an evenly stiff table towards itself: the lean turns with C, so in the table's own frame it is
+/// the same at every C: a tilt of each block with the shift that goes with it.
+const TABLE_LOAD: Blind = ("table-load", "one tilt of every block on C");
+
+/// Every face that is touched along Z is an upper one: Z moves down to each of them, and half the backlash is the height of
+/// each block.
+const BACKLASH_Z: Blind = ("backlash-z", "one height of every block");
+
+/// What `full` cannot see on each machine. Nothing else may be blind, least of all an axis's own motions.
 #[test]
 fn full_leaves_only_what_no_touch_can_show() {
     for (name, location, expected, most_pairs) in [
-        ("swivel-head", ["location-b", "location-c"], &["zero-c", "backlash-z", "table-load", "tool-length"][..], 41),
-        ("double-head", ["location-b", "location-a"], &["zero-b", "backlash-z", "tool-length"], 41),
+        (
+            "swivel-head",
+            ["location-b", "location-c"],
+            // the ball stands at Ry(B)·(EX0B, 0, EZ0B − L), L longer with every stylus by the same amount. B's own zero is seen: it
+            // moves the ball by L across the tool, and two styli have two L; nothing stands between B and the tool
+            &[ZERO_C, BACKLASH_Z, TABLE_LOAD, ("tool-length", "−EZ0B: behind the rotation of B, along the tool")][..],
+            41,
+        ),
+        (
+            "double-head",
+            ["location-b", "location-a"],
+            // the ball: Ry(B)·Trans(EX0B, 0, EZ0B)·Rz(EC0A)·Ry(EB0A)·Rx(A)·(0, EY0A, EZ0A − L). No axis bears blocks: neither a
+            // zero of C nor a load. A's own zero is seen as B's on the machine above: two lengths
+            &[
+                ("zero-b", "Ry(B + ζ): EB0A grows by ζ, and (EX0B, EZ0B) turns by ζ; to first order EB0A alone"),
+                BACKLASH_Z,
+                ("tool-length", "−EZ0A: behind the rotation of A, along the tool"),
+            ],
+            41,
+        ),
         (
             "trunnion",
             ["location-a", "location-c"],
-            &["zero-a", "zero-c", "backlash-z", "table-load", "tool-length"],
+            // a block on C: Trans(0, EY0A, EZ0A)·Rz·Ry·Rx(A)·Trans(EX0C, EY0C, 0)·Ry(EB0C)·Rx(EA0C)·Rz(C)·block
+            &[
+                (
+                    "zero-a",
+                    "Rx(A + ζ): EA0C grows by ζ, EY0C by ζ times the height of C's point over A's line; heights of blocks",
+                ),
+                ZERO_C,
+                BACKLASH_Z,
+                TABLE_LOAD,
+                // the spindle never leans: the ball is lower by dL at every touch, as is A's line with all that it carries; what
+                // stands beside A takes it as its height
+                ("tool-length", "EZ0A, and the heights of blocks that A does not carry"),
+            ],
             41,
         ),
         (
             "swivel-table-b",
             ["location-b", "location-c"],
-            &["zero-b", "zero-c", "backlash-z", "table-load", "tool-length"],
+            // as the trunnion with B for A: Trans(EX0B, 0, EZ0B)·…·Ry(B)·Trans(EX0C, EY0C, 0)·Ry(EB0C)·Rx(EA0C)·Rz(C)·block
+            &[
+                (
+                    "zero-b",
+                    "Ry(B + ζ): EB0C grows by ζ, EX0C by ζ times the height of C's point over B's line; heights of blocks",
+                ),
+                ZERO_C,
+                BACKLASH_Z,
+                TABLE_LOAD,
+                ("tool-length", "EZ0B, and the heights of blocks that B does not carry"),
+            ],
             41,
         ),
     ] {
@@ -352,7 +447,7 @@ fn full_leaves_only_what_no_touch_can_show() {
         println!("{name}: blind {:?}, pairs {}, {:?} {}", invisible(&a), a.alias_pairs, a.score, a.says);
         let moves = |id: &&str| of(&a, id).typical_um > 1e-9;
         let blind: BTreeSet<&str> = invisible(&a).into_iter().filter(moves).collect();
-        assert_eq!(blind, expected.iter().copied().collect(), "{name}: pairs {}", a.alias_pairs);
+        assert_eq!(blind, expected.iter().map(|e| e.0).collect(), "{name}: {expected:?}");
         assert!(a.alias_pairs <= most_pairs, "{name}: {:?}", a.alias_groups);
         assert_eq!(a.score, Score::Good, "{name}: {}", a.says);
         // a value that holds another effect with any touches is no fault of the plan, but it is named

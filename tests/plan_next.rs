@@ -190,3 +190,31 @@ fn what_is_promised_is_what_diagnose_then_does() {
         assert!(!left.iter().any(|e| e == rival), "{rival} was to be told apart and was not: {left:?} of {promised:?}");
     }
 }
+
+/// A formula of the user's own that has a value at every touch of the study and none at B = 0: the program does not go there, and
+/// a warning says so; without it the effect would count as one that leaves no trace.
+#[test]
+fn poses_at_which_an_effect_has_no_value_are_left_out_and_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    study(dir, "");
+    let own = "[[effect]]\nid = \"mine\"\nname = \"Mine\"\nat = \"B\"\nterms = [{ parameter = \"mine\", unit = \"um\", \
+               dof = \"dy\", formula = \"sqrt(-B)\" }]\n";
+    std::fs::write(dir.join("own.toml"), own).unwrap();
+    let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
+    std::fs::write(dir.join("study.toml"), format!("effects_file = [\"own.toml\"]\n{text}")).unwrap();
+    let asked = ["--effects", "mine,axial-b-1", "--minutes", "10", "--moved", "--json"];
+    let out =
+        axiscal(dir, &[&["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc"][..], &asked].concat());
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    // the paper's programs tilt the head to one side only
+    assert!(said.contains("has no value at") && said.contains("the program does not go there"), "{said}");
+    let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert!(separation(&answer, "after") > separation(&answer, "before"), "{answer}");
+    let plan: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(dir.join("next-3.plan.json")).unwrap()).unwrap();
+    for touch in plan["touches"].as_array().unwrap() {
+        assert!(touch["pose"]["B"].as_f64().unwrap() <= 0.0, "{touch}");
+    }
+}

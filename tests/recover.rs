@@ -90,62 +90,124 @@ fn noise_free_touches_give_back_everything_that_is_called_identified() {
     }
 }
 
-/// Every program alone, and models with gauges: a value that is called identified comes back exactly where it has no part in
-/// what leaves no trace; where it has one at the solution, it says how far it may be off. No touch is rejected.
+/// Every program, alone and with its companion.
+const PROGRAMS: [(&str, &[&str]); 10] = [
+    ("swivel-head", &["head"]),
+    ("swivel-head", &["table"]),
+    ("swivel-head", &["full"]),
+    ("swivel-head", &["head", "table"]),
+    ("double-head", &["double-head"]),
+    ("double-head", &["full"]),
+    ("trunnion", &["basic"]),
+    ("trunnion", &["full"]),
+    ("swivel-table-b", &["basic"]),
+    ("swivel-table-b", &["full"]),
+];
+
+/// Effects of one number with the locations on some programs: gauges of every kind.
+fn gauges(machine: &str) -> Vec<Vec<&'static str>> {
+    let zeros: Vec<&str> = match machine {
+        "swivel-head" | "swivel-table-b" => vec!["zero-b", "zero-c"],
+        "double-head" => vec!["zero-b", "zero-a"],
+        _ => vec!["zero-a", "zero-c"],
+    };
+    let single = ["tip-eccentricity", "tool-length"];
+    let more = ["backlash-z", "latency", "squareness-xy", "squareness-yz", "squareness-zx"];
+    let many = [&zeros[..], &single, &more, &["scale-x", "scale-y", "scale-z"]].concat();
+    let each = zeros.iter().chain(&single).map(|id| vec![*id]);
+    std::iter::once(vec![]).chain(each).chain([many]).collect()
+}
+
+/// Every program alone, and models with gauges: what is called identified comes back exactly, whatever is planted in the
+/// locations and the set-ups of the blocks and in values that leave no trace. No touch is rejected.
 #[test]
-fn every_program_alone_and_models_with_gauges_are_exact_or_say_by_how_much_not() {
+fn every_program_alone_and_models_with_gauges_are_exact() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
-    let (mut n_exact, mut n_moved) = (0, 0);
-    for (name, programs) in [
-        ("swivel-head", &["head"][..]),
-        ("swivel-head", &["table"]),
-        ("swivel-head", &["full"]),
-        ("swivel-head", &["head", "table"]),
-        ("double-head", &["double-head"]),
-        ("double-head", &["full"]),
-        ("trunnion", &["basic"]),
-        ("trunnion", &["full"]),
-        ("swivel-table-b", &["basic"]),
-        ("swivel-table-b", &["full"]),
-    ] {
+    let mut n_exact = 0;
+    let mut wrong_ones = Vec::new();
+    for (name, programs) in PROGRAMS {
         let machine = machine(name);
         let (scenario, truth) = wrong(&machine, &mut rng);
         let plans: Vec<_> = programs.iter().map(|p| plan(&machine, p)).collect();
         let touches: Vec<_> = plans.iter().map(|p| touch(&machine, p, &scenario, None)).collect();
         let runs: Vec<_> = plans.iter().zip(&touches).map(|(p, t)| (p, &t[..])).collect();
         let [(first, _), (second, _)] = location(&machine.name);
-        let zeros = [first, second].map(|l| l.replace("location", "zero"));
-        let (one, other) = (zeros[0].as_str(), zeros[1].as_str());
-        let mut many = vec![one, other, "tip-eccentricity", "tool-length", "backlash-z", "latency"];
-        many.extend(["squareness-xy", "squareness-yz", "squareness-zx", "scale-x", "scale-y", "scale-z"]);
-        for more in [&[][..], &[one], &[other], &["tip-eccentricity"], &["tool-length"], &many[..]] {
-            let effects = [&[first, second, "block-setup", "pretravel"], more].concat();
+        for more in gauges(name) {
+            let effects = [&[first, second, "block-setup", "pretravel"], &more[..]].concat();
             let fit = identify(&machine, &runs, &effects);
             let o = &fit.outcome;
             let case = format!("{name} {programs:?} with {more:?}");
             assert!(o.converged, "{case}: {}", o.stopped);
             assert!(o.rejected.is_empty(), "{case}: {:?}", o.rejected);
-            for (parameter, planted) in &truth {
-                let p = o.parameters.iter().find(|p| p.name == *parameter).unwrap();
+            // results and set-ups of the blocks alike
+            for p in &o.parameters {
+                let planted = truth.iter().find(|(n, _)| *n == p.name).map(|t| t.1);
+                let Some(planted) = planted else { continue };
+                let off = (p.value - planted).abs();
+                if p.status != Status::Identified {
+                    assert!(p.sigma.is_none(), "{case} {}", p.name);
+                } else if off < 1e-10 {
+                    n_exact += 1;
+                } else {
+                    wrong_ones.push(format!(
+                        "{case} {}: off by {off:e}, moves by {:?}, {} um left",
+                        p.name, p.moves_with_unseen, o.rms_um
+                    ));
+                }
+            }
+        }
+    }
+    println!("{n_exact} values exact");
+    assert!(wrong_ones.is_empty(), "{}", wrong_ones.join("\n"));
+    assert!(n_exact > 350, "{n_exact} exact");
+}
+
+/// What is held by convention has a value of its usual size at the machine: what does not follow it comes back exactly, and what
+/// does says by how much.
+#[test]
+fn what_follows_a_held_value_says_by_how_much() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let (mut n_exact, mut n_moved, mut farthest) = (0, 0, 0.0_f64);
+    let mut wrong_ones = Vec::new();
+    for (name, programs) in PROGRAMS {
+        let machine = machine(name);
+        let plans: Vec<_> = programs.iter().map(|p| plan(&machine, p)).collect();
+        let [(first, _), (second, _)] = location(&machine.name);
+        for more in gauges(name).into_iter().filter(|m| m.len() == 1) {
+            let (mut scenario, truth) = wrong(&machine, &mut rng);
+            let planted: Vec<(&str, f64)> = match more[0] {
+                "zero-a" => vec![("EA0A", 0.0018)],
+                "zero-b" => vec![("EB0B", -0.0018)],
+                "zero-c" => vec![("EC0C", 0.0026)],
+                "tool-length" => vec![("dL", 0.03)],
+                _ => vec![("ex", 6.3), ("ey", -6.3)],
+            };
+            scenario = scenario.with(&machine, more[0], &planted).unwrap();
+            let touches: Vec<_> = plans.iter().map(|p| touch(&machine, p, &scenario, None)).collect();
+            let runs: Vec<_> = plans.iter().zip(&touches).map(|(p, t)| (p, &t[..])).collect();
+            let fit = identify(&machine, &runs, &[&[first, second, "block-setup", "pretravel"], &more[..]].concat());
+            let case = format!("{name} {programs:?} with {more:?}");
+            for (parameter, planted) in truth.iter().chain(&planted) {
+                let p = fit.outcome.parameters.iter().find(|p| p.name == *parameter).unwrap();
+                // 1e-10 mm and deg
+                let exact = if p.unit == "um" { 1e-7 } else { 1e-10 };
                 let off = (p.value - planted).abs();
                 match (p.status, p.moves_with_unseen) {
-                    (Status::Identified, None) => {
-                        assert!(off < 1e-10, "{case} {parameter}: off by {off:e}");
-                        n_exact += 1;
+                    (Status::Identified, _) if off < exact => n_exact += 1,
+                    (Status::Identified, Some(moves)) if off < 10.0 * moves && moves < p.sigma.unwrap() => {
+                        (n_moved, farthest) = (n_moved + 1, farthest.max(off / moves));
                     }
-                    (Status::Identified, Some(moves)) => {
-                        // a block's turn of 1 mrad is some twenty usual sizes of an axis's zero
-                        assert!(off < 50.0 * moves, "{case} {parameter}: off by {off:e}, moves by {moves:e}");
-                        assert!(moves < p.sigma.unwrap(), "{case} {parameter}: {moves:e} of {:?}", p.sigma);
-                        n_moved += 1;
+                    (Status::Identified, moves) => {
+                        wrong_ones.push(format!("{case} {parameter}: off by {off:e}, moves by {moves:?}"));
                     }
                     _ => assert!(p.sigma.is_none(), "{case} {parameter}"),
                 }
             }
         }
     }
-    println!("{n_exact} values exact, {n_moved} that follow what is not told");
-    assert!(n_exact > 250, "{n_exact} exact, {n_moved} not");
+    println!("{n_exact} values exact, {n_moved} follow what is not told, at most by {farthest:.1} times what they say");
+    assert!(wrong_ones.is_empty(), "{}", wrong_ones.join("\n"));
+    assert!(n_exact > 200, "{n_exact} exact, {n_moved} not");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::load::{Loaded, load_study, read_log};
 use super::new::relative;
 use super::{Answer, Io};
 use crate::design::bundle::{Bundle, as_plan, bundles, program_text, without};
-use crate::design::next::{Design, Separation};
+use crate::design::next::{Design, Separation, where_all_have_values};
 use crate::design::questions::Questions;
 use crate::design::{Known, Noise, Planned, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
@@ -21,6 +21,8 @@ use crate::search::apart::SEEN;
 use crate::study;
 use comfy_table::Cell;
 use serde_json::json;
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Rounds of choosing, generating and leaving out what cannot be reached.
@@ -173,6 +175,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             }
         }
     }
+    warn(setting.holes.borrow().iter(), io);
     let Some(chosen) = best else {
         return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time").help(
             "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
@@ -228,6 +231,8 @@ struct Setting<'a> {
     /// What the study knows beside the touches.
     known: Vec<Known>,
     noise: Noise,
+    /// What was left out of the choice because an effect has no value there.
+    holes: RefCell<BTreeSet<String>>,
 }
 
 impl<'a> Setting<'a> {
@@ -250,7 +255,8 @@ impl<'a> Setting<'a> {
             reference: loaded.machine.reference.pivot,
             temperature: fit.data.observations.iter().any(|o| o.has_temperature),
         };
-        Ok(Self { task, runs, known, noise: Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: fit.noise.tau_test_mm } })
+        let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: fit.noise.tau_test_mm };
+        Ok(Self { task, runs, known, noise, holes: RefCell::default() })
     }
 
     /// The mounting that stands there since the last run, with the study's name for it (`None` where it is put up anew).
@@ -277,17 +283,13 @@ impl<'a> Setting<'a> {
         runs
     }
 
-    fn design(
-        &self,
-        plan: &Plan,
-        label: Option<&str>,
-        effects: &[(&Effect, Option<f64>)],
-        pool: &[Bundle],
-        q: &Questions,
-    ) -> Result<Design> {
-        let view = View::with_effects(&self.task, &self.with(plan.clone(), label), &self.known, self.noise, effects)?;
-        let n_given = self.runs.iter().map(|r| r.plan.touches.len()).sum();
-        Ok(Design::new(&view, n_given, pool, q))
+    fn view(&self, plan: &Plan, label: Option<&str>, effects: &[(&Effect, Option<f64>)]) -> Result<View> {
+        View::with_effects(&self.task, &self.with(plan.clone(), label), &self.known, self.noise, effects)
+    }
+
+    /// Touches that were made or planned before.
+    fn n_given(&self) -> usize {
+        self.runs.iter().map(|r| r.plan.touches.len()).sum()
     }
 
     /// Chooses touches on a mounting and proves their program, again without what cannot be reached.
@@ -310,7 +312,17 @@ impl<'a> Setting<'a> {
                 break;
             }
             let planned = as_plan(machine, mounting, &pool, budget_s / 2.0);
-            let design = self.design(&planned, label, effects, &pool, questions)?;
+            let view = self.view(&planned, label, effects)?;
+            if !view.left_out.is_empty() {
+                let (left, says) = where_all_have_values(&view, self.n_given(), effects, &pool);
+                self.holes.borrow_mut().extend(says);
+                if left.len() == pool.len() {
+                    break;
+                }
+                pool = left;
+                continue;
+            }
+            let design = Design::new(&view, self.n_given(), &pool, questions);
             let chosen = design.choose(&pool, budget_s * scale);
             if chosen.is_empty() {
                 break;
@@ -365,7 +377,8 @@ impl<'a> Setting<'a> {
         };
         let all = Bundle { manner, block: String::new(), faces: Vec::new(), touches };
         let pool = [all];
-        Ok(self.design(plan, label, effects, &pool, questions)?.separated(&[0]))
+        let view = self.view(plan, label, effects)?;
+        Ok(Design::new(&view, self.n_given(), &pool, questions).separated(&[0]))
     }
 }
 

@@ -6,10 +6,10 @@ use super::record::{Advice, Assessment, Expected, FORMAT, Seen};
 use super::score;
 use super::view::{Noise, Planned, Task, View};
 use crate::diag::Result;
-use crate::fit::declared_tau_mm;
 use crate::fit::solve::observe;
 use crate::fit::statement;
 use crate::fit::uncertainty::expected;
+use crate::fit::{declared_tau_mm, held_first};
 use crate::search::groups::{ALIGNED, AliasPair, alias_pairs};
 use crate::search::power::{Power, power};
 use crate::units::um_from_mm;
@@ -60,13 +60,11 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let acting = Noise { tau_mm, ..request.probe };
     let view = View::new(task, &request.runs, &[], acting)?;
     let parameters = parameters(task, &alone, &view);
-    let observability = observe(&alone.jacobian);
+    let mut observability = observe(&alone.jacobian);
+    observability.hold(held_first(&alone.model, &alone.free));
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
-    let mut undetermined: Vec<_> = observability
-        .unseen
-        .iter()
-        .map(|v| statement::undetermined(&free, &task.effects, v, &observability.scale))
-        .collect();
+    let mut undetermined: Vec<_> =
+        observability.unseen.iter().map(|v| statement::undetermined(&free, &task.effects, v, &observability)).collect();
     let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();

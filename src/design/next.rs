@@ -7,6 +7,8 @@
 use super::bundle::{Bundle, cost_s};
 use super::questions::{Pair, Questions};
 use super::view::View;
+use crate::fit::candidates::without_value;
+use crate::model::catalogue::Effect;
 use crate::search::apart::{Left, Products, chance};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -328,4 +330,40 @@ impl Design {
         }
         chosen
     }
+}
+/// Bundles at which every effect of the user's own has a value, and a sentence for each effect that has none at others. Without
+/// it such an effect would stand in the design as one that leaves no trace, and nothing would ever part it from another.
+///
+/// `view` holds `n_given` touches and then those of the pool, in its order.
+#[must_use]
+pub fn where_all_have_values(
+    view: &View,
+    n_given: usize,
+    effects: &[(&Effect, Option<f64>)],
+    pool: &[Bundle],
+) -> (Vec<Bundle>, Vec<String>) {
+    let mut left = vec![true; pool.len()];
+    let mut said = Vec::new();
+    for (effect, _) in effects.iter().filter(|(e, _)| !e.built_in) {
+        let mut at = n_given;
+        let mut bad: Vec<(usize, &str)> = Vec::new();
+        for (i, bundle) in pool.iter().enumerate() {
+            let end = (at + bundle.touches.len()).min(view.data.nominal.len());
+            let found = without_value(effect, &view.data.nominal[at.min(end)..end]);
+            bad.extend(found.first().map(|b| (i, b.formula)));
+            at = end;
+        }
+        let Some(&(first, formula)) = bad.first() else { continue };
+        bad.iter().for_each(|(i, _)| left[*i] = false);
+        let pose: Vec<String> = pool[first].manner.pose.iter().map(|(axis, deg)| format!("{axis} {deg}")).collect();
+        said.push(format!(
+            "formula {formula:?} of effect {} has no value at {} of the {} blocks and poses that could be touched, for instance at \
+             {}: the program does not go there; write the formula so that it holds everywhere if the effect acts there too",
+            effect.id,
+            bad.len(),
+            pool.len(),
+            pose.join(", ")
+        ));
+    }
+    (pool.iter().zip(left).filter(|(_, l)| *l).map(|(b, _)| b.clone()).collect(), said)
 }

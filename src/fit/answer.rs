@@ -114,7 +114,7 @@ pub(super) fn outcome(
             .observability
             .unseen
             .iter()
-            .map(|v| statement::undetermined(&free_unknowns, effects, v, &fit.observability.scale))
+            .map(|v| statement::undetermined(&free_unknowns, effects, v, &fit.observability))
             .collect(),
         parted_together: Vec::new(),
         weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {

@@ -41,6 +41,18 @@ pub fn columns(
     all.pop().unwrap_or_else(|| Columns::none(observations.len()))
 }
 
+/// Columns of all unknowns of a model at some touches, in the order of its θ, at the start of its shape parameters.
+#[must_use]
+pub(super) fn columns_of(model: &Model, observations: &[Observation]) -> DMatrix<f64> {
+    let traces = Traces::of(model, observations);
+    let start = model.start();
+    let mut values = DMatrix::zeros(observations.len(), model.n_unknowns());
+    for (first, count) in model.all_instances() {
+        values.columns_mut(first, count).copy_from(&traces.columns(first, count, &start[first..first + count]));
+    }
+    values
+}
+
 /// Some of the effects with values of their shape parameters, in their order within these effects; where there are too few
 /// the effects' own stand.
 #[derive(Debug, Clone)]

@@ -7,6 +7,8 @@
 //! that then cannot be predicted, because the prediction is more uncertain than three touches' noise, judge nothing.
 
 use super::Fit;
+use super::normal::Touches;
+use super::solve::{Normal, Problem as _};
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -57,7 +59,6 @@ pub fn by_visit(fit: &Fit) -> Option<HeldOut> {
 /// Leaves out each group in turn. `groups[i]` is the group of observation i; touches of a visit stand in one group.
 #[must_use]
 pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
-    let rows = Rows::new(fit);
     let mut members: Vec<Vec<usize>> = Vec::new();
     for i in (0..groups.len()).filter(|&i| fit.weight[i] > 0.0) {
         if groups[i] >= members.len() {
@@ -69,7 +70,10 @@ pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
     if members.len() < 2 {
         return None;
     }
-    let predicted: Vec<Vec<Option<f64>>> = members.par_iter().map(|m| rows.predict(m, &[])).collect();
+    let predicted: Vec<Vec<Option<f64>>> = fit.with_touches(fit.noise.tau_mm, |touches| {
+        let rest = Whole::new(fit, touches);
+        members.par_iter().map(|m| rest.without(m).predict(&[])).collect()
+    });
     let mut error_mm = vec![None; groups.len()];
     for (group, errors) in members.iter().zip(predicted) {
         group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
@@ -97,9 +101,13 @@ pub fn later_run(fit: &Fit) -> Option<HeldOut> {
             u.nuisance && u.set_up.is_some_and(|s| !elsewhere(s))
         })
         .collect();
-    let rows = Rows::new(fit);
-    let mut errors = rows.predict(&group, &own);
-    let n_own = rows.without_own(&group, &own, &mut errors);
+    let (errors, n_own) = fit.with_touches(fit.noise.tau_mm, |touches| {
+        let whole = Whole::new(fit, touches);
+        let part = whole.without(&group);
+        let mut errors = part.predict(&own);
+        let n_own = part.without_own(&own, &mut errors);
+        (errors, n_own)
+    });
     let mut error_mm = vec![None; observations.len()];
     group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
     let mut out = collect(fit, error_mm, std::slice::from_ref(&group), n_own)?;
@@ -153,68 +161,82 @@ pub fn fall(before: &HeldOut, after: &HeldOut, groups: &[usize]) -> Option<(f64,
     (sum > 0.0).then(|| (root(b) - root(a), um_from_mm(um_from_mm(of_squares)) / sum))
 }
 
-/// The rows of a fit at its minimum.
-struct Rows<'f> {
+/// A fit at its minimum. Rows are made anew for the group that is looked at: those of all touches together would be larger
+/// than the touches.
+struct Whole<'f> {
     fit: &'f Fit,
-    /// mm per unit.
-    jacobian: DMatrix<f64>,
-    whitened: DMatrix<f64>,
-    residual: DVector<f64>,
+    touches: &'f Touches<'f>,
+    theta: DVector<f64>,
     gradient: DVector<f64>,
     gram: DMatrix<f64>,
     /// Scale of each unknown, so that the Gram matrix has about unit diagonal.
     scale: DVector<f64>,
 }
 
-impl<'f> Rows<'f> {
-    fn new(fit: &'f Fit) -> Self {
-        let at = fit.free_theta();
-        let ((_, jacobian), (residual, whitened)) =
-            fit.with_touches(fit.noise.tau_mm, |t| (t.unwhitened(&at), t.dense(&at)));
-        let gram = whitened.tr_mul(&whitened);
-        let gradient = whitened.tr_mul(&residual);
+/// A group of touches that is left out.
+struct Part<'w> {
+    whole: &'w Whole<'w>,
+    group: &'w [usize],
+    /// mm per unit.
+    jacobian: DMatrix<f64>,
+    whitened: DMatrix<f64>,
+    residual: DVector<f64>,
+}
+
+impl<'f> Whole<'f> {
+    fn new(fit: &'f Fit, touches: &'f Touches<'f>) -> Self {
+        let theta = fit.free_theta();
+        let Normal { gram, gradient, .. } = touches.normal(&theta, true);
         let scale = gram.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
-        Self { fit, jacobian, whitened, residual, gradient, gram, scale }
+        Self { fit, touches, theta, gradient, gram, scale }
     }
 
-    /// Measured less predicted at the touches of a group that the rest predicts, mm; `own` unknowns are left aside.
-    fn predict(&self, group: &[usize], own: &[usize]) -> Vec<Option<f64>> {
-        let p = self.scale.len();
-        let part = self.whitened.select_rows(group);
-        let r = DVector::from_iterator(group.len(), group.iter().map(|&i| self.residual[i]));
-        let mut rest = &self.gram - part.tr_mul(&part);
+    fn without<'w>(&'w self, group: &'w [usize]) -> Part<'w> {
+        let (gaps, jacobian) = self.touches.unwhitened_of(&self.theta, group);
+        let mut whitened = jacobian.clone();
+        self.touches.whiten_of(group, &mut whitened);
+        let mut residual = DMatrix::from_column_slice(group.len(), 1, gaps.as_slice());
+        self.touches.whiten_of(group, &mut residual);
+        Part { whole: self, group, jacobian, whitened, residual: residual.column(0).into_owned() }
+    }
+}
+
+impl Part<'_> {
+    /// Measured less predicted at the touches that the rest predicts, mm; `own` unknowns are left aside.
+    fn predict(&self, own: &[usize]) -> Vec<Option<f64>> {
+        let Whole { fit, gradient, gram, scale, .. } = self.whole;
+        let p = scale.len();
+        let mut rest = gram - self.whitened.tr_mul(&self.whitened);
         for a in 0..p {
             for b in 0..p {
-                rest[(a, b)] /= self.scale[a] * self.scale[b];
+                rest[(a, b)] /= scale[a] * scale[b];
             }
-            let wide = WIDE * self.fit.model.unknowns[self.fit.free[a]].typical * self.scale[a];
+            let wide = WIDE * fit.model.unknowns[fit.free[a]].typical * scale[a];
             rest[(a, a)] += wide.powi(-2);
         }
-        let Some(factor) = rest.cholesky() else { return vec![None; group.len()] };
-        let gradient = (&self.gradient - part.tr_mul(&r)).component_div(&self.scale);
+        let Some(factor) = rest.cholesky() else { return vec![None; self.group.len()] };
+        let gradient = (gradient - self.whitened.tr_mul(&self.residual)).component_div(scale);
         let mut step = -factor.solve(&gradient);
         own.iter().for_each(|&c| step[c] = 0.0);
-        let limit = LARGEST_VARIANCE * self.fit.noise.sigma_mm.powi(2);
-        group
-            .iter()
-            .map(|&i| {
-                let mut row = self.jacobian.row(i).transpose().component_div(&self.scale);
-                own.iter().for_each(|&c| row[c] = 0.0);
-                let variance = row.dot(&factor.solve(&row));
-                (variance < limit).then(|| self.fit.residual_mm[i] + row.dot(&step))
-            })
-            .collect()
+        let limit = LARGEST_VARIANCE * fit.noise.sigma_mm.powi(2);
+        let each = self.group.iter().zip(self.jacobian.row_iter());
+        each.map(|(&i, row)| {
+            let mut row = row.transpose().component_div(scale);
+            own.iter().for_each(|&c| row[c] = 0.0);
+            let variance = row.dot(&factor.solve(&row));
+            (variance < limit).then(|| fit.residual_mm[i] + row.dot(&step))
+        })
+        .collect()
     }
 
     /// Takes off what `own` unknowns can explain of the errors; their number.
-    fn without_own(&self, group: &[usize], own: &[usize], errors: &mut [Option<f64>]) -> usize {
-        let seen: Vec<usize> = (0..group.len()).filter(|&k| errors[k].is_some()).collect();
+    fn without_own(&self, own: &[usize], errors: &mut [Option<f64>]) -> usize {
+        let seen: Vec<usize> = (0..self.group.len()).filter(|&k| errors[k].is_some()).collect();
         if own.is_empty() || seen.is_empty() {
             return 0;
         }
-        let b = DMatrix::from_fn(seen.len(), own.len(), |k, c| {
-            self.jacobian[(group[seen[k]], own[c])] / self.scale[own[c]]
-        });
+        let b =
+            DMatrix::from_fn(seen.len(), own.len(), |k, c| self.jacobian[(seen[k], own[c])] / self.whole.scale[own[c]]);
         let e = DVector::from_iterator(seen.len(), seen.iter().filter_map(|&k| errors[k]));
         let svd = b.svd(true, false);
         let Some(u) = svd.u else { return 0 };

@@ -13,6 +13,8 @@ pub mod noise;
 pub mod normal;
 pub mod outcome;
 pub mod quantiles;
+mod rank;
+mod search;
 pub mod shapes;
 pub mod snoop;
 pub mod solve;
@@ -20,20 +22,21 @@ pub mod statement;
 pub mod uncertainty;
 
 pub use knowledge::effects_of;
+pub use rank::{held_first, observe_plan};
 pub use shapes::{around, scan, start_shapes};
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::{Data, Run, assemble};
-use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation};
 use nalgebra::{DMatrix, DVector, Vector3};
-use noise::{Known, Noise, Sample};
+use noise::{Known, Noise};
 use normal::{Prior, Touches};
 use outcome::Outcome;
+use search::Search;
 use snoop::Snoop;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// What the user decided about one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -270,10 +273,12 @@ fn identify_from(
         touches.set_weights(masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
     }
     let first = solve::Problem::normal(&touches, &start, true);
-    let (observability, condition) = observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
-    let mut search = Search { data: &data, observability: observability.clone(), touches, masked };
+    let (observability, condition) =
+        rank::observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
+    let declared_sigma_mm = known.declared_sigma_mm;
+    let mut search = Search { data: &data, observability: observability.clone(), touches, masked, declared_sigma_mm };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
-    let solution = search.settle(solution);
+    let solution = search.follow_bends(solution, &model, &free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
     let solution = search.without_strangers(solution, 0.0);
     let noise = noise::estimate(&search.samples(&solution), &known);
@@ -290,7 +295,7 @@ fn identify_from(
         solution = search.refit_here(solution.theta);
         noise
     };
-    solution = search.settle(solution);
+    solution = search.follow_bends(solution, &model, &free);
     solution.iterations += first_steps;
     let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
     let snoop = Snoop::new(
@@ -327,7 +332,7 @@ fn identify_from(
         }
     }
     let studentised = snoop.studentised();
-    let seen = search.observability;
+    let seen = search.seen_at(&solution.theta);
     drop(search.touches);
     drop(batch);
     let chi2 = solution.chi2;
@@ -366,255 +371,4 @@ pub fn declared_tau_mm(machine: &Machine, observations: &[Observation]) -> f64 {
     };
     let axes = machine.axes.iter().filter(|a| a.name.is_rotary() && moved(a.name));
     axes.map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt()
-}
-
-/// A fit that is being made.
-struct Search<'a> {
-    data: &'a Data,
-    /// What is seen where the search stands.
-    observability: solve::Observability,
-    touches: Touches<'a>,
-    masked: Vec<bool>,
-}
-
-impl Search<'_> {
-    fn gaps(&self, solution: &solve::Solution) -> Vec<f64> {
-        self.touches.gaps(&solution.theta)
-    }
-
-    /// The touches that are used, as the noise sees them.
-    fn samples(&self, solution: &solve::Solution) -> Vec<Sample> {
-        let mut points: HashMap<[u64; 8], usize> = HashMap::new();
-        let gaps = self.gaps(solution);
-        let mut out = Vec::with_capacity(gaps.len());
-        for (i, o) in self.data.observations.iter().enumerate() {
-            let bits = |x: f64| x.to_bits();
-            let key = [
-                o.set_up as u64,
-                bits(o.point.x),
-                bits(o.point.y),
-                bits(o.point.z),
-                bits(o.normal.x),
-                bits(o.normal.y),
-                bits(o.normal.z),
-                bits(o.state[slot::FEED]),
-            ];
-            let n = points.len();
-            let point = *points.entry(key).or_insert(n);
-            if self.touches.weights()[i] > 0.0 {
-                let visit = self.data.visits[i];
-                out.push(Sample {
-                    residual_mm: gaps[i],
-                    normal: Vector3::new(o.state[8], o.state[9], o.state[10]),
-                    repeat: self.data.repeats[i],
-                    visit,
-                    pose: self.data.poses[visit],
-                    point,
-                });
-            }
-        }
-        out
-    }
-
-    fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
-        self.touches.set_weights(weights);
-        self.refit_here(from.theta.clone())
-    }
-
-    fn refit_here(&self, from: DVector<f64>) -> solve::Solution {
-        solve::minimise(&self.touches, from, &self.observability)
-    }
-
-    /// A combination that leaves no trace is straight to first order only: what is seen is looked at again where the search
-    /// has come to, and it goes on from there until it rests.
-    fn settle(&mut self, mut solution: solve::Solution) -> solve::Solution {
-        let rank = self.observability.rank;
-        if self.observability.full() || rank == 0 {
-            return solution;
-        }
-        for _ in 0..MOST_TURNS {
-            let jacobian = solve::Problem::jacobian(&self.touches, &solution.theta);
-            self.observability = solve::observe_of_rank(&jacobian, rank);
-            let next = self.refit_here(solution.theta);
-            let rests = next.iterations <= 1;
-            solution = solve::Solution { iterations: solution.iterations + next.iterations, ..next };
-            if rests {
-                break;
-            }
-        }
-        solution
-    }
-
-    /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do
-    /// get it back. `noise_dof` is that of σ.
-    fn without_strangers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
-        let n = self.data.observations.len();
-        let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
-        let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
-        let judge = |search: &Self, s: &solve::Solution| {
-            let dof = solve::Problem::n_rows(&search.touches).saturating_sub(search.observability.rank);
-            Snoop::new(&search.touches, &s.theta, &s.covariance, (s.chi2, dof), noise_dof)
-        };
-        let first = judge(self, &solution).dropped();
-        if first.is_empty() {
-            return solution;
-        }
-        // several bad touches hide each other: let the rest vote first
-        let most = (snoop::MOST_SHARE * n as f64).ceil() as usize;
-        let mut out = self.robust_strangers(&solution, &all);
-        if out.is_empty() || out.len() > most {
-            out = first;
-        }
-        for _ in 0..4 {
-            let mut weights = all.clone();
-            out.iter().for_each(|&i| weights[i] = 0.0);
-            solution = self.refit(weights, &solution);
-            // back in what belongs, out what does not
-            let scale2 = self.scale2(&solution, noise_dof);
-            let back: Vec<usize> =
-                out.iter().copied().filter(|&i| snoop::belongs(self.off(&solution, i, scale2).1)).collect();
-            let more: Vec<usize> = judge(self, &solution).dropped();
-            if back.is_empty() && (more.is_empty() || out.len() >= most) {
-                break;
-            }
-            out.retain(|i| !back.contains(i));
-            out.extend(more);
-            out.truncate(most.max(1));
-        }
-        // touches of one face that miss together say something in common: that is no matter of chips
-        let normals: Vec<[i8; 3]> = self
-            .data
-            .observations
-            .iter()
-            .map(|o| [o.normal.x, o.normal.y, o.normal.z].map(|x| (10.0 * x).round() as i8))
-            .collect();
-        let face = |i: usize| (self.data.visits[i], self.data.observations[i].set_up, normals[i]);
-        for cluster in snoop::clusters(&out, face, n) {
-            out.retain(|i| !cluster.contains(i));
-        }
-        let mut weights = all;
-        out.iter().for_each(|&i| weights[i] = 0.0);
-        if weights == self.touches.weights() { solution } else { self.refit(weights, &solution) }
-    }
-
-    /// Touches further than 4 robust standard deviations off a fit in which far touches count little.
-    fn robust_strangers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
-        let (sigma, _) = self.touches.noise_mm();
-        let mut solution = plain.clone();
-        let mut gaps = self.gaps(&solution);
-        let mut scale = gaps.iter().map(|r| r.abs()).fold(0.0, f64::max);
-        loop {
-            let mut weights = snoop::robust_weights(&gaps, scale);
-            weights.iter_mut().zip(all).for_each(|(w, a)| *w = (*w * a).max(1e-6 * a));
-            solution = self.refit(weights, &solution);
-            gaps = self.gaps(&solution);
-            let floor = 3.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
-            if scale <= floor {
-                break;
-            }
-            scale = (scale / 3.0).max(floor);
-        }
-        let limit = 4.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
-        (0..gaps.len()).filter(|&i| all[i] > 0.0 && gaps[i].abs() > limit).collect()
-    }
-
-    fn scale2(&self, solution: &solve::Solution, noise_dof: f64) -> f64 {
-        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank) as f64;
-        (solution.chi2 + noise_dof) / (dof + noise_dof).max(1.0)
-    }
-
-    /// How far touch i is off what the fit says, mm and in standard deviations.
-    fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
-        let (gap, row) = self.touches.row(&solution.theta, i);
-        let (sigma, tau) = self.touches.noise_mm();
-        snoop::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
-    }
-
-    /// The rejected touches with their reasons.
-    fn reasons(&self, solution: &solve::Solution) -> BTreeMap<usize, String> {
-        let scale2 = self.scale2(solution, 0.0);
-        let weights = self.touches.weights();
-        (0..weights.len())
-            .filter(|&i| weights[i] == 0.0 && !self.masked[i])
-            .map(|i| {
-                let (off_mm, standardised) = self.off(solution, i, scale2);
-                (i, snoop::Rejection { touch: i, off_mm, standardised }.reason())
-            })
-            .collect()
-    }
-}
-
-/// So often at most the directions that are seen are looked at again.
-const MOST_TURNS: usize = 8;
-
-/// Condition up to which the touches as they were made show the rank that the nominal ones have: the two Jacobians differ
-/// by what errors and set-ups of some tenths of a millimetre make of levers of some hundred.
-const CLEARLY_SEEN: f64 = 300.0;
-
-/// Rank and null directions, and the condition where the unknowns are least correlated. From the Gram matrix of the
-/// touches as they were made where that is beyond doubt, else from the nominal touches: errors of the machine itself
-/// must not make a combination look seen.
-fn observe(
-    gram: &DMatrix<f64>,
-    model: &Model,
-    data: &Data,
-    theta: &[f64],
-    free: &[usize],
-    priors: &[Prior],
-    weights: &[f64],
-) -> (solve::Observability, f64) {
-    let clear = solve::observe_gram(gram).filter(|seen| seen.condition < CLEARLY_SEEN);
-    let (seen, nominal) = match clear {
-        Some(seen) => (seen, None),
-        None => {
-            let (seen, gram) = observe_nominal(model, data, theta, free, priors, Some(weights));
-            (seen, Some(gram))
-        }
-    };
-    let mut change = DMatrix::identity(free.len(), free.len());
-    for (offset, tilt, lever) in model.least_correlated(&data.observations) {
-        if let (Ok(o), Ok(t)) = (free.binary_search(&offset), free.binary_search(&tilt)) {
-            change[(o, t)] += lever;
-        }
-    }
-    let condition = solve::condition(&(change.tr_mul(nominal.as_ref().unwrap_or(gram)) * &change), seen.rank);
-    (seen, condition)
-}
-
-/// Rank and null directions at the nominal touches, with the Gram matrix there.
-fn observe_nominal(
-    model: &Model,
-    data: &Data,
-    theta: &[f64],
-    free: &[usize],
-    priors: &[Prior],
-    weights: Option<&[f64]>,
-) -> (solve::Observability, DMatrix<f64>) {
-    let nominal = model.prepare(&data.nominal);
-    let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (1e-3, 0.0));
-    if let Some(weights) = weights {
-        touches.set_weights(weights.to_vec());
-    }
-    let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
-    let gram = solve::Problem::normal(&touches, &at, true).gram;
-    let seen = solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
-    (seen, gram)
-}
-
-/// Rank of a model on given (nominal) touches, without measurements: what a plan can tell.
-///
-/// # Errors
-/// When an effect is unknown or does not apply.
-pub fn observe_plan(
-    machine: &Machine,
-    catalogue: &Catalogue,
-    data: &Data,
-    effects: &[String],
-) -> Result<(Model, solve::Observability)> {
-    let effects = effects_of(effects, catalogue, machine)?;
-    let model = Model::new(machine, &effects, &data.set_ups, machine.reference.pivot);
-    let theta = model.start();
-    let free: Vec<usize> = (0..theta.len()).collect();
-    let seen = observe_nominal(&model, data, &theta, &free, &[], None).0;
-    Ok((model, seen))
 }

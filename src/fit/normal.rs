@@ -63,16 +63,8 @@ impl<'a> Touches<'a> {
     /// Another noise, mm.
     pub fn set_noise(&mut self, sigma_mm: f64, tau_mm: f64) {
         (self.sigma_mm, self.tau_mm) = (sigma_mm, tau_mm);
-        self.chunks.clear();
-        let mut from = 0;
-        for i in 1..=self.visits.len() {
-            // a visit's touches must stay together where they share a displacement
-            let may_end = tau_mm == 0.0 || i == self.visits.len() || self.visits[i] != self.visits[i - 1];
-            if i == self.visits.len() || (may_end && i - from >= CHUNK) {
-                self.chunks.push(from..i);
-                from = i;
-            }
-        }
+        // a visit's touches must stay together where they share a displacement
+        self.chunks = self.cut(0..self.visits.len(), CHUNK);
     }
 
     /// Other weights, one for each touch.
@@ -161,25 +153,39 @@ impl<'a> Touches<'a> {
 
     /// Whitens columns (one row per touch, mm or mm per unit) in place; rows of unused touches become zero.
     pub fn whiten(&self, columns: &mut DMatrix<f64>) {
-        for (i, w) in self.weight.iter().enumerate() {
-            if *w != 1.0 {
-                columns.row_mut(i).scale_mut(w.sqrt());
+        let all: Vec<usize> = (0..self.batch.len()).collect();
+        self.whiten_of(&all, columns);
+    }
+
+    /// The same for some touches only, one row each in their order: the used touches of a visit stand together.
+    pub(super) fn whiten_of(&self, touches: &[usize], columns: &mut DMatrix<f64>) {
+        for (k, &i) in touches.iter().enumerate() {
+            if self.weight[i] != 1.0 {
+                columns.row_mut(k).scale_mut(self.weight[i].sqrt());
             }
         }
         if self.tau_mm > 0.0 {
-            for visit in self.visits_in(0..self.batch.len()) {
-                let k = self.visit_root(&self.normals_square(visit.clone()));
+            let mut from = 0;
+            for visit in touches.chunk_by(|&a, &b| self.visits[a] == self.visits[b]) {
                 let normals: Vec<Vector3<f64>> =
-                    visit.clone().map(|i| self.normal_in_r(i) * self.weight[i].sqrt()).collect();
+                    visit.iter().map(|&i| self.normal_in_r(i) * self.weight[i].sqrt()).collect();
+                let square = normals.iter().fold(Matrix3::zeros(), |sum, n| sum + n * n.transpose());
+                let k = self.visit_root(&square);
                 for mut column in columns.column_iter_mut() {
-                    let mut part = column.rows_mut(visit.start, visit.len());
+                    let mut part = column.rows_mut(from, visit.len());
                     let sum = normals.iter().zip(part.iter()).fold(Vector3::zeros(), |s, (n, x)| s + n * *x);
                     let by = k * sum;
                     part.iter_mut().zip(&normals).for_each(|(x, n)| *x -= n.dot(&by));
                 }
+                from += visit.len();
             }
         }
         *columns /= self.sigma_mm;
+    }
+
+    /// All touches in parts of about a thousand, visits whole where their touches share a displacement.
+    pub(super) fn parts(&self) -> &[Range<usize>] {
+        &self.chunks
     }
 
     /// Gaps and rows of all touches with only the free unknowns that they see.
@@ -206,23 +212,44 @@ impl<'a> Touches<'a> {
         out
     }
 
+    /// A part in smaller ones of about `most` touches, visits whole where their touches share a displacement.
+    pub(super) fn cut(&self, part: Range<usize>, most: usize) -> Vec<Range<usize>> {
+        let mut out = Vec::new();
+        let mut from = part.start;
+        for i in part.start + 1..=part.end {
+            let may_end = i == part.end || self.tau_mm == 0.0 || self.visits[i] != self.visits[i - 1];
+            if i == part.end || (may_end && i - from >= most) {
+                out.push(from..i);
+                from = i;
+            }
+        }
+        out
+    }
+
     /// Gaps, mm, and Jacobian of the free unknowns, mm per unit; touches only.
     #[must_use]
     pub fn unwhitened(&self, free: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let all: Vec<usize> = (0..self.batch.len()).collect();
+        self.unwhitened_of(free, &all)
+    }
+
+    /// The same for some touches only, one row each in their order.
+    pub(super) fn unwhitened_of(&self, free: &DVector<f64>, touches: &[usize]) -> (DVector<f64>, DMatrix<f64>) {
         let theta = self.full(free);
         let at = self.batch.at(&theta);
-        let (n, p) = (self.batch.len(), self.free.len());
+        let (n, p) = (touches.len(), self.free.len());
         let column_of = self.columns();
         let (mut gaps, mut jacobian) = (DVector::zeros(n), DMatrix::zeros(n, p));
         let mut scratch = self.batch.scratch();
         let layout = self.batch.model().layout();
         let mut row = Vec::new();
-        for (i, o) in self.batch.observations().iter().enumerate() {
-            row.resize(layout.row_length(o.set_up), 0.0);
-            gaps[i] = at.gap_and_row(i, &mut scratch, &mut row);
-            for (value, unknown) in row.iter().zip(layout.row(o.set_up)) {
+        for (k, &i) in touches.iter().enumerate() {
+            let set_up = self.batch.observations()[i].set_up;
+            row.resize(layout.row_length(set_up), 0.0);
+            gaps[k] = at.gap_and_row(i, &mut scratch, &mut row);
+            for (value, unknown) in row.iter().zip(layout.row(set_up)) {
                 if let Some(c) = column_of[unknown] {
-                    jacobian[(i, c)] = *value;
+                    jacobian[(k, c)] = *value;
                 }
             }
         }

@@ -1,7 +1,10 @@
 //! Weighted Gauss-Newton, rank by singular values, and nothing about effects or machines.
 //!
 //! The unknowns are scaled by their columns' norms at the nominal touches; directions that leave no trace there
-//! (singular value below [`RANK_TOLERANCE`] of the largest) are gauges: they are taken out of the search and reported. Source of the method: Björck, Numerical Methods for Least Squares Problems, ch. 9.
+//! (singular value below [`RANK_TOLERANCE`] of the largest) are gauges: they are reported, and for each of them one unknown is
+//! held where it stands ([`Observability::hold`]). What is left is a plain problem of full rank: a gauge that bends away from its
+//! straight direction cannot lead the search astray, because the search never moves along it. Source of the method: Björck,
+//! Numerical Methods for Least Squares Problems, ch. 9.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 pub const RANK_TOLERANCE: f64 = 1e-9;
 
 /// The search stops when a step moves no predicted touch by more than this, mm.
-const STEP_TOLERANCE_MM: f64 = 1e-13;
+pub(super) const STEP_TOLERANCE_MM: f64 = 1e-13;
 
 const MAX_STEPS: usize = 60;
 
@@ -27,7 +30,12 @@ pub struct Observability {
     pub seen: DMatrix<f64>,
     /// Rows in echelon form, unit norm: scaled combinations that leave no trace.
     pub unseen: Vec<DVector<f64>>,
+    /// Unknowns that a search holds where they stand, in ascending order: one for each combination without a trace.
+    pub held: Vec<usize>,
 }
+
+/// A held unknown must have at least this share in what leaves no trace: the others follow it with the inverse of that.
+const SHARE_OF_HELD: f64 = 0.05;
 
 /// Rank and null directions of a Jacobian (rows: touches, columns: unknowns).
 #[must_use]
@@ -51,6 +59,7 @@ fn observe_with(jacobian: &DMatrix<f64>, rank: Option<usize>) -> Observability {
             condition: 1.0,
             seen: DMatrix::zeros(p, 0),
             unseen: (0..p).map(|i| DVector::from_fn(p, |k, _| f64::from(u8::from(k == i)))).collect(),
+            held: (0..p).collect(),
         };
     }
     let mut scaled = jacobian.clone();
@@ -76,13 +85,16 @@ fn observe_with(jacobian: &DMatrix<f64>, rank: Option<usize>) -> Observability {
     let lost: Vec<usize> = (0..p).filter(|i| !kept.contains(i)).collect();
     let smallest = kept.iter().map(|&i| values[i]).fold(f64::INFINITY, f64::min);
     let seen = if lost.is_empty() { DMatrix::identity(p, p) } else { v.select_columns(&kept) };
-    Observability {
+    let mut out = Observability {
         scale,
         rank: kept.len(),
         condition: if kept.is_empty() { f64::INFINITY } else { top / smallest },
         seen,
         unseen: echelon(v.select_columns(&lost).transpose()),
-    }
+        held: Vec::new(),
+    };
+    out.hold((0..p).rev());
+    out
 }
 
 /// Singular values and right singular vectors of a tall matrix, by QR first; as many as columns.
@@ -179,11 +191,11 @@ pub struct Solution {
     pub iterations: usize,
     /// By which test it stopped.
     pub stopped: String,
-    /// Covariance of the free unknowns; zero along unseen directions.
+    /// Covariance of the free unknowns; zero for those that are held.
     pub covariance: DMatrix<f64>,
 }
 
-/// The seen directions of the scaled unknowns with the factor R, RᵀR = their normal matrix.
+/// The scaled unknowns that are not held, with the factor R, RᵀR = their normal matrix.
 struct Factor {
     r: DMatrix<f64>,
 }
@@ -195,7 +207,12 @@ impl Factor {
             let scaled = DMatrix::from_fn(theta.len(), theta.len(), |i, j| {
                 normal.gram[(i, j)] / (seen.scale[i] * seen.scale[j])
             });
-            let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
+            let reduced = if seen.full() {
+                scaled
+            } else {
+                let moved = seen.moved();
+                scaled.select_rows(&moved).select_columns(&moved)
+            };
             if let Some(cholesky) = reduced.cholesky() {
                 return Some(Self { r: cholesky.unpack().transpose() });
             }
@@ -204,16 +221,16 @@ impl Factor {
         for (mut column, s) in jacobian.column_iter_mut().zip(seen.scale.iter()) {
             column /= *s;
         }
-        let reduced = if seen.full() { jacobian } else { jacobian * &seen.seen };
+        let reduced = if seen.full() { jacobian } else { jacobian.select_columns(&seen.moved()) };
         let r = reduced.qr().r();
         let good = r.nrows() == seen.rank && r.diagonal().iter().all(|d| *d != 0.0 && d.is_finite());
         good.then_some(Self { r })
     }
 
-    /// −(RᵀR)⁻¹·Sᵀ·D⁻¹·gradient, and the length of the move that it makes (whitened).
+    /// −(RᵀR)⁻¹·D⁻¹·gradient, 0 for what is held, and the length of the move that it makes (whitened).
     fn step(&self, gradient: &DVector<f64>, seen: &Observability) -> Option<(DVector<f64>, f64)> {
         let scaled = gradient.component_div(&seen.scale);
-        let mut x = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) };
+        let mut x = if seen.full() { scaled } else { scaled.select_rows(&seen.moved()) };
         if !self.r.tr_solve_upper_triangular_mut(&mut x) {
             return None;
         }
@@ -221,7 +238,7 @@ impl Factor {
         if !self.r.solve_upper_triangular_mut(&mut x) || x.iter().any(|v| !v.is_finite()) {
             return None;
         }
-        let step = if seen.full() { -x } else { -(&seen.seen * x) };
+        let step = -seen.spread(DMatrix::from_column_slice(x.len(), 1, x.as_slice())).column(0);
         Some((step.component_div(&seen.scale), length))
     }
 
@@ -230,7 +247,7 @@ impl Factor {
         if !self.r.solve_upper_triangular_mut(&mut inverse) {
             return None;
         }
-        let mut half = if seen.full() { inverse } else { &seen.seen * inverse };
+        let mut half = seen.spread(inverse);
         for (mut row, s) in half.row_iter_mut().zip(seen.scale.iter()) {
             row /= *s;
         }
@@ -244,9 +261,48 @@ impl Observability {
     pub fn full(&self) -> bool {
         self.rank == self.scale.len()
     }
+
+    /// Chooses the unknowns that a search holds: for each combination without a trace the first of `order` that has a share in
+    /// it.
+    pub fn hold(&mut self, order: impl IntoIterator<Item = usize>) {
+        self.held.clear();
+        let mut rows: Vec<DVector<f64>> = self.unseen.clone();
+        let order: Vec<usize> = order.into_iter().collect();
+        for least in [SHARE_OF_HELD, 0.0] {
+            for &c in &order {
+                let largest = (0..rows.len()).max_by(|&a, &b| rows[a][c].abs().total_cmp(&rows[b][c].abs()));
+                let Some(row) = largest.filter(|&k| rows[k][c].abs() > least * rows[k].norm()) else { continue };
+                let pivot = rows.swap_remove(row);
+                for other in &mut rows {
+                    let share = other[c] / pivot[c];
+                    other.axpy(-share, &pivot, 1.0);
+                    other[c] = 0.0;
+                }
+                self.held.push(c);
+            }
+        }
+        self.held.sort_unstable();
+    }
+
+    /// The unknowns that a search moves.
+    fn moved(&self) -> Vec<usize> {
+        (0..self.scale.len()).filter(|c| self.held.binary_search(c).is_err()).collect()
+    }
+
+    /// Rows for the unknowns that are moved → rows for all of them, 0 for those that are held.
+    fn spread(&self, rows: DMatrix<f64>) -> DMatrix<f64> {
+        if self.full() {
+            return rows;
+        }
+        let mut out = DMatrix::zeros(self.scale.len(), rows.ncols());
+        for (&c, row) in self.moved().iter().zip(rows.row_iter()) {
+            out.set_row(c, &row);
+        }
+        out
+    }
 }
 
-/// Minimises the sum of squares over the seen directions, from `start`: Gauss-Newton with halved steps. Its steps solve
+/// Minimises the sum of squares over the unknowns that are not held, from `start`: Gauss-Newton with halved steps. Its steps solve
 /// (corrected semi-)normal equations; the gradient is always that of the exact residuals, so that the factor decides
 /// about the speed of convergence and not about the answer.
 #[must_use]
@@ -371,6 +427,7 @@ pub fn observe_gram(gram: &DMatrix<f64>) -> Option<Observability> {
         condition: (high / low).sqrt(),
         seen: DMatrix::identity(p, p),
         unseen: Vec::new(),
+        held: Vec::new(),
     })
 }
 
@@ -387,6 +444,20 @@ mod tests {
         assert_eq!(seen.unseen.len(), 1);
         let unscaled = seen.unseen[0].component_div(&seen.scale);
         assert!((a * unscaled).norm() < 1e-12);
+        // one of the three is held: the first that is named
+        assert_eq!(seen.held, [2]);
+        let mut other = seen.clone();
+        other.hold([1, 2, 0]);
+        assert_eq!(other.held, [1]);
+    }
+
+    #[test]
+    fn a_parameter_with_next_to_no_share_is_not_held() {
+        // no trace: (1, 1e-3, 0) and (0, 0, 1) of the scaled unknowns
+        let mut seen = observe(&DMatrix::from_row_slice(2, 3, &[1e-3, -1.0, 0.0, 2e-3, -2.0, 0.0]));
+        seen.unseen = vec![DVector::from_vec(vec![1.0, 1e-3, 0.0]), DVector::from_vec(vec![0.0, 0.0, 1.0])];
+        seen.hold([1, 0, 2]);
+        assert_eq!(seen.held, [0, 2]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What the data cannot tell, in sentences.
 
 use super::outcome::Undetermined;
+use super::solve::Observability;
 use crate::model::catalogue::{Effect, Place, Term};
 use crate::model::formula::VARIABLES;
 use crate::model::predict::Unknown;
@@ -10,15 +11,18 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Weights below this are not worth a word.
 const WORTH_NAMING: f64 = 0.05;
 
-/// A null direction (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `scale` what their scaled
-/// values are divided by, `effects` the model's.
+/// A null direction (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `seen` says how they are
+/// scaled and which are held, `effects` are the model's.
 #[must_use]
 pub fn undetermined(
     unknowns: &[&Unknown],
     effects: &[&Effect],
     direction: &DVector<f64>,
-    scale: &DVector<f64>,
+    seen: &Observability,
 ) -> Undetermined {
+    let scale = &seen.scale;
+    let held: Vec<String> =
+        seen.held.iter().filter(|&&c| direction[c].abs() > 1e-6).map(|&c| unknowns[c].name.clone()).collect();
     let mut combination = BTreeMap::new();
     for (u, weight) in unknowns.iter().zip(direction.iter()) {
         if weight.abs() > 1e-6 {
@@ -49,14 +53,17 @@ pub fn undetermined(
         };
         members.push(format!("the set-up of {of} ({})", words.join(", ")));
     }
-    let convention = "by convention the part that leaves no trace is 0";
+    let convention = match &held[..] {
+        [one] => format!("by convention {one} counts as 0"),
+        _ => format!("by convention {} count as 0", join(&held)),
+    };
     let says = match (&members[..], &physical[..]) {
         ([], _) => "a combination of many parameters leaves no trace in these touches".to_owned(),
         ([one], _) => format!(
             "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
         ),
         (_, [a, b]) if blocks.is_empty() => format!(
-            "{} are one number with these touches: only {} is seen, and {convention}, so that each value holds a share of that",
+            "{} are one number with these touches: only {} is seen, and {convention}",
             join(&members),
             what_is_seen(*a, *b)
         ),

@@ -1,24 +1,27 @@
 //! Where the uncertainty of a parameter comes from, what it becomes with everything that the model leaves out, and which
 //! combinations are weak.
 
-use super::candidates::{columns, with_values, without_value};
+use super::candidates::{columns, columns_of, with_values, without_value};
 use super::normal::Touches;
 use super::outcome::{Combination, Correlation, Covariance};
-use super::solve::RANK_TOLERANCE;
+use super::solve::{Problem as _, RANK_TOLERANCE};
 use super::{Fit, Knowledge};
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::formula::slot;
-use crate::model::predict::{Observation, Unknown};
+use crate::model::predict::{Model, Observation, Unknown};
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::collections::BTreeMap;
 
 /// Correlations above this are worth a line.
 const WORTH_NAMING: f64 = 0.8;
 
-/// With more touches the columns of the whole catalogue would need gigabytes.
+/// With more touches the whole catalogue would take longer than everything else together.
 pub(super) const MOST_UNMODELLED: usize = 20_000;
+
+/// Touches whose columns of the whole catalogue are held at once.
+const UNMODELLED_AT_ONCE: usize = 256;
 
 /// Projecting the set-ups out of a Gram matrix leaves some 1e-5 of the largest singular value: below this share of it the
 /// rows themselves must tell.
@@ -35,21 +38,26 @@ pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
         return out;
     }
     let c = free_covariance(fit);
+    let theta = fit.free_theta();
     fit.with_touches(tau, |touches: &Touches| {
-        let (_, jacobian) = touches.unwhitened(&fit.free_theta());
         let (sigma, _) = touches.noise_mm();
-        for visit in touches.visits_in(0..jacobian.nrows()) {
-            let square = touches.normals_square(visit.clone());
-            let m = touches.visit_inverse(&square);
-            let mut sums = DMatrix::zeros(3, jacobian.ncols());
-            for i in visit {
-                sums.ger(fit.weight[i], &touches.normal_in_r(i), &jacobian.row(i).transpose(), 1.0);
-            }
-            // JᵀV⁻¹N of this visit, times C: how its displacement moves each unknown
-            let by = (Matrix3::identity() - square * m) / (sigma * sigma);
-            let moves = &c * sums.transpose() * by;
-            for (i, row) in moves.row_iter().enumerate() {
-                out[i] += tau * tau * row.norm_squared();
+        for part in touches.parts() {
+            let rows: Vec<usize> = part.clone().collect();
+            let (_, jacobian) = touches.unwhitened_of(&theta, &rows);
+            for visit in touches.visits_in(part.clone()) {
+                let square = touches.normals_square(visit.clone());
+                let m = touches.visit_inverse(&square);
+                let mut sums = DMatrix::zeros(3, jacobian.ncols());
+                for i in visit {
+                    let row = jacobian.row(i - part.start).transpose();
+                    sums.ger(fit.weight[i], &touches.normal_in_r(i), &row, 1.0);
+                }
+                // JᵀV⁻¹N of this visit, times C: how its displacement moves each unknown
+                let by = (Matrix3::identity() - square * m) / (sigma * sigma);
+                let moves = &c * sums.transpose() * by;
+                for (i, row) in moves.row_iter().enumerate() {
+                    out[i] += tau * tau * row.norm_squared();
+                }
             }
         }
     });
@@ -167,7 +175,7 @@ pub(super) fn type_b(
             .values
             .column(which)
             .into_owned();
-        let moved = sensitivity(fit, column);
+        let moved = sensitivity(fit, &column);
         let p = &effect.parameters[which];
         out.push(TypeB {
             name: p.name.clone(),
@@ -181,12 +189,20 @@ pub(super) fn type_b(
 }
 
 /// How much the free unknowns move per unit of something that displaces the touches by `column` (mm per unit).
-fn sensitivity(fit: &Fit, column: DVector<f64>) -> DVector<f64> {
-    let linear = fit.linear(fit.noise.tau_mm);
-    let n = column.len();
-    let mut whitened = DMatrix::from_column_slice(n, 1, column.as_slice());
-    fit.with_touches(fit.noise.tau_mm, |t| t.whiten(&mut whitened));
-    -(free_covariance(fit) * linear.jacobian.rows(0, n).tr_mul(&whitened.column(0)))
+fn sensitivity(fit: &Fit, column: &DVector<f64>) -> DVector<f64> {
+    let theta = fit.free_theta();
+    let mut sum = DVector::zeros(fit.free.len());
+    fit.with_touches(fit.noise.tau_mm, |touches| {
+        for part in touches.parts() {
+            let rows: Vec<usize> = part.clone().collect();
+            let mut jacobian = touches.unwhitened_of(&theta, &rows).1;
+            touches.whiten_of(&rows, &mut jacobian);
+            let mut moved = DMatrix::from_column_slice(rows.len(), 1, &column.as_slice()[part.clone()]);
+            touches.whiten_of(&rows, &mut moved);
+            sum += jacobian.tr_mul(&moved.column(0));
+        }
+    });
+    -(free_covariance(fit) * sum)
 }
 
 /// Effects that may act although a model with these unknowns does not hold them: all of the catalogue but those that share a
@@ -204,15 +220,31 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
     let mut effects = unmodelled_by(&fit.model.unknowns, machine, catalogue);
     effects.retain(|e| !e.per_block);
     let (effects, left_out) = with_values(effects, &fit.data.observations);
-    let all = columns(machine, &effects, &fit.data, &fit.data.observations, fit.model.reference, None);
-    let tau_mm = fit.noise.tau_mm;
-    let linear = fit.linear(tau_mm);
-    let mut b = all.values;
-    for (mut column, u) in b.column_iter_mut().zip(&all.unknowns) {
-        column *= u.typical;
+    let others = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
+    let typical: Vec<f64> = others.unknowns.iter().map(|u| u.typical).collect();
+    let theta = fit.free_theta();
+    let (p, q) = (fit.free.len(), typical.len());
+    let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
+    // part by part: the columns of the whole catalogue at all touches would be many times the touches themselves
+    fit.with_touches(fit.noise.tau_mm, |touches| {
+        for part in touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)) {
+            let rows: Vec<usize> = part.clone().collect();
+            let mut jacobian = touches.unwhitened_of(&theta, &rows).1;
+            touches.whiten_of(&rows, &mut jacobian);
+            let mut b = columns_of(&others, &fit.data.observations[part]);
+            for (mut column, size) in b.column_iter_mut().zip(&typical) {
+                column *= *size;
+            }
+            touches.whiten_of(&rows, &mut b);
+            sums.add(&jacobian, &b);
+        }
+    });
+    for (unknown, _, sigma) in &fit.priors {
+        if let Ok(c) = fit.free.binary_search(unknown) {
+            sums.gram[(c, c)] += sigma.powi(-2);
+        }
     }
-    fit.with_touches(tau_mm, |t| t.whiten(&mut b));
-    (expected(&linear.jacobian, Some(&b), &fit.seen), left_out)
+    (sums.expected(&fit.seen), left_out)
 }
 
 /// Standard uncertainty of each unknown of a whitened regression, in its unit, while effects that are not solved for act
@@ -220,22 +252,45 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
 /// number where the normal equations cannot be solved.
 #[must_use]
 pub fn expected(jacobian: &DMatrix<f64>, b: Option<&DMatrix<f64>>, seen: &super::solve::Observability) -> DVector<f64> {
-    let p = jacobian.ncols();
-    let unknown = || DVector::from_element(p, f64::NAN);
-    let mut gram = jacobian.tr_mul(jacobian);
-    if let Some(b) = b {
-        // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
-        let cross = jacobian.rows(0, b.nrows()).tr_mul(b);
-        let mut inner = b.tr_mul(b);
-        inner.fill_diagonal_added();
-        let Some(cholesky) = inner.cholesky() else { return unknown() };
-        gram -= &cross * cholesky.solve(&cross.transpose());
+    let none = DMatrix::zeros(jacobian.nrows(), 0);
+    let b = b.unwrap_or(&none);
+    let cross = jacobian.rows(0, b.nrows()).tr_mul(b);
+    Sums { gram: jacobian.tr_mul(jacobian), cross, inner: b.tr_mul(b) }.expected(seen)
+}
+
+/// Products of a whitened Jacobian J and columns B of effects that may act at their typical size.
+struct Sums {
+    /// JᵀJ
+    gram: DMatrix<f64>,
+    /// JᵀB
+    cross: DMatrix<f64>,
+    /// BᵀB
+    inner: DMatrix<f64>,
+}
+
+impl Sums {
+    fn add(&mut self, jacobian: &DMatrix<f64>, b: &DMatrix<f64>) {
+        let (turned, b_turned) = (jacobian.transpose(), b.transpose());
+        self.gram.gemm(1.0, &turned, jacobian, 1.0);
+        self.cross.gemm(1.0, &turned, b, 1.0);
+        self.inner.gemm(1.0, &b_turned, b, 1.0);
     }
-    let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
-    let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
-    let Some(inverse) = reduced.cholesky().map(|c| c.inverse()) else { return unknown() };
-    let full = if seen.full() { inverse } else { &seen.seen * inverse * seen.seen.transpose() };
-    DVector::from_fn(p, |i, _| full[(i, i)].max(0.0).sqrt() / seen.scale[i])
+
+    fn expected(mut self, seen: &super::solve::Observability) -> DVector<f64> {
+        let p = self.gram.nrows();
+        let unknown = || DVector::from_element(p, f64::NAN);
+        if self.inner.nrows() > 0 {
+            // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
+            self.inner.fill_diagonal_added();
+            let Some(cholesky) = self.inner.cholesky() else { return unknown() };
+            self.gram -= &self.cross * cholesky.solve(&self.cross.transpose());
+        }
+        let scaled = DMatrix::from_fn(p, p, |i, j| self.gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
+        let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
+        let Some(inverse) = reduced.cholesky().map(|c| c.inverse()) else { return unknown() };
+        let full = if seen.full() { inverse } else { &seen.seen * inverse * seen.seen.transpose() };
+        DVector::from_fn(p, |i, _| full[(i, i)].max(0.0).sqrt() / seen.scale[i])
+    }
 }
 
 trait AddToDiagonal {
@@ -282,12 +337,13 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
     if physical.is_empty() {
         return Vec::new();
     }
-    let jacobian = only_seen(fit.linear(fit.noise.tau_mm).jacobian, &fit.seen);
     let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
-    let (values, directions) = match from_gram(&jacobian, &physical, &nuisance, typical) {
-        Some(found) if fit.seen.full() => found,
-        _ => from_rows(&jacobian, &physical, &nuisance, typical),
-    };
+    let gram = || fit.with_touches(fit.noise.tau_mm, |t| t.normal(&fit.free_theta(), true).gram);
+    let quick = if fit.seen.full() { from_gram(&gram(), &physical, &nuisance, typical) } else { None };
+    let (values, directions) = quick.unwrap_or_else(|| {
+        let jacobian = only_seen(fit.linear(fit.noise.tau_mm).jacobian, &fit.seen);
+        from_rows(&jacobian, &physical, &nuisance, typical)
+    });
     let top = values.max();
     let mut out = Vec::new();
     for (s, direction) in values.iter().zip(directions.column_iter()) {
@@ -326,12 +382,11 @@ type Spectrum = (DVector<f64>, DMatrix<f64>);
 
 /// From the Gram matrix: quick, and good to some 1e-5 of the largest; `None` where one is below that.
 fn from_gram(
-    jacobian: &DMatrix<f64>,
+    gram: &DMatrix<f64>,
     physical: &[usize],
     nuisance: &[usize],
     typical: impl Fn(usize) -> f64,
 ) -> Option<Spectrum> {
-    let gram = jacobian.tr_mul(jacobian);
     // the set-ups by the norms of their columns, which leaves their span as it is
     let norm = |c: usize| if gram[(c, c)] > 0.0 { gram[(c, c)].sqrt().recip() } else { 0.0 };
     let part = |rows: &[(usize, f64)], columns: &[(usize, f64)]| {

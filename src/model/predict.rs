@@ -316,6 +316,11 @@ impl Model {
         self.instances.get(effect).map_or(&[], Vec::as_slice)
     }
 
+    /// The same of all effects, in the order of θ.
+    pub fn all_instances(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.instances.iter().flatten().copied()
+    }
+
     /// Number of unknowns.
     #[must_use]
     pub fn n_unknowns(&self) -> usize {

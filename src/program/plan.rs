@@ -207,12 +207,14 @@ impl Plan {
                     .at(source, 0..0),
             );
         }
+        // plans of our own count upwards: then no number stands twice
+        let ascending = plan.touches.is_sorted_by(|a, b| a.id < b.id);
         let mut seen = std::collections::BTreeSet::new();
         for touch in &plan.touches {
             let mut bad = |code, message: String, help: &str| {
                 findings.push(Finding::error(code, message).help(help).at(source, 0..0));
             };
-            if !seen.insert(touch.id) {
+            if !ascending && !seen.insert(touch.id) {
                 bad(
                     "plan::id_twice",
                     format!("touch {} stands twice in the plan", touch.id),
@@ -241,13 +243,21 @@ impl Plan {
         findings.finish(plan)
     }
 
-    /// The plan as JSON, the same bytes for the same plan.
+    /// The plan as JSON, the same bytes for the same plan; each touch in a line of its own.
     #[must_use]
     pub fn to_json(&self) -> String {
         // a plan holds only strings and finite numbers: serialisation cannot fail
-        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        const EMPTY: &str = "\"touches\": []";
+        let frame = Self { touches: Vec::new(), ..self.clone() };
+        let mut text = serde_json::to_string_pretty(&frame).unwrap_or_default();
         text.push('\n');
-        text
+        let lines: Vec<String> =
+            self.touches.iter().map(|t| format!("\n    {}", serde_json::to_string(t).unwrap_or_default())).collect();
+        if lines.is_empty() {
+            return text;
+        }
+        // quotes inside of strings are escaped: this stands there once
+        text.replacen(EMPTY, &format!("\"touches\": [{}\n  ]", lines.join(",")), 1)
     }
 
     /// The block of a touch.

@@ -1,0 +1,245 @@
+//! The steps of a fit around the least squares: noise samples, touches that do not belong, gauges that bend.
+
+use super::noise::Sample;
+use super::normal::Touches;
+use super::snoop::{self, Snoop};
+use super::solve;
+use crate::model::data::Data;
+use crate::model::formula::slot;
+use crate::model::predict::Model;
+use nalgebra::{DVector, Vector3};
+use std::collections::{BTreeMap, HashMap};
+
+/// Steps at most along the bends of gauges.
+const MOST_BENDS: usize = 30;
+
+/// Touches that scatter less than this share of what the probe's maker declares were made by no probe: they are exact.
+const QUIET: f64 = 0.05;
+
+/// A fit that is being made.
+pub(super) struct Search<'a> {
+    pub data: &'a Data,
+    /// What the nominal touches say, and what is held.
+    pub observability: solve::Observability,
+    pub touches: Touches<'a>,
+    pub masked: Vec<bool>,
+    /// Noise of a touch as the machine's file declares it, mm.
+    pub declared_sigma_mm: f64,
+}
+
+impl Search<'_> {
+    fn gaps(&self, solution: &solve::Solution) -> Vec<f64> {
+        self.touches.gaps(&solution.theta)
+    }
+
+    /// The touches that are used, as the noise sees them.
+    pub fn samples(&self, solution: &solve::Solution) -> Vec<Sample> {
+        let mut points: HashMap<[u64; 8], usize> = HashMap::new();
+        let gaps = self.gaps(solution);
+        let mut out = Vec::with_capacity(gaps.len());
+        for (i, o) in self.data.observations.iter().enumerate() {
+            let bits = |x: f64| x.to_bits();
+            let key = [
+                o.set_up as u64,
+                bits(o.point.x),
+                bits(o.point.y),
+                bits(o.point.z),
+                bits(o.normal.x),
+                bits(o.normal.y),
+                bits(o.normal.z),
+                bits(o.state[slot::FEED]),
+            ];
+            let n = points.len();
+            let point = *points.entry(key).or_insert(n);
+            if self.touches.weights()[i] > 0.0 {
+                let visit = self.data.visits[i];
+                out.push(Sample {
+                    residual_mm: gaps[i],
+                    normal: Vector3::new(o.state[8], o.state[9], o.state[10]),
+                    repeat: self.data.repeats[i],
+                    visit,
+                    pose: self.data.poses[visit],
+                    point,
+                });
+            }
+        }
+        out
+    }
+
+    fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
+        self.touches.set_weights(weights);
+        self.refit_here(from.theta.clone())
+    }
+
+    pub fn refit_here(&self, from: DVector<f64>) -> solve::Solution {
+        solve::minimise(&self.touches, from, &self.observability)
+    }
+
+    /// What the touches tell of held unknowns by the bend of their gauges. A combination leaves no trace where everything is
+    /// nominal; where blocks stand askew it may leave a small one, which goes into the other values while an unknown of the
+    /// combination is held. Where the touches scatter far less than a probe does, that trace is more than their scatter: then
+    /// everything moves, each held unknown expected within its usual size of where it stands, and each touch within what it
+    /// scatters. Touches as real probes make them say nothing of it, and stay with what is held.
+    pub fn follow_bends(&self, mut solution: solve::Solution, model: &Model, free: &[usize]) -> solve::Solution {
+        let seen = &self.observability;
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(seen.rank);
+        if seen.full() || seen.rank == 0 || dof == 0 {
+            return solution;
+        }
+        let (sigma_mm, _) = self.touches.noise_mm();
+        let (p, k) = (free.len(), seen.held.len());
+        let typical = DVector::from_iterator(p, free.iter().map(|&i| model.unknowns[i].typical));
+        let stood: Vec<f64> = seen.held.iter().map(|&c| solution.theta[c]).collect();
+        let off = |theta: &DVector<f64>| -> DVector<f64> {
+            let each = seen.held.iter().zip(&stood).map(|(&c, stood)| (theta[c] - stood) / typical[c]);
+            DVector::from_iterator(k, each)
+        };
+        let sum = |theta: &DVector<f64>| solve::Problem::normal(&self.touches, theta, false).sum;
+        for _ in 0..MOST_BENDS {
+            let scatter = (solution.chi2.max(0.0) / dof as f64).sqrt().max(solve::STEP_TOLERANCE_MM / sigma_mm);
+            if scatter * sigma_mm > QUIET * self.declared_sigma_mm {
+                return solution;
+            }
+            let (residual, jacobian) = self.touches.dense(&solution.theta);
+            let n = jacobian.nrows();
+            let mut rows = jacobian.resize_vertically(n + k, 0.0);
+            for (mut column, size) in rows.column_iter_mut().zip(typical.iter()) {
+                column *= size / scatter;
+            }
+            seen.held.iter().enumerate().for_each(|(row, &c)| rows[(n + row, c)] = 1.0);
+            let mut right = residual.resize_vertically(n + k, 0.0) / -scatter;
+            right.rows_mut(n, k).copy_from(&-off(&solution.theta));
+            let moved = |step: &DVector<f64>| (rows.rows(0, n) * step).norm() * scatter * sigma_mm / (n as f64).sqrt();
+            let factor = rows.clone().qr();
+            factor.q_tr_mul(&mut right);
+            let Some(step) = factor.r().solve_upper_triangular(&right.rows(0, p).into_owned()) else { break };
+            let moved_mm = moved(&step);
+            let step = step.component_mul(&typical);
+            if !moved_mm.is_finite() || step.iter().any(|s| !s.is_finite()) {
+                break;
+            }
+            let worth = |theta: &DVector<f64>, sum: f64| sum / scatter.powi(2) + off(theta).norm_squared();
+            let before = worth(&solution.theta, solution.chi2);
+            let parts = [1.0, 0.5, 0.25, 0.125];
+            let better = parts.iter().find_map(|part| {
+                let theta = &solution.theta + &step * *part;
+                let chi2 = sum(&theta);
+                (worth(&theta, chi2) < before).then_some((theta, chi2))
+            });
+            let Some((theta, chi2)) = better else { break };
+            (solution.theta, solution.chi2) = (theta, chi2);
+            solution.iterations += 1;
+            if moved_mm < solve::STEP_TOLERANCE_MM {
+                break;
+            }
+        }
+        solution
+    }
+
+    /// What is seen where the search has come to: as many combinations as at the nominal touches.
+    pub fn seen_at(&self, theta: &DVector<f64>) -> solve::Observability {
+        let nominal = &self.observability;
+        if nominal.full() || nominal.rank == 0 {
+            return nominal.clone();
+        }
+        solve::observe_of_rank(&solve::Problem::jacobian(&self.touches, theta), nominal.rank)
+    }
+
+    /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do
+    /// get it back. `noise_dof` is that of σ.
+    pub fn without_strangers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
+        let n = self.data.observations.len();
+        let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
+        let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
+        let judge = |search: &Self, s: &solve::Solution| {
+            let dof = solve::Problem::n_rows(&search.touches).saturating_sub(search.observability.rank);
+            Snoop::new(&search.touches, &s.theta, &s.covariance, (s.chi2, dof), noise_dof)
+        };
+        let first = judge(self, &solution).dropped();
+        if first.is_empty() {
+            return solution;
+        }
+        // several bad touches hide each other: let the rest vote first
+        let most = (snoop::MOST_SHARE * n as f64).ceil() as usize;
+        let mut out = self.robust_strangers(&solution, &all);
+        if out.is_empty() || out.len() > most {
+            out = first;
+        }
+        for _ in 0..4 {
+            let mut weights = all.clone();
+            out.iter().for_each(|&i| weights[i] = 0.0);
+            solution = self.refit(weights, &solution);
+            // back in what belongs, out what does not
+            let scale2 = self.scale2(&solution, noise_dof);
+            let back: Vec<usize> =
+                out.iter().copied().filter(|&i| snoop::belongs(self.off(&solution, i, scale2).1)).collect();
+            let more: Vec<usize> = judge(self, &solution).dropped();
+            if back.is_empty() && (more.is_empty() || out.len() >= most) {
+                break;
+            }
+            out.retain(|i| !back.contains(i));
+            out.extend(more);
+            out.truncate(most.max(1));
+        }
+        // touches of one face that miss together say something in common: that is no matter of chips
+        let normals: Vec<[i8; 3]> = self
+            .data
+            .observations
+            .iter()
+            .map(|o| [o.normal.x, o.normal.y, o.normal.z].map(|x| (10.0 * x).round() as i8))
+            .collect();
+        let face = |i: usize| (self.data.visits[i], self.data.observations[i].set_up, normals[i]);
+        for cluster in snoop::clusters(&out, face, n) {
+            out.retain(|i| !cluster.contains(i));
+        }
+        let mut weights = all;
+        out.iter().for_each(|&i| weights[i] = 0.0);
+        if weights == self.touches.weights() { solution } else { self.refit(weights, &solution) }
+    }
+
+    /// Touches further than 4 robust standard deviations off a fit in which far touches count little.
+    fn robust_strangers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
+        let (sigma, _) = self.touches.noise_mm();
+        let mut solution = plain.clone();
+        let mut gaps = self.gaps(&solution);
+        let mut scale = gaps.iter().map(|r| r.abs()).fold(0.0, f64::max);
+        loop {
+            let mut weights = snoop::robust_weights(&gaps, scale);
+            weights.iter_mut().zip(all).for_each(|(w, a)| *w = (*w * a).max(1e-6 * a));
+            solution = self.refit(weights, &solution);
+            gaps = self.gaps(&solution);
+            let floor = 3.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+            if scale <= floor {
+                break;
+            }
+            scale = (scale / 3.0).max(floor);
+        }
+        let limit = 4.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+        (0..gaps.len()).filter(|&i| all[i] > 0.0 && gaps[i].abs() > limit).collect()
+    }
+
+    fn scale2(&self, solution: &solve::Solution, noise_dof: f64) -> f64 {
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank) as f64;
+        (solution.chi2 + noise_dof) / (dof + noise_dof).max(1.0)
+    }
+
+    /// How far touch i is off what the fit says, mm and in standard deviations.
+    fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
+        let (gap, row) = self.touches.row(&solution.theta, i);
+        let (sigma, tau) = self.touches.noise_mm();
+        snoop::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
+    }
+
+    /// The rejected touches with their reasons.
+    pub fn reasons(&self, solution: &solve::Solution) -> BTreeMap<usize, String> {
+        let scale2 = self.scale2(solution, 0.0);
+        let weights = self.touches.weights();
+        (0..weights.len())
+            .filter(|&i| weights[i] == 0.0 && !self.masked[i])
+            .map(|i| {
+                let (off_mm, standardised) = self.off(solution, i, scale2);
+                (i, snoop::Rejection { touch: i, off_mm, standardised }.reason())
+            })
+            .collect()
+    }
+}
