@@ -96,13 +96,41 @@ fn too_many_strangers_and_whole_faces_are_findings() {
     assert!(rejected < face.len(), "{rejected} of {} touches of a face were thrown away together", face.len());
     assert!(spoiled.outcome.warnings.iter().any(|w| w.contains("miss the model")), "{:?}", spoiled.outcome.warnings);
 
-    let mut runs = measured(&machine, 7);
-    for i in (0..200).step_by(9) {
-        chip(&mut runs[0], i, if i % 2 == 0 { 0.05 } else { 0.09 });
+    // the cap holds, and what the robust fit found is said
+    let found = spoiled.outcome.warnings.iter().any(|w| w.contains("a robust fit finds"));
+    assert_eq!(found, spoiled.strangers_beyond.is_some());
+}
+
+/// Many gross touches strewn over the faces are left out, all of them, and the values are those of the rest; that they are
+/// many is a finding all the same.
+#[test]
+fn many_strangers_do_not_make_the_values_wrong() {
+    let machine = machine("swivel-head");
+    for (seed, every, sizes) in [(7, 18, [0.03, 0.5]), (8, 9, [0.03, 0.08]), (9, 7, [-0.05, 0.3])] {
+        let clean = measured(&machine, seed);
+        let whole = fit(&machine, &clean, &MODEL, Settings::default());
+        let mut runs = clean.clone();
+        let mut bad = Vec::new();
+        let mut touch = seed as usize;
+        while touch < 356 {
+            let (run, index) = if touch < 202 { (0, touch) } else { (1, touch - 202) };
+            chip(&mut runs[run], index, sizes[bad.len() % 2]);
+            bad.push((run + 1, runs[run].1[index].id));
+            // not in step with the faces
+            touch += every - 2 + (touch * 7) % 5;
+        }
+        let o = fit(&machine, &runs, &MODEL, Settings::default());
+        let rejected: Vec<(usize, u64)> = o.outcome.rejected.iter().map(|r| (r.run, r.id)).collect();
+        assert!(bad.iter().all(|b| rejected.contains(b)), "{seed}: {bad:?} {rejected:?}");
+        assert!(rejected.len() <= bad.len() + 2, "{seed}: {} of {}", rejected.len(), bad.len());
+        assert!((o.outcome.chi2_per_dof - 1.0).abs() < 0.3, "{}", o.outcome.chi2_per_dof);
+        for p in o.outcome.parameters.iter().filter(|p| !p.name.contains('@')) {
+            let off = (p.value - value(&whole, &p.name)).abs();
+            assert!(off < 1.5 * p.sigma.unwrap(), "{seed} {}: {off} {:?}", p.name, p.sigma);
+        }
+        let share = format!("{} of 356 touches ({:.1} %)", rejected.len(), 100.0 * rejected.len() as f64 / 356.0);
+        assert!(o.outcome.warnings.iter().any(|w| w.contains(&share)), "{share}: {:?}", o.outcome.warnings);
     }
-    let spoiled = fit(&machine, &runs, &MODEL, Settings::default());
-    let warned = |word: &str| spoiled.outcome.warnings.iter().any(|w| w.contains(word));
-    assert!(warned("do not belong") || warned("miss the model"), "{:?}", spoiled.outcome.warnings);
 }
 
 #[test]
