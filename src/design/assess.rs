@@ -161,6 +161,7 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
         .flat_map(|c| c.variants[0].columns.clone())
         .collect();
     let acting = observe(&view.jacobian);
+    let visits = expected(&view.jacobian, None, &acting);
     let with = expected(&view.jacobian, Some(&view.left_out().select_columns(&beside)), &acting);
     alone
         .free
@@ -177,6 +178,7 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
                 effect: u.effect.clone(),
                 unit: u.unit.clone(),
                 sigma: finite(sigma[c]),
+                sigma_with_visits: finite(visits[c]),
                 sigma_with_unmodelled: finite(with[c]),
                 holds: Vec::new(),
             }

@@ -3,7 +3,7 @@
 use super::record::{Assessment, Expected, Score};
 use super::view::Task;
 
-/// The noise of a touch alone must leave a location error to this share of its typical size.
+/// The noise of the touches and the scatter of indexing must leave a location error to this share of its typical size.
 const NOISE_SHARE: f64 = 0.25;
 
 /// A good plan knows location errors to this share of their typical size whatever else acts.
@@ -46,10 +46,10 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         let over = judged.iter().filter(|p| of(p).is_none_or(|s| s > share * typical(p)));
         over.map(|p| p.name.as_str()).collect()
     };
-    let noisy = coarse(NOISE_SHARE, |p| p.sigma);
+    let noisy = coarse(NOISE_SHARE, |p| p.sigma_with_visits);
     if !noisy.is_empty() {
         let says = format!(
-            "the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size",
+            "the noise of the touches and of indexing leaves {} uncertain by more than a quarter of its usual size",
             noisy.join(", ")
         );
         return (Score::NotEnough, format!("{says}{not_for}"));

@@ -30,8 +30,6 @@ pub(super) fn outcome(
         .then(|| uncertainty::with_unmodelled(fit, machine, catalogue))
         .unzip();
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
-    // what the file only declares of the visits is no noise of the probe
-    let declared_part = |c: usize| if fit.noise.visit_source == "declared" { by_visits[c] } else { 0.0 };
     let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
     let moves = uncertainty::moves_with_unseen(fit);
     let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
@@ -64,7 +62,7 @@ pub(super) fn outcome(
                 unit: u.unit.clone(),
                 sigma,
                 expanded,
-                sigma_noise: known.map(|c| (noise_variance(c) - declared_part(c)).max(0.0).sqrt()),
+                sigma_noise: known.map(|c| (noise_variance(c) - by_visits[c]).max(0.0).sqrt()),
                 sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
                 moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
                 sigma_with_unmodelled: known

@@ -200,8 +200,8 @@ pub struct Parameter {
     pub sigma: Option<f64>,
     /// Expanded uncertainty (95 %, Student's t with the degrees of freedom of the noise).
     pub expanded: Option<f64>,
-    /// Standard uncertainty from the noise alone, as the touches show it: a scatter of visits that is only declared has no
-    /// part in it.
+    /// Standard uncertainty from the touches' own noise alone: the scatter of index visits, from whatever source, has no part
+    /// in it, and neither have type B rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_noise: Option<f64>,
     /// Standard uncertainty from the type B rows.
