@@ -108,12 +108,12 @@ pub(super) fn outcome(
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
-        undetermined: fit
-            .observability
-            .unseen
-            .iter()
-            .map(|v| statement::undetermined(&free_unknowns, effects, v, &fit.observability.scale))
-            .collect(),
+        undetermined: statement::undetermined(
+            &free_unknowns,
+            effects,
+            &fit.observability.unseen,
+            &fit.observability.scale,
+        ),
         parted_together: Vec::new(),
         weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {
             Vec::new()
