@@ -11,7 +11,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::formula::slot;
 use crate::model::predict::{Observation, Unknown};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
 use std::collections::BTreeMap;
 
 /// Correlations above this are worth a line.
@@ -23,6 +23,12 @@ pub(super) const MOST_UNMODELLED: usize = 20_000;
 /// Projecting the set-ups out of a Gram matrix leaves some 1e-5 of the largest singular value: below this share of it the
 /// rows themselves must tell.
 const GRAM_SEES: f64 = 1e-4;
+
+/// The same against the columns before the projection: their Gram matrix is good to some 1e-15.
+const GRAM_SEES_OF_RAW: f64 = 1e-6;
+
+/// What is left of a column that is taken out whole, as a share of it: gauges are said elsewhere.
+const ROUNDING: f64 = 1e-12;
 
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
@@ -282,16 +288,22 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
     if physical.is_empty() {
         return Vec::new();
     }
-    let jacobian = only_seen(fit.linear(fit.noise.tau_mm).jacobian, &fit.seen);
     let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
-    let (values, directions) = match from_gram(&jacobian, &physical, &nuisance, typical) {
+    let jacobian = fit.linear(fit.noise.tau_mm).jacobian;
+    // what the columns are before anything is taken out of them: all that is left may be rounding
+    let raw: Vec<f64> = physical.iter().map(|&c| jacobian.column(c).norm() * typical(c)).collect();
+    let size = |direction: DVectorView<f64>| direction.iter().zip(&raw).map(|(w, r)| (w * r).powi(2)).sum::<f64>().sqrt();
+    let jacobian = only_seen(jacobian, &fit.seen);
+    let precise = |(values, directions): &Spectrum| {
+        values.iter().zip(directions.column_iter()).all(|(s, d)| *s > GRAM_SEES_OF_RAW * size(d))
+    };
+    let (values, directions) = match from_gram(&jacobian, &physical, &nuisance, typical).filter(precise) {
         Some(found) if fit.seen.full() => found,
         _ => from_rows(&jacobian, &physical, &nuisance, typical),
     };
-    let top = values.max();
     let mut out = Vec::new();
     for (s, direction) in values.iter().zip(directions.column_iter()) {
-        if *s >= 1.0 || *s <= RANK_TOLERANCE * top {
+        if *s >= 1.0 || *s <= ROUNDING * size(direction) {
             continue;
         }
         let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
