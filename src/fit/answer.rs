@@ -206,7 +206,13 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
             100.0 * snoop::MOST_SHARE
         ));
     }
-    if fit.dof > 0 && chi2_per_dof > noise::chi2_limit(fit.dof, fit.noise.dof) {
+    let contradictions = uncertainty::contradictions(fit);
+    // what is stated wrongly is no fault of the model
+    let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
+    let dof = fit.dof.saturating_sub(contradictions.len());
+    out.extend(contradictions.into_iter().map(|c| c.says));
+    let limit = noise::chi2_limit(fit.dof, fit.noise.dof);
+    if fit.dof > 0 && chi2_per_dof > limit && (dof == 0 || chi2 > limit * dof as f64) {
         out.push(format!(
             "the touches miss the model by {:.1} times their noise: something is missing in it, and the uncertainties count the noise only (`axiscal diagnose` looks for it)",
             chi2_per_dof.sqrt()
