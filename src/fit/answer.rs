@@ -2,7 +2,7 @@
 
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
-use super::{Fit, Knowledge, Settings, held_out, noise, snoop, statement, uncertainty};
+use super::{Fit, Settings, held_out, noise, snoop, statement, uncertainty};
 use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -30,6 +30,11 @@ pub(super) fn outcome(
         .then(|| uncertainty::with_unmodelled(fit, machine, catalogue))
         .unzip();
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
+    // what the scatter of the priors makes of it
+    let prior_variance = |c: usize| {
+        let of = |&(j, _, sigma): &(usize, f64, f64)| (fit.covariance[(fit.free[c], j)] / sigma).powi(2);
+        fit.priors.iter().map(of).sum::<f64>()
+    };
     let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
     let moves = uncertainty::moves_with_unseen(fit);
     let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
@@ -37,15 +42,13 @@ pub(super) fn outcome(
         .map(|i| {
             let u = &fit.model.unknowns[i];
             let column = fit.free.binary_search(&i).ok();
-            let status = match (column, &fit.knowledge[i]) {
-                (None, _) => Status::Fixed,
-                (Some(c), _) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
+            let status = match column {
+                None => Status::Fixed,
+                Some(c) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
                 // it follows what is not known by more than its uncertainty
-                (Some(c), _) if moves[c] * moves[c] > noise_variance(c) => Status::Undetermined,
-                // the data halve the prior's variance at least, or the value is the prior's rather than theirs
-                (Some(c), Some(Knowledge::Prior { sigma, .. })) if noise_variance(c) > 0.5 * sigma * sigma => {
-                    Status::PriorDominated
-                }
+                Some(c) if moves[c] * moves[c] > noise_variance(c) => Status::Undetermined,
+                // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
+                Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
                 _ => Status::Identified,
             };
             let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));

@@ -176,7 +176,7 @@ pub enum Status {
     Identified,
     /// Held by the user.
     Fixed,
-    /// Known from its prior rather than from the data.
+    /// Known from priors, its own or those of others, rather than from the data: most of its variance is theirs.
     PriorDominated,
     /// The data cannot tell it.
     Undetermined,
