@@ -3,7 +3,6 @@
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
 use super::{Fit, Settings, held_out, noise, snoop, statement, uncertainty};
-use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
@@ -21,11 +20,11 @@ pub(super) fn outcome(
     settings: &Settings,
     solution: &Solution,
     condition: f64,
-) -> Result<Outcome> {
+    type_b: &[uncertainty::TypeB],
+) -> Outcome {
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
-    let type_b = uncertainty::type_b(fit, machine, catalogue, &settings.type_b)?;
     let (unmodelled, left_out) = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
         .then(|| uncertainty::with_unmodelled(fit, machine, catalogue))
         .unzip();
@@ -88,7 +87,7 @@ pub(super) fn outcome(
         let o = &fit.data.observations[i];
         Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
     });
-    Ok(Outcome {
+    Outcome {
         format: FORMAT.into(),
         machine: machine.name.clone(),
         effects: settings.effects.clone(),
@@ -132,6 +131,7 @@ pub(super) fn outcome(
             .collect(),
         reference_mm: fit.model.reference.into(),
         covariance: None,
+        covariance_type_a: None,
         residuals: Some(residuals(fit)),
         warnings: [
             warnings(fit, effects, solution, chi2_per_dof),
@@ -139,7 +139,7 @@ pub(super) fn outcome(
             left_out.unwrap_or_default(),
         ]
         .concat(),
-    })
+    }
 }
 
 fn residuals(fit: &Fit) -> Vec<Residual> {

@@ -101,6 +101,8 @@ pub struct Fit {
     pub rejected: BTreeMap<usize, String>,
     /// Covariance of all unknowns, in their units; zero rows for held ones.
     pub covariance: DMatrix<f64>,
+    /// What one standard uncertainty of each type B row makes of the free unknowns, in their units.
+    pub type_b: Vec<DVector<f64>>,
     /// What the nominal touches say about the free unknowns.
     pub observability: solve::Observability,
     /// The same at the solution, of equal rank: combinations that leave no trace bend with the machine's errors.
@@ -348,13 +350,16 @@ fn identify_from(
         free,
         priors,
         knowledge,
+        type_b: Vec::new(),
         noise,
         strangers_beyond,
         chi2,
         dof,
         outcome: Outcome::default(),
     };
-    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition)?;
+    let type_b = uncertainty::type_b(&fit, machine, catalogue, &settings.type_b)?;
+    fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
+    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition, &type_b);
     fit.outcome.warnings.extend(unknown_masks);
     Ok(fit)
 }

@@ -79,9 +79,12 @@ pub struct Outcome {
     pub type_b: Vec<TypeBRow>,
     /// Where location errors of workpiece-side axes are stated, mm in R.
     pub reference_mm: [f64; 3],
-    /// Covariance of the results, on request.
+    /// Covariance of the results with the type B rows, on request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Covariance>,
+    /// The same without the type B rows, on request and where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance_type_a: Option<Covariance>,
     /// Residuals, on request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residuals: Option<Vec<Residual>>,
@@ -159,7 +162,7 @@ pub struct TypeBRow {
     pub unit: String,
 }
 
-/// Covariance matrix of some parameters, in their units (type A).
+/// Covariance matrix of some parameters, in their units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     /// The parameters.

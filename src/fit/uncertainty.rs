@@ -97,7 +97,7 @@ pub(super) struct TypeB {
     pub name: String,
     pub unit: String,
     pub sigma: f64,
-    /// What it makes of each free unknown: standard uncertainty, in the unknown's unit.
+    /// What one standard uncertainty of it makes of each free unknown, with its sign, in the unknown's unit.
     pub makes: DVector<f64>,
     /// It goes with the temperature, and no touch carries one: it is counted for a room 1 K off 20 °C.
     pub per_kelvin: bool,
@@ -179,7 +179,7 @@ pub(super) fn type_b(
             name: p.name.clone(),
             unit: p.unit.clone(),
             sigma,
-            makes: moved.map(|m| (m * sigma).abs()),
+            makes: moved * sigma,
             per_kelvin,
         });
     }
@@ -403,13 +403,27 @@ fn from_rows(
     (svd.singular_values, directions)
 }
 
-/// Covariance of the results (no set-ups of blocks), type A.
+/// Covariance of the results (no set-ups of blocks) from the noise and the priors: type A.
 #[must_use]
 pub fn results_covariance(fit: &Fit) -> Covariance {
-    let results: Vec<usize> = fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance).collect();
+    covariance_with(fit, |_, _| 0.0)
+}
+
+/// Covariance of the results with the type B rows: the roots of its diagonal are the standard uncertainties of what does not
+/// follow a combination that leaves no trace.
+#[must_use]
+pub fn full_covariance(fit: &Fit) -> Covariance {
+    covariance_with(fit, |i, j| fit.type_b.iter().map(|makes| makes[i] * makes[j]).sum())
+}
+
+/// The type A covariance of the results with something added, by places among the free unknowns.
+fn covariance_with(fit: &Fit, more: impl Fn(usize, usize) -> f64) -> Covariance {
+    let results: Vec<(usize, usize)> =
+        fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].nuisance).collect();
+    let row = |&(a, i): &(usize, usize)| results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect();
     Covariance {
-        names: results.iter().map(|&i| fit.model.unknowns[i].name.clone()).collect(),
-        matrix: results.iter().map(|&i| results.iter().map(|&j| fit.covariance[(i, j)]).collect()).collect(),
+        names: results.iter().map(|(_, i)| fit.model.unknowns[*i].name.clone()).collect(),
+        matrix: results.iter().map(row).collect(),
     }
 }
 
