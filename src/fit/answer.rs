@@ -122,8 +122,8 @@ pub(super) fn outcome(
         } else {
             uncertainty::weak(fit, effects)
         },
+        correlations: uncertainty::correlations(fit, |i| parameters[i].sigma.is_some()),
         parameters,
-        correlations: uncertainty::correlations(fit),
         priors: uncertainty::priors(fit),
         type_b: type_b
             .iter()

@@ -257,10 +257,10 @@ impl AddToDiagonal for DMatrix<f64> {
     }
 }
 
-/// The pairs of results that are least told apart.
-pub(super) fn correlations(fit: &Fit) -> Vec<Correlation> {
-    let results: Vec<usize> =
-        fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance && fit.covariance[(i, i)] > 0.0).collect();
+/// The pairs of results that are least told apart, among those that have a value.
+pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<Correlation> {
+    let is_result = |i: &usize| !fit.model.unknowns[*i].nuisance && fit.covariance[(*i, *i)] > 0.0 && has_value(*i);
+    let results: Vec<usize> = fit.free.iter().copied().filter(is_result).collect();
     let mut out = Vec::new();
     for (k, &i) in results.iter().enumerate() {
         for &j in &results[..k] {
