@@ -54,7 +54,7 @@ pub(super) fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Res
     let mut findings = Vec::new();
     for bad in effects.iter().flat_map(|e| without_value(e, &data.observations)) {
         findings.push(Finding::error("model::no_value", bad.says()).help(
-            "a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
+            "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
         ));
     }
     if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
