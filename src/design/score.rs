@@ -32,6 +32,13 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     };
     let judged: Vec<&&Expected> = location.iter().filter(|p| !silent.contains(&p.effect.as_str())).collect();
     let not_for = if silent.is_empty() { String::new() } else { format!("; it says nothing of {}", silent.join(", ")) };
+    let told = if silent.is_empty() {
+        "the location errors".to_owned()
+    } else {
+        let mut ids: Vec<&str> = judged.iter().map(|p| p.effect.as_str()).collect();
+        ids.dedup();
+        ids.join(" and ")
+    };
     let lost: Vec<&str> = judged.iter().filter(|p| p.sigma.is_none()).map(|p| p.name.as_str()).collect();
     if !lost.is_empty() {
         return (Score::NotEnough, format!("it cannot tell {}{not_for}", lost.join(", ")));
@@ -92,14 +99,14 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         let of_usual_size = |e: &&super::record::Seen| e.noncentrality >= 25.0;
         let found = a.effects.iter().filter(of_usual_size).count();
         let says = format!(
-            "it tells the location errors also while other errors act, and would find {found} of {} effects at their usual size",
+            "it tells {told} also while other errors act, and would find {found} of {} effects at their usual size",
             a.effects.len()
         );
         return (Score::Good, format!("{says}{not_for}"));
     }
     (
         Score::Enough,
-        format!("it tells the location errors of a machine without other errors, but {}{not_for}", reasons.join("; ")),
+        format!("it tells {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")),
     )
 }
 

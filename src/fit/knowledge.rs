@@ -87,7 +87,7 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
         if bad {
             findings.push(
                 Finding::error("model::knowledge", format!("what is said of {word} is not usable"))
-                    .help("value must be a number and sigma greater than 0"),
+                    .help("write numbers below 1e6 in size, in the parameter's unit, and a sigma greater than 0"),
             );
         }
     }

@@ -184,6 +184,10 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let mut held_settings = settings.clone();
     for effect in effects.iter().filter(|e| starts.contains_key(&e.parameters[0].name)) {
         let values: Vec<f64> = effect.parameters.iter().map(|p| starts.get(&p.name).copied().unwrap_or(0.0)).collect();
+        // what the data does not show has no place to be held at
+        if effect.parameters.iter().zip(&values).all(|(p, v)| p.shape.is_some() || *v == 0.0) {
+            continue;
+        }
         for (name, value) in shapes::jumps(effect, &values, &data) {
             held_settings.knowledge.entry(name.to_owned()).or_insert(Knowledge::Fixed(value));
         }

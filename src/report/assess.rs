@@ -201,6 +201,7 @@ fn listed(words: &[String]) -> String {
 }
 
 fn time(seconds: f64) -> String {
-    let minutes = (seconds / 60.0).ceil();
+    // as `generate` says it
+    let minutes = (seconds / 60.0).round().max(1.0);
     if minutes < 100.0 { format!("{minutes:.0} min") } else { format!("{:.1} h", seconds / 3600.0) }
 }
