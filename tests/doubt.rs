@@ -394,7 +394,8 @@ fn assess_promises_what_identify_states() {
     let stated = fit(&machine, &runs, &MODEL, settings).outcome;
     for p in &promised.parameters {
         let q = stated.parameters.iter().find(|q| q.name == p.name).unwrap();
-        let (whole, alone) = (q.sigma.unwrap() / p.sigma_with_visits.unwrap(), q.sigma_noise.unwrap() / p.sigma.unwrap());
+        let (whole, alone) =
+            (q.sigma.unwrap() / p.sigma_with_visits.unwrap(), q.sigma_noise.unwrap() / p.sigma.unwrap());
         assert!((whole - 1.0).abs() < 0.02, "{}: {whole}", p.name);
         // the fit weighs the touches for the scatter of visits too, which costs a little of the probe's share
         assert!((0.99..1.3).contains(&alone), "{}: {alone}", p.name);
@@ -463,7 +464,8 @@ fn what_the_touches_contradict_is_said() {
     };
     let bare = fit(&machine, &runs, &MODEL, Settings::default());
     let alone = format!("{:.4}", value(&bare, "EX0B"));
-    let says = |o: &Outcome, what: &str| o.warnings.iter().find(|w| w.contains(what) && w.contains("contradict")).cloned();
+    let says =
+        |o: &Outcome, what: &str| o.warnings.iter().find(|w| w.contains(what) && w.contains("contradict")).cloned();
     let wrong = with(Knowledge::Prior { value: 0.05, sigma: 0.001 });
     let said = says(&wrong, "prior of EX0B").unwrap_or_else(|| panic!("{:?}", wrong.warnings));
     // the figures are those of the fit without the prior

@@ -43,8 +43,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     if args.covariance {
         fit.outcome.covariance = Some(fit::uncertainty::full_covariance(&fit));
-        fit.outcome.covariance_type_a =
-            (!fit.type_b.is_empty()).then(|| fit::uncertainty::results_covariance(&fit));
+        fit.outcome.covariance_type_a = (!fit.type_b.is_empty()).then(|| fit::uncertainty::results_covariance(&fit));
     }
     let mut outcome = fit.outcome;
     if let Some(active) = loaded.active()? {

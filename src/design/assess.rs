@@ -62,8 +62,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let parameters = parameters(task, &alone, &view);
     let observability = observe(&alone.jacobian);
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
-    let mut undetermined =
-        statement::undetermined(&free, &task.effects, &observability.unseen, &observability.scale);
+    let mut undetermined = statement::undetermined(&free, &task.effects, &observability.unseen, &observability.scale);
     let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();

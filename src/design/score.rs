@@ -104,10 +104,7 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         );
         return (Score::Good, format!("{says}{not_for}"));
     }
-    (
-        Score::Enough,
-        format!("it tells {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")),
-    )
+    (Score::Enough, format!("it tells {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")))
 }
 
 fn is_location(effect: &str) -> bool {

@@ -114,7 +114,11 @@ impl NoValue<'_> {
         } else {
             (&*format!("{n_touches} touches"), "the first is touch")
         };
-        let (no, why) = if *too_large { ("no usable value", ", more than a kilometre at its usual size") } else { ("no value", "") };
+        let (no, why) = if *too_large {
+            ("no usable value", ", more than a kilometre at its usual size")
+        } else {
+            ("no value", "")
+        };
         format!("formula {formula:?} of effect {} has {no} at {touches}: {which} {first}{why}", effect.id)
     }
 

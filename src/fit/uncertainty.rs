@@ -175,13 +175,7 @@ pub(super) fn type_b(
             .into_owned();
         let moved = sensitivity(fit, column);
         let p = &effect.parameters[which];
-        out.push(TypeB {
-            name: p.name.clone(),
-            unit: p.unit.clone(),
-            sigma,
-            makes: moved * sigma,
-            per_kelvin,
-        });
+        out.push(TypeB { name: p.name.clone(), unit: p.unit.clone(), sigma, makes: moved * sigma, per_kelvin });
     }
     if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
 }
@@ -292,7 +286,8 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
     let jacobian = fit.linear(fit.noise.tau_mm).jacobian;
     // what the columns are before anything is taken out of them: all that is left may be rounding
     let raw: Vec<f64> = physical.iter().map(|&c| jacobian.column(c).norm() * typical(c)).collect();
-    let size = |direction: DVectorView<f64>| direction.iter().zip(&raw).map(|(w, r)| (w * r).powi(2)).sum::<f64>().sqrt();
+    let size =
+        |direction: DVectorView<f64>| direction.iter().zip(&raw).map(|(w, r)| (w * r).powi(2)).sum::<f64>().sqrt();
     let jacobian = only_seen(jacobian, &fit.seen);
     let precise = |(values, directions): &Spectrum| {
         values.iter().zip(directions.column_iter()).all(|(s, d)| *s > GRAM_SEES_OF_RAW * size(d))

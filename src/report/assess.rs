@@ -41,7 +41,8 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     );
     *out += &format!("model: {}\n", a.model.join(", "));
     *out += &format!("this plan is {}: {}\n\n", a.score.word(), a.says);
-    let mut t = table(&["parameter", "unit", "probe noise alone", "with indexing", "with unmodelled effects", "holds as well"]);
+    let mut t =
+        table(&["parameter", "unit", "probe noise alone", "with indexing", "with unmodelled effects", "holds as well"]);
     for p in &a.parameters {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |alias| format!("{} ({alias})", p.name));
         let size = |s: Option<f64>| number(s.map_or_else(|| "not told".into(), significant));
