@@ -33,8 +33,18 @@ fn main() {
             begun.elapsed().as_secs_f64()
         );
         println!("| parameter | RMS error / Cramér-Rao bound | inside its 95 % interval |\n|---|---|---|");
-        for row in &summary.rows {
+        let (set_ups, results): (Vec<_>, Vec<_>) = summary.rows.iter().partition(|r| r.name.contains('@'));
+        for row in results {
             println!("| {} | {:.3} | {:.1} % |", row.name, row.ratio, 100.0 * row.covered);
+        }
+        if !set_ups.is_empty() {
+            let count = set_ups.len() as f64;
+            println!(
+                "| {} set-up unknowns, mean | {:.3} | {:.1} % |",
+                set_ups.len(),
+                set_ups.iter().map(|r| r.ratio).sum::<f64>() / count,
+                100.0 * set_ups.iter().map(|r| r.covered).sum::<f64>() / count
+            );
         }
         wrong.extend(coverage::check(case, &summary, 0.0));
     }

@@ -235,9 +235,10 @@ fn a_users_effect_goes_from_simulation_to_identification() {
     let answer = axiscal(folder.path()).args(["identify", "study.toml", "--json"]).assert().success();
     let answer: serde_json::Value = serde_json::from_slice(&answer.get_output().stdout).unwrap();
     let of = |name: &str| answer["parameters"].as_array().unwrap().iter().find(|p| p["name"] == name).unwrap().clone();
+    // with this seed all three lie within: 95 of 100 would each
     for (name, truth) in [("sag", 12.0), ("EA0B", 0.015), ("EX0B", 0.03)] {
         let (value, expanded) = (of(name)["value"].as_f64().unwrap(), of(name)["expanded"].as_f64().unwrap());
-        assert!((value - truth).abs() < 1.5 * expanded, "{name}: {value} ± {expanded}, planted {truth}");
+        assert!((value - truth).abs() < expanded, "{name}: {value} ± {expanded}, planted {truth}");
         assert!(expanded < 0.2 * truth, "{name} is hardly told: {value} ± {expanded}");
     }
     // what it reads is not written over, and what is wrong in it is said with its place

@@ -81,7 +81,7 @@ fn the_last_line_says_what_was_read_and_how_the_log_ends() {
     }
     let mut command = axiscal();
     command.args(["parse", "bad/nan.log", "--controller", "linuxcnc", "--plan", "t.plan.json"]);
-    let says = "1 of the plan's 3 touches are in the log, but their lines are not used (see above): 2";
+    let says = "1 of the plan's 3 touches is in the log, but its line is not used (see above): 2";
     command
         .assert()
         .success()

@@ -36,11 +36,11 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub effects_file: Vec<PathBuf>,
     /// Standard deviation of a touch, µm (default: the probe's repeatability in the machine's file)
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", allow_hyphen_values = true)]
     pub noise_um: Option<f64>,
     /// Scatter of the ball's place from one index to the next, µm (default: as the machine's file declares it; the
     /// uncertainty from probe noise alone leaves it out)
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", allow_hyphen_values = true)]
     pub visit_um: Option<f64>,
     /// Where location errors of workpiece-side axes are stated: pivot, ball, table, or X,Y,Z in mm in R
     #[arg(long, value_name = "POINT", default_value = "pivot", allow_hyphen_values = true)]
@@ -62,10 +62,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let ids = if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
     let noise_um = args.noise_um.unwrap_or(machine.probe.repeatability_um);
-    let bad = |um: f64, least: f64| !(um.is_finite() && um >= least && um < 1e6);
-    if bad(noise_um, 1e-6) || args.visit_um.is_some_and(|um| bad(um, 0.0)) {
-        return Err(Failure::new("assess::noise", "the noise is no usable size")
-            .help("write micrometres: --noise-um above 0, --visit-um 0 or more"));
+    let unusable = |word: &str, um: f64, least: &str| {
+        Err(Failure::new("assess::noise", format!("{word} is {um}, expected micrometres, {least}"))
+            .help("write micrometres: --noise-um above 0, --visit-um 0 or more"))
+    };
+    let usable = |um: f64, least: f64| um.is_finite() && um >= least && um < 1e6;
+    if !usable(noise_um, 1e-6) {
+        return unusable("--noise-um", noise_um, "above 0");
+    }
+    if let Some(um) = args.visit_um.filter(|um| !usable(*um, 0.0)) {
+        return unusable("--visit-um", um, "0 or more");
     }
     let task = Task {
         machine: &machine,

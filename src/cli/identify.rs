@@ -41,9 +41,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if !settings.quick {
         design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
     }
-    let covariance = args.covariance.then(|| fit::uncertainty::results_covariance(&fit));
+    if args.covariance {
+        fit.outcome.covariance = Some(fit::uncertainty::full_covariance(&fit));
+        fit.outcome.covariance_type_a = (!fit.type_b.is_empty()).then(|| fit::uncertainty::results_covariance(&fit));
+    }
     let mut outcome = fit.outcome;
-    outcome.covariance = covariance;
     if let Some(active) = loaded.active()? {
         outcome.warnings.push(format!(
             "a compensation with {} terms was active: the values are what it leaves, not the machine's whole errors",

@@ -63,8 +63,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let mut observability = observe(&alone.jacobian);
     observability.hold(held_first(&alone.model, &alone.free));
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
-    let mut undetermined: Vec<_> =
-        observability.unseen.iter().map(|v| statement::undetermined(&free, &task.effects, v, &observability)).collect();
+    let mut undetermined = statement::undetermined(&free, &task.effects, &observability.unseen, &observability);
     let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();
@@ -159,6 +158,7 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
         .flat_map(|c| c.variants[0].columns.clone())
         .collect();
     let acting = observe(&view.jacobian);
+    let visits = expected(&view.jacobian, None, &acting);
     let with = expected(&view.jacobian, Some(&view.left_out().select_columns(&beside)), &acting);
     alone
         .free
@@ -175,6 +175,7 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
                 effect: u.effect.clone(),
                 unit: u.unit.clone(),
                 sigma: finite(sigma[c]),
+                sigma_with_visits: finite(visits[c]),
                 sigma_with_unmodelled: finite(with[c]),
                 holds: Vec::new(),
             }

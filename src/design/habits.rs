@@ -192,11 +192,20 @@ impl Pool<'_> {
         // one visit for each place of the axes that turn the tool, else of all
         let turns_tool: Vec<AxisName> =
             self.machine.rotary().filter(|a| a.side == Side::Tool).map(|a| a.name).collect();
+        let key_of =
+            |v: &Visit| -> Vec<i64> { turns_tool.iter().map(|a| (v.pose().get(*a) * 1e3).round() as i64).collect() };
+        // where the plan uses it already, it is no other one
+        let has_it = |v: &&Visit| {
+            let is =
+                |t: &&PlanTouch| (t.tool_length_mm.unwrap_or(self.plan(v.run).tool_length_mm) - length).abs() < 0.5;
+            v.touches.iter().any(is)
+        };
+        let used: Vec<Vec<i64>> = all.iter().filter(has_it).map(key_of).collect();
         let mut seen: Vec<Vec<i64>> = Vec::new();
         let mut added = Vec::new();
         for v in all {
-            let key: Vec<i64> = turns_tool.iter().map(|a| (v.pose().get(*a) * 1e3).round() as i64).collect();
-            if !seen.contains(&key) && seen.len() < 4 {
+            let key = key_of(v);
+            if !used.contains(&key) && !seen.contains(&key) && seen.len() < 4 {
                 let touches = self.once_more(v, &change);
                 if !touches.is_empty() {
                     seen.push(key);

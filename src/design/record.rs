@@ -95,7 +95,10 @@ pub struct Expected {
     pub unit: String,
     /// Standard uncertainty from the noise of a touch alone; none where the plan cannot tell it.
     pub sigma: Option<f64>,
-    /// The same while everything that the model leaves out acts at its typical size.
+    /// The same with the scatter of the ball's place from one index to the next: what `identify` will say of its `sigma`.
+    #[serde(default)]
+    pub sigma_with_visits: Option<f64>,
+    /// That again while everything that the model leaves out acts at its typical size.
     pub sigma_with_unmodelled: Option<f64>,
     /// Effects that equal this parameter exactly: its value holds theirs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -3,7 +3,7 @@
 use super::record::{Assessment, Expected, Score};
 use super::view::Task;
 
-/// The noise of a touch alone must leave a location error to this share of its typical size.
+/// The noise of the touches and the scatter of indexing must leave a location error to this share of its typical size.
 const NOISE_SHARE: f64 = 0.25;
 
 /// A good plan knows location errors to this share of their typical size whatever else acts.
@@ -32,6 +32,13 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     };
     let judged: Vec<&&Expected> = location.iter().filter(|p| !silent.contains(&p.effect.as_str())).collect();
     let not_for = if silent.is_empty() { String::new() } else { format!("; it says nothing of {}", silent.join(", ")) };
+    let told = if silent.is_empty() {
+        "the location errors".to_owned()
+    } else {
+        let mut ids: Vec<&str> = judged.iter().map(|p| p.effect.as_str()).collect();
+        ids.dedup();
+        ids.join(" and ")
+    };
     let lost: Vec<&str> = judged.iter().filter(|p| p.sigma.is_none()).map(|p| p.name.as_str()).collect();
     if !lost.is_empty() {
         return (Score::NotEnough, format!("it cannot tell {}{not_for}", lost.join(", ")));
@@ -46,10 +53,10 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         let over = judged.iter().filter(|p| of(p).is_none_or(|s| s > share * typical(p)));
         over.map(|p| p.name.as_str()).collect()
     };
-    let noisy = coarse(NOISE_SHARE, |p| p.sigma);
+    let noisy = coarse(NOISE_SHARE, |p| p.sigma_with_visits);
     if !noisy.is_empty() {
         let says = format!(
-            "the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size",
+            "the noise of the touches and of indexing leaves {} uncertain by more than a quarter of its usual size",
             noisy.join(", ")
         );
         return (Score::NotEnough, format!("{says}{not_for}"));
@@ -92,15 +99,12 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         let of_usual_size = |e: &&super::record::Seen| e.noncentrality >= 25.0;
         let found = a.effects.iter().filter(of_usual_size).count();
         let says = format!(
-            "it tells the location errors also while other errors act, and would find {found} of {} effects at their usual size",
+            "it tells {told} also while other errors act, and would find {found} of {} effects at their usual size",
             a.effects.len()
         );
         return (Score::Good, format!("{says}{not_for}"));
     }
-    (
-        Score::Enough,
-        format!("it tells the location errors of a machine without other errors, but {}{not_for}", reasons.join("; ")),
-    )
+    (Score::Enough, format!("it tells {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")))
 }
 
 fn is_location(effect: &str) -> bool {

@@ -2,8 +2,7 @@
 
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
-use super::{Fit, Knowledge, Settings, held_out, noise, snoop, statement, uncertainty};
-use crate::diag::Result;
+use super::{Fit, Settings, held_out, noise, snoop, statement, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
@@ -21,17 +20,20 @@ pub(super) fn outcome(
     settings: &Settings,
     solution: &Solution,
     condition: f64,
-) -> Result<Outcome> {
+    type_b: &[uncertainty::TypeB],
+) -> Outcome {
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
-    let type_b = uncertainty::type_b(fit, machine, catalogue, &settings.type_b)?;
     let (unmodelled, left_out) = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
         .then(|| uncertainty::with_unmodelled(fit, machine, catalogue))
         .unzip();
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
-    // what the file only declares of the visits is no noise of the probe
-    let declared_part = |c: usize| if fit.noise.visit_source == "declared" { by_visits[c] } else { 0.0 };
+    // what the scatter of the priors makes of it
+    let prior_variance = |c: usize| {
+        let of = |&(j, _, sigma): &(usize, f64, f64)| (fit.covariance[(fit.free[c], j)] / sigma).powi(2);
+        fit.priors.iter().map(of).sum::<f64>()
+    };
     let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
     let moves = uncertainty::moves_with_unseen(fit);
     let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
@@ -39,15 +41,13 @@ pub(super) fn outcome(
         .map(|i| {
             let u = &fit.model.unknowns[i];
             let column = fit.free.binary_search(&i).ok();
-            let status = match (column, &fit.knowledge[i]) {
-                (None, _) => Status::Fixed,
-                (Some(c), _) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
+            let status = match column {
+                None => Status::Fixed,
+                Some(c) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
                 // it follows what is not known by more than its uncertainty
-                (Some(c), _) if moves[c] * moves[c] > noise_variance(c) => Status::Undetermined,
-                // the data halve the prior's variance at least, or the value is the prior's rather than theirs
-                (Some(c), Some(Knowledge::Prior { sigma, .. })) if noise_variance(c) > 0.5 * sigma * sigma => {
-                    Status::PriorDominated
-                }
+                Some(c) if moves[c] * moves[c] > noise_variance(c) => Status::Undetermined,
+                // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
+                Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
                 _ => Status::Identified,
             };
             let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
@@ -64,7 +64,7 @@ pub(super) fn outcome(
                 unit: u.unit.clone(),
                 sigma,
                 expanded,
-                sigma_noise: known.map(|c| (noise_variance(c) - declared_part(c)).max(0.0).sqrt()),
+                sigma_noise: known.map(|c| (noise_variance(c) - by_visits[c]).max(0.0).sqrt()),
                 sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
                 moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
                 sigma_with_unmodelled: known
@@ -87,7 +87,7 @@ pub(super) fn outcome(
         let o = &fit.data.observations[i];
         Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
     });
-    Ok(Outcome {
+    Outcome {
         format: FORMAT.into(),
         machine: machine.name.clone(),
         effects: settings.effects.clone(),
@@ -110,20 +110,15 @@ pub(super) fn outcome(
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
-        undetermined: fit
-            .observability
-            .unseen
-            .iter()
-            .map(|v| statement::undetermined(&free_unknowns, effects, v, &fit.observability))
-            .collect(),
+        undetermined: statement::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
         parted_together: Vec::new(),
         weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {
             Vec::new()
         } else {
             uncertainty::weak(fit, effects)
         },
+        correlations: uncertainty::correlations(fit, |i| parameters[i].sigma.is_some()),
         parameters,
-        correlations: uncertainty::correlations(fit),
         priors: uncertainty::priors(fit),
         type_b: type_b
             .iter()
@@ -131,6 +126,7 @@ pub(super) fn outcome(
             .collect(),
         reference_mm: fit.model.reference.into(),
         covariance: None,
+        covariance_type_a: None,
         residuals: Some(residuals(fit)),
         warnings: [
             warnings(fit, effects, solution, chi2_per_dof),
@@ -138,7 +134,7 @@ pub(super) fn outcome(
             left_out.unwrap_or_default(),
         ]
         .concat(),
-    })
+    }
 }
 
 fn residuals(fit: &Fit) -> Vec<Residual> {
@@ -194,13 +190,27 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
     }
     let n_out = fit.rejected.values().filter(|r| !r.starts_with("taken out")).count();
     let n = fit.data.observations.len();
-    if n_out as f64 > snoop::MOST_SHARE * n as f64 {
+    let share = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
+    if let Some(found) = fit.strangers_beyond {
         out.push(format!(
-            "{n_out} of {n} touches do not belong to the rest, more than {:.0} %: dirt, a loose block or probe, or an effect that the model lacks",
+            "a robust fit finds {found} of {n} touches ({:.1} %) that do not belong to the rest, and without them the others still do not agree: only {n_out} are left out (removal stops at {:.0} %), and the values and their uncertainties are not to be trusted; look for dirt, a loose block or stylus, or an effect that the model lacks",
+            share(found),
+            100.0 * snoop::MOST_SHARE
+        ));
+    } else if n_out as f64 > snoop::MOST_SHARE * n as f64 {
+        out.push(format!(
+            "{n_out} of {n} touches ({:.1} %) do not belong to the rest and are left out; more than {:.0} % is a finding in itself: chips, a loose block or stylus, or an effect that the model lacks; look at them before you trust the values",
+            share(n_out),
             100.0 * snoop::MOST_SHARE
         ));
     }
-    if fit.dof > 0 && chi2_per_dof > noise::chi2_limit(fit.dof, fit.noise.dof) {
+    let contradictions = uncertainty::contradictions(fit);
+    // what is stated wrongly is no fault of the model
+    let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
+    let dof = fit.dof.saturating_sub(contradictions.len());
+    out.extend(contradictions.into_iter().map(|c| c.says));
+    let limit = noise::chi2_limit(fit.dof, fit.noise.dof);
+    if fit.dof > 0 && chi2_per_dof > limit && (dof == 0 || chi2 > limit * dof as f64) {
         out.push(format!(
             "the touches miss the model by {:.1} times their noise: something is missing in it, and the uncertainties count the noise only (`axiscal diagnose` looks for it)",
             chi2_per_dof.sqrt()

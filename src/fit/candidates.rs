@@ -1,7 +1,7 @@
 //! What effects that are not in a model would do to its touches: columns for tests, type B rows and designs.
 
 use crate::machine::Machine;
-use crate::model::catalogue::Effect;
+use crate::model::catalogue::{Effect, Term};
 use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
 use crate::model::traces::Traces;
@@ -112,19 +112,26 @@ pub struct NoValue<'e> {
     pub n_touches: usize,
     /// Number of the first one in its plan.
     pub first: u64,
+    /// There is a number, and at its usual size the effect would displace the touch by more than a kilometre.
+    pub too_large: bool,
 }
 
 impl NoValue<'_> {
     /// In words.
     #[must_use]
     pub fn says(&self) -> String {
-        let Self { effect, formula, n_touches, first } = self;
+        let Self { effect, formula, n_touches, first, too_large } = self;
         let (touches, which) = if *n_touches == 1 {
             ("1 touch", "touch")
         } else {
             (&*format!("{n_touches} touches"), "the first is touch")
         };
-        format!("formula {formula:?} of effect {} has no value at {touches}: {which} {first}", effect.id)
+        let (no, why) = if *too_large {
+            ("no usable value", ", more than a kilometre at its usual size")
+        } else {
+            ("no value", "")
+        };
+        format!("formula {formula:?} of effect {} has {no} at {touches}: {which} {first}{why}", effect.id)
     }
 
     /// In words, for an effect that is only a candidate.
@@ -134,7 +141,13 @@ impl NoValue<'_> {
     }
 }
 
-/// The formulas of an effect that have no value at some touch, at the shapes where it starts and at those that are tried.
+/// A displacement beyond this, mm, at an effect's usual size is none of a machine: such a column would drown all others.
+const MOST_MM: f64 = 1e6;
+
+/// What a turn makes of a touch, mm per rad.
+const LEVER_MM: f64 = 1e3;
+
+/// The formulas of an effect that have no usable value at some touch, at the shapes where it starts and at those that are tried.
 #[must_use]
 pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Vec<NoValue<'e>> {
     let starts: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
@@ -146,14 +159,19 @@ pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Ve
             tried
         }));
     }
-    let of_term = |formula: &'e crate::model::formula::Formula| -> Option<NoValue<'e>> {
+    let of_term = |term: &'e Term| -> Option<NoValue<'e>> {
+        let formula = &term.formula;
         let tried = if formula.has_shape() { &shapes[..] } else { &shapes[..1] };
-        let bad = |o: &&Observation| tried.iter().any(|s| !formula.eval(&o.state, s).is_finite());
-        let mut bad = observations.iter().filter(bad);
-        let first = bad.next()?.id;
-        Some(NoValue { effect, formula: formula.text(), n_touches: 1 + bad.count(), first })
+        let p = &effect.parameters[term.parameter];
+        let size = (p.typical * p.factor).abs() * if term.component >= 3 { LEVER_MM } else { 1.0 };
+        let values = |o: &Observation| tried.iter().map(|s| formula.eval(&o.state, s)).collect::<Vec<_>>();
+        let is_bad = |v: &f64| !v.is_finite() || v.abs() * size > MOST_MM;
+        let mut bad = observations.iter().map(|o| (o, values(o))).filter(|(_, v)| v.iter().any(is_bad));
+        let (first, values) = bad.next()?;
+        let too_large = values.iter().all(|v| v.is_finite());
+        Some(NoValue { effect, formula: formula.text(), n_touches: 1 + bad.count(), first: first.id, too_large })
     };
-    effect.terms.iter().filter_map(|t| of_term(&t.formula)).collect()
+    effect.terms.iter().filter_map(of_term).collect()
 }
 
 /// Candidates that have a value at every touch, and a sentence for each that is left out: its column would be no number, and

@@ -54,7 +54,7 @@ pub(super) fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Res
     let mut findings = Vec::new();
     for bad in effects.iter().flat_map(|e| without_value(e, &data.observations)) {
         findings.push(Finding::error("model::no_value", bad.says()).help(
-            "a division by zero, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
+            "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
         ));
     }
     if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
@@ -87,7 +87,7 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
         if bad {
             findings.push(
                 Finding::error("model::knowledge", format!("what is said of {word} is not usable"))
-                    .help("value must be a number and sigma greater than 0"),
+                    .help("write numbers below 1e6 in size, in the parameter's unit, and a sigma greater than 0"),
             );
         }
     }

@@ -104,6 +104,8 @@ pub struct Fit {
     pub rejected: BTreeMap<usize, String>,
     /// Covariance of all unknowns, in their units; zero rows for held ones.
     pub covariance: DMatrix<f64>,
+    /// What one standard uncertainty of each type B row makes of the free unknowns, in their units.
+    pub type_b: Vec<DVector<f64>>,
     /// What the nominal touches say about the free unknowns.
     pub observability: solve::Observability,
     /// The same at the solution, of equal rank: combinations that leave no trace bend with the machine's errors.
@@ -116,6 +118,8 @@ pub struct Fit {
     pub knowledge: Vec<Option<Knowledge>>,
     /// The noise.
     pub noise: Noise,
+    /// How many touches a robust fit finds off the rest, where they are too many to be left out on its word.
+    pub strangers_beyond: Option<usize>,
     /// χ² of the touches and priors.
     pub chi2: f64,
     /// Degrees of freedom.
@@ -183,6 +187,10 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let mut held_settings = settings.clone();
     for effect in effects.iter().filter(|e| starts.contains_key(&e.parameters[0].name)) {
         let values: Vec<f64> = effect.parameters.iter().map(|p| starts.get(&p.name).copied().unwrap_or(0.0)).collect();
+        // what the data does not show has no place to be held at
+        if effect.parameters.iter().zip(&values).all(|(p, v)| p.shape.is_some() || *v == 0.0) {
+            continue;
+        }
         for (name, value) in shapes::jumps(effect, &values, &data) {
             held_settings.knowledge.entry(name.to_owned()).or_insert(Knowledge::Fixed(value));
         }
@@ -275,8 +283,7 @@ fn identify_from(
     let first = solve::Problem::normal(&touches, &start, true);
     let (observability, condition) =
         rank::observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
-    let declared_sigma_mm = known.declared_sigma_mm;
-    let mut search = Search { data: &data, observability: observability.clone(), touches, masked, declared_sigma_mm };
+    let mut search = Search { data: &data, observability: observability.clone(), touches, masked, known, beyond: None };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     let solution = search.follow_bends(solution, &model, &free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
@@ -333,6 +340,7 @@ fn identify_from(
     }
     let studentised = snoop.studentised();
     let seen = search.seen_at(&solution.theta);
+    let strangers_beyond = search.beyond;
     drop(search.touches);
     drop(batch);
     let chi2 = solution.chi2;
@@ -350,12 +358,16 @@ fn identify_from(
         free,
         priors,
         knowledge,
+        type_b: Vec::new(),
         noise,
+        strangers_beyond,
         chi2,
         dof,
         outcome: Outcome::default(),
     };
-    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition)?;
+    let type_b = uncertainty::type_b(&fit, machine, catalogue, &settings.type_b)?;
+    fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
+    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition, &type_b);
     fit.outcome.warnings.extend(unknown_masks);
     Ok(fit)
 }

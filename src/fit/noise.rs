@@ -39,6 +39,8 @@ pub struct Noise {
     pub visit_dof: Option<f64>,
     /// What tests for missing effects use, mm: the 90 % upper bound of τ, or the declared value.
     pub tau_test_mm: f64,
+    /// There are repeats enough, and they agree to the last digit: they say nothing of the noise.
+    pub repeats_agree: bool,
 }
 
 /// What is known without looking at the touches.
@@ -80,6 +82,7 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
     let (squares, dof) = (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1);
     let from_repeats = (dof >= LEAST_REPEATS).then(|| (squares / dof as f64).sqrt());
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
+    let repeats_agree = from_repeats.is_some_and(|s| s <= 1e-9);
     let from_repeats = from_repeats.filter(|s| *s > 1e-9);
     let (sigma_mm, source, sigma_dof) = match (known.stated_sigma_mm, from_repeats) {
         (Some(stated), _) => (stated, "study", None),
@@ -98,7 +101,7 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
         None if n_poses < 2 => fixed(0.0, "one pose"),
         None => fixed(known.declared_tau_mm, "declared"),
     };
-    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm }
+    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm, repeats_agree }
 }
 
 impl Noise {
@@ -108,6 +111,7 @@ impl Noise {
         let sigma = match (self.source, self.dof) {
             ("repeats", Some(dof)) => format!("from repeated touches, {dof:.0} degrees of freedom"),
             ("study", _) => "as the study states".to_owned(),
+            _ if self.repeats_agree => "the probe's declared repeatability: the repeats agree exactly (a log that was rounded, or made without noise?)".to_owned(),
             _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
         };
         let tau = match (self.visit_source, self.visit_dof) {
@@ -117,6 +121,7 @@ impl Noise {
             ),
             ("study", _) => "as the study states".to_owned(),
             ("one pose", _) => "only one pose was visited".to_owned(),
+            _ if self.repeats_agree => "the axes' declared indexing repeatability, for the same reason".to_owned(),
             _ => "the axes' declared indexing repeatability: the plan has too few revisits to measure it".to_owned(),
         };
         format!(

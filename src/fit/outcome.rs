@@ -79,9 +79,12 @@ pub struct Outcome {
     pub type_b: Vec<TypeBRow>,
     /// Where location errors of workpiece-side axes are stated, mm in R.
     pub reference_mm: [f64; 3],
-    /// Covariance of the results, on request.
+    /// Covariance of the results with the type B rows, on request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Covariance>,
+    /// The same without the type B rows, on request and where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance_type_a: Option<Covariance>,
     /// Residuals, on request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub residuals: Option<Vec<Residual>>,
@@ -159,7 +162,7 @@ pub struct TypeBRow {
     pub unit: String,
 }
 
-/// Covariance matrix of some parameters, in their units (type A).
+/// Covariance matrix of some parameters, in their units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     /// The parameters.
@@ -176,7 +179,7 @@ pub enum Status {
     Identified,
     /// Held by the user.
     Fixed,
-    /// Known from its prior rather than from the data.
+    /// Known from priors, its own or those of others, rather than from the data: most of its variance is theirs.
     PriorDominated,
     /// The data cannot tell it.
     Undetermined,
@@ -200,8 +203,8 @@ pub struct Parameter {
     pub sigma: Option<f64>,
     /// Expanded uncertainty (95 %, Student's t with the degrees of freedom of the noise).
     pub expanded: Option<f64>,
-    /// Standard uncertainty from the noise alone, as the touches show it: a scatter of visits that is only declared has no
-    /// part in it.
+    /// Standard uncertainty from the touches' own noise alone: the scatter of index visits, from whatever source, has no part
+    /// in it, and neither have type B rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_noise: Option<f64>,
     /// Standard uncertainty from the type B rows.

@@ -1,6 +1,6 @@
 //! The steps of a fit around the least squares: noise samples, touches that do not belong, gauges that bend.
 
-use super::noise::Sample;
+use super::noise::{self, Known, Sample};
 use super::normal::Touches;
 use super::snoop::{self, Snoop};
 use super::solve;
@@ -16,6 +16,17 @@ const MOST_BENDS: usize = 30;
 /// Touches that scatter less than this share of what the probe's maker declares were made by no probe: they are exact.
 const QUIET: f64 = 0.05;
 
+/// More than this share of the touches is never left out: the rest is no longer what most of them say.
+const MOST_STRANGERS: f64 = 0.25;
+
+/// More than this share of the strangers on faces of which most is off is no chance: of a quarter of all touches, strewn at
+/// random, every fourth has the other touch of its face with it.
+const MOST_TOGETHER: f64 = 1.0 / 3.0;
+
+/// Touches that miss the model by five times their noise, in the square, without one that stands out may hide each other
+/// behind many gross ones.
+const GROSS2: f64 = 25.0;
+
 /// A fit that is being made.
 pub(super) struct Search<'a> {
     pub data: &'a Data,
@@ -23,8 +34,10 @@ pub(super) struct Search<'a> {
     pub observability: solve::Observability,
     pub touches: Touches<'a>,
     pub masked: Vec<bool>,
-    /// Noise of a touch as the machine's file declares it, mm.
-    pub declared_sigma_mm: f64,
+    /// What is known of the noise without the touches.
+    pub known: Known,
+    /// As [`super::Fit::strangers_beyond`].
+    pub beyond: Option<usize>,
 }
 
 impl Search<'_> {
@@ -97,7 +110,7 @@ impl Search<'_> {
         let sum = |theta: &DVector<f64>| solve::Problem::normal(&self.touches, theta, false).sum;
         for _ in 0..MOST_BENDS {
             let scatter = (solution.chi2.max(0.0) / dof as f64).sqrt().max(solve::STEP_TOLERANCE_MM / sigma_mm);
-            if scatter * sigma_mm > QUIET * self.declared_sigma_mm {
+            if scatter * sigma_mm > QUIET * self.known.declared_sigma_mm {
                 return solution;
             }
             let (residual, jacobian) = self.touches.dense(&solution.theta);
@@ -155,15 +168,27 @@ impl Search<'_> {
             let dof = solve::Problem::n_rows(&search.touches).saturating_sub(search.observability.rank);
             Snoop::new(&search.touches, &s.theta, &s.covariance, (s.chi2, dof), noise_dof)
         };
+        self.beyond = None;
         let first = judge(self, &solution).dropped();
-        if first.is_empty() {
+        if first.is_empty() && self.scale2(&solution, noise_dof) < GROSS2 {
             return solution;
         }
         // several bad touches hide each other: let the rest vote first
-        let most = (snoop::MOST_SHARE * n as f64).ceil() as usize;
-        let mut out = self.robust_strangers(&solution, &all);
-        if out.is_empty() || out.len() > most {
-            out = first;
+        let cap = (snoop::MOST_SHARE * n as f64).ceil() as usize;
+        let mut most = cap;
+        let robust = self.robust_strangers(&solution, &all);
+        let mut out = if robust.is_empty() || robust.len() > cap { first } else { robust.clone() };
+        if robust.len() > cap {
+            match self.many_strangers(&robust, &all, &solution) {
+                Some(many) => {
+                    most = (MOST_STRANGERS * n as f64) as usize;
+                    out = many;
+                }
+                None => self.beyond = Some(robust.len()),
+            }
+        }
+        if out.is_empty() {
+            return if self.touches.weights() == all { solution } else { self.refit(all, &solution) };
         }
         for _ in 0..4 {
             let mut weights = all.clone();
@@ -181,20 +206,57 @@ impl Search<'_> {
             out.extend(more);
             out.truncate(most.max(1));
         }
-        // touches of one face that miss together say something in common: that is no matter of chips
-        let normals: Vec<[i8; 3]> = self
-            .data
-            .observations
-            .iter()
-            .map(|o| [o.normal.x, o.normal.y, o.normal.z].map(|x| (10.0 * x).round() as i8))
-            .collect();
-        let face = |i: usize| (self.data.visits[i], self.data.observations[i].set_up, normals[i]);
-        for cluster in snoop::clusters(&out, face, n) {
-            out.retain(|i| !cluster.contains(i));
+        // touches of one face that miss together say something in common: that is no matter of chips. Among many strangers
+        // some meet on a face by chance
+        if most == cap {
+            for cluster in snoop::clusters(&out, self.faces(), n) {
+                out.retain(|i| !cluster.contains(i));
+            }
         }
         let mut weights = all;
         out.iter().for_each(|&i| weights[i] = 0.0);
         if weights == self.touches.weights() { solution } else { self.refit(weights, &solution) }
+    }
+
+    /// The face of each touch.
+    fn faces(&self) -> impl Fn(usize) -> snoop::Face {
+        let rounded = |n: Vector3<f64>| [n.x, n.y, n.z].map(|x| (10.0 * x).round() as i8);
+        move |i| {
+            let o = &self.data.observations[i];
+            (self.data.visits[i], o.set_up, rounded(o.normal))
+        }
+    }
+
+    /// More strangers than chips explain, where they are gross ones all the same and no missing effect: they are a
+    /// minority and strewn over the faces, the others see as much without them, and the others agree to within their
+    /// noise, which an effect that the model lacks would not let them do. `None` where that does not hold.
+    fn many_strangers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
+        let n_used = all.iter().filter(|w| **w > 0.0).count();
+        let mut out = robust.to_vec();
+        if out.len() as f64 > MOST_STRANGERS * n_used as f64
+            || snoop::whole_faces(&out, self.faces(), all.len()) as f64 > MOST_TOGETHER * out.len() as f64
+        {
+            return None;
+        }
+        let (sigma_mm, tau_mm) = self.touches.noise_mm();
+        let mut weights = all.to_vec();
+        out.iter().for_each(|&i| weights[i] = 0.0);
+        let mut solution = self.refit(weights, from);
+        let noise = noise::estimate(&self.samples(&solution), &self.known);
+        self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+        solution = self.refit_here(solution.theta);
+        // touches that the robust fit took for strangers, and that are not, come back
+        let scale2 = self.scale2(&solution, noise.dof.unwrap_or(0.0));
+        out.retain(|&i| !snoop::belongs(self.off(&solution, i, scale2).1));
+        let mut weights = all.to_vec();
+        out.iter().for_each(|&i| weights[i] = 0.0);
+        solution = self.refit(weights, &solution);
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
+        let fits = dof > 0 && solution.chi2 / dof as f64 <= noise::chi2_limit(dof, noise.dof);
+        let jacobian = solve::Problem::jacobian(&self.touches, &solution.theta);
+        let sees_all = solve::observe(&jacobian).rank >= self.observability.rank;
+        self.touches.set_noise(sigma_mm, tau_mm);
+        (fits && sees_all).then_some(out)
     }
 
     /// Touches further than 4 robust standard deviations off a fit in which far touches count little.

@@ -333,10 +333,8 @@ pub fn belongs(standardised: f64) -> bool {
 /// A face as it was touched: visit, block, rounded normal.
 pub type Face = (usize, usize, [i8; 3]);
 
-/// Clusters among rejected touches: where three or more of one face in one visit go together and make half of it, they
-/// are no chips but say something in common.
-#[must_use]
-pub fn clusters(rejected: &[usize], face_of: impl Fn(usize) -> Face, n: usize) -> Vec<Vec<usize>> {
+/// Number of touches and the rejected ones of each face.
+fn by_face(rejected: &[usize], face_of: impl Fn(usize) -> Face, n: usize) -> impl Iterator<Item = (usize, Vec<usize>)> {
     let mut faces: BTreeMap<Face, (usize, Vec<usize>)> = BTreeMap::new();
     for i in 0..n {
         faces.entry(face_of(i)).or_default().0 += 1;
@@ -344,7 +342,21 @@ pub fn clusters(rejected: &[usize], face_of: impl Fn(usize) -> Face, n: usize) -
     for &i in rejected {
         faces.entry(face_of(i)).or_default().1.push(i);
     }
-    faces.into_values().filter(|(all, out)| out.len() >= 3 && 2 * out.len() >= *all).map(|(_, out)| out).collect()
+    faces.into_values()
+}
+
+/// Clusters among rejected touches: where three or more of one face in one visit go together and make half of it, they
+/// are no chips but say something in common.
+#[must_use]
+pub fn clusters(rejected: &[usize], face_of: impl Fn(usize) -> Face, n: usize) -> Vec<Vec<usize>> {
+    by_face(rejected, face_of, n).filter(|(all, out)| out.len() >= 3 && 2 * out.len() >= *all).map(|f| f.1).collect()
+}
+
+/// How many rejected touches stand on faces of which more than half is rejected, two touches at least.
+#[must_use]
+pub fn whole_faces(rejected: &[usize], face_of: impl Fn(usize) -> Face, n: usize) -> usize {
+    let whole = |(all, out): (usize, Vec<usize>)| (out.len() >= 2 && 2 * out.len() > all).then_some(out.len());
+    by_face(rejected, face_of, n).filter_map(whole).sum()
 }
 
 /// Weights of a robust start: Geman and McClure's function with a scale that falls from the largest residual to 3 σ.

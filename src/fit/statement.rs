@@ -11,18 +11,43 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Weights below this are not worth a word.
 const WORTH_NAMING: f64 = 0.05;
 
-/// A null direction (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `seen` says how they are
+/// The null directions (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `seen` says how they are
 /// scaled and which are held, `effects` are the model's.
 #[must_use]
 pub fn undetermined(
     unknowns: &[&Unknown],
     effects: &[&Effect],
+    unseen: &[DVector<f64>],
+    seen: &Observability,
+) -> Vec<Undetermined> {
+    let each = |k: usize| {
+        let others: Vec<&DVector<f64>> = unseen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, v)| v).collect();
+        one(unknowns, effects, &unseen[k], &others, seen)
+    };
+    (0..unseen.len()).map(each).collect()
+}
+
+/// One null direction in words. What is said to be seen must stand still in the other ones too.
+fn one(
+    unknowns: &[&Unknown],
+    effects: &[&Effect],
     direction: &DVector<f64>,
+    others: &[&DVector<f64>],
     seen: &Observability,
 ) -> Undetermined {
     let scale = &seen.scale;
     let held: Vec<String> =
         seen.held.iter().filter(|&&c| direction[c].abs() > 1e-6).map(|&c| unknowns[c].name.clone()).collect();
+    // a part below this is the rounding of the null directions
+    const LEAST: f64 = 1e-6;
+    let members_at: Vec<usize> = (0..unknowns.len()).filter(|&i| direction[i].abs() > WORTH_NAMING).collect();
+    let alone = others.iter().all(|v| members_at.iter().all(|&i| v[i].abs() <= LEAST));
+    // a sum of two is seen although both stand in another direction where that one leaves the sum as it is
+    let still = |v: &&DVector<f64>| match members_at[..] {
+        [a, b] => (direction[b] * v[a] - direction[a] * v[b]).abs() <= LEAST,
+        _ => false,
+    };
+    let one_number = alone || others.iter().all(still);
     let mut combination = BTreeMap::new();
     for (u, weight) in unknowns.iter().zip(direction.iter()) {
         if weight.abs() > 1e-6 {
@@ -62,12 +87,12 @@ pub fn undetermined(
         ([one], _) => format!(
             "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
         ),
-        (_, [a, b]) if blocks.is_empty() => format!(
+        (_, [a, b]) if blocks.is_empty() && one_number => format!(
             "{} are one number with these touches: only {} is seen, and {convention}",
             join(&members),
             what_is_seen(*a, *b)
         ),
-        (_, [one]) => format!(
+        (_, [one]) if one_number => format!(
             "{} are one number with these touches: no touch notices a change of {} while the blocks go with it, and {convention}",
             join(&members),
             one.0.name

@@ -11,7 +11,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation, Unknown};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, DVectorView, Matrix3};
 use std::collections::BTreeMap;
 
 /// Correlations above this are worth a line.
@@ -26,6 +26,12 @@ const UNMODELLED_AT_ONCE: usize = 256;
 /// Projecting the set-ups out of a Gram matrix leaves some 1e-5 of the largest singular value: below this share of it the
 /// rows themselves must tell.
 const GRAM_SEES: f64 = 1e-4;
+
+/// The same against the columns before the projection: their Gram matrix is good to some 1e-15.
+const GRAM_SEES_OF_RAW: f64 = 1e-6;
+
+/// What is left of a column that is taken out whole, as a share of it: gauges are said elsewhere.
+const ROUNDING: f64 = 1e-12;
 
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
@@ -99,7 +105,7 @@ pub(super) struct TypeB {
     pub name: String,
     pub unit: String,
     pub sigma: f64,
-    /// What it makes of each free unknown: standard uncertainty, in the unknown's unit.
+    /// What one standard uncertainty of it makes of each free unknown, with its sign, in the unknown's unit.
     pub makes: DVector<f64>,
     /// It goes with the temperature, and no touch carries one: it is counted for a room 1 K off 20 °C.
     pub per_kelvin: bool,
@@ -177,13 +183,7 @@ pub(super) fn type_b(
             .into_owned();
         let moved = sensitivity(fit, &column);
         let p = &effect.parameters[which];
-        out.push(TypeB {
-            name: p.name.clone(),
-            unit: p.unit.clone(),
-            sigma,
-            makes: moved.map(|m| (m * sigma).abs()),
-            per_kelvin,
-        });
+        out.push(TypeB { name: p.name.clone(), unit: p.unit.clone(), sigma, makes: moved * sigma, per_kelvin });
     }
     if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
 }
@@ -306,10 +306,10 @@ impl AddToDiagonal for DMatrix<f64> {
     }
 }
 
-/// The pairs of results that are least told apart.
-pub(super) fn correlations(fit: &Fit) -> Vec<Correlation> {
-    let results: Vec<usize> =
-        fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance && fit.covariance[(i, i)] > 0.0).collect();
+/// The pairs of results that are least told apart, among those that have a value.
+pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<Correlation> {
+    let is_result = |i: &usize| !fit.model.unknowns[*i].nuisance && fit.covariance[(*i, *i)] > 0.0 && has_value(*i);
+    let results: Vec<usize> = fit.free.iter().copied().filter(is_result).collect();
     let mut out = Vec::new();
     for (k, &i) in results.iter().enumerate() {
         for &j in &results[..k] {
@@ -338,16 +338,22 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
         return Vec::new();
     }
     let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
-    let gram = || fit.with_touches(fit.noise.tau_mm, |t| t.normal(&fit.free_theta(), true).gram);
-    let quick = if fit.seen.full() { from_gram(&gram(), &physical, &nuisance, typical) } else { None };
-    let (values, directions) = quick.unwrap_or_else(|| {
+    let gram = fit.with_touches(fit.noise.tau_mm, |t| t.normal(&fit.free_theta(), true).gram);
+    // what the columns are before anything is taken out of them: all that is left may be rounding
+    let raw: Vec<f64> = physical.iter().map(|&c| gram[(c, c)].max(0.0).sqrt() * typical(c)).collect();
+    let size =
+        |direction: DVectorView<f64>| direction.iter().zip(&raw).map(|(w, r)| (w * r).powi(2)).sum::<f64>().sqrt();
+    let precise = |(values, directions): &Spectrum| {
+        values.iter().zip(directions.column_iter()).all(|(s, d)| *s > GRAM_SEES_OF_RAW * size(d))
+    };
+    let quick = if fit.seen.full() { from_gram(&gram, &physical, &nuisance, typical) } else { None };
+    let (values, directions) = quick.filter(precise).unwrap_or_else(|| {
         let jacobian = only_seen(fit.linear(fit.noise.tau_mm).jacobian, &fit.seen);
         from_rows(&jacobian, &physical, &nuisance, typical)
     });
-    let top = values.max();
     let mut out = Vec::new();
     for (s, direction) in values.iter().zip(directions.column_iter()) {
-        if *s >= 1.0 || *s <= RANK_TOLERANCE * top {
+        if *s >= 1.0 || *s <= ROUNDING * size(direction) {
             continue;
         }
         let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
@@ -446,14 +452,127 @@ fn from_rows(
     (svd.singular_values, directions)
 }
 
-/// Covariance of the results (no set-ups of blocks), type A.
+/// Covariance of the results (no set-ups of blocks) from the noise and the priors: type A.
 #[must_use]
 pub fn results_covariance(fit: &Fit) -> Covariance {
-    let results: Vec<usize> = fit.free.iter().copied().filter(|&i| !fit.model.unknowns[i].nuisance).collect();
+    covariance_with(fit, |_, _| 0.0)
+}
+
+/// Covariance of the results with the type B rows: the roots of its diagonal are the standard uncertainties of what does not
+/// follow a combination that leaves no trace.
+#[must_use]
+pub fn full_covariance(fit: &Fit) -> Covariance {
+    covariance_with(fit, |i, j| fit.type_b.iter().map(|makes| makes[i] * makes[j]).sum())
+}
+
+/// The type A covariance of the results with something added, by places among the free unknowns.
+fn covariance_with(fit: &Fit, more: impl Fn(usize, usize) -> f64) -> Covariance {
+    let results: Vec<(usize, usize)> =
+        fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].nuisance).collect();
+    let row = |&(a, i): &(usize, usize)| results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect();
     Covariance {
-        names: results.iter().map(|&i| fit.model.unknowns[i].name.clone()).collect(),
-        matrix: results.iter().map(|&i| results.iter().map(|&j| fit.covariance[(i, j)]).collect()).collect(),
+        names: results.iter().map(|(_, i)| fit.model.unknowns[*i].name.clone()).collect(),
+        matrix: results.iter().map(row).collect(),
     }
+}
+
+/// A value that the user states and that the touches contradict.
+#[derive(Debug, Clone)]
+pub(super) struct Contradiction {
+    /// In words.
+    pub says: String,
+    /// By how much χ² would fall without it.
+    pub chi2: f64,
+}
+
+/// Further apart than this many standard deviations, what is stated and what the touches say contradict each other; the
+/// chance of that is 6e-5 where both are right.
+const CONTRADICTS: f64 = 4.0;
+
+/// Priors and held values that the touches contradict: each compared with the estimate without it (a rank-one downdate), at
+/// the scatter that the touches would then have.
+pub(super) fn contradictions(fit: &Fit) -> Vec<Contradiction> {
+    let scale2 = |falls: f64| ((fit.chi2 - falls).max(0.0) / fit.dof.saturating_sub(1).max(1) as f64).max(1.0);
+    let mut out = Vec::new();
+    for &(i, stated, sigma) in &fit.priors {
+        let (variance, prior) = (fit.covariance[(i, i)], sigma * sigma);
+        let rest = 1.0 / variance - 1.0 / prior;
+        // the touches say next to nothing of it
+        if !rest.is_finite() || rest <= 1e-9 / prior {
+            continue;
+        }
+        let alone = (fit.theta[i] / variance - stated / prior) / rest;
+        let falls = (alone - stated).powi(2) / (1.0 / rest + prior);
+        let own = (scale2(falls) / rest).sqrt();
+        let apart = (alone - stated).abs() / own.hypot(sigma);
+        if apart > CONTRADICTS {
+            let u = &fit.model.unknowns[i];
+            out.push(Contradiction {
+                says: format!(
+                    "the touches contradict the prior of {}: it says {stated} ± {sigma} {}, and without it they say {} ± {} ({apart:.0} standard deviations apart); check it, or give it a larger sigma",
+                    u.name,
+                    u.unit,
+                    with_digits(alone, own),
+                    with_digits(own, own)
+                ),
+                chi2: falls,
+            });
+        }
+    }
+    out.extend(held_contradictions(fit, scale2));
+    out
+}
+
+/// The same for held values: the score test of each, and what the touches would make of it.
+fn held_contradictions(fit: &Fit, scale2: impl Fn(f64) -> f64) -> Vec<Contradiction> {
+    let held: Vec<usize> = (0..fit.theta.len())
+        .filter(|&i| matches!(fit.knowledge[i], Some(Knowledge::Fixed(_))) && !fit.model.unknowns[i].shape)
+        .collect();
+    if held.is_empty() {
+        return Vec::new();
+    }
+    let batch = fit.model.prepare(&fit.data.observations);
+    let noise = (fit.noise.sigma_mm, fit.noise.tau_mm);
+    let all: Vec<usize> = (0..fit.theta.len()).collect();
+    let mut touches = Touches::new(&batch, &fit.data.visits, fit.theta.clone(), &all, &fit.priors, noise);
+    touches.set_weights(fit.weight.clone());
+    let (residual, jacobian) = touches.dense(&DVector::from_column_slice(&fit.theta));
+    let free = jacobian.select_columns(&fit.free);
+    let covariance = free_covariance(fit);
+    let mut out = Vec::new();
+    for i in held {
+        let column = jacobian.column(i).into_owned();
+        let own = &column - &free * (&covariance * free.tr_mul(&column));
+        let information = own.norm_squared();
+        // the other parameters follow it: nothing tells it from them
+        if information.is_nan() || information <= 1e-9 * column.norm_squared() || information == 0.0 {
+            continue;
+        }
+        let by = -own.dot(&residual) / information;
+        let falls = by * by * information;
+        let sigma = (scale2(falls) / information).sqrt();
+        let apart = by.abs() / sigma;
+        if apart > CONTRADICTS {
+            let (u, stated) = (&fit.model.unknowns[i], fit.theta[i]);
+            out.push(Contradiction {
+                says: format!(
+                    "the touches contradict the held value of {}: it is held at {stated} {}, and if it were free they would say {} ± {} ({apart:.0} standard deviations away); check it, or let it free",
+                    u.name,
+                    u.unit,
+                    with_digits(stated + by, sigma),
+                    with_digits(sigma, sigma)
+                ),
+                chi2: falls,
+            });
+        }
+    }
+    out
+}
+
+/// A value with two digits of its uncertainty.
+fn with_digits(value: f64, sigma: f64) -> String {
+    let decimals = if sigma > 0.0 && sigma.is_finite() { (1.0 - sigma.log10().floor()).clamp(0.0, 12.0) } else { 6.0 };
+    format!("{value:.*}", decimals as usize)
 }
 
 /// Names and values of the priors that entered the fit.

@@ -148,16 +148,19 @@ fn not_read(missing: &[u64], planned: usize, rejected: &Rejected) -> String {
     let mut parts = Vec::new();
     if !damaged.is_empty() {
         parts.push(format!(
-            "{} of the plan's {planned} touches are in the log, but their lines are not used (see above): {}",
+            "{} of the plan's {planned} touches {}, but {} not used (see above): {}",
             damaged.len(),
+            if damaged.len() == 1 { "is in the log" } else { "are in the log" },
+            if damaged.len() == 1 { "its line is" } else { "their lines are" },
             ranges(&damaged)
         ));
     }
     if !absent.is_empty() {
         let unless = if rejected.unnamed { ", or only in lines that are not used (see above)" } else { "" };
         parts.push(format!(
-            "{} of the plan's {planned} touches are not in the log{unless}: {}",
+            "{} of the plan's {planned} touches {} not in the log{unless}: {}",
             absent.len(),
+            if absent.len() == 1 { "is" } else { "are" },
             ranges(&absent)
         ));
     }

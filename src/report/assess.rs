@@ -41,7 +41,8 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     );
     *out += &format!("model: {}\n", a.model.join(", "));
     *out += &format!("this plan is {}: {}\n\n", a.score.word(), a.says);
-    let mut t = table(&["parameter", "unit", "probe noise alone", "with unmodelled effects", "holds as well"]);
+    let mut t =
+        table(&["parameter", "unit", "probe noise alone", "with indexing", "with unmodelled effects", "holds as well"]);
     for p in &a.parameters {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |alias| format!("{} ({alias})", p.name));
         let size = |s: Option<f64>| number(s.map_or_else(|| "not told".into(), significant));
@@ -49,13 +50,14 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
             Cell::new(name),
             Cell::new(&p.unit),
             size(p.sigma),
+            size(p.sigma_with_visits),
             size(p.sigma_with_unmodelled),
             Cell::new(p.holds.join(", ")),
         ]);
     }
     t.set_width(paper.width.min(120) as u16);
     *out += &format!(
-        "expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second)\n{t}\n\n",
+        "expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second and third)\n{t}\n\n",
         significant(a.noise_um),
         significant(a.visit_um)
     );
@@ -139,6 +141,9 @@ fn side_by_side(first: &Assessment, paper: Paper, out: &mut String) {
         row(&format!("{} ({})", p.name, p.unit), &|a| {
             of(a).and_then(|q| q.sigma).map_or_else(|| "not told".into(), significant)
         });
+        row("  with indexing", &|a| {
+            of(a).and_then(|q| q.sigma_with_visits).map_or_else(|| "not told".into(), significant)
+        });
         row("  with unmodelled", &|a| {
             of(a).and_then(|q| q.sigma_with_unmodelled).map_or_else(|| "not told".into(), significant)
         });
@@ -197,6 +202,7 @@ fn listed(words: &[String]) -> String {
 }
 
 fn time(seconds: f64) -> String {
-    let minutes = (seconds / 60.0).ceil();
+    // as `generate` says it
+    let minutes = (seconds / 60.0).round().max(1.0);
     if minutes < 100.0 { format!("{minutes:.0} min") } else { format!("{:.1} h", seconds / 3600.0) }
 }

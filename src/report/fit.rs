@@ -57,7 +57,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
     // two figures side by side: what the probe's noise leaves open, and what everything else may add
     let unmodelled = results.iter().any(|p| p.sigma_with_unmodelled.is_some());
-    let mut head = vec!["parameter", "value", "unit", "std. unc.", "95 %"];
+    let mut head = vec!["parameter", "value", "unit", "probe noise", "std. unc.", "95 %"];
     if unmodelled {
         head.push("unmodelled");
     }
@@ -69,6 +69,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
             Cell::new(name),
             number(if p.status == Status::Undetermined { "?".into() } else { digits(p.value, p.sigma) }),
             Cell::new(&p.unit),
+            number(p.sigma_noise.map_or_else(|| "-".into(), significant)),
             number(p.sigma.map_or_else(|| "-".into(), significant)),
             number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
         ];
@@ -82,6 +83,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     t.set_width(paper.width.min(120) as u16);
     out += &t.to_string();
     out.push('\n');
+    out += "probe noise: standard uncertainty from the touches' own noise alone; std. unc.: with all that the fit counts\n";
     if unmodelled {
         out += "unmodelled: standard uncertainty if every effect that the model leaves out acts at its typical size\n";
     }
