@@ -363,7 +363,7 @@ fn identify_from(
     };
     let type_b = uncertainty::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
-    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition, &type_b);
+    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, (&solution, condition), &type_b);
     fit.outcome.warnings.extend(unknown_masks);
     Ok(fit)
 }
@@ -545,7 +545,7 @@ impl Search<'_> {
         let (sigma_mm, tau_mm) = self.touches.noise_mm();
         let mut weights = all.to_vec();
         out.iter().for_each(|&i| weights[i] = 0.0);
-        let mut solution = self.refit(weights.clone(), from);
+        let mut solution = self.refit(weights, from);
         let noise = noise::estimate(&self.samples(&solution), &self.known);
         self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
         solution = self.refit_here(solution.theta);
