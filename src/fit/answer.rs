@@ -18,8 +18,7 @@ pub(super) fn outcome(
     catalogue: &Catalogue,
     effects: &[&Effect],
     settings: &Settings,
-    solution: &Solution,
-    condition: f64,
+    (solution, condition): (&Solution, f64),
     type_b: &[uncertainty::TypeB],
 ) -> Outcome {
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());

@@ -164,11 +164,11 @@ pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Ve
         let tried = if formula.has_shape() { &shapes[..] } else { &shapes[..1] };
         let p = &effect.parameters[term.parameter];
         let size = (p.typical * p.factor).abs() * if term.component >= 3 { LEVER_MM } else { 1.0 };
-        let values = |o: &Observation| tried.iter().map(|s| formula.eval(&o.state, s)).collect::<Vec<_>>();
-        let is_bad = |v: &f64| !v.is_finite() || v.abs() * size > MOST_MM;
-        let mut bad = observations.iter().map(|o| (o, values(o))).filter(|(_, v)| v.iter().any(is_bad));
-        let (first, values) = bad.next()?;
-        let too_large = values.iter().all(|v| v.is_finite());
+        let is_bad = |v: f64| !v.is_finite() || v.abs() * size > MOST_MM;
+        let is_usable = |o: &Observation| !tried.iter().any(|s| is_bad(formula.eval(&o.state, s)));
+        let mut bad = observations.iter().filter(|o| !is_usable(o));
+        let first = bad.next()?;
+        let too_large = tried.iter().all(|s| formula.eval(&first.state, s).is_finite());
         Some(NoValue { effect, formula: formula.text(), n_touches: 1 + bad.count(), first: first.id, too_large })
     };
     effect.terms.iter().filter_map(of_term).collect()

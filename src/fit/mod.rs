@@ -367,7 +367,7 @@ fn identify_from(
     };
     let type_b = uncertainty::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
-    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, &solution, condition, &type_b);
+    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, (&solution, condition), &type_b);
     fit.outcome.warnings.extend(unknown_masks);
     Ok(fit)
 }

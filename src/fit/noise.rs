@@ -121,7 +121,9 @@ impl Noise {
             ),
             ("study", _) => "as the study states".to_owned(),
             ("one pose", _) => "only one pose was visited".to_owned(),
-            _ if self.repeats_agree => "the axes' declared indexing repeatability, for the same reason".to_owned(),
+            _ if self.repeats_agree => {
+                "the axes' declared indexing repeatability: repeats that agree exactly cannot tell it".to_owned()
+            }
             _ => "the axes' declared indexing repeatability: the plan has too few revisits to measure it".to_owned(),
         };
         format!(

@@ -469,7 +469,9 @@ pub fn full_covariance(fit: &Fit) -> Covariance {
 fn covariance_with(fit: &Fit, more: impl Fn(usize, usize) -> f64) -> Covariance {
     let results: Vec<(usize, usize)> =
         fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].nuisance).collect();
-    let row = |&(a, i): &(usize, usize)| results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect();
+    let row = |&(a, i): &(usize, usize)| -> Vec<f64> {
+        results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect()
+    };
     Covariance {
         names: results.iter().map(|(_, i)| fit.model.unknowns[*i].name.clone()).collect(),
         matrix: results.iter().map(row).collect(),
