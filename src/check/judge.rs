@@ -40,6 +40,8 @@ pub struct Case<'a> {
     pub mountings: &'a [&'a Mounting],
     /// A person may start it from anywhere only when this holds.
     pub clear_from_anywhere: bool,
+    /// The settings of a control as it is switched on.
+    pub neutral: &'a BTreeMap<String, String>,
 }
 
 /// Findings of one kind that are shown; the rest is counted.
@@ -77,8 +79,8 @@ impl Said {
     }
 }
 
-/// Judges all runs. The first one is the whole program.
-pub fn judge(case: &Case<'_>, runs: &[Told]) -> Vec<Finding> {
+/// Judges all runs. The first one is the whole program; of the others only what they leave to the user.
+pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told]) -> Vec<Finding> {
     let mut said = Said::default();
     let mut proofs: BTreeMap<Key, Proof> = BTreeMap::new();
     for told in runs {
@@ -91,6 +93,7 @@ pub fn judge(case: &Case<'_>, runs: &[Told]) -> Vec<Finding> {
         }
         settings_return(case, told, &mut said);
     }
+    others.iter().for_each(|told| settings_return(case, told, &mut said));
     let proofs: Vec<(Key, Proof)> = proofs.into_iter().collect();
     let hits: Vec<(Range<usize>, &'static str, String)> =
         proofs.par_iter().filter_map(|(_, proof)| proof.check(case)).collect();
@@ -702,7 +705,9 @@ fn compare_settings(
 ) {
     let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
     for (name, value) in after {
-        if before.get(name) != Some(value) && !left.contains(name) {
+        // what it may leave changed, it may leave off and no otherwise
+        let off = left.contains(name) && case.neutral.get(name) == Some(value);
+        if before.get(name) != Some(value) && !off {
             let was = before.get(name).map_or("nothing", String::as_str);
             let says = format!("{when}: the user's setting is not given back: {name}: {was} before, {value} after");
             said.say(case, "check::not_restored", at, says, "");

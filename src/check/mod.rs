@@ -228,8 +228,9 @@ fn with_parts(
         source,
         same,
         clear_from_anywhere: told.clear_from_anywhere,
+        neutral: &told.neutral,
     };
-    let mut findings = judge::judge(&case, &told.runs);
+    let mut findings = judge::judge(&case, &told.runs, &told.others);
     findings.extend(
         told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
     );

@@ -4,6 +4,7 @@
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
 use super::code::{Code, Piece, Statement, Values, Var, What, Word};
+use super::seconds::event_s;
 use super::world::World;
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
@@ -179,9 +180,18 @@ pub struct Vm {
     pub asked: bool,
     /// The angles near which axes that count from 0 to 360 are counted when they first move, deg.
     pub turned_near: Position,
+    /// Since the program began, without the time in which it waits for a person, s.
+    pub seconds: f64,
 }
 
 impl Vm {
+    /// What a clock shows that counts whole ticks of so many seconds.
+    pub fn clock_s(&self, tick_s: f64) -> f64 {
+        // no tick falls on a moment that a program of round numbers meets: a last digit would then be a matter of rounding
+        const AFTER_A_TICK: f64 = 0.123_457;
+        ((self.seconds / tick_s + AFTER_A_TICK).floor() * tick_s).max(0.0)
+    }
+
     /// Is the probe deflected here?
     pub fn deflected(&self) -> bool {
         self.stuck || self.world.touches(self.part, &self.at, &self.shift)
@@ -190,6 +200,7 @@ impl Vm {
     /// Notes an event.
     pub fn note(&mut self, event: Event) {
         self.asked &= !matches!(event, Event::Move { .. } | Event::Probe { .. });
+        self.seconds += event_s(&event);
         match &event {
             // several stops without a move between them are one
             Event::Wait(_) if self.moved => {
@@ -280,6 +291,10 @@ pub enum Start {
     Fresh,
     /// Every mode otherwise than the program needs it, every offset set.
     Awkward,
+    /// What neither of the two has: modes and coordinate systems of which a control has more than two.
+    Third,
+    /// Something acts on the program's coordinates that none of its words takes off: it must see that and not move.
+    Obstructed,
 }
 
 /// The language of a control: what words, variables and G numbers mean.
@@ -310,7 +325,11 @@ pub trait Dialect: Clone + Send + Sync {
     ///
     /// # Errors
     /// When it cannot be.
-    fn write(&mut self, var: &Var, value: f64) -> Result<(), String>;
+    fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String>;
+    /// Must a program look whether its coordinates are those of the axes, because it cannot switch off all that acts on them?
+    fn sees_offsets(&self) -> bool {
+        false
+    }
     /// A move ended: where its result is kept.
     fn probed(&mut self, probe: &Probe, outcome: Outcome, stands: &Position);
     /// The control latches all axes at the contact and lets them run out behind it; `false`: a cycle that keeps X, Y, Z and itself
@@ -557,11 +576,11 @@ impl<'p, D: Dialect> Run<'p, D> {
             }
             What::Set(var, expr) => {
                 let value = self.value(expr)?;
-                self.dialect.write(var, value)?;
+                self.dialect.write(var, value, &self.vm)?;
             }
             What::SetIndirect(number, expr) => {
                 let (number, value) = (self.value(number)?, self.value(expr)?);
-                self.dialect.write(&super::code::numbered(number)?, value)?;
+                self.dialect.write(&super::code::numbered(number)?, value, &self.vm)?;
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
@@ -609,7 +628,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                     return Err(format!("the log {name} is thrown away after something was written into it"));
                 }
                 self.deleted.insert(name);
-                self.dialect.write(error, 0.0)?;
+                self.dialect.write(error, 0.0, &self.vm)?;
             }
             What::Abort(text) => {
                 let text = self.text(text)?;
@@ -625,7 +644,7 @@ impl<'p, D: Dialect> Run<'p, D> {
         let (name, text) = (self.text(name)?, self.text(text)?);
         if self.log_is_full {
             self.vm.note(Event::Other(format!("no line goes into {name}")));
-            return self.dialect.write(error, FULL);
+            return self.dialect.write(error, FULL, &self.vm);
         }
         self.fork(Trouble::LogFull);
         if self.writes_to.as_ref() != Some(&name) {
@@ -633,7 +652,7 @@ impl<'p, D: Dialect> Run<'p, D> {
             self.writes_to = Some(name);
         }
         self.vm.note(Event::Log(text));
-        self.dialect.write(error, 0.0)
+        self.dialect.write(error, 0.0, &self.vm)
     }
 
     fn say(&mut self, text: &[Piece], event: fn(String) -> Event) -> Result<(), String> {
