@@ -9,6 +9,7 @@
 //! program was made; shapes and the proof of a single move come from [`crate::program`], contacts from
 //! [`crate::simulate`].
 
+mod branches;
 mod code;
 mod explore;
 mod heidenhain;
@@ -20,8 +21,10 @@ mod proof;
 mod run;
 mod runs;
 mod seconds;
+mod settings;
 mod sinumerik;
 mod touches;
+mod vm;
 mod world;
 
 use crate::diag::{Failure, Finding, Result, Source};

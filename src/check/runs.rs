@@ -181,9 +181,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
         // the whole run, the same from elsewhere, and each set-up but the first
         let numbers: Vec<(usize, Start, bool)> =
             [(1, Start::Awkward, true), (1, Start::Fresh, false), (1, Start::Third, false)]
-            .into_iter()
-            .chain((2..=last).map(|k| (k, Start::Awkward, true)))
-            .collect();
+                .into_iter()
+                .chain((2..=last).map(|k| (k, Start::Awkward, true)))
+                .collect();
         let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
         let mut runs: Vec<Told> = numbers
             .par_iter()

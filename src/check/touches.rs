@@ -181,7 +181,8 @@ fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &s
         }
     }
     // a clock that stands still is none
-    if touches.len() > 2 && before <= 0.0 {
+    let first = touches.first().and_then(|t| t.time_s).unwrap_or(0.0);
+    if touches.len() > 2 && before <= first {
         let place = lines.last().map_or(0..0, |(at, _)| (*at).clone());
         said.say(case, "check::log", &place, "the times in the log stand still".to_owned(), "");
     }
@@ -335,8 +336,10 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
     for (axis, sense) in planned.from.iter() {
         need(made.senses.get(axis) == Some(sense), format!("axis {axis} came in another sense than planned"));
     }
-    if let (Some(deg), true) = (planned.spindle_deg, orients(case)) {
-        let wanted = (deg * case.machine.tool.spindle_sense).rem_euclid(360.0);
+    // a touch that says nothing stands at 0, where the plan turns the spindle at all
+    let turns = case.plan.is_some_and(|p| p.touches.iter().any(|t| t.spindle_deg.is_some()));
+    if turns && orients(case) {
+        let wanted = (planned.spindle_deg.unwrap_or(0.0) * case.machine.tool.spindle_sense).rem_euclid(360.0);
         let found = made.spindle_deg.map(|d| d.rem_euclid(360.0));
         let off = found.map_or(360.0, |f| (f - wanted).abs());
         need(off.min(360.0 - off) <= case.same, format!("the spindle is not oriented to {wanted} deg"));

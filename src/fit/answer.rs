@@ -194,9 +194,17 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
     }
     let n_out = fit.rejected.values().filter(|r| !r.starts_with("taken out")).count();
     let n = fit.data.observations.len();
-    if n_out as f64 > snoop::MOST_SHARE * n as f64 {
+    let share = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
+    if let Some(found) = fit.strangers_beyond {
         out.push(format!(
-            "{n_out} of {n} touches do not belong to the rest, more than {:.0} %: dirt, a loose block or probe, or an effect that the model lacks",
+            "a robust fit finds {found} of {n} touches ({:.1} %) that do not belong to the rest, and without them the others still do not agree: only {n_out} are left out (removal stops at {:.0} %), and the values and their uncertainties are not to be trusted; look for dirt, a loose block or stylus, or an effect that the model lacks",
+            share(found),
+            100.0 * snoop::MOST_SHARE
+        ));
+    } else if n_out as f64 > snoop::MOST_SHARE * n as f64 {
+        out.push(format!(
+            "{n_out} of {n} touches ({:.1} %) do not belong to the rest and are left out; more than {:.0} % is a finding in itself: chips, a loose block or stylus, or an effect that the model lacks; look at them before you trust the values",
+            share(n_out),
             100.0 * snoop::MOST_SHARE
         ));
     }

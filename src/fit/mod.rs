@@ -113,6 +113,8 @@ pub struct Fit {
     pub knowledge: Vec<Option<Knowledge>>,
     /// The noise.
     pub noise: Noise,
+    /// How many touches a robust fit finds off the rest, where they are too many to be left out on its word.
+    pub strangers_beyond: Option<usize>,
     /// χ² of the touches and priors.
     pub chi2: f64,
     /// Degrees of freedom.
@@ -271,7 +273,7 @@ fn identify_from(
     }
     let first = solve::Problem::normal(&touches, &start, true);
     let (observability, condition) = observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
-    let mut search = Search { data: &data, observability: observability.clone(), touches, masked };
+    let mut search = Search { data: &data, observability: observability.clone(), touches, masked, known, beyond: None };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     let solution = search.settle(solution);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
@@ -328,6 +330,7 @@ fn identify_from(
     }
     let studentised = snoop.studentised();
     let seen = search.observability;
+    let strangers_beyond = search.beyond;
     drop(search.touches);
     drop(batch);
     let chi2 = solution.chi2;
@@ -346,6 +349,7 @@ fn identify_from(
         priors,
         knowledge,
         noise,
+        strangers_beyond,
         chi2,
         dof,
         outcome: Outcome::default(),
@@ -375,6 +379,10 @@ struct Search<'a> {
     observability: solve::Observability,
     touches: Touches<'a>,
     masked: Vec<bool>,
+    /// What is known of the noise without the touches.
+    known: Known,
+    /// As [`Fit::strangers_beyond`].
+    beyond: Option<usize>,
 }
 
 impl Search<'_> {
@@ -455,15 +463,27 @@ impl Search<'_> {
             let dof = solve::Problem::n_rows(&search.touches).saturating_sub(search.observability.rank);
             Snoop::new(&search.touches, &s.theta, &s.covariance, (s.chi2, dof), noise_dof)
         };
+        self.beyond = None;
         let first = judge(self, &solution).dropped();
-        if first.is_empty() {
+        if first.is_empty() && self.scale2(&solution, noise_dof) < GROSS2 {
             return solution;
         }
         // several bad touches hide each other: let the rest vote first
-        let most = (snoop::MOST_SHARE * n as f64).ceil() as usize;
-        let mut out = self.robust_strangers(&solution, &all);
-        if out.is_empty() || out.len() > most {
-            out = first;
+        let cap = (snoop::MOST_SHARE * n as f64).ceil() as usize;
+        let mut most = cap;
+        let robust = self.robust_strangers(&solution, &all);
+        let mut out = if robust.is_empty() || robust.len() > cap { first } else { robust.clone() };
+        if robust.len() > cap {
+            match self.many_strangers(&robust, &all, &solution) {
+                Some(many) => {
+                    most = (MOST_STRANGERS * n as f64) as usize;
+                    out = many;
+                }
+                None => self.beyond = Some(robust.len()),
+            }
+        }
+        if out.is_empty() {
+            return if self.touches.weights() == all { solution } else { self.refit(all, &solution) };
         }
         for _ in 0..4 {
             let mut weights = all.clone();
@@ -482,19 +502,56 @@ impl Search<'_> {
             out.truncate(most.max(1));
         }
         // touches of one face that miss together say something in common: that is no matter of chips
-        let normals: Vec<[i8; 3]> = self
-            .data
-            .observations
-            .iter()
-            .map(|o| [o.normal.x, o.normal.y, o.normal.z].map(|x| (10.0 * x).round() as i8))
-            .collect();
-        let face = |i: usize| (self.data.visits[i], self.data.observations[i].set_up, normals[i]);
-        for cluster in snoop::clusters(&out, face, n) {
+        for cluster in self.clusters(&out) {
             out.retain(|i| !cluster.contains(i));
         }
         let mut weights = all;
         out.iter().for_each(|&i| weights[i] = 0.0);
         if weights == self.touches.weights() { solution } else { self.refit(weights, &solution) }
+    }
+
+    /// Touches of one face in one visit that miss together.
+    fn clusters(&self, out: &[usize]) -> Vec<Vec<usize>> {
+        let observations = &self.data.observations;
+        let normals: Vec<[i8; 3]> = observations
+            .iter()
+            .map(|o| [o.normal.x, o.normal.y, o.normal.z].map(|x| (10.0 * x).round() as i8))
+            .collect();
+        let face = |i: usize| (self.data.visits[i], observations[i].set_up, normals[i]);
+        snoop::clusters(out, face, observations.len())
+    }
+
+    /// More strangers than chips explain, where they are gross ones all the same and no missing effect: they are a
+    /// minority, no faces that miss together, the others see as much without them, and the others agree to within
+    /// their noise, which an effect that the model lacks would not let them do. `None` where that does not hold.
+    fn many_strangers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
+        let n_used = all.iter().filter(|w| **w > 0.0).count();
+        let mut out = robust.to_vec();
+        for cluster in self.clusters(&out) {
+            out.retain(|i| !cluster.contains(i));
+        }
+        if out.len() as f64 > MOST_STRANGERS * n_used as f64 {
+            return None;
+        }
+        let (sigma_mm, tau_mm) = self.touches.noise_mm();
+        let mut weights = all.to_vec();
+        out.iter().for_each(|&i| weights[i] = 0.0);
+        let mut solution = self.refit(weights.clone(), from);
+        let noise = noise::estimate(&self.samples(&solution), &self.known);
+        self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+        solution = self.refit_here(solution.theta);
+        // touches that the robust fit took for strangers, and that are not, come back
+        let scale2 = self.scale2(&solution, noise.dof.unwrap_or(0.0));
+        out.retain(|&i| !snoop::belongs(self.off(&solution, i, scale2).1));
+        let mut weights = all.to_vec();
+        out.iter().for_each(|&i| weights[i] = 0.0);
+        solution = self.refit(weights, &solution);
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
+        let fits = dof > 0 && solution.chi2 / dof as f64 <= noise::chi2_limit(dof, noise.dof);
+        let jacobian = solve::Problem::jacobian(&self.touches, &solution.theta);
+        let sees_all = solve::observe(&jacobian).rank >= self.observability.rank;
+        self.touches.set_noise(sigma_mm, tau_mm);
+        (fits && sees_all).then_some(out)
     }
 
     /// Touches further than 4 robust standard deviations off a fit in which far touches count little.
@@ -543,6 +600,13 @@ impl Search<'_> {
             .collect()
     }
 }
+
+/// More than this share of the touches is never left out: the rest is no longer what most of them say.
+const MOST_STRANGERS: f64 = 0.25;
+
+/// Touches that miss the model by five times their noise, in the square, without one that stands out may hide each other
+/// behind many gross ones.
+const GROSS2: f64 = 25.0;
 
 /// So often at most the directions that are seen are looked at again.
 const MOST_TURNS: usize = 8;

@@ -134,7 +134,9 @@ pub fn touch(bytes: &[u8], line_number: usize, table: &Table) -> Option<(RawTouc
         }
     };
     let n_axes = present.iter().filter(|p| **p).count();
-    if !(present[0] && present[1] && present[2]) || (table.check && off_sum(check? - sum, table.modulo) > table.room[n_axes]) {
+    if !(present[0] && present[1] && present[2])
+        || (table.check && off_sum(check? - sum, table.modulo) > table.room[n_axes])
+    {
         return None;
     }
     let used = bytes.len() - rest.len() + length;

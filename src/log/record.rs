@@ -203,15 +203,17 @@ fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Num
         Ok((rest, n)) if n.value.is_finite() => {
             let other = if rule.mark == b',' { b'.' } else { b',' };
             if rest.first() == Some(&other) {
+                let mark = other as char;
+                let what_to_do = match rule.other_mark {
+                    None => format!(
+                        "where a setting makes it write '{mark}', say other_decimal_mark = \"{mark}\" in [log] of its postprocessor file"
+                    ),
+                    Some(_) => "a log has one decimal mark, and its first touch has that one".to_owned(),
+                };
                 let message = format!(
-                    "{} has the decimal mark '{}', this controller writes '{}'. Where the control does write '{0}', say so in its file: {}",
+                    "{} has the decimal mark '{mark}', this controller writes '{}'; {what_to_do}",
                     show(&at[..word_length(at)]),
-                    other as char,
-                    rule.mark as char,
-                    match rule.other_mark {
-                        None => format!("[log] other_decimal_mark = \"{}\"", other as char),
-                        Some(_) => "one log has one mark, and its first touch has the other".to_owned(),
-                    }
+                    rule.mark as char
                 );
                 return fault("log::decimal_mark", message);
             }

@@ -13,7 +13,10 @@ use axiscal::tables::control::{self, Export, Options};
 
 /// The number behind a name and `=`.
 fn value(text: &str, name: &str) -> f64 {
-    let line = text.lines().find(|l| l.split('=').next().unwrap().trim() == name).unwrap_or_else(|| panic!("no {name}\n{text}"));
+    let line = text
+        .lines()
+        .find(|l| l.split('=').next().unwrap().trim() == name)
+        .unwrap_or_else(|| panic!("no {name}\n{text}"));
     line.split('=').nth(1).unwrap().split(';').next().unwrap().trim().parse().unwrap()
 }
 
@@ -120,15 +123,16 @@ fn fanuc_head_and_table_by_hand() {
     assert_eq!(text.split_once('\n').unwrap().1, expected);
 }
 
-/// By hand: A tilted by 0.02 deg about Z points along (cos, sin, 0), C by 0.01 deg about Y along (sin, 0, cos); the workpiece
-/// moves, so the control counts both against that (IM9 12/2017 p. 572).
+/// By hand: A tilted by 0.02 deg about Z points along (cos, sin, 0) = (0.999999939, 0.000349066, 0). C tilted by 0.01 deg about Y
+/// points along (sin, 0, cos) = (0.000174533, 0, 0.999999985) in what A carries, and A's tilt turns that about Z: its Y becomes
+/// 0.000174533 x 0.000349066 = 0.000000061. The workpiece moves, so the control counts both against that (IM9 12/2017 p. 572).
 #[test]
 fn tilted_directions_by_hand() {
     let planted = vec![("location-a", "EC0A", 0.02), ("location-c", "EB0C", 0.01)];
     let text = text(&export(&machine("trunnion"), "sinumerik", &planted, &accepting()), "axiscal_trafo.ini");
     let three = |name: &str| [0, 1, 2].map(|k| value(&text, &format!("$MC_TRAFO5_{name}_1[{k}]")));
     assert_eq!(three("AXIS1"), [-0.999_999_939, -0.000_349_066, 0.0]);
-    assert_eq!(three("AXIS2"), [-0.000_174_533, 0.0, -0.999_999_985]);
+    assert_eq!(three("AXIS2"), [-0.000_174_533, -0.000_000_061, -0.999_999_985]);
 }
 
 /// By hand: X that goes 20 um/m too far stands 20e-6 x off; a control that adds the table's value to the axis (Extended
@@ -154,7 +158,9 @@ fn the_sign_of_a_position_table_by_hand() {
 #[test]
 fn the_sheets_by_hand_round_trip_only() {
     let planted = vec![("location-a", "EY0A", 0.02), ("location-a", "EZ0A", -0.03), ("location-c", "EX0C", 0.01)];
-    let of = |machine: &Machine, control: &str| text(&export(machine, control, &planted, &accepting()), "axiscal_worksheet.txt");
+    let of = |machine: &Machine, control: &str| {
+        text(&export(machine, control, &planted, &accepting()), "axiscal_worksheet.txt")
+    };
     let trunnion = machine("trunnion");
     let sheet = of(&trunnion, "heidenhain");
     let three = |sheet: &str, what: &str| ["X", "Y", "Z"].map(|k| value(sheet, &format!("{what} {k}")));
@@ -191,7 +197,9 @@ fn fanuc_s_forms_are_read_back() {
         }];
         let of = |unit: LengthUnit| -> Export {
             let options = Options { unit, ..accepting() };
-            control::export(&machine, "fanuc", &tables("fanuc"), &correction(&machine, &planted, None), &options).unwrap().0
+            control::export(&machine, "fanuc", &tables("fanuc"), &correction(&machine, &planted, None), &options)
+                .unwrap()
+                .0
         };
         let (mm, inch) = (of(LengthUnit::Mm), of(LengthUnit::Inch));
         let values = |e: &Export, unit: f64| e.values.iter().map(|v| v.new * unit).collect::<Vec<_>>();

@@ -175,7 +175,8 @@ fn old_settings_of_haas_are_added_to_and_restored() {
     // another machine's
     let other = Old { values: [("SETTING 255".to_owned(), (4.0, None))].into() };
     let options = Options { old: other, ..accepting() };
-    let refused = control::export(&machine, "haas", &sheet, &correction(&machine, &planted, None), &options).unwrap_err();
+    let refused =
+        control::export(&machine, "haas", &sheet, &correction(&machine, &planted, None), &options).unwrap_err();
     assert!(refused.0.iter().any(|f| f.code == "tables::other_place"), "{refused}");
 }
 

@@ -98,7 +98,8 @@ impl MacroB {
 
     fn target(&self, words: &[Spoken], vm: &mut Vm) -> [Option<f64>; 6] {
         AxisName::ALL.map(|axis| {
-            let way = self.sense(axis) * self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
+            let way =
+                self.sense(axis) * self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
             Some(match (self.incremental, self.modulo[axis.index()]) {
                 (true, _) => vm.at.get(axis) + way,
                 (false, true) => self.turn(axis, way, vm),
@@ -349,7 +350,10 @@ impl Dialect for MacroB {
         }
         let awkward = start == Start::Awkward;
         let third = start == Start::Third;
-        let some = |values: [f64; 6]| if awkward { values } else { [0.0; 6] };
+        // an axis that the machine lacks has no offset
+        let some = |values: [f64; 6]| {
+            AxisName::ALL.map(|a| if awkward && numbers[a.index()].is_some() { values[a.index()] } else { 0.0 })
+        };
         Self {
             numbers,
             inch: awkward,
@@ -478,9 +482,9 @@ impl Dialect for MacroB {
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
         match var {
             Var::Number(n) if *n < 1000 => own(&self.own, var),
-            Var::Number(5021..=5026 | 5041..=5046) if self.ahead => {
-                Err(format!("{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"))
-            }
+            Var::Number(5021..=5026 | 5041..=5046) if self.ahead => Err(format!(
+                "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
+            )),
             Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
             Var::Name(_) => Err(format!("{var} is no variable")),
         }

@@ -112,7 +112,8 @@ impl Ngc {
         }
         if start == Start::Third {
             // the very coordinate system that a program may take for itself
-            ngc.modes = Modes { system: 8, feed_mode: 95, plane: 19, path: 61, tool_on: true, feed: 300.0, ..ngc.modes };
+            ngc.modes =
+                Modes { system: 8, feed_mode: 95, plane: 19, path: 61, tool_on: true, feed: 300.0, ..ngc.modes };
             ngc.systems[8] = [-3.5, 6.25, 12.5, 0.75, -1.25, 2.0, 0.0];
             ngc.acting = ngc.systems[8];
             ngc.tool = ngc.table;

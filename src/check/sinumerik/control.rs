@@ -470,7 +470,9 @@ impl Dialect for Sinumerik {
 
     fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String> {
         match var {
-            Var::Name(name) if name.starts_with("$AC_TIMER[") => self.timers.insert(var.clone(), vm.clock_s(TIMER_S) - value),
+            Var::Name(name) if name.starts_with("$AC_TIMER[") => {
+                self.timers.insert(var.clone(), vm.clock_s(TIMER_S) - value)
+            }
             Var::Name(name) if !name.starts_with('$') => self.own.insert(var.clone(), value),
             _ => return Err(format!("{var} cannot be written")),
         };

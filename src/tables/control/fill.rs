@@ -54,19 +54,17 @@ impl Filled {
         all(false) || (self.values.iter().any(|v| v.instead) && all(true))
     }
 
-    /// Names of the values that a person would have to give so that all of a set are known: of the set of which some are.
+    /// Names of the values that a person would have to give so that all of a set are known: of the set of which some are, as the
+    /// user's own are spelled.
     #[must_use]
-    pub fn lacking(&self) -> Vec<String> {
+    pub fn lacking(&self, old: &Old) -> Vec<String> {
         let begun = |instead: bool| self.values.iter().any(|v| v.instead == instead && v.known);
-        let of = |instead: bool| {
-            let lacks = self.values.iter().filter(move |v| v.instead == instead && !v.known);
-            lacks.filter_map(|v| v.names.values().next().cloned())
-        };
-        match (self.known(), begun(true) && !begun(false)) {
-            (true, _) => Vec::new(),
-            (_, true) => of(true).collect(),
-            _ => of(false).collect(),
-        }
+        let mut given = self.values.iter().flat_map(|v| &v.names).filter(|(_, name)| old.values.contains_key(*name));
+        let spelling = given.next().map(|(spelling, _)| spelling.as_str()).unwrap_or_default();
+        let name = |v: &Value| v.names.get(spelling).or(v.names.values().next()).cloned();
+        let instead = begun(true) && !begun(false);
+        let lacks = self.values.iter().filter(|v| v.instead == instead && !v.known);
+        if self.known() { Vec::new() } else { lacks.filter_map(name).collect() }
     }
 }
 
@@ -368,7 +366,11 @@ impl Question<'_> {
                 findings.push(
                     Finding::error(
                         "tables::other_place",
-                        format!("the old values place axis {} {:.3} mm from where the machine's description has it", line.axis, across.norm()),
+                        format!(
+                            "the old values place axis {} {:.3} mm from where the machine's description has it",
+                            line.axis,
+                            across.norm()
+                        ),
                     )
                     .help(OTHER_PLACE),
                 );

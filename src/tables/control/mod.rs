@@ -257,7 +257,7 @@ pub fn export(
         }
     }
     say_unverified(tables, kind, &filled, !grid_list.is_empty(), options, &mut findings);
-    let lacking = filled.lacking();
+    let lacking = filled.lacking(&options.old);
     if !options.old.values.is_empty() && !lacking.is_empty() {
         let says = format!(
             "the control's old values of {} are not known: they are taken from the machine's description and what was active",
