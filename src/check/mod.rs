@@ -244,7 +244,7 @@ fn with_parts(
                 .at(source, program.begins_in()),
         );
     }
-    let proof = proof::proof(told.runs.iter().chain(&told.refused));
+    let proof = proof::proof(told.runs.iter().chain(&told.others).chain(&told.refused));
     if let Some(plan) = against.plan {
         findings.extend(as_written(plan, post, &proof, first.map(|t| &t.trunk), source));
     }
