@@ -122,7 +122,7 @@ fn under_the_control_s_own_transformation() {
 fn inches() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "table", false);
-    for base in ["fanuc", "haas", "heidenhain"] {
+    for base in ["fanuc", "haas", "heidenhain", "linuxcnc", "sinumerik"] {
         for decimals in [4, 5] {
             let lines = format!(
                 "[number]\ndecimals = {decimals}\nunverified = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = 5\nunverified = \"ours\"\n"
@@ -231,4 +231,160 @@ fn a_number_that_has_lost_its_point_is_no_number() {
         let refused = check(&machine, &post, &source("p.nc", edited), &against).unwrap_err();
         assert!(refused.0[0].message.contains("decimal point"), "{:?}", refused.0);
     }
+}
+
+/// Findings of an edited program, by code.
+fn codes(post: &Postprocessor, machine: &Machine, generated: &Generated, text: &str) -> Vec<&'static str> {
+    let nc = post.program(machine, &generated.plan, &generated.path).unwrap();
+    let beside = nc.sources();
+    let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+    match check(machine, post, &source("edited", text), &against) {
+        Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
+        Err(failure) => failure.0.iter().map(|f| f.code).collect(),
+    }
+}
+
+/// The text without its `n`th line (from 0) that holds a word; block numbers are counted anew.
+fn without_line(post: &Postprocessor, text: &str, word: &str, n: usize) -> String {
+    let bare =
+        |l: &str| if post.block_numbers.is_some() { l.split_once(' ').unwrap().1.to_owned() } else { l.to_owned() };
+    let mut lines: Vec<String> = text.split_inclusive('\n').map(bare).collect();
+    let found: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].trim_end() == word).collect();
+    lines.remove(*found.get(n).unwrap_or_else(|| panic!("{} has {} lines {word:?}", post.name, found.len())));
+    let Some(rule) = &post.block_numbers else { return lines.concat() };
+    let number = |n: usize| rule.word.replace("{n}", &(rule.first + n * rule.step).to_string());
+    lines.iter().enumerate().map(|(n, l)| number(n) + l).collect()
+}
+
+/// `full` under each control's own transformation, where it takes it: stops for another stylus, and machines that LinuxCNC has no
+/// transformation for, are refused when the program is made.
+#[test]
+fn the_full_program_under_the_control_s_own_transformation() {
+    let mut proven = 0;
+    for name in ["swivel-head", "double-head", "trunnion", "swivel-table-b"] {
+        let machine = machine(name);
+        let generated = generated(&machine, "full", true);
+        for control in ["linuxcnc", "fanuc", "haas", "heidenhain", "sinumerik"] {
+            let post = controller(control);
+            match post.program(&machine, &generated.plan, &generated.path) {
+                Ok(_) => {
+                    is_clean(&post, &machine, &generated);
+                    proven += 1;
+                }
+                Err(failure) => {
+                    let head = control == "linuxcnc" && name.contains("head");
+                    assert!(head || failure.0[0].code == "post::other_stylus", "{control} {name}: {failure}");
+                }
+            }
+        }
+    }
+    println!("{proven} programs");
+    assert!(proven >= 12, "{proven}");
+}
+
+/// Functions are off and given back: one that the program has switched on itself, and one of before under which M128 would stand.
+#[test]
+fn the_transformation_is_switched_off_again() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", true);
+    let post = controller("heidenhain");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let of = |word: &str, n: usize| codes(&post, &machine, &generated, &without_line(&post, &text, word, n));
+    assert!(of("M129", 0).contains(&"check::not_run"), "{:?}", of("M129", 0));
+    assert!(of("M129", 1).contains(&"check::not_restored"), "{:?}", of("M129", 1));
+    for (control, off) in [("fanuc", "G49"), ("haas", "G49")] {
+        let post = controller(control);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let last = text.lines().filter(|l| *l == off).count() - 1;
+        let found = codes(&post, &machine, &generated, &without_line(&post, &text, off, last));
+        assert!(found.contains(&"check::not_restored"), "{control}: {found:?}");
+    }
+}
+
+/// A control reads macro statements ahead: without a block to wait the program would compute from where it has not arrived yet.
+#[test]
+fn a_block_to_wait_that_is_missing_is_found() {
+    let machine = machine("trunnion");
+    for (control, wait) in [("fanuc", "G4 P10"), ("haas", "G4 P0.1")] {
+        for tcp in [false, true] {
+            let post = controller(control);
+            let generated = generated(&machine, "basic", tcp);
+            let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+            let count = text.lines().filter(|l| *l == wait).count();
+            assert!(count >= 3, "{control}: {count}");
+            let lacking: Vec<usize> = (0..count)
+                .filter(|n| codes(&post, &machine, &generated, &without_line(&post, &text, wait, *n)).is_empty())
+                .collect();
+            println!("{control} tcp {tcp}: {count} blocks, without these it is the same: {lacking:?}");
+            // nothing is read between the first and the second one, but under the transformation
+            let free: &[usize] = if tcp { &[] } else { &[0] };
+            assert!(lacking.iter().all(|n| free.contains(n)), "{control} tcp {tcp}: {lacking:?} of {count}");
+        }
+    }
+}
+
+/// What a program finds: further work offsets, an offset of all, a local system, a mirror image.
+#[test]
+fn a_program_sees_what_acts_on_its_coordinates() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", false);
+    for control in ["fanuc", "haas"] {
+        let post = controller(control);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        // the guard against an offset that the program cannot take off
+        let guard = text.lines().find(|l| l.starts_with("IF[#4LT0.02]GOTO")).unwrap();
+        let unguarded = without(&text, guard, "GOTO9");
+        let found = codes(&post, &machine, &generated, &unguarded);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // an offset that is taken as it is, and is 0 in some state
+        let taken = text.lines().find(|l| l.starts_with("G52 X[")).unwrap();
+        let found = codes(&post, &machine, &generated, &text.replacen(taken, "G52 X0. Y0. Z0. A0. C0.", 1));
+        assert!(!found.is_empty(), "{control}");
+    }
+    // the user's further work offset comes back
+    let post = controller("fanuc");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let found = codes(&post, &machine, &generated, &without_line(&post, &text, "G54.1 P#16", 0));
+    assert!(found.contains(&"check::not_restored"), "{found:?}");
+    // Haas cannot give it back: the program does not begin
+    let post = controller("haas");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let found = codes(&post, &machine, &generated, &without(&text, "IF[#15LT59.5]", "GOTO9"));
+    assert!(found.contains(&"check::not_restored"), "{found:?}");
+}
+
+/// The time goes on while a program runs: one that writes another time, or none, shows.
+#[test]
+fn times_follow_the_run() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", false);
+    for control in ["fanuc", "haas"] {
+        let post = controller(control);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        assert!(text.contains("*T#8[50]"), "{control}");
+        // the program begins before midnight: without the day that is added its time would go back
+        let found =
+            codes(&post, &machine, &generated, &text.replace("#8=#8-86400.*FIX[#8/86400.]\n", "#8=#8-86400.\n"));
+        assert!(found.contains(&"check::log"), "{control}: {found:?}");
+        let found = codes(&post, &machine, &generated, &text.replace("#8=#3012\n", "#8=0.\n"));
+        assert!(found.contains(&"check::log"), "{control}: {found:?}");
+        // the user's file may say that none is wanted; the log then has none
+        let silent = variant(control, "[settings]\ntime = \"no\"\n");
+        is_clean(&silent, &machine, &generated);
+        assert!(!silent.log.writes_time && post.log.writes_time);
+        let text = silent.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        assert!(!text.contains("#3012") && !text.contains("*T#8"));
+    }
+}
+
+/// A spindle that is not turned as planned, on controls whose word for it is a setting.
+#[test]
+fn the_spindle_is_oriented() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "full", false);
+    let post = controller("fanuc");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let turned = text.lines().filter(|l| l.starts_with("M19 R")).nth(1).unwrap().to_owned();
+    let found = codes(&post, &machine, &generated, &text.replacen(&format!("{turned}\n"), "M19 R77.\n", 1));
+    assert!(found.contains(&"check::not_the_plan"), "{turned}: {found:?}");
 }

@@ -233,9 +233,13 @@ fn words(text: &str, axis: char) -> Vec<f64> {
 fn a_machine_in_inches_gets_inches_everywhere() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "head", false);
-    for (base, word) in
-        [("sinumerik", "G700"), ("fanuc", "G20"), ("haas", "G20"), ("heidenhain", "BEGIN PGM HEAD INCH")]
-    {
+    for (base, word) in [
+        ("sinumerik", "G700"),
+        ("fanuc", "G20"),
+        ("haas", "G20"),
+        ("heidenhain", "BEGIN PGM HEAD INCH"),
+        ("linuxcnc", "G20"),
+    ] {
         let metric = written(&controller(base), &machine, &generated);
         let lines = "[number]\ndecimals = 5\nunverified = \"an inch machine of ours\"\n[log]\nunit = \"inch\"\ndecimals = 5\nunverified = \"an inch machine of ours\"\n";
         let post = variant(base, lines);

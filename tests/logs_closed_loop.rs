@@ -100,7 +100,8 @@ fn through_the_log(post: &Postprocessor, machine: &Machine, plan: &Plan, raw: &[
         if post.log.time_word.is_some()
             && let (Some(read), Some(made)) = (touch.time_s, made.time_s)
         {
-            assert!((read - made).abs() <= half, "{touch:?}");
+            let half_tick = 0.5001 * 10f64.powi(-i32::try_from(post.log.time_decimals).unwrap());
+            assert!((read - made).abs() <= half_tick, "{touch:?}");
         }
     }
     read.touches

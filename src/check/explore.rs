@@ -4,7 +4,7 @@
 //! the way, contact at once, a block that stands off, a probe that does not close again, a search and a measuring touch
 //! that disagree, a person who breaks the program off. A branch is followed until the program ends or moves on.
 
-use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Trouble, Vm};
+use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Start, Trouble, Vm};
 use super::world::way_mm;
 use std::collections::BTreeMap;
 
@@ -56,6 +56,8 @@ pub struct Branch {
 pub struct Told {
     /// Set-up at which it was told to begin.
     pub from: u32,
+    /// In what state it found the control.
+    pub start: Start,
     /// What happened when all was as it should be.
     pub trunk: Vec<Happened>,
     /// What is mounted at each event.
@@ -124,6 +126,7 @@ pub fn explore<'p, D: Dialect>(
     run.keeps_forks = limits.is_some();
     let mut told = Told {
         from,
+        start: Start::Fresh,
         trunk: Vec::new(),
         parts: Vec::new(),
         branches: Vec::new(),

@@ -3,8 +3,10 @@
 //! Shapes and the proof that a move is clear are those of [`crate::program`]; the order of moves, what a touch is and what
 //! must happen when something goes wrong are judged here, from what the program did and not from how it was made.
 
-use super::explore::{Branch, Told};
-use super::run::{Alarm, Event, Happened, Probe, Rate};
+use super::branches::branch_stops;
+use super::explore::Told;
+use super::run::{Event, Happened, Probe, Rate};
+use super::settings::settings_return;
 use super::touches::{Made, against_plan};
 use super::world::World;
 use crate::axes::{AxisMap, AxisName, Position};
@@ -40,6 +42,8 @@ pub struct Case<'a> {
     pub mountings: &'a [&'a Mounting],
     /// A person may start it from anywhere only when this holds.
     pub clear_from_anywhere: bool,
+    /// The settings of a control as it is switched on.
+    pub neutral: &'a BTreeMap<String, String>,
 }
 
 /// Findings of one kind that are shown; the rest is counted.
@@ -77,8 +81,8 @@ impl Said {
     }
 }
 
-/// Judges all runs. The first one is the whole program.
-pub fn judge(case: &Case<'_>, runs: &[Told]) -> Vec<Finding> {
+/// Judges all runs. The first one is the whole program; of the others only what they leave to the user.
+pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told]) -> Vec<Finding> {
     let mut said = Said::default();
     let mut proofs: BTreeMap<Key, Proof> = BTreeMap::new();
     for told in runs {
@@ -91,6 +95,7 @@ pub fn judge(case: &Case<'_>, runs: &[Told]) -> Vec<Finding> {
         }
         settings_return(case, told, &mut said);
     }
+    others.iter().for_each(|told| settings_return(case, told, &mut said));
     let proofs: Vec<(Key, Proof)> = proofs.into_iter().collect();
     let hits: Vec<(Range<usize>, &'static str, String)> =
         proofs.par_iter().filter_map(|(_, proof)| proof.check(case)).collect();
@@ -589,123 +594,5 @@ fn stops_by_itself(told: &Told) -> bool {
     told.from == 1 && waits && closed != Some(true)
 }
 
-// ------------------------------------------------------------------------------------------------------ branches
-
-/// When something went wrong the program must say so and stay where it is.
-fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) {
-    use super::explore::Deviation;
-    if !branch.deviation.must_stop() {
-        return;
-    }
-    let Some(first) = branch.trace.first() else { return };
-    let what = match branch.deviation {
-        Deviation::Contact(part) if part > 0.0 => "contact on the way",
-        Deviation::Contact(_) => "the probe is triggered before this move",
-        Deviation::Miss => "no contact up to the end",
-        Deviation::Shift(_) => "the block stands off by more than the placement tolerance",
-        Deviation::Disagree(_) => "search and measuring touch disagree",
-        Deviation::Stuck => "the probe does not close again",
-        Deviation::Deflected => "the probe is deflected before the move",
-        Deviation::NotWritten => "a line cannot be written into the log",
-    };
-    let mut complain = |at: &Range<usize>, says: &str| {
-        said.say(case, "check::goes_on", at, format!("{what}: {says}"), "the program must say what is wrong and stop");
-    };
-    if let Some(fault) = &branch.fault {
-        complain(&fault.at, &fault.says);
-        return;
-    }
-    let stuck = branch.deviation == Deviation::Stuck;
-    let moves = branch.trace.iter().skip(1).find(|h| match &h.event {
-        Event::Move { from, to, .. } => !(stuck && goes_back(branch, from, to)),
-        // with the probe deflected a search ends where it begins
-        Event::Probe { probe, outcome, .. } => {
-            !(stuck && (outcome.part == 0.0 || goes_back(branch, &probe.from, &probe.to)))
-        }
-        _ => false,
-    });
-    if let Some(moves) = moves {
-        complain(&moves.at, "the program moves on");
-        return;
-    }
-    if !branch.over {
-        complain(&first.at, "the program goes on");
-        return;
-    }
-    let shows =
-        |h: &Happened| matches!(&h.event, Event::Message(t) | Event::Wait(t) | Event::Abort(t) if !t.is_empty());
-    if !branch.trace.iter().any(shows) {
-        complain(&first.at, "no message is shown");
-    }
-    let last_line = told.trunk.iter().rev().find_map(|h| match &h.event {
-        Event::Log(text) => Some(text),
-        _ => None,
-    });
-    let logs_end = |h: &Happened| matches!((&h.event, last_line), (Event::Log(t), Some(l)) if t == l);
-    if told.fault.is_none() && branch.trace.iter().any(logs_end) {
-        complain(&first.at, "the log is closed as if the program were complete");
-    }
-    let ends_well = matches!(branch.trace.last().map(|h| &h.event), Some(Event::End));
-    let stops = |h: &Happened| matches!(&h.event, Event::Wait(_) | Event::Abort(_));
-    if ends_well && !branch.trace.iter().any(stops) {
-        complain(&first.at, "the program ends as if it were complete");
-    }
-    let alarmed = branch.trace.iter().any(
-        |h| matches!(&h.event, Event::Probe { probe, outcome, .. } if probe.alarm == Alarm::AtEvent && outcome.hit),
-    );
-    let mut after = branch.settings.clone();
-    if alarmed {
-        // the package's own alarm: what it leaves is the package's, and the postprocessor file says what that is
-        let calls = case.post.check.as_ref().map(|c| c.calls.as_slice()).unwrap_or_default();
-        after.retain(|name, _| !calls.iter().any(|c| c.leaves.contains(name)));
-    }
-    compare_settings(case, &told.settings[0], &after, &first.at, what, said);
-}
-
 /// How far a way back may lead sideways: its words are rounded, and it may be short, mm.
-const SIDEWAYS_MM: f64 = 0.002;
-
-/// Does a move go back from where the branch began?
-fn goes_back(branch: &Branch, from: &Position, to: &Position) -> bool {
-    let Some(Event::Probe { probe, .. }) = branch.trace.first().map(|h| &h.event) else { return false };
-    let along = probe.to.xyz_mm() - probe.from.xyz_mm();
-    let way = to.xyz_mm() - from.xyz_mm();
-    let turned = from.0[3..] != to.0[3..];
-    !turned && way.dot(&along) <= 0.0 && way.cross(&along).norm() <= (1e-3 * way.norm() + SIDEWAYS_MM) * along.norm()
-}
-
-// ------------------------------------------------------------------------------------------------------ settings
-
-fn settings_return(case: &Case<'_>, told: &Told, said: &mut Said) {
-    if told.fault.is_some() {
-        return;
-    }
-    let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
-    compare_settings(case, &told.settings[0], &told.settings[1], &end, "at the end", said);
-    let kept = case.post.check.as_ref().map(|c| c.after_abort.as_slice()).unwrap_or_default();
-    for (place, after) in &told.aborted {
-        let at = told.trunk.get(*place).map_or(0..0, |h| h.at.clone());
-        let what = "broken off here by hand, then started once more to give the settings back";
-        let after: BTreeMap<String, String> =
-            after.iter().filter(|(name, _)| kept.contains(name)).map(|(n, v)| (n.clone(), v.clone())).collect();
-        compare_settings(case, &told.settings[0], &after, &at, what, said);
-    }
-}
-
-fn compare_settings(
-    case: &Case<'_>,
-    before: &BTreeMap<String, String>,
-    after: &BTreeMap<String, String>,
-    at: &Range<usize>,
-    when: &str,
-    said: &mut Said,
-) {
-    let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
-    for (name, value) in after {
-        if before.get(name) != Some(value) && !left.contains(name) {
-            let was = before.get(name).map_or("nothing", String::as_str);
-            let says = format!("{when}: the user's setting is not given back: {name}: {was} before, {value} after");
-            said.say(case, "check::not_restored", at, says, "");
-        }
-    }
-}
+pub const SIDEWAYS_MM: f64 = 0.002;

@@ -9,6 +9,7 @@
 //! program was made; shapes and the proof of a single move come from [`crate::program`], contacts from
 //! [`crate::simulate`].
 
+mod branches;
 mod code;
 mod explore;
 mod heidenhain;
@@ -20,8 +21,10 @@ mod proof;
 mod run;
 mod runs;
 mod seconds;
+mod settings;
 mod sinumerik;
 mod touches;
+mod vm;
 mod world;
 
 use crate::diag::{Failure, Finding, Result, Source};
@@ -228,8 +231,9 @@ fn with_parts(
         source,
         same,
         clear_from_anywhere: told.clear_from_anywhere,
+        neutral: &told.neutral,
     };
-    let mut findings = judge::judge(&case, &told.runs);
+    let mut findings = judge::judge(&case, &told.runs, &told.others);
     findings.extend(
         told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
     );
@@ -240,7 +244,7 @@ fn with_parts(
                 .at(source, program.begins_in()),
         );
     }
-    let proof = proof::proof(told.runs.iter().chain(&told.refused));
+    let proof = proof::proof(told.runs.iter().chain(&told.others).chain(&told.refused));
     if let Some(plan) = against.plan {
         findings.extend(as_written(plan, post, &proof, first.map(|t| &t.trunk), source));
     }

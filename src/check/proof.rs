@@ -1,9 +1,10 @@
 //! What a program does, as a text and as a digest: two programs with one digest move identically.
 //!
-//! "Identically" means: in the run from the beginning and in the runs from each set-up, the same moves in the same order
-//! (targets to 0.001 µm, rapid or feed, stopping at contact or not), the same lines in the same logs, the same messages, stops,
-//! orientations and other functions; and the same, from each probing move on, when the probe triggers early, late, not at
-//! all, does not close again, or when the block stands off; and the same settings left to the user each time.
+//! "Identically" means: in the run from the beginning, whatever state it finds the control in, and in the runs from each
+//! set-up, the same moves in the same order (targets to 0.001 µm, rapid or feed, stopping at contact or not), the same lines in
+//! the same logs, the same messages, stops, orientations and other functions; and the same, from each probing move on, when the
+//! probe triggers early, late, not at all, does not close again, or when the block stands off; and the same settings left to
+//! the user each time.
 
 use super::explore::{Branch, Told};
 use super::run::{Event, Happened, Rate};

@@ -4,254 +4,14 @@
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
 use super::code::{Code, Piece, Statement, Values, Var, What, Word};
-use super::world::World;
-use crate::axes::{AxisName, Position};
+use super::vm;
+use crate::axes::Position;
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Arc;
 
-/// How fast a move is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Rate {
-    /// As fast as the machine can; each axis by itself unless the control says otherwise.
-    Rapid,
-    /// mm/min, or deg/min where only rotary axes move.
-    Feed(f64),
-}
-
-/// A move that the probe may end.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Probe {
-    /// Where it begins: the control's coordinates in machine coordinates.
-    pub from: Position,
-    /// Where it ends if nothing happens.
-    pub to: Position,
-    /// mm/min
-    pub feed: f64,
-    /// It ends at contact; `false`: it ends when contact is lost.
-    pub toward: bool,
-    /// The place from which each axis comes is known.
-    pub known: [bool; 6],
-    /// The operator's feed override acts on it.
-    pub overridden: bool,
-    /// When the control itself breaks the program off.
-    pub alarm: Alarm,
-}
-
-/// When a control breaks a program off at a move that the probe may end, with an alarm of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Alarm {
-    /// The program has to look.
-    Never,
-    /// When the event for which it waits does not come.
-    WithoutEvent,
-    /// When it does: a guarded move of a macro package.
-    AtEvent,
-}
-
-impl Alarm {
-    /// How it stands in a proof.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Never => "false",
-            Self::WithoutEvent => "true",
-            Self::AtEvent => "at the event",
-        }
-    }
-
-    /// Does it come?
-    pub fn comes(self, outcome: Outcome) -> bool {
-        match self {
-            Self::Never => false,
-            Self::WithoutEvent => !outcome.hit,
-            Self::AtEvent => outcome.hit,
-        }
-    }
-}
-
-/// How a move that the probe may end did end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
-    /// The event that it waited for came.
-    pub hit: bool,
-    /// Which part of the way was made, 0 to 1.
-    pub part: f64,
-}
-
-/// Something that a person or a machine would notice.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Event {
-    /// A move that does not look at the probe.
-    Move {
-        /// From where.
-        from: Position,
-        /// To where.
-        to: Position,
-        /// How fast.
-        rate: Rate,
-        /// The place from which each axis comes is known.
-        known: [bool; 6],
-        /// Corners are driven to: the next move begins where this one ends.
-        exact: bool,
-        /// The axes that the block names.
-        named: [bool; 6],
-    },
-    /// A move that looked at the probe.
-    Probe {
-        /// As it was programmed.
-        probe: Probe,
-        /// How it ended.
-        outcome: Outcome,
-        /// The place that the control keeps of it.
-        latched: Position,
-    },
-    /// The control itself went back from where the probe had triggered, as a part of the same block.
-    Release {
-        /// From the contact.
-        from: Position,
-        /// To where it then stands.
-        to: Position,
-    },
-    /// A log was opened.
-    LogOpen {
-        /// Its name.
-        name: String,
-        /// What it held is kept.
-        append: bool,
-    },
-    /// A line went into the log.
-    Log(String),
-    /// The log was closed.
-    LogClose,
-    /// A message was shown.
-    Message(String),
-    /// The program waited for a person, with this text.
-    Wait(String),
-    /// The program was broken off.
-    Abort(String),
-    /// The spindle was turned to an angle, deg.
-    Orient(f64),
-    /// Something else that the machine does, by its word.
-    Other(String),
-    /// The program ended.
-    End,
-}
-
-/// An event with its place in the program.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Happened {
-    /// Bytes of the text.
-    pub at: Range<usize>,
-    /// What.
-    pub event: Event,
-}
-
-/// The axes, the record of what happened, and what a dialect needs of both.
-#[derive(Debug, Clone)]
-pub struct Vm {
-    /// Machine coordinates.
-    pub at: Position,
-    /// Axes whose place the program knows because it has sent them there.
-    pub known: [bool; 6],
-    /// What happened.
-    pub trace: Vec<Happened>,
-    /// The statement that is being done.
-    pub place: Range<usize>,
-    /// Which axes the machine has.
-    pub axes: [bool; 6],
-    /// Where the blocks are.
-    pub world: Arc<World>,
-    /// What is mounted.
-    pub part: usize,
-    /// The first stop only says what must be mounted.
-    pub stop_is_reminder: bool,
-    /// The probe does not close any more.
-    pub stuck: bool,
-    /// How much further along X, Y, Z the blocks seem to stand, mm.
-    pub shift: [f64; 3],
-    /// Searches that found a face since the last line of the log.
-    pub hits: usize,
-    /// An axis has moved since the last stop.
-    pub moved: bool,
-    /// The program has looked at the probe since the last move.
-    pub asked: bool,
-    /// The angles near which axes that count from 0 to 360 are counted when they first move, deg.
-    pub turned_near: Position,
-}
-
-impl Vm {
-    /// Is the probe deflected here?
-    pub fn deflected(&self) -> bool {
-        self.stuck || self.world.touches(self.part, &self.at, &self.shift)
-    }
-
-    /// Notes an event.
-    pub fn note(&mut self, event: Event) {
-        self.asked &= !matches!(event, Event::Move { .. } | Event::Probe { .. });
-        match &event {
-            // several stops without a move between them are one
-            Event::Wait(_) if self.moved => {
-                self.moved = false;
-                if !std::mem::take(&mut self.stop_is_reminder) {
-                    self.part = (self.part + 1).min(self.world.last_part());
-                }
-            }
-            Event::Log(_) => self.hits = 0,
-            Event::Move { .. } | Event::Release { .. } => self.moved = true,
-            Event::Probe { probe, outcome, .. } => {
-                self.moved = true;
-                self.hits += usize::from(probe.toward && outcome.hit);
-            }
-            _ => {}
-        }
-        self.trace.push(Happened { at: self.place.clone(), event });
-    }
-
-    /// A move that does not look at the probe.
-    pub fn go(&mut self, to: &[Option<f64>; 6], rate: Rate, exact: bool) -> Result<(), String> {
-        self.refuse_missing(to)?;
-        let from = self.at;
-        let known = self.known;
-        let mut end = from;
-        for axis in AxisName::ALL {
-            if let Some(value) = to[axis.index()] {
-                end.set(axis, value);
-                self.known[axis.index()] = true;
-            }
-        }
-        self.at = end;
-        self.note(Event::Move { from, to: end, rate, known, exact, named: to.map(|v| v.is_some()) });
-        Ok(())
-    }
-
-    /// No move has an axis that the machine lacks, or a number that is none.
-    pub fn refuse_missing(&self, to: &[Option<f64>; 6]) -> Result<(), String> {
-        for axis in AxisName::ALL {
-            let Some(value) = to[axis.index()] else { continue };
-            if !self.axes[axis.index()] {
-                return Err(format!("the machine has no axis {axis}"));
-            }
-            if !value.is_finite() || value.abs() > 1e6 {
-                return Err(format!("{axis} is sent to {value}"));
-            }
-        }
-        Ok(())
-    }
-
-    /// The end of a probing move.
-    pub fn target(&self, to: &[Option<f64>; 6]) -> Result<Position, String> {
-        self.refuse_missing(to)?;
-        let mut end = self.at;
-        for axis in AxisName::ALL {
-            if let Some(value) = to[axis.index()] {
-                end.set(axis, value);
-            }
-        }
-        Ok(end)
-    }
-}
+pub use vm::{Alarm, Event, Happened, Outcome, Probe, Rate, Vm};
 
 /// Where a run rests.
 #[derive(Debug, Clone, PartialEq)]
@@ -280,6 +40,10 @@ pub enum Start {
     Fresh,
     /// Every mode otherwise than the program needs it, every offset set.
     Awkward,
+    /// What neither of the two has: modes and coordinate systems of which a control has more than two.
+    Third,
+    /// Something acts on the program's coordinates that none of its words takes off: it must see that and not move.
+    Obstructed,
 }
 
 /// The language of a control: what words, variables and G numbers mean.
@@ -310,7 +74,11 @@ pub trait Dialect: Clone + Send + Sync {
     ///
     /// # Errors
     /// When it cannot be.
-    fn write(&mut self, var: &Var, value: f64) -> Result<(), String>;
+    fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String>;
+    /// Must a program look whether its coordinates are those of the axes, because it cannot switch off all that acts on them?
+    fn sees_offsets(&self) -> bool {
+        false
+    }
     /// A move ended: where its result is kept.
     fn probed(&mut self, probe: &Probe, outcome: Outcome, stands: &Position);
     /// The control latches all axes at the contact and lets them run out behind it; `false`: a cycle that keeps X, Y, Z and itself
@@ -557,11 +325,11 @@ impl<'p, D: Dialect> Run<'p, D> {
             }
             What::Set(var, expr) => {
                 let value = self.value(expr)?;
-                self.dialect.write(var, value)?;
+                self.dialect.write(var, value, &self.vm)?;
             }
             What::SetIndirect(number, expr) => {
                 let (number, value) = (self.value(number)?, self.value(expr)?);
-                self.dialect.write(&super::code::numbered(number)?, value)?;
+                self.dialect.write(&super::code::numbered(number)?, value, &self.vm)?;
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
@@ -609,7 +377,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                     return Err(format!("the log {name} is thrown away after something was written into it"));
                 }
                 self.deleted.insert(name);
-                self.dialect.write(error, 0.0)?;
+                self.dialect.write(error, 0.0, &self.vm)?;
             }
             What::Abort(text) => {
                 let text = self.text(text)?;
@@ -625,7 +393,7 @@ impl<'p, D: Dialect> Run<'p, D> {
         let (name, text) = (self.text(name)?, self.text(text)?);
         if self.log_is_full {
             self.vm.note(Event::Other(format!("no line goes into {name}")));
-            return self.dialect.write(error, FULL);
+            return self.dialect.write(error, FULL, &self.vm);
         }
         self.fork(Trouble::LogFull);
         if self.writes_to.as_ref() != Some(&name) {
@@ -633,7 +401,7 @@ impl<'p, D: Dialect> Run<'p, D> {
             self.writes_to = Some(name);
         }
         self.vm.note(Event::Log(text));
-        self.dialect.write(error, 0.0)
+        self.dialect.write(error, 0.0, &self.vm)
     }
 
     fn say(&mut self, text: &[Piece], event: fn(String) -> Event) -> Result<(), String> {

@@ -13,6 +13,7 @@ use crate::post::{CheckRule, DialectName, Postprocessor};
 use crate::program::plan::Plan;
 use crate::program::scene::Scene;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -109,6 +110,10 @@ fn compared(condition: &Expr, var: &Var, found: &mut dyn FnMut(f64)) {
 pub struct All {
     /// The first is that of the whole program.
     pub runs: Vec<Told>,
+    /// Whole runs that find the control in other states.
+    pub others: Vec<Told>,
+    /// The settings of a control as it is switched on.
+    pub neutral: BTreeMap<String, String>,
     /// Runs that find the machine where the program must not begin.
     pub refused: Vec<Told>,
     /// What is wrong in the comparison of runs.
@@ -174,41 +179,50 @@ impl<'a, D: Dialect> Runs<'a, D> {
         };
         let last = self.codes.len();
         // the whole run, the same from elsewhere, and each set-up but the first
-        let numbers: Vec<(usize, Start, bool)> = [(1, Start::Awkward, true), (1, Start::Fresh, false)]
-            .into_iter()
-            .chain((2..=last).map(|k| (k, Start::Awkward, true)))
-            .collect();
+        let numbers: Vec<(usize, Start, bool)> =
+            [(1, Start::Awkward, true), (1, Start::Fresh, false), (1, Start::Third, false)]
+                .into_iter()
+                .chain((2..=last).map(|k| (k, Start::Awkward, true)))
+                .collect();
         let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
         let mut runs: Vec<Told> = numbers
             .par_iter()
             .map(|(k, start, forks)| {
-                let at = if *start == Start::Fresh { elsewhere } else { beginning };
+                let at = if *start == Start::Awkward { beginning } else { elsewhere };
                 self.told(*k, *start, at, forks.then_some(limits))
             })
             .collect();
         let mut findings = Vec::new();
-        let fresh = if runs.len() > 1 { Some(runs.remove(1)) } else { None };
+        let others: Vec<Told> = runs.drain(1..3.min(runs.len())).collect();
         let stops = runs.first().map_or(0, |t| stops(&t.trunk));
-        if let (Some(awkward), Some(fresh)) = (runs.first(), fresh) {
-            findings.extend(otherwise(awkward, &fresh));
+        if let Some(awkward) = runs.first() {
+            for other in &others {
+                findings.extend(otherwise(awkward, other).filter(|_| !stays(other)));
+            }
+            // the same finding in two states is one
+            findings.dedup();
         }
         let refused = self.refused(beginning);
         findings.extend(refused.iter().filter_map(moves_all_the_same));
-        All { runs, refused, findings, setups: self.program.setups, stops, clear_from_anywhere }
+        let neutral = D::begin(Start::Fresh, self.post, self.machine).settings();
+        All { runs, others, neutral, refused, findings, setups: self.program.setups, stops, clear_from_anywhere }
     }
 
-    /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere.
+    /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And one in
+    /// which the program's coordinates are not those of the axes, where the program must look.
     fn refused(&self, beginning: Position) -> Vec<Told> {
         const ELSEWHERE_DEG: f64 = 0.01;
-        if !self.tcp() {
-            return Vec::new();
-        }
+        let obstructed = D::begin(Start::Obstructed, self.post, self.machine)
+            .sees_offsets()
+            .then(|| self.told(1, Start::Obstructed, beginning, None));
         let elsewhere = |axis: AxisName, by: f64| {
             let mut at = beginning;
             at.set(axis, at.get(axis) + by);
             self.told(1, Start::Awkward, at, None)
         };
-        self.machine.rotary().flat_map(|a| [ELSEWHERE_DEG, -ELSEWHERE_DEG].map(|by| elsewhere(a.name, by))).collect()
+        let rotary = self.machine.rotary().filter(|_| self.tcp());
+        let turned = rotary.flat_map(|a| [ELSEWHERE_DEG, -ELSEWHERE_DEG].map(|by| elsewhere(a.name, by)));
+        turned.chain(obstructed).collect()
     }
 
     fn tcp(&self) -> bool {
@@ -255,6 +269,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             moved: true,
             asked: false,
             turned_near,
+            seconds: 0.0,
         };
         Run::new(code, D::begin(start, self.post, self.machine), vm)
     }
@@ -274,7 +289,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let part = if k == 1 || parts == 1 { 0 } else { self.part_of(code, from, start, at, parts) };
         let run = self.run(code, start, at, part, k > 1 && parts > 1);
         let probes = if k > 1 { Limits::PROBES_AFTER_RESTART } else { usize::MAX };
-        explore(run, from, limits.map(|l| Limits { probes, ..l }), &restart)
+        Told { start, ..explore(run, from, limits.map(|l| Limits { probes, ..l }), &restart) }
     }
 
     /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.
@@ -393,9 +408,23 @@ impl<'a, D: Dialect> Runs<'a, D> {
 
 /// It begins where it must not.
 fn moves_all_the_same(told: &Told) -> Option<(Range<usize>, String)> {
-    let moves = told.trunk.iter().find(|h| matches!(h.event, Event::Move { .. } | Event::Probe { .. }))?;
-    let says = "under the control's own transformation the program must not move unless the rotary axes stand at 0: begun with one at 0.01 deg, it does";
+    let moves = told.trunk.iter().find(|h| is_motion(h))?;
+    let says = if told.start == Start::Obstructed {
+        "with a mirror image left on by the user (G51.1), which the program's words do not take off, it moves: it must first see that its coordinates are those of the axes"
+    } else {
+        "under the control's own transformation the program must not move unless the rotary axes stand at 0: begun with one at 0.01 deg, it does"
+    };
     Some((moves.at.clone(), says.to_owned()))
+}
+
+fn is_motion(happened: &Happened) -> bool {
+    matches!(happened.event, Event::Move { .. } | Event::Probe { .. })
+}
+
+/// It says that it cannot begin so, and moves nothing.
+fn stays(told: &Told) -> bool {
+    let says = |h: &Happened| matches!(&h.event, Event::Wait(t) | Event::Abort(t) | Event::Message(t) if !t.is_empty());
+    told.fault.is_none() && !told.trunk.iter().any(is_motion) && told.trunk.iter().any(says)
 }
 
 /// Stops of a run: several without a move between them are one.

@@ -117,6 +117,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
     }
     // the line of each touch, by the number of the line
     let by_line = |line: usize| made.iter().find(|m| lines.get(line - 1).is_some_and(|(at, _)| **at == m.at));
+    times(case, &parsed.touches, &lines, said);
     let mut ids = Vec::new();
     let mut met: BTreeSet<(usize, &str)> = BTreeSet::new();
     for raw in &parsed.touches {
@@ -155,6 +156,36 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
         }
     }
     order(case, told, &ids, &end, said);
+}
+
+/// Where the log has times, each touch has one, it goes on as the run does, and it does not jump.
+fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &str)], said: &mut Said) {
+    // no touch with the way to it takes as long
+    const LONGEST_S: f64 = 3600.0;
+    if !case.post.log.writes_time {
+        return;
+    }
+    let mut before = 0.0;
+    for touch in touches {
+        let place = lines.get(touch.line.saturating_sub(1)).map_or(0..0, |(at, _)| (*at).clone());
+        let id = touch.id.unwrap_or_default();
+        match touch.time_s {
+            None => said.say(case, "check::log", &place, format!("touch {id} has no time in the log"), ""),
+            Some(time) => {
+                if !(before..before + LONGEST_S).contains(&time) {
+                    let says = format!("touch {id}: the log gives {time} s, {before} s for the one before it");
+                    said.say(case, "check::log", &place, says, "");
+                }
+                before = time;
+            }
+        }
+    }
+    // a clock that stands still is none
+    let first = touches.first().and_then(|t| t.time_s).unwrap_or(0.0);
+    if touches.len() > 2 && before <= first {
+        let place = lines.last().map_or(0..0, |(at, _)| (*at).clone());
+        said.say(case, "check::log", &place, "the times in the log stand still".to_owned(), "");
+    }
 }
 
 /// The whole log must read as that of a complete run of this plan.
@@ -305,8 +336,10 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
     for (axis, sense) in planned.from.iter() {
         need(made.senses.get(axis) == Some(sense), format!("axis {axis} came in another sense than planned"));
     }
-    if let (Some(deg), true) = (planned.spindle_deg, orients(case)) {
-        let wanted = (deg * case.machine.tool.spindle_sense).rem_euclid(360.0);
+    // a touch that says nothing stands at 0, where the plan turns the spindle at all
+    let turns = case.plan.is_some_and(|p| p.touches.iter().any(|t| t.spindle_deg.is_some()));
+    if turns && orients(case) {
+        let wanted = (planned.spindle_deg.unwrap_or(0.0) * case.machine.tool.spindle_sense).rem_euclid(360.0);
         let found = made.spindle_deg.map(|d| d.rem_euclid(360.0));
         let off = found.map_or(360.0, |f| (f - wanted).abs());
         need(off.min(360.0 - off) <= case.same, format!("the spindle is not oriented to {wanted} deg"));
@@ -316,5 +349,5 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
 
 /// Some machines cannot orient the spindle: the user's setting says so.
 fn orients(case: &Case<'_>) -> bool {
-    case.post.settings.get("orient").is_none_or(|o| o == "yes")
+    case.post.settings.get("orient").is_none_or(|o| !matches!(o.as_str(), "" | "no"))
 }

@@ -96,22 +96,25 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         keep_inputs(file, own.into_iter().flatten())?;
     }
     let name = format!("{}.{}", spec.name, nc.extension);
-    let proof = prove(&machine, &post, &generated.plan, &name, &nc, io)?;
+    let proven = prove(&machine, &post, &generated.plan, &name, &nc, io)?;
+    // the figure of `check`, move by move as this control makes them, and what a person needs at the stops
+    let seconds = proven.as_ref().map_or(generated.path.seconds, |(_, s)| s + generated.path.waiting);
     // the same touches for another control: what was proven of its program stays known
     if let Some(old) = old_programs(&plan_file, &generated.plan) {
         generated.plan.programs = old;
     }
-    generated.plan.programs.extend(proof.map(|p| (post.name.clone(), p)));
+    generated.plan.programs.extend(proven.map(|(p, _)| (post.name.clone(), p)));
     files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
     for (file, text) in &files {
         files::write_whole(file, text.as_bytes())?;
     }
     let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
-    summary(&machine, &post, &generated, (&written, &plan_file), io);
+    summary(&machine, &post, &generated, seconds, (&written, &plan_file), io);
     Ok(Answer::Done)
 }
 
-/// Reads the program back and proves it: what cannot be proven is not written.
+/// Reads the program back and proves it: what cannot be proven is not written. What it does, and its run time without the
+/// stops, s.
 ///
 /// # Errors
 /// When the program holds anything that `check` refuses.
@@ -122,7 +125,7 @@ pub(super) fn prove(
     name: &str,
     nc: &NcProgram,
     io: &Io,
-) -> Result<Option<Proof>> {
+) -> Result<Option<(Proof, f64)>> {
     if post.check.is_none() {
         let what = format!(
             "controller {} does not say how its programs are read back: the program was not checked",
@@ -144,7 +147,7 @@ pub(super) fn prove(
         );
         return Err(Failure(findings));
     }
-    Ok(Some(checked.proof))
+    Ok(Some((checked.proof, checked.seconds)))
 }
 
 /// What was proven of other programs for the same plan.
@@ -259,6 +262,7 @@ fn summary(
     machine: &Machine,
     post: &Postprocessor,
     generated: &Generated,
+    seconds: f64,
     (files, plan_file): (&[&PathBuf], &PathBuf),
     io: &Io,
 ) {
@@ -275,7 +279,7 @@ fn summary(
         plan.touches.len(),
         machine.name,
         plan.mounting,
-        program::duration(path.seconds)
+        program::duration(seconds)
     ));
     let stops: Vec<&Stop> =
         path.steps.iter().filter_map(|s| if let Step::Stop(stop) = s { Some(stop) } else { None }).collect();
@@ -319,7 +323,7 @@ fn summary(
         "mounting": plan.mounting,
         "controller_frame": plan.controller_frame,
         "touches": plan.touches.len(),
-        "time_s": path.seconds,
+        "time_s": seconds,
         "stops": stops.iter().map(|s| json!({
             "says": s.says, "mounting": s.mounting, "tool_length_mm": s.tool_length_mm, "ball_radius_mm": s.ball_radius_mm,
         })).collect::<Vec<_>>(),

@@ -412,7 +412,7 @@ fn write(
     let name = format!("{}.{}", plan.program, nc.extension);
     let proof = super::generate::prove(&loaded.machine, post, plan, &name, &nc, io)?;
     let mut proven = plan.clone();
-    proven.programs.extend(proof.map(|p| (post.name.clone(), p)));
+    proven.programs.extend(proof.map(|(p, _)| (post.name.clone(), p)));
     files::write_whole(plan_file, proven.to_json().as_bytes())?;
     files::write_whole(&form_file, chosen.text.as_bytes())?;
     for (name, text) in nc.files(&plan.program) {

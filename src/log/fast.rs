@@ -5,7 +5,7 @@
 //! Digits are read eight at a time, as one 64-bit word.
 
 use super::lines::line_end;
-use super::record::sum_room;
+use super::record::{off_sum, sum_room};
 use super::touch::{RawTouch, Status};
 use super::words::POWERS;
 use crate::axes::{AxisName, Position};
@@ -28,6 +28,8 @@ enum Word {
 pub struct Table {
     words: [Word; 256],
     decimals: Option<usize>,
+    time_decimals: usize,
+    modulo: Option<f64>,
     mark: u8,
     check: bool,
     room: [f64; 7],
@@ -52,6 +54,8 @@ impl Table {
         Self {
             words,
             decimals: rule.exact_decimals.then_some(rule.decimals),
+            time_decimals: rule.time_decimals,
+            modulo: rule.check_modulo,
             mark: rule.mark,
             check: rule.check_word.is_some(),
             room: std::array::from_fn(|n_axes| sum_room(rule, n_axes)),
@@ -118,7 +122,7 @@ pub fn touch(bytes: &[u8], line_number: usize, table: &Table) -> Option<(RawTouc
                 rest = tail;
             }
             Word::Time => {
-                let (value, tail) = decimal(after, table)?;
+                let (value, tail) = time(after, table)?;
                 time_s = Some(value);
                 sum += value;
                 rest = tail;
@@ -130,7 +134,9 @@ pub fn touch(bytes: &[u8], line_number: usize, table: &Table) -> Option<(RawTouc
         }
     };
     let n_axes = present.iter().filter(|p| **p).count();
-    if !(present[0] && present[1] && present[2]) || (table.check && (check? - sum).abs() > table.room[n_axes]) {
+    if !(present[0] && present[1] && present[2])
+        || (table.check && off_sum(check? - sum, table.modulo) > table.room[n_axes])
+    {
         return None;
     }
     let used = bytes.len() - rest.len() + length;
@@ -182,6 +188,20 @@ fn digits(bytes: &[u8]) -> Option<(u64, usize, &[u8])> {
 fn decimal<'a>(bytes: &'a [u8], table: &Table) -> Option<(f64, &'a [u8])> {
     let ((value, decimals), rest) = any_decimal(bytes, table.mark)?;
     table.decimals.is_none_or(|d| d == decimals).then_some((value, rest))
+}
+
+/// A time: with the decimals of its own, or with those of all other numbers.
+#[inline]
+fn time<'a>(bytes: &'a [u8], table: &Table) -> Option<(f64, &'a [u8])> {
+    if table.time_decimals == 0 {
+        let (value, count, rest) = digits(blanks(bytes))?;
+        if count > 0 && count < 8 && rest.first() != Some(&table.mark) {
+            return Some((value as f64, rest));
+        }
+    }
+    let ((value, decimals), rest) = any_decimal(bytes, table.mark)?;
+    let known = decimals == table.time_decimals || table.decimals.is_none_or(|d| d == decimals);
+    known.then_some((value, rest))
 }
 
 /// A number with a mark and its count of decimals.

@@ -171,7 +171,7 @@ fn with_its_mark<'r>(
             let finding = Finding::info("log::other_decimal_mark", message)
                 .help("a setting of the control chooses it; the log is read with it");
             findings.push(places.at(finding, at..at + 1));
-            Cow::Owned(LogRule { mark: other, other_mark: None, ..rule.clone() })
+            Cow::Owned(LogRule { mark: other, other_mark: Some(rule.mark), ..rule.clone() })
         }
         _ => Cow::Borrowed(rule),
     }

@@ -138,7 +138,9 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
             });
         } else if Some(*letter) == rule.time_word {
             // any clock, any zero
-            exact(line, word, width, value, rule)?;
+            if value.decimals.unwrap_or(0) != rule.time_decimals {
+                exact(line, word, width, value, rule)?;
+            }
             time_s = Some(value.value);
             sum += value.value;
         } else {
@@ -158,7 +160,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
     }
     if let Some(letter) = rule.check_word {
         let (check, word, width) = check.ok_or_else(|| lacks(&format!("its sum {}", letter as char)))?;
-        if (check - sum).abs() > sum_room(rule, present.iter().filter(|p| **p).count()) {
+        if off_sum(check - sum, rule.check_modulo) > sum_room(rule, present.iter().filter(|p| **p).count()) {
             let message = format!("the numbers add up to {sum:.6}, the line says {check:.6}: it was damaged or edited");
             return Err(Fault::at(line, word, width, "log::sum", message));
         }
@@ -166,12 +168,20 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
     Ok(RawTouch { id: Some(id), position, present, status, time_s, temperature_deg_c: None, line: line_number })
 }
 
+/// How far a sum is off the one that it should be; whole multiples of the modulo do not count.
+#[inline]
+pub fn off_sum(difference: f64, modulo: Option<f64>) -> f64 {
+    modulo.map_or(difference, |m| difference - (difference / m).round() * m).abs()
+}
+
 /// How far the sum that a line gives may be from the sum of its numbers.
 ///
 /// Every position, a time and the sum itself are rounded by at most half a digit; with a little room for the doubles.
 pub fn sum_room(rule: &LogRule, n_axes: usize) -> f64 {
-    let rounded = n_axes as f64 + 1.0 + if rule.time_word.is_some() { 1.0 } else { 0.0 };
-    rounded * (0.505 * 10f64.powi(-i32::try_from(rule.decimals).unwrap_or(0))) + 1e-9
+    let half = |decimals: usize| 0.505 * 10f64.powi(-i32::try_from(decimals).unwrap_or(0));
+    // a control that counts whole ticks adds those that it writes: only digits behind the positions' own are rounded
+    let time = if rule.time_word.is_some() { half(rule.decimals) } else { 0.0 };
+    (n_axes as f64 + 1.0) * half(rule.decimals) + time + 1e-9
 }
 
 fn axis_of(letter: u8) -> Option<AxisName> {
@@ -193,10 +203,16 @@ fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Num
         Ok((rest, n)) if n.value.is_finite() => {
             let other = if rule.mark == b',' { b'.' } else { b',' };
             if rest.first() == Some(&other) {
+                let mark = other as char;
+                let what_to_do = match rule.other_mark {
+                    None => format!(
+                        "where a setting makes it write '{mark}', say other_decimal_mark = \"{mark}\" in [log] of its postprocessor file"
+                    ),
+                    Some(_) => "a log has one decimal mark, and its first touch has that one".to_owned(),
+                };
                 let message = format!(
-                    "{} has the decimal mark '{}', this controller writes '{}'",
+                    "{} has the decimal mark '{mark}', this controller writes '{}'; {what_to_do}",
                     show(&at[..word_length(at)]),
-                    other as char,
                     rule.mark as char
                 );
                 return fault("log::decimal_mark", message);

@@ -355,9 +355,14 @@ pub struct Log {
     /// Letter of the word with the time of the touch, s since the program began, where the control can give it.
     #[schemars(with = "Option<String>")]
     pub time_word: Option<Spanned<String>>,
+    /// Digits after the decimal mark of a time, where they are others than those of positions; 0: whole seconds.
+    pub time_decimals: Option<usize>,
     /// Letter of the word with the sum of all other numbers of the line, where the control can write one.
     #[schemars(with = "Option<String>")]
     pub check_word: Option<Spanned<String>>,
+    /// Whole multiples of this are taken off the sum, where its field has no room for all of it.
+    #[schemars(with = "Option<f64>")]
+    pub check_modulo: Option<Spanned<f64>>,
     /// A file of nothing but columns, where the control has such a log of its own.
     pub columns: Option<Columns>,
     /// Document and page, public file, or observation.
@@ -436,9 +441,12 @@ pub struct Check {
     /// Settings that a run behind the last set-up gives back after a person has broken the program off.
     #[serde(default)]
     pub after_abort: Vec<String>,
-    /// Settings of the control that the program leaves changed, by the names that `check` gives them.
+    /// Settings of the control that the program leaves off, whatever they were before, by the names that `check` gives them.
     #[serde(default)]
     pub leaves: Vec<String>,
+    /// The G number of the further work offsets, which are chosen with P: only of Fanuc (54.1) and Haas (154).
+    #[schemars(with = "Option<f64>")]
+    pub further_offsets: Option<Spanned<f64>>,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.

@@ -10,6 +10,9 @@ use std::ops::Range;
 use toml::Spanned;
 
 const FORMAT: &str = "axiscal-postprocessor/1";
+/// G numbers of the work offsets beyond G59.
+const FANUC_OFFSETS: f64 = 54.1;
+const HAAS_OFFSETS: f64 = 154.0;
 
 /// Reads and checks a postprocessor file that is complete by itself.
 ///
@@ -25,7 +28,8 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     check.head(&file);
     let number = check.number(&file.number, file.log.unit);
     let comment = check.comment(&file.comment);
-    let log = check.log(&file.log);
+    // a file whose setting `time` is "no" writes no time
+    let log = check.log(&file.log, file.settings.get("time").is_none_or(|t| t != "no"));
     let result = check.result(&file.result);
     let tcp = file.tcp.as_ref().map(|tcp| {
         check.origin("tcp", &tcp.source, &tcp.unverified, &tcp.rotary_step.span());
@@ -58,6 +62,13 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
             dialect: c.dialect,
             from: c.from.get_ref().clone(),
             leaves: c.leaves.clone(),
+            further_offsets: c.further_offsets.as_ref().map_or(FANUC_OFFSETS, |g| {
+                if ![FANUC_OFFSETS, HAAS_OFFSETS].contains(g.get_ref()) {
+                    let says = format!("further_offsets is {}", g.get_ref());
+                    check.error(&g.span(), "post::further_offsets", says, "54.1 (Fanuc) or 154 (Haas)");
+                }
+                *g.get_ref()
+            }),
             after_abort: c.after_abort.clone(),
             calls: c.call.clone(),
             log_always_open: c.log_always_open,
@@ -210,7 +221,7 @@ impl Check<'_> {
         AxisName::ALL.into_iter().zip(places).filter_map(|(a, p)| p.clone().map(|p| (a, p))).collect()
     }
 
-    fn log(&mut self, log: &w::Log) -> LogRule {
+    fn log(&mut self, log: &w::Log, writes_time: bool) -> LogRule {
         self.origin("log", &log.source, &log.unverified, &log.file.span());
         if log.end_of_line.is_empty() {
             let help = "name at least one of \"lf\", \"crlf\", \"cr\"";
@@ -229,6 +240,15 @@ impl Check<'_> {
             let help = "two words of a line need two letters";
             self.error(&word.span(), "post::word", "time_word is check_word".into(), help);
         }
+        let check_modulo = log.check_modulo.as_ref().and_then(|modulo| {
+            let good = *modulo.get_ref() >= 100.0 && modulo.get_ref().is_finite();
+            if !good {
+                let message = format!("check_modulo is {}", modulo.get_ref());
+                let help = "a round number, at least 100: the first that the field of the sum cannot hold";
+                self.error(&modulo.span(), "post::check_modulo", message, help);
+            }
+            good.then_some(*modulo.get_ref())
+        });
         let whole_places = log.whole_places.as_ref().map_or(0, |places| {
             if *places.get_ref() > 12 {
                 let message = format!("whole_places is {}", places.get_ref());
@@ -271,7 +291,10 @@ impl Check<'_> {
             prefix: log.prefix.clone(),
             skip: log.skip.clone(),
             time_word,
+            time_decimals: log.time_decimals.map_or(self.decimals(&log.decimals), |d| d.min(9)),
+            writes_time: time_word.is_some() && writes_time,
             check_word,
+            check_modulo,
             columns,
         }
     }
@@ -313,7 +336,7 @@ impl Check<'_> {
             self.template(&mut env, name, &Spanned::new(part.template.span(), lines));
         }
         for (index, companion) in file.companion.iter().enumerate() {
-            let entry = format!("companion {}", companion.name.get_ref());
+            let entry = format!("companion {}", without_places(companion.name.get_ref()));
             self.origin(&entry, &companion.source, &companion.unverified, &companion.template.span());
             self.template(&mut env, &format!("companion {index} name"), &companion.name);
             self.template(&mut env, &format!("companion {index}"), &companion.template);
@@ -331,6 +354,13 @@ impl Check<'_> {
             self.error(&text.span(), "post::template", message, help);
         }
     }
+}
+
+/// A name with `...` where its template fills something in.
+fn without_places(template: &str) -> String {
+    let mut parts = template.split("{{");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |name, part| name + "..." + part.split_once("}}").map_or("", |(_, rest)| rest))
 }
 
 /// A number without its sign.

@@ -107,9 +107,11 @@ impl Postprocessor {
                 // writing into a String cannot fail
                 let _ = write!(line, " {axis}{}", self.log.number(shown.get(*axis)));
             }
-            let time_s = record.time_s.filter(|_| self.log.time_word.is_some());
+            // the sum is that of the numbers as they stand in the line
+            let tick = 0.1_f64.powi(i32::try_from(self.log.time_decimals).unwrap_or(0));
+            let time_s = record.time_s.filter(|_| self.log.writes_time).map(|t| (t / tick).round() * tick);
             if let (Some(letter), Some(time)) = (self.log.time_word, time_s) {
-                let _ = write!(line, " {}{}", letter as char, self.log.number(time));
+                let _ = write!(line, " {}{}", letter as char, self.log.number_of(time, self.log.time_decimals));
             }
             if let Some(letter) = self.log.check_word {
                 // ids are small: a double holds them
@@ -117,6 +119,7 @@ impl Postprocessor {
                     + f64::from(status)
                     + axes.iter().map(|a| shown.get(*a)).sum::<f64>()
                     + time_s.unwrap_or(0.0);
+                let sum = self.log.check_modulo.map_or(sum, |modulo| sum % modulo);
                 let _ = write!(line, " {}{}", letter as char, self.log.number(sum));
             }
             lines.push(line);
@@ -135,7 +138,11 @@ impl LogRule {
     /// A number as the control writes it into its log: rounded, padded, with its mark; never `-0`.
     #[must_use]
     pub fn number(&self, value: f64) -> String {
-        let mut digits = format!("{:.*}", self.decimals, value.abs());
+        self.number_of(value, self.decimals)
+    }
+
+    fn number_of(&self, value: f64, decimals: usize) -> String {
+        let mut digits = format!("{value:.decimals$}", value = value.abs());
         let negative = value < 0.0 && digits.bytes().any(|b| (b'1'..=b'9').contains(&b));
         if self.mark == b',' {
             digits = digits.replace('.', ",");

@@ -115,8 +115,10 @@ pub struct CheckRule {
     pub after_abort: Vec<String>,
     /// What the macros of a package do.
     pub calls: Vec<CallRule>,
-    /// Settings that the program leaves changed.
+    /// Settings that the program leaves off.
     pub leaves: Vec<String>,
+    /// The G number of the further work offsets.
+    pub further_offsets: f64,
 }
 
 /// How a log is called and read.
@@ -148,8 +150,14 @@ pub struct LogRule {
     pub skip: Vec<String>,
     /// Letter of the word with the time, s since the program began.
     pub time_word: Option<u8>,
+    /// Digits after the decimal mark of a time.
+    pub time_decimals: usize,
+    /// The program writes the time with each touch: a setting of the postprocessor file may say no.
+    pub writes_time: bool,
     /// Letter of the word with the sum of all other numbers of the line: it shows a damaged digit.
     pub check_word: Option<u8>,
+    /// Whole multiples of this are taken off the sum.
+    pub check_modulo: Option<f64>,
     /// A file of nothing but columns.
     pub columns: Option<ColumnRule>,
 }

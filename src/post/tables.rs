@@ -29,6 +29,8 @@ pub enum Point {
     /// On the line of the second one.
     #[serde(rename = "tool-2")]
     Tool2,
+    /// On the line of the first rotary axis of the workpiece side, where the second one passes it.
+    WorkpieceCrossing,
     /// Where tool lengths are measured from: the adapter in the spindle.
     ToolAdapter,
 }
@@ -189,6 +191,9 @@ pub struct VectorForm {
     pub reversed: bool,
     /// Is minus the sum of these vectors.
     pub close: Option<Vec<String>>,
+    /// Some software of the control has this one in place of all others.
+    #[serde(default)]
+    pub instead: bool,
     /// Document and page.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -272,7 +277,7 @@ impl Point {
             Self::Workpiece2 => Some(Turn::Workpiece2),
             Self::Tool1 => Some(Turn::Tool1),
             Self::Tool2 => Some(Turn::Tool2),
-            Self::MachineZero | Self::ToolAdapter => None,
+            Self::MachineZero | Self::WorkpieceCrossing | Self::ToolAdapter => None,
         }
     }
 }
@@ -285,6 +290,7 @@ impl std::fmt::Display for Point {
             Self::Workpiece2 => "the second axis of the table",
             Self::Tool1 => "the first axis of the head",
             Self::Tool2 => "the second axis of the head",
+            Self::WorkpieceCrossing => "where the axes of the table cross",
             Self::ToolAdapter => "the tool adapter",
         })
     }
@@ -377,10 +383,11 @@ pub(super) fn check(check: &mut Check, tables: &Tables) {
             }
             if let (Some(from), Some(to)) = (v.from, v.to) {
                 let of_head = |p: Point| matches!(p, Point::Tool1 | Point::Tool2 | Point::ToolAdapter);
-                if of_head(from) != of_head(to) || to.turn().is_none() {
+                let crosses = to == Point::WorkpieceCrossing && v.instead && kind.workpiece == 2;
+                if of_head(from) != of_head(to) || (to.turn().is_none() && !crosses) {
                     wrong(
                         of(&format!("vector {:?} leads from {from} to {to}", v.id)),
-                        "head and table are two chains; a vector leads to an axis",
+                        "head and table are two chains; a vector leads to an axis, or, with instead = true, to where two of them cross",
                     );
                 }
             }

@@ -33,6 +33,8 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 pub(super) struct Clock {
     /// s
     pub(super) seconds: f64,
+    /// Of which a person needs, s.
+    pub(super) waiting: f64,
 }
 
 impl Clock {
@@ -58,7 +60,9 @@ impl Clock {
 
     /// The program stands while blocks or stylus are changed.
     pub(super) fn stop(&mut self, blocks: bool, stylus: bool) {
-        self.seconds += if blocks { MOUNTING_S } else { 0.0 } + if stylus { STYLUS_S } else { 0.0 };
+        let waiting = if blocks { MOUNTING_S } else { 0.0 } + if stylus { STYLUS_S } else { 0.0 };
+        self.seconds += waiting;
+        self.waiting += waiting;
     }
 
     /// A touch up to its measuring trigger.

@@ -110,8 +110,10 @@ pub struct Path {
     pub head: Vec<String>,
     /// The steps.
     pub steps: Vec<Step>,
-    /// Predicted run time, s.
+    /// Predicted run time, s; with what a person needs at the stops.
     pub seconds: f64,
+    /// What a person needs at the stops, s: assumed.
+    pub waiting: f64,
     /// What is mounted up to the first stop, one line each; empty where the program does not stop.
     pub mounted: Vec<String>,
     /// Where the rotary axes must stand at the start; `None`: anywhere.

@@ -80,6 +80,7 @@ pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec) -> Re
     }
     router.leave();
     router.out.path.seconds = router.clock.rounded_s();
+    router.out.path.waiting = router.clock.waiting;
     if router.part > 0 {
         router.out.path.mounted = layout.parts.first().map(mounted).unwrap_or_default();
     }

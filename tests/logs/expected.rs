@@ -14,7 +14,7 @@ const CASES: &[Case] = &[
     case("bad/cr-only.log", Some("1 2 3"), &["log::line_ends 1:54"], "the lines end with CR alone; linuxcnc writes others"),
     case("bad/cut.csv", Some("1"), &["log::not_understood 3:1", "log::missing"], "3 fields, the header has 4 (the file is cut off here); the line is"),
     case("bad/decimal-commas.csv", Some("2"), &["log::not_understood 2:1", "log::missing"], "5 fields, the header has 4 (decimal commas? then separate the fields"),
-    case("bad/decimal-commas.log", None, &["log::decimal_mark 2:10", "log::decimal_mark 3:10", "log::decimal_mark 4:10", "log::nothing 1:1"], "\"28,000000\" has the decimal mark ',', this controller writes '.'; the"),
+    case("bad/decimal-commas.log", None, &["log::decimal_mark 2:10", "log::decimal_mark 3:10", "log::decimal_mark 4:10", "log::nothing 1:1"], "\"28,000000\" has the decimal mark ',', this controller writes '.'; where a setting makes it write ',', say other_decimal_mark = \",\" in [log]"),
     case("bad/edited-digit.log", Some("1 3"), &["log::sum 3:60", "log::missing"], "the numbers add up to 44.100000, the line says 44.000000: it was"),
     case("bad/edited-id.log", Some("1 3"), &["log::sum 3:60", "log::missing"], "the numbers add up to 45.000000, the line says 44.000000: it was"),
     case("bad/empty.log", None, &["log::empty 1:1"], "bad/empty.log:1:1: the log is empty"),

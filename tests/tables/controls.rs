@@ -5,14 +5,13 @@ use crate::support::{MACHINES, Spread, catalogue, machine};
 use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::fit::outcome::Status;
-use axiscal::machine::{Carrier, Machine, Side};
+use axiscal::machine::{self, Carrier, Machine, Side};
 use axiscal::model::catalogue::Catalogue;
 use axiscal::post::Postprocessor;
-use axiscal::post::tables::{LengthUnit, Tables};
+use axiscal::post::tables::Tables;
 use axiscal::program::plan::{ControllerFrame, Plan};
 use axiscal::simulate::{self, Compensation, Scenario};
 use axiscal::tables::compensation::{self, Provenance};
-use axiscal::tables::control::backup::{self, Old};
 use axiscal::tables::control::{self, Export, Options};
 use axiscal::tables::correction::Correction;
 use axiscal::tables::kins::{Errors, Kins};
@@ -82,7 +81,7 @@ pub fn loaded(machine: &Machine, export: &Export, instead: Option<(&str, &str)>)
 }
 
 /// Touches under the transformation at points and poses that no program has, blocks on what turns last.
-fn plan(machine: &Machine, seed: u64) -> Plan {
+pub fn plan(machine: &Machine, seed: u64) -> Plan {
     let last = machine.side(Side::Workpiece).last().unwrap().name;
     let borne = |m: &&axiscal::machine::Mounting| m.carrier == Carrier::Axis(last) || !last.is_rotary();
     let mounting = machine.mountings.iter().find(borne).unwrap();
@@ -93,7 +92,7 @@ fn plan(machine: &Machine, seed: u64) -> Plan {
 }
 
 /// Recorded less nominal along the search, mm.
-fn readings(machine: &Machine, plan: &Plan, scenario: &Scenario, c: Option<&Compensation>) -> Vec<f64> {
+pub fn readings(machine: &Machine, plan: &Plan, scenario: &Scenario, c: Option<&Compensation>) -> Vec<f64> {
     let (raw, _) = simulate::run(machine, plan, scenario, c).unwrap();
     raw.iter()
         .map(|r| {
@@ -182,18 +181,22 @@ fn way(machine: &Machine, control: &str, planted: &Planted, plan: &Plan) -> (f64
 /// For each control, parameter and sign: every touch reads what was foretold; what is carried is gone to the control's
 /// resolution, what is not is said.
 fn every_parameter(name: &str, controls: [&str; 2], at_least: usize) {
-    let (catalogue, machine) = (catalogue(), machine(name));
-    let plan = plan(&machine, 7);
+    every_parameter_of(&machine(name), controls, at_least);
+}
+
+fn every_parameter_of(machine: &Machine, controls: [&str; 2], at_least: usize) {
+    let (catalogue, name) = (catalogue(), machine.name.as_str());
+    let plan = plan(machine, 7);
     let (mut carried, mut told) = (0, BTreeMap::new());
     for control in controls {
-        if control::kind_of(&machine, &tables(control)).is_err() {
+        if control::kind_of(machine, &tables(control)).is_err() {
             assert!(control == "haas" && machine.side(Side::Tool).any(|a| a.name.is_rotary()), "{control} {name}");
             continue;
         }
-        for (effect, parameter, length) in parameters(&catalogue, &machine) {
+        for (effect, parameter, length) in parameters(&catalogue, machine) {
             for sign in [1.0, -1.0] {
                 let value = sign * if length { 0.05 } else { 0.02 };
-                let (before, after, export) = way(&machine, control, &vec![(effect, &parameter, value)], &plan);
+                let (before, after, export) = way(machine, control, &vec![(effect, &parameter, value)], &plan);
                 let of = format!("{control} {name} {parameter} ({effect}) {value}");
                 if export.left.is_empty() {
                     // half a step in each of several components, and angles of 0.0005 deg at some 100 mm
@@ -220,6 +223,34 @@ fn every_parameter(name: &str, controls: [&str; 2], at_least: usize) {
     }
     println!("{name}: {carried} carried; said to be left: {told:?}");
     assert!(carried >= at_least, "{carried}");
+}
+
+/// Axes that count the other way, and a machine zero that is not R's origin: the same must come back.
+fn counting_otherwise(name: &str) -> Machine {
+    let (before, own) = machine::BUILT_IN.split_once(&format!("name = \"{name}\"")).unwrap();
+    let (own, after) = own.split_once("[machine.tool]").unwrap();
+    let own = own.replace("\nsense = 1\n", "\nsense = -1\n");
+    let own = own.replacen("X = 0.0, Y = 0.0, Z = 0.0,", "X = 100.0, Y = -50.0, Z = 30.0,", 1);
+    let text = format!("{before}name = \"{name}\"{own}[machine.tool]{after}");
+    let (machines, _) = machine::load(&source("machines.toml", text)).unwrap();
+    let found = machines.into_iter().find(|m| m.name == name).unwrap();
+    assert!(found.rotary().all(|a| a.sense < 0.0) && found.origin.get(AxisName::X) == Some(100.0));
+    found
+}
+
+#[test]
+fn every_parameter_of_a_table_that_counts_otherwise_comes_back() {
+    let trunnion = counting_otherwise("trunnion");
+    every_parameter_of(&trunnion, DOCUMENTED, 24);
+    every_parameter_of(&trunnion, ROUND_TRIP_ONLY, 14);
+}
+
+#[test]
+fn every_parameter_of_a_head_that_counts_otherwise_comes_back() {
+    let swivel = counting_otherwise("swivel-head");
+    every_parameter_of(&swivel, DOCUMENTED, 24);
+    every_parameter_of(&swivel, ROUND_TRIP_ONLY, 10);
+    every_parameter_of(&counting_otherwise("double-head"), DOCUMENTED, 24);
 }
 
 #[test]
@@ -392,76 +423,6 @@ fn swivel_data_do_what_machine_data_do() {
     }
 }
 
-/// By hand from IM9 03/2013 p. 502 and 12/2017 p. 572, for the trunnion: axes through (0, 0, -250), pivot at 0, A about X
-/// and C about Z, both turning the table right-handed. EY0A = 0.02, EZ0A = -0.03, EX0C = 0.01.
-/// I2 = reference point to A = (0, 0.02, -250.03). C has moved with A, and by its own 0.01: I3 = A to C = (0.01, 0, 0).
-/// I4 = -(I2 + I3). The workpiece moves, so V1 = -X, V2 = -Z.
-#[test]
-fn sinumerik_by_hand() {
-    let machine = machine("trunnion");
-    let planted = vec![("location-a", "EY0A", 0.02), ("location-a", "EZ0A", -0.03), ("location-c", "EX0C", 0.01)];
-    let export = export(&machine, "sinumerik", &planted, &accepting());
-    let text = text(&export, "axiscal_tcarr.ini");
-    let value = |n: usize| -> f64 {
-        let line = text.lines().find(|l| l.starts_with(&format!("$TC_CARR{n}[1]="))).unwrap();
-        line.split('=').nth(1).unwrap().split(';').next().unwrap().trim().parse().unwrap()
-    };
-    let three = |n| [value(n), value(n + 1), value(n + 2)];
-    assert_eq!(three(4), [0.0, 0.02, -250.03]);
-    assert_eq!(three(15), [0.01, 0.0, 0.0]);
-    assert_eq!(three(18), [-0.01, -0.02, 250.03]);
-    assert_eq!((three(7), three(10)), ([-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
-    assert!(text.contains("$TC_CARR23[1]=\"P\""));
-}
-
-/// By hand, swivel-head (kind M): B through (0, 0, 0) with the pivot there, so the adapter stands on it: I2 = 0. EX0B is
-/// behind the rotation: the ball stands 0.02 further in X, so the axis lies 0.02 less far: I2 = (-0.02, 0, 0), I1 = (0.02,
-/// 0, 0). Counted from the ball, C lies 0.02 less far too, and 0.05 further by EX0C: I3 = (0.03, 0, 0), I4 = (-0.03, 0, 0).
-#[test]
-fn a_head_and_a_table_by_hand() {
-    let machine = machine("swivel-head");
-    let planted = vec![("location-b", "EX0B", 0.02), ("location-c", "EX0C", 0.05)];
-    let text = text(&export(&machine, "sinumerik", &planted, &accepting()), "axiscal_trafo.ini");
-    for line in [
-        "$MC_TRAFO5_BASE_TOOL_1[0]=-0.020000 ",
-        "$MC_TRAFO5_JOINT_OFFSET_1[0]=0.020000 ",
-        "$MC_TRAFO5_JOINT_OFFSET_PART_1[0]=0.030000 ",
-        "$MC_TRAFO5_PART_OFFSET_1[0]=-0.030000 ",
-        "$MC_TRAFO5_AXIS1_1[1]=1.000000000 ",
-        "$MC_TRAFO5_AXIS2_1[2]=-1.000000000 ",
-    ] {
-        assert!(text.contains(line), "{line}\n{text}");
-    }
-}
-
-/// By hand from A-79348E p. 82: table position = a point of A in machine coordinates, 19703.. = from A to B(=C).
-#[test]
-fn fanuc_by_hand() {
-    let machine = machine("trunnion");
-    let planted = vec![("location-a", "EY0A", 0.0204), ("location-c", "EX0C", 0.0106)];
-    let export = export(&machine, "fanuc", &planted, &accepting());
-    let text = text(&export, "axiscal_parameters.txt");
-    let (title, text) = text.split_once('\n').unwrap();
-    for word in ["%", "STUDY.TOML", "0123ABCD", "2026-11-20"] {
-        assert!(title.contains(word), "{title}");
-    }
-    let expected =
-        "N19700Q1M0.000;\nN19701Q1M0.020;\nN19702Q1M-250.000;\nN19703Q1M0.011;\nN19704Q1M0.000;\nN19705Q1M0.000;\n%\n";
-    assert_eq!(text, expected);
-    assert!(self::text(&export, "axiscal_g10.nc").contains("G10 L52\nN19700 R0.000\n"));
-    // inch: the letter says it, and the control reads the same place
-    let inch = control::export(
-        &machine,
-        "fanuc",
-        &tables("fanuc"),
-        &correction(&machine, &planted, None),
-        &Options { unit: LengthUnit::Inch, ..accepting() },
-    )
-    .unwrap()
-    .0;
-    assert!(self::text(&inch, "axiscal_parameters.txt").contains("N19702Q1I-9.8425;"));
-}
-
 /// Run-out of C (C next to the linear axes): a position table; the control adds it by C's angle.
 #[test]
 fn run_out_and_positioning_become_position_tables() {
@@ -507,168 +468,6 @@ fn run_out_and_positioning_become_position_tables() {
         assert_eq!(fanuc.left.len(), planted.len(), "{:?}", fanuc.left);
         assert!(fanuc.left.iter().all(|l| l.left_um.is_some_and(|um| um > 1.0)), "{:?}", fanuc.left);
     }
-}
-
-/// Extended Functions 03/2013 p. 264: X from -585 to -5 mm with a step of 58 mm has 11 points.
-#[test]
-fn points_of_a_position_table_by_hand() {
-    let machine = machine("trunnion");
-    let mut lines = String::from("CHANDATA(1)\n");
-    for t in 0..2 {
-        for n in 0..11 {
-            lines += &format!("$AN_CEC[{t},{n}]={}\n", (n as f64 - 5.0) * 0.001 * if t == 0 { 1.0 } else { -1.0 });
-        }
-        for (what, value) in [
-            ("INPUT_AXIS", "(AX1)"),
-            ("OUTPUT_AXIS", "(AX1)"),
-            ("STEP", "58"),
-            ("MIN", "-585"),
-            ("MAX", "-5"),
-            ("MULT_BY_TABLE", "0"),
-            ("IS_MODULO", "0"),
-        ] {
-            lines += &format!("$AN_CEC_{what}[{t}]={value}\n");
-        }
-        lines += &format!("$AN_CEC_DIRECTION[{t}]={}\n", if t == 0 { 1 } else { -1 });
-    }
-    let trafo =
-        text(&export(&machine, "sinumerik", &vec![("location-c", "EX0C", 0.01)], &accepting()), "axiscal_trafo.ini");
-    let json =
-        text(&export(&machine, "sinumerik", &vec![("location-c", "EX0C", 0.01)], &accepting()), "compensation.json");
-    let json = json.replace("\"axiscal_trafo.ini\"", "\"axiscal_trafo.ini\", \"cec.ini\"");
-    let read = |lines: &str| {
-        let open = |name: &str| Ok(source(name, if name == "cec.ini" { lines.to_owned() } else { trafo.clone() }));
-        Compensation::parse_with(&source("compensation.json", json.clone()), &machine, &open)
-    };
-    read(&lines).unwrap();
-    // the eleventh point is needed, a twelfth is not
-    let without = lines.replace("$AN_CEC[0,10]=0.005\n", "");
-    assert!(read(&without).unwrap_err().to_string().contains("$AN_CEC[0,10]"));
-}
-
-/// Old values are the user's: only the identified change is added, at the user's own point of a line.
-#[test]
-fn the_user_s_own_values_are_added_to() {
-    let machine = machine("trunnion");
-    let planted = vec![("location-a", "EY0A", 0.02), ("location-c", "EX0C", 0.01), ("location-c", "EB0C", 0.01)];
-    // the builder's C point lies 99.95 mm higher than that of the description, and 0.004 mm aside
-    let text_of = "\
-N24550 $MC_TRAFO5_BASE_TOOL_1[0]=0.1\n$MC_TRAFO5_BASE_TOOL_1[1]=-0.2 ; remark\n$MC_TRAFO5_BASE_TOOL_1[2]=-250.05EX+00\n\
-$MC_TRAFO5_JOINT_OFFSET_PART_1[0]=0.004\n$MC_TRAFO5_JOINT_OFFSET_PART_1[1]=0\n$MC_TRAFO5_JOINT_OFFSET_PART_1[2]=100\n\
-$MC_TRAFO5_PART_OFFSET_1[0]=-0.104\n$MC_TRAFO5_PART_OFFSET_1[1]=0.2\n$MC_TRAFO5_PART_OFFSET_1[2]=150.05\n\
-$MC_TRAFO5_AXIS1_1[0]=-1\n$MC_TRAFO5_AXIS1_1[1]=0\n$MC_TRAFO5_AXIS1_1[2]=0\n\
-$MC_TRAFO5_AXIS2_1[0]=0\n$MC_TRAFO5_AXIS2_1[1]=0\n$MC_TRAFO5_AXIS2_1[2]=-1\n$MC_OTHER[0]='H12'\n";
-    let sheet = tables("sinumerik");
-    let old = backup::read(&source("backup.ini", text_of), &sheet.backup, &control::names(&machine, &sheet)).unwrap();
-    let options = Options { old, ..accepting() };
-    let (export, findings) =
-        control::export(&machine, "sinumerik", &sheet, &correction(&machine, &planted, None), &options).unwrap();
-    assert!(
-        !findings.0.iter().any(|f| f.code == "tables::old_assumed" || f.code == "tables::open_chain"),
-        "{findings:?}"
-    );
-    let find = |name: &str| export.values.iter().find(|v| v.names.values().any(|n| n == name)).unwrap().clone();
-    let y = find("$MC_TRAFO5_BASE_TOOL_1[1]");
-    assert_eq!((y.old, y.new), (-0.2, -0.18));
-    // C is stated at the pivot, z = -250: at the user's point, z = -150.05, it is 0.01 deg over 99.95 mm more aside
-    let x = find("$MC_TRAFO5_JOINT_OFFSET_PART_1[0]");
-    let by_hand = 0.004 + 0.01 + 0.01_f64.to_radians() * 99.95;
-    assert!((x.new - by_hand).abs() < 3e-6, "{} {by_hand}", x.new);
-    // it closes
-    let sum = |k: &str| {
-        ["BASE_TOOL", "JOINT_OFFSET_PART", "PART_OFFSET"]
-            .map(|n| find(&format!("$MC_TRAFO5_{n}_1[{k}]")).new)
-            .iter()
-            .sum::<f64>()
-    };
-    assert!(["0", "1", "2"].iter().all(|k| sum(k).abs() < 1e-9));
-    let restore = text(&export, "restore_trafo.ini");
-    assert!(restore.contains("$MC_TRAFO5_BASE_TOOL_1[2]=-250.050000 "), "{restore}");
-    assert!(text(&export, "axiscal_trafo.ini").contains("; Study sha256: 0123abcd\n"));
-}
-
-#[test]
-fn a_bad_backup_is_refused_with_its_place() {
-    let machine = machine("trunnion");
-    let (siemens, fanuc) = (tables("sinumerik"), tables("fanuc"));
-    let read = |t: &Tables, text: &str| {
-        backup::read(&source("b", text), &t.backup, &control::names(&machine, t)).unwrap_err().to_string()
-    };
-    for (t, text, expected) in [
-        (&siemens, "; x\n$MC_TRAFO5_BASE_TOOL_1[0]=1,5\n", "b:2:1: $MC_TRAFO5_BASE_TOOL_1[0] is no number here"),
-        (
-            &siemens,
-            "$MC_TRAFO5_BASE_TOOL_1[0]=1\n$MC_TRAFO5_BASE_TOOL_1[0]=2\n",
-            "b:2:1: $MC_TRAFO5_BASE_TOOL_1[0] stands twice",
-        ),
-        (&siemens, "$MC_TRAFO5_BASE_TOOL_1[0]=inf\n", "b:1:1: $MC_TRAFO5_BASE_TOOL_1[0] is no number"),
-        (&siemens, "", "none of the values"),
-        (&siemens, "\u{0}\u{1}garbage=\n==\n", "none of the values"),
-        (&fanuc, "%\nN19700Q1M1.0;\nN19701Q1M1.0;\n", "cut off"),
-        (&fanuc, "%\nN19700Q1X1.0;\n%\n", "b:2:1: N19700 is no number here"),
-        (&fanuc, "%\nN19700Q1M1.0.0;\n%\n", "b:2:1: N19700 is no number here"),
-    ] {
-        let said = read(t, text);
-        assert!(said.contains(expected), "{said}\n{expected}");
-    }
-    let good = backup::read(
-        &source("b", "%\nN01005Q1A1P10000001;\nN19700Q1I1.0;\nN19701Q1M2;\n%\n"),
-        &fanuc.backup,
-        &control::names(&machine, &fanuc),
-    )
-    .unwrap();
-    assert_eq!(good.values["N19700"], (1.0, Some(LengthUnit::Inch)));
-    assert_eq!(good.values["N19701"], (2.0, Some(LengthUnit::Mm)));
-}
-
-#[test]
-fn what_is_doubtful_is_refused() {
-    let trunnion = machine("trunnion");
-    let refused = |machine: &Machine, control: &str, planted: &Planted, options: &Options| {
-        let t = tables(control);
-        let failure = control::export(machine, control, &t, &correction(machine, planted, None), options).unwrap_err();
-        failure.0.iter().map(|f| f.code).collect::<Vec<_>>()
-    };
-    let small: Planted = vec![("location-c", "EX0C", 0.01)];
-    for control in CONTROLS {
-        assert!(refused(&trunnion, control, &small, &Options::default()).contains(&"tables::unverified"), "{control}");
-    }
-    // the head's kinds of SINUMERIK are documented throughout
-    let t = tables("sinumerik");
-    let head = machine("double-head");
-    assert!(
-        control::export(
-            &head,
-            "sinumerik",
-            &t,
-            &correction(&head, &vec![("location-b", "EX0B", 0.01)], None),
-            &Options::default()
-        )
-        .is_ok()
-    );
-    assert!(
-        refused(&trunnion, "sinumerik", &vec![("location-c", "EX0C", 0.6)], &accepting())
-            .contains(&"tables::too_large")
-    );
-    assert!(refused(&head, "haas", &vec![("location-b", "EX0B", 0.01)], &accepting()).contains(&"tables::kind"));
-    // another machine's backup: the other sense, another place
-    let names = ["$MC_TRAFO5_AXIS2_1[0]", "$MC_TRAFO5_AXIS2_1[1]", "$MC_TRAFO5_AXIS2_1[2]"];
-    let values = names.iter().zip([0.0, 0.0, 1.0]).map(|(n, v)| ((*n).to_owned(), (v, None))).collect();
-    assert!(
-        refused(&trunnion, "sinumerik", &small, &Options { old: Old { values }, ..accepting() })
-            .contains(&"tables::other_direction")
-    );
-    let values = [("$MC_TRAFO5_BASE_TOOL_1[1]".to_owned(), (3.0, None))].into();
-    let old = Old { values };
-    assert!(
-        refused(&trunnion, "sinumerik", &small, &Options { old: old.clone(), ..accepting() })
-            .contains(&"tables::other_place")
-    );
-    let forced = Options { old, force: true, ..accepting() };
-    assert!(
-        control::export(&trunnion, "sinumerik", &tables("sinumerik"), &correction(&trunnion, &small, None), &forced)
-            .is_ok()
-    );
 }
 
 /// What was active is added to; the position tables too.

@@ -193,6 +193,10 @@ impl Heidenhain {
             19 => vm.note(Event::Orient(self.angle.ok_or("M19 without cycle 13: to which angle?")?)),
             30 => return Ok(Next::End),
             126 | 127 => self.short_way = m == 126.0,
+            // FUNCTION TCPM has settings that M128 lacks: what is left of them is not known
+            128 if self.tcpm == Tcpm::Found => {
+                return Err("M128 stands under the transformation of before: M129 is missing".to_owned());
+            }
             128 => self.tcpm = Tcpm::On,
             129 => self.tcpm = Tcpm::Off,
             _ => return Err(format!("M{m} is not known here")),
@@ -203,11 +207,11 @@ impl Heidenhain {
     fn system(&self, data: &str, vm: &Vm) -> Option<f64> {
         let (id, index) = data.strip_prefix("ID")?.split_once(" IDX")?;
         let index: usize = index.parse().ok()?;
-        // any time: what a program makes of it is the difference of two
+        // any time: what a program makes of it is the difference of two; the control counts whole seconds
         const CLOCK_S: f64 = 1000.0;
         let axis = || AxisName::ALL.get(index.checked_sub(1)?).copied().filter(|a| vm.axes[a.index()]);
         Some(match id {
-            "320" => CLOCK_S,
+            "320" => CLOCK_S + vm.clock_s(1.0),
             "240" => vm.at.get(axis()?),
             "270" => {
                 let axis = axis()?;
@@ -221,14 +225,15 @@ impl Heidenhain {
 impl Dialect for Heidenhain {
     fn begin(start: Start, _post: &Postprocessor, _machine: &Machine) -> Self {
         let awkward = start == Start::Awkward;
-        let some = |values: [f64; 6]| if awkward { values } else { [0.0; 6] };
+        let third = start == Start::Third;
+        let some = |values: [f64; 6], when: bool| if when { values } else { [0.0; 6] };
         Self {
             inch: false,
-            preset: some([7.5, -3.25, 11.0, 1.5, -2.0, 0.75]),
-            tool_mm: if awkward { 120.25 } else { 0.0 },
-            shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0]),
+            preset: some([7.5, -3.25, 11.0, 1.5, -2.0, 0.75], awkward || third),
+            tool_mm: if awkward || third { 120.25 } else { 0.0 },
+            shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0], awkward),
             tilted: awkward,
-            tcpm: if awkward { Tcpm::Found } else { Tcpm::Off },
+            tcpm: if awkward || third { Tcpm::Found } else { Tcpm::Off },
             short_way: awkward,
             feed: 0.0,
             angle: None,
@@ -275,7 +280,7 @@ impl Dialect for Heidenhain {
         self.own.contains_key(var)
     }
 
-    fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {
+    fn write(&mut self, var: &Var, value: f64, _vm: &Vm) -> Result<(), String> {
         match var {
             Var::Number(n) if OWN.contains(n) => {
                 self.own.insert(var.clone(), value);
@@ -306,7 +311,15 @@ impl Dialect for Heidenhain {
         let on = |yes: bool| if yes { "on" } else { "off" }.to_owned();
         BTreeMap::from([
             ("tilted plane".to_owned(), on(self.tilted)),
-            ("tool centre point control".to_owned(), on(self.tcpm != Tcpm::Off)),
+            (
+                "tool centre point control".to_owned(),
+                match self.tcpm {
+                    Tcpm::Off => "off",
+                    Tcpm::Found => "on",
+                    Tcpm::On => "switched on by the program",
+                }
+                .to_owned(),
+            ),
             ("short way".to_owned(), on(self.short_way)),
             ("datum shift".to_owned(), numbers(&self.shift)),
         ])

@@ -1,7 +1,8 @@
 //! What a Fanuc or a Haas does with a block: modes, work offsets, system variables, G31.
 //!
 //! What a skip move leaves in #5061 … where no signal came (the end point), what #5021 and #5041 mean, and that a number
-//! without its point counts thousandths, is as the postprocessor files say: unverified on a real control.
+//! without its point counts thousandths, is as the postprocessor files say: unverified on a real control. Macro statements
+//! are read ahead of the blocks before them: what the control shows of its position is refused until a block has made them wait.
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
@@ -32,8 +33,16 @@ pub struct MacroB {
     tool_mm: f64,
     /// Length in the tool offset memory, mm.
     stored_mm: f64,
+    /// Do work offsets hold anything?
+    offsets: bool,
+    /// The offset that adds to all of them (EXT), mm and deg.
+    external: [f64; 6],
     /// mm or deg
     local: [f64; 6],
+    /// X of the program runs against the axis: a mirror image that none of its words takes off.
+    mirrored: bool,
+    /// Blocks before this place may not have been done yet.
+    ahead: bool,
     /// mm/min
     feed: f64,
     /// #3004
@@ -42,6 +51,7 @@ pub struct MacroB {
     own: Values,
     /// In work coordinates, mm and deg.
     skipped: [f64; 6],
+    /// When #3001 was 0, s since the program began.
     seconds: f64,
     /// What the macros of a package do.
     calls: Arc<[CallRule]>,
@@ -64,7 +74,7 @@ impl MacroB {
 
     /// Offsets of the chosen work coordinate system, mm and deg: each has its own.
     fn offset(&self, axis: AxisName) -> f64 {
-        if self.system == 54.0 && self.stored_mm == 0.0 {
+        if !self.offsets {
             return 0.0;
         }
         let n = (self.system - 50.0) + self.system_p;
@@ -74,7 +84,12 @@ impl MacroB {
     /// Machine coordinate less work coordinate, mm or deg.
     fn shift(&self, axis: AxisName) -> f64 {
         let tool = if axis == AxisName::Z && self.tool_on { self.tool_mm } else { 0.0 };
-        self.offset(axis) + self.local[axis.index()] + tool
+        self.offset(axis) + self.external[axis.index()] + self.local[axis.index()] + tool
+    }
+
+    /// Sense of the program's coordinate.
+    fn sense(&self, axis: AxisName) -> f64 {
+        if self.mirrored && axis == AxisName::X { -1.0 } else { 1.0 }
     }
 
     fn axis(&self, number: u32) -> Option<AxisName> {
@@ -83,7 +98,8 @@ impl MacroB {
 
     fn target(&self, words: &[Spoken], vm: &mut Vm) -> [Option<f64>; 6] {
         AxisName::ALL.map(|axis| {
-            let way = self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
+            let way =
+                self.sense(axis) * self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
             Some(match (self.incremental, self.modulo[axis.index()]) {
                 (true, _) => vm.at.get(axis) + way,
                 (false, true) => self.turn(axis, way, vm),
@@ -132,6 +148,7 @@ impl MacroB {
 
     fn mode(&mut self, tenth: i64, words: &[Spoken]) -> Result<(), String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
+        self.ahead |= tenth != 40;
         match tenth {
             170 | 180 | 190 => self.plane = tenth as f64 / 10.0,
             200 | 210 => self.inch = tenth == 200,
@@ -148,6 +165,7 @@ impl MacroB {
             1030 => self.lookahead = value("P").ok_or("G103 needs P")?,
             40 => {
                 value("P").ok_or("G4 needs P")?;
+                self.ahead = false;
             }
             _ => return Err(format!("G{} is not known here", tenth as f64 / 10.0)),
         }
@@ -205,18 +223,23 @@ impl MacroB {
                 if self.feed_mode != 94.0 || self.incremental {
                     return Err(format!("G65 P{number} needs G90 and G94"));
                 }
-                let to = self.target(words, vm);
-                Ok(Next::Probe(Probe {
-                    from: vm.at,
-                    to: vm.target(&to)?,
-                    feed: self.feed,
-                    toward: true,
-                    known: vm.known,
-                    overridden: (self.holds as u32) & 2 == 0,
-                    alarm: Alarm::AtEvent,
-                }))
+                self.probe(words, vm, Alarm::AtEvent)
             }
         }
+    }
+
+    /// A move that a signal ends, at the feed that acts.
+    fn probe(&self, words: &[Spoken], vm: &mut Vm, alarm: Alarm) -> Result<Next, String> {
+        let to = self.target(words, vm);
+        Ok(Next::Probe(Probe {
+            from: vm.at,
+            to: vm.target(&to)?,
+            feed: self.feed,
+            toward: true,
+            known: vm.known,
+            overridden: (self.holds as u32) & 2 == 0,
+            alarm,
+        }))
     }
 
     fn may_move(&self) -> Result<(), String> {
@@ -251,7 +274,8 @@ impl MacroB {
     fn system_variable(&self, n: u32, vm: &Vm) -> Option<f64> {
         Some(match n {
             2001 | 11001 => self.stored_mm / self.unit(AxisName::Z),
-            3001 => self.seconds * 1000.0,
+            3001 => ((vm.clock_s(MILLISECOND_S) - self.seconds) * 1000.0).round(),
+            3012 => time_of_day(vm.clock_s(1.0)),
             3004 => self.holds,
             4002 => self.plane,
             4003 => {
@@ -277,7 +301,7 @@ impl MacroB {
             }
             5041..=5046 => {
                 let axis = self.axis(n - 5040)?;
-                self.shown(axis, vm.at.get(axis) - self.shift(axis)) / self.unit(axis)
+                self.shown(axis, self.sense(axis) * (vm.at.get(axis) - self.shift(axis))) / self.unit(axis)
             }
             5061..=5066 => {
                 let axis = self.axis(n - 5060)?;
@@ -286,6 +310,15 @@ impl MacroB {
             _ => return None,
         })
     }
+}
+
+const MILLISECOND_S: f64 = 0.001;
+
+/// #3012, hours minutes seconds in one number: the program begins two minutes before midnight.
+fn time_of_day(clock_s: f64) -> f64 {
+    const DAY_S: f64 = 86_400.0;
+    let s = (clock_s + DAY_S - 120.0).rem_euclid(DAY_S);
+    (s / 3600.0).floor() * 10_000.0 + (s / 60.0 % 60.0).floor() * 100.0 + (s % 60.0).floor()
 }
 
 /// The M functions with which a file switches the probe on and off; those that mean something else to every control are not the
@@ -316,20 +349,45 @@ impl Dialect for MacroB {
             numbers[axis.index()] = u32::try_from(*post.number.numbers.get(&axis).unwrap_or(&place)).ok();
         }
         let awkward = start == Start::Awkward;
+        let third = start == Start::Third;
+        // an axis that the machine lacks has no offset
+        let some = |values: [f64; 6]| {
+            AxisName::ALL.map(|a| if awkward && numbers[a.index()].is_some() { values[a.index()] } else { 0.0 })
+        };
         Self {
             numbers,
             inch: awkward,
-            incremental: awkward,
-            plane: if awkward { 18.0 } else { 17.0 },
-            feed_mode: if awkward { 93.0 } else { 94.0 },
-            system: if awkward { 56.0 } else { 54.0 },
-            system_p: 0.0,
+            incremental: awkward || third,
+            plane: if awkward {
+                18.0
+            } else if third {
+                19.0
+            } else {
+                17.0
+            },
+            feed_mode: if awkward {
+                93.0
+            } else if third {
+                95.0
+            } else {
+                94.0
+            },
+            system: match start {
+                Start::Awkward => 56.0,
+                Start::Third => post.check.as_ref().map_or(54.0, |c| c.further_offsets),
+                Start::Fresh | Start::Obstructed => 54.0,
+            },
+            system_p: if third { 7.0 } else { 0.0 },
             cutter: awkward,
             rotated: awkward,
-            tool_on: awkward,
-            tool_mm: if awkward { 33.5 } else { 0.0 },
-            stored_mm: if awkward { 120.25 } else { 0.0 },
-            local: [0.0; 6],
+            tool_on: awkward || third,
+            tool_mm: if awkward || third { 33.5 } else { 0.0 },
+            stored_mm: if awkward || third { 120.25 } else { 0.0 },
+            offsets: awkward || third,
+            external: some([0.625, -1.5, 2.25, 0.125, 0.25, -0.5]),
+            local: some([-2.0, 0.75, 1.125, -0.25, 0.5, 0.375]),
+            mirrored: start == Start::Obstructed,
+            ahead: false,
             feed: 0.0,
             holds: 0.0,
             lookahead: 0.0,
@@ -379,6 +437,7 @@ impl Dialect for MacroB {
             self.mode(*g, words)?;
         }
         if gs.contains(&520) {
+            self.ahead = true;
             for axis in AxisName::ALL {
                 if let Some(word) = words.iter().find(|w| w.address.starts_with(axis.letter())) {
                     self.local[axis.index()] = self.length(word, axis);
@@ -386,7 +445,7 @@ impl Dialect for MacroB {
             }
         }
         if gs.iter().any(|g| matches!(g, 434 | 2340)) {
-            (self.tool_on, self.tool_mm) = (true, self.stored_mm);
+            (self.tool_on, self.tool_mm, self.ahead) = (true, self.stored_mm, true);
             let to = self.target(words, vm);
             let moves = |axis: &AxisName| to[axis.index()].is_some_and(|to| (to - vm.at.get(*axis)).abs() > SAME_DEG);
             if AxisName::ALL.iter().any(moves) {
@@ -401,21 +460,13 @@ impl Dialect for MacroB {
         }
         let Some(motion) = motion else { return Ok(if over { Next::End } else { Next::On }) };
         self.may_move()?;
-        let to = self.target(words, vm);
         if motion == 310 {
             if self.feed_mode != 94.0 || self.feed <= 0.0 {
                 return Err("G31 needs a feed, in mm per minute".to_owned());
             }
-            return Ok(Next::Probe(Probe {
-                from: vm.at,
-                to: vm.target(&to)?,
-                feed: self.feed,
-                toward: true,
-                known: vm.known,
-                overridden: (self.holds as u32) & 2 == 0,
-                alarm: Alarm::Never,
-            }));
+            return self.probe(words, vm, Alarm::Never);
         }
+        let to = self.target(words, vm);
         let rate = match motion {
             0 => Rate::Rapid,
             _ if self.feed_mode != 94.0 || self.feed <= 0.0 => {
@@ -423,6 +474,7 @@ impl Dialect for MacroB {
             }
             _ => Rate::Feed(self.feed),
         };
+        self.ahead = true;
         vm.go(&to, rate, true)?;
         Ok(Next::On)
     }
@@ -430,6 +482,9 @@ impl Dialect for MacroB {
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
         match var {
             Var::Number(n) if *n < 1000 => own(&self.own, var),
+            Var::Number(5021..=5026 | 5041..=5046) if self.ahead => Err(format!(
+                "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
+            )),
             Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
             Var::Name(_) => Err(format!("{var} is no variable")),
         }
@@ -439,9 +494,13 @@ impl Dialect for MacroB {
         self.own.contains_key(var)
     }
 
-    fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {
+    fn sees_offsets(&self) -> bool {
+        true
+    }
+
+    fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String> {
         match var {
-            Var::Number(3001) => self.seconds = value / 1000.0,
+            Var::Number(3001) => self.seconds = vm.clock_s(MILLISECOND_S) - value / 1000.0,
             Var::Number(3004) => self.holds = value,
             Var::Number(1..=33) => {
                 self.own.insert(var.clone(), value);
@@ -453,8 +512,9 @@ impl Dialect for MacroB {
 
     fn probed(&mut self, _probe: &Probe, _outcome: Outcome, stands: &Position) {
         for axis in AxisName::ALL {
-            self.skipped[axis.index()] = stands.get(axis) - self.shift(axis);
+            self.skipped[axis.index()] = self.sense(axis) * (stands.get(axis) - self.shift(axis));
         }
+        self.ahead = false;
     }
 
     fn settings(&self) -> BTreeMap<String, String> {

@@ -297,7 +297,7 @@ fn value(input: &str) -> IResult<&str, Expr> {
         call("ABS", Function::Abs),
         call("SQRT", Function::Sqrt),
         call("ROUND", Function::Round),
-        call("FIX", Function::Floor),
+        call("FIX", Function::Truncate),
         call("FUP", Function::Ceil),
         preceded(char('-'), value).map(|e| Expr::Call(Function::Minus, Box::new(e))),
     ))

@@ -110,6 +110,14 @@ impl Ngc {
             ngc.g92_on = true;
             ngc.tool = [0.125, -0.25, 77.5];
         }
+        if start == Start::Third {
+            // the very coordinate system that a program may take for itself
+            ngc.modes =
+                Modes { system: 8, feed_mode: 95, plane: 19, path: 61, tool_on: true, feed: 300.0, ..ngc.modes };
+            ngc.systems[8] = [-3.5, 6.25, 12.5, 0.75, -1.25, 2.0, 0.0];
+            ngc.acting = ngc.systems[8];
+            ngc.tool = ngc.table;
+        }
         ngc
     }
 
@@ -454,7 +462,7 @@ impl Dialect for Ngc {
         self.globals.contains_key(var) || self.locals.last().is_some_and(|l| l.contains_key(var))
     }
 
-    fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {
+    fn write(&mut self, var: &Var, value: f64, _vm: &Vm) -> Result<(), String> {
         match var {
             Var::Number(n @ 5221..=5400) => {
                 let (system, place) = (((n - 5221) / 20) as usize, (n - 5221) % 20);

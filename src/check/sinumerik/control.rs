@@ -18,6 +18,8 @@ use std::collections::BTreeMap;
 const TURN: f64 = 360.0;
 /// Angles that differ by less are the same, deg.
 const SAME_DEG: f64 = 1e-6;
+/// What a timer counts, s.
+const TIMER_S: f64 = 0.001;
 
 /// What MEAS has kept.
 #[derive(Debug, Clone)]
@@ -316,9 +318,19 @@ impl Dialect for Sinumerik {
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
         let setting = |name: &str| post.settings.get(name).map_or("", String::as_str);
         let awkward = start == Start::Awkward;
+        let third = start == Start::Third;
         let modulo = AxisName::ALL.map(|a| a.is_rotary() && setting("modulo").contains(a.letter()));
         let lines = format!("{} {}", setting("probe_on"), setting("probe_off"));
-        let offsets = |factor: f64| [7.5, -3.25, 11.0, 1.5, -2.0, 0.75].map(|x| if awkward { x * factor } else { 0.0 });
+        let offsets = |awkwardly: f64, thirdly: f64| {
+            let factor = if awkward {
+                awkwardly
+            } else if third {
+                thirdly
+            } else {
+                0.0
+            };
+            [7.5, -3.25, 11.0, 1.5, -2.0, 0.75].map(|x| x * factor)
+        };
         Self {
             input: setting("probe").trim().parse().unwrap_or(1.0),
             edge: setting("tool_edge").trim().trim_start_matches('D').parse().unwrap_or(1.0),
@@ -327,16 +339,34 @@ impl Dialect for Sinumerik {
             origin: machine.origin.position(),
             inch: awkward,
             incremental: awkward,
-            plane: if awkward { 18.0 } else { 17.0 },
-            feed_mode: if awkward { 95.0 } else { 94.0 },
+            plane: if awkward {
+                18.0
+            } else if third {
+                19.0
+            } else {
+                17.0
+            },
+            feed_mode: if awkward {
+                95.0
+            } else if third {
+                93.0
+            } else {
+                94.0
+            },
             exact: false,
             cutter: awkward,
-            system: if awkward { 56.0 } else { 500.0 },
-            base: offsets(0.5),
-            settable: offsets(1.25),
-            programmed: offsets(-2.0),
-            tool_on: awkward,
-            tool_mm: if awkward { 120.25 } else { 0.0 },
+            system: if awkward {
+                56.0
+            } else if third {
+                54.0
+            } else {
+                500.0
+            },
+            base: offsets(0.5, 0.0),
+            settable: offsets(1.25, -0.75),
+            programmed: offsets(-2.0, 1.5),
+            tool_on: awkward || third,
+            tool_mm: if awkward || third { 120.25 } else { 0.0 },
             transformed: awkward,
             feed: 0.0,
             own: Values::new(),
@@ -425,8 +455,7 @@ impl Dialect for Sinumerik {
             return Err(format!("STOPRE is missing: {var} would be read before the block before it has ended"));
         }
         if name == "$AC_TIMER" {
-            // time goes on with whatever happens
-            return own(&self.timers, var).map(|since| since + vm.trace.len() as f64);
+            return own(&self.timers, var).map(|zero| vm.clock_s(TIMER_S) - zero);
         }
         self.system_variable(name, index, vm)
     }
@@ -439,9 +468,11 @@ impl Dialect for Sinumerik {
         matches!(var, Var::Name(name) if name.starts_with("$A_PROBE["))
     }
 
-    fn write(&mut self, var: &Var, value: f64) -> Result<(), String> {
+    fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String> {
         match var {
-            Var::Name(name) if name.starts_with("$AC_TIMER[") => self.timers.insert(var.clone(), value),
+            Var::Name(name) if name.starts_with("$AC_TIMER[") => {
+                self.timers.insert(var.clone(), vm.clock_s(TIMER_S) - value)
+            }
             Var::Name(name) if !name.starts_with('$') => self.own.insert(var.clone(), value),
             _ => return Err(format!("{var} cannot be written")),
         };

@@ -35,6 +35,7 @@ fn entry(value: &Entry, spelling: Option<&str>, restore: bool, always_mark: bool
     Some(context! {
         id => value.id.clone(), name, value => show(now), other => show(other), old => show(value.old), new => show(value.new),
         change, says => one_line(&value.says), unit => value.unit, changed => value.new != value.old,
+        known => value.known, instead => value.instead,
     })
 }
 
@@ -117,6 +118,7 @@ pub(super) fn write(
             files.push((name.clone(), text.into_bytes()));
         }
     }
+    let load = how_to_load(tables, &files);
     let left: Vec<Value> = export
         .left
         .iter()
@@ -165,7 +167,7 @@ pub(super) fn write(
         README,
         &context! {
             ..common(false, None), ..context! {
-                says => tables.says.clone(), worksheet => tables.worksheet, load => tables.load.clone(), cannot => tables.cannot.clone(),
+                says => tables.says.clone(), worksheet => tables.worksheet, load, cannot => tables.cannot.clone(),
                 files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
                 variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
                 reads => tables.reads.is_some(),
@@ -182,6 +184,13 @@ pub(super) fn write(
     files.push(("compensation.json".to_owned(), export.compensation.to_json()?.into_bytes()));
     export.files = files;
     Ok(())
+}
+
+/// The lines that say how to load the tables; one that names a file of position tables stands only where that is written.
+fn how_to_load(tables: &Tables, files: &[(String, Vec<u8>)]) -> Vec<String> {
+    let written = |name: &str| files.iter().any(|(n, _)| n == name);
+    let lacks = |line: &&String| tables.file.iter().any(|f| line.contains(&f.name) && !written(&f.name));
+    tables.load.iter().filter(|line| !lacks(line)).cloned().collect()
 }
 
 /// A template of the postprocessor file: the user may have changed it.

@@ -27,6 +27,10 @@ pub struct Value {
     pub unit: &'static str,
     /// Digits behind the point.
     pub decimals: usize,
+    /// The old value is the user's own.
+    pub known: bool,
+    /// Some software of the control has it in place of the others.
+    pub instead: bool,
     /// Why it is not verified.
     pub unverified: Option<String>,
 }
@@ -40,8 +44,28 @@ pub struct Filled {
     pub vectors: Vec<(VectorForm, Vector3<f64>)>,
     /// The machine as this table describes it, in the terms of the machine's own description.
     pub seen: Seen,
-    /// Did every old value come from the user?
-    pub known: bool,
+}
+
+impl Filled {
+    /// Did every old value come from the user? Where software has either of two sets, one is enough.
+    #[must_use]
+    pub fn known(&self) -> bool {
+        let all = |instead: bool| self.values.iter().filter(|v| v.instead == instead).all(|v| v.known);
+        all(false) || (self.values.iter().any(|v| v.instead) && all(true))
+    }
+
+    /// Names of the values that a person would have to give so that all of a set are known: of the set of which some are, as the
+    /// user's own are spelled.
+    #[must_use]
+    pub fn lacking(&self, old: &Old) -> Vec<String> {
+        let begun = |instead: bool| self.values.iter().any(|v| v.instead == instead && v.known);
+        let mut given = self.values.iter().flat_map(|v| &v.names).filter(|(_, name)| old.values.contains_key(*name));
+        let spelling = given.next().map(|(spelling, _)| spelling.as_str()).unwrap_or_default();
+        let name = |v: &Value| v.names.get(spelling).or(v.names.values().next()).cloned();
+        let instead = begun(true) && !begun(false);
+        let lacks = self.values.iter().filter(|v| v.instead == instead && !v.known);
+        if self.known() { Vec::new() } else { lacks.filter_map(name).collect() }
+    }
 }
 
 /// What the filling needs to know.
@@ -64,6 +88,8 @@ pub struct Question<'a> {
     pub limits: Limits,
 }
 
+const OTHER_PLACE: &str = "are `origin`, `point` and `pivot` in machines.toml those of this machine, is it this machine's backup? --force adds the difference all the same";
+
 /// Digits behind the point that a step needs.
 #[must_use]
 pub fn decimals(step: f64) -> usize {
@@ -78,6 +104,11 @@ pub fn line_of(seen: &Seen, turn: Turn) -> Option<(Side, usize, &Line)> {
 }
 
 fn point_of(seen: &Seen, point: Point) -> Vector3<f64> {
+    if point == Point::WorkpieceCrossing {
+        let lines = [Turn::Workpiece1, Turn::Workpiece2].map(|turn| line_of(seen, turn));
+        let [Some((_, _, first)), Some((_, _, second))] = lines else { return Vector3::zeros() };
+        return first.point + first.direction.into_inner() * first.direction.dot(&(second.point - first.point));
+    }
     point.turn().and_then(|t| line_of(seen, t)).map_or_else(Vector3::zeros, |(_, _, line)| line.point)
 }
 
@@ -122,19 +153,13 @@ impl Question<'_> {
         Some(if inch { mm_from_inch(*value) } else { *value })
     }
 
-    /// The old vector: the user's numbers where they are known, else as described. True where all are the user's.
-    fn old_vector(&self, form: &VectorForm, described: Vector3<f64>) -> (Vector3<f64>, bool) {
-        let mut known = true;
-        let value = Vector3::from_fn(|k, _| {
-            if form.names.values().all(|n| n[k].is_empty()) {
-                return described[k];
-            }
-            self.old_value(&form.names, k, form.direction.is_none()).unwrap_or_else(|| {
-                known = false;
-                described[k]
-            })
-        });
-        (value, known)
+    /// The old vector: the user's numbers where they are known, else as described.
+    fn old_vector(&self, form: &VectorForm, described: Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|k, _| {
+            let no_name = form.names.values().all(|n| n[k].is_empty());
+            let given = self.old_value(&form.names, k, form.direction.is_none());
+            given.filter(|_| !no_name).unwrap_or(described[k])
+        })
     }
 
     /// As the description has it.
@@ -155,14 +180,16 @@ impl Question<'_> {
     #[must_use]
     pub fn fill(&self) -> (Filled, Findings) {
         let mut findings = Findings::default();
-        let mut known = true;
         // where the user's numbers put the points, against the description
         let mut off: BTreeMap<Point, Vector3<f64>> = BTreeMap::new();
         let mut turned: BTreeMap<Turn, Vector3<f64>> = BTreeMap::new();
         for form in in_order(self.kind.vector.iter(), |f| f) {
             let described = self.described(form, self.before);
-            let (old, all) = self.old_vector(form, described);
-            known &= all;
+            let old = self.old_vector(form, described);
+            if form.instead {
+                self.compare_instead(form, old - described, &mut findings);
+                continue;
+            }
             match (form.from, form.to, form.direction) {
                 (Some(from), Some(to), _) => {
                     let base = off.get(&from).copied().unwrap_or_default();
@@ -177,7 +204,7 @@ impl Question<'_> {
                         .iter()
                         .flatten()
                         .filter_map(|id| self.kind.vector.iter().find(|v| v.id == *id))
-                        .map(|v| self.old_vector(v, self.described(v, self.before)).0)
+                        .map(|v| self.old_vector(v, self.described(v, self.before)))
                         .sum();
                     if (sum + old).amax() > 2.5 * self.step_mm() {
                         findings.push(Finding::warning(
@@ -212,7 +239,7 @@ impl Question<'_> {
         let direction_step = 0.1_f64.powi(i32::try_from(self.tables.direction_decimals).unwrap_or(9));
         for form in &self.kind.vector {
             let described = self.described(form, self.before);
-            let old = self.old_vector(form, described).0;
+            let old = self.old_vector(form, described);
             let direction = form.direction.is_some();
             let step = if direction { direction_step } else { step };
             let exact = match &form.close {
@@ -220,6 +247,8 @@ impl Question<'_> {
                 Some(ids) => {
                     -vectors.iter().filter(|(f, _)| ids.contains(&f.id)).map(|(_, v)| *v).sum::<Vector3<f64>>()
                 }
+                // the user's own numbers of the other set say nothing of this one
+                None if form.instead => old + self.described(form, self.now) - described,
                 None => self.described(form, &target),
             };
             let new = exact.map(|v| (v / step).round() * step);
@@ -260,6 +289,8 @@ impl Question<'_> {
                         (_, LengthUnit::Mm) => "mm",
                         (_, LengthUnit::Inch) => "inch",
                     },
+                    known: self.old_value(&form.names, k, !direction).is_some(),
+                    instead: form.instead,
                     decimals: if direction { self.tables.direction_decimals } else { decimals(self.in_unit(step)) },
                     unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
                 });
@@ -274,7 +305,7 @@ impl Question<'_> {
             vectors.push((form.clone(), held));
         }
         self.as_written(&vectors, &off, &turned, &mut seen);
-        (Filled { values, vectors, seen, known }, findings)
+        (Filled { values, vectors, seen }, findings)
     }
 
     /// The machine that the written vectors describe, without what the user's numbers are off the description.
@@ -309,6 +340,18 @@ impl Question<'_> {
         }
     }
 
+    /// Do the user's numbers of the other set describe the machine that was measured?
+    fn compare_instead(&self, form: &VectorForm, off: Vector3<f64>, findings: &mut Findings) {
+        if off.norm() > self.limits.mm {
+            let says = format!(
+                "the old values place {} {:.3} mm from where the machine's description has it",
+                form.to.map_or_else(|| form.id.clone(), |p| p.to_string()),
+                off.norm()
+            );
+            findings.push(Finding::error("tables::other_place", says).help(OTHER_PLACE));
+        }
+    }
+
     /// Do the user's numbers describe the machine that was measured?
     fn compare(
         &self,
@@ -323,9 +366,13 @@ impl Question<'_> {
                 findings.push(
                     Finding::error(
                         "tables::other_place",
-                        format!("the old values place axis {} {:.3} mm from where the machine's description has it", line.axis, across.norm()),
+                        format!(
+                            "the old values place axis {} {:.3} mm from where the machine's description has it",
+                            line.axis,
+                            across.norm()
+                        ),
                     )
-                    .help("are `origin`, `point` and `pivot` in machines.toml those of this machine, is it this machine's backup? --force adds the difference all the same"),
+                    .help(OTHER_PLACE),
                 );
             }
         }

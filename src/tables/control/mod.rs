@@ -257,7 +257,17 @@ pub fn export(
         }
     }
     say_unverified(tables, kind, &filled, !grid_list.is_empty(), options, &mut findings);
-    if !filled.known && !filled.values.is_empty() {
+    let lacking = filled.lacking(&options.old);
+    if !options.old.values.is_empty() && !lacking.is_empty() {
+        let says = format!(
+            "the control's old values of {} are not known: they are taken from the machine's description and what was active",
+            lacking.join(", ")
+        );
+        findings.push(
+            Finding::warning("tables::old_lacking", says)
+                .help("give these too: in the backup, or each as --old \"NAME=VALUE\"; without them the restoring file is not this machine's own"),
+        );
+    } else if !filled.known() && !filled.values.is_empty() {
         findings.push(
             Finding::warning("tables::old_assumed", "the control's old values are not known: they are taken from the machine's description and what was active")
                 .help("give the control's own backup with --backup FILE; without it neither the new values nor the restoring file are this machine's own"),
@@ -283,6 +293,7 @@ pub fn export(
         radius_mm: options.radius_mm,
     };
     let left = pieces.left();
+    let known = filled.known();
     let (rounding_um, rest_um, longer_tool_um) = pieces.figures(&now);
     let mut terms = carried.terms.clone();
     terms.extend(carried.zero.iter().cloned());
@@ -302,6 +313,7 @@ pub fn export(
         vectors: filled
             .vectors
             .iter()
+            .filter(|(form, _)| !form.instead)
             .map(|(form, value)| Vector {
                 id: form.id.clone(),
                 between: form.from.zip(form.to).map(|(a, b)| [a, b]),
@@ -338,7 +350,7 @@ pub fn export(
         rest_um,
         longer_tool_um,
     };
-    files::write(machine, tables, kind, correction, options, filled.known, &mut export, &mut findings)?;
+    files::write(machine, tables, kind, correction, options, known, &mut export, &mut findings)?;
     Ok((export, findings))
 }
 
@@ -360,7 +372,6 @@ fn add_angles(
         let (now, before) = (now.get(&axis.name).copied(), before.get(&axis.name).copied().unwrap_or(0.0));
         let Some(now) = now else { continue };
         let given = form.names.values().find_map(|n| options.old.values.get(n)).map(|(v, _)| *v);
-        filled.known &= given.is_some();
         let old = given.unwrap_or(before);
         let new = rounded(((old + now - before) / step).round() * step);
         out.insert(axis.name, rounded(new - old + before));
@@ -372,6 +383,8 @@ fn add_angles(
             new,
             unit: "deg",
             decimals: fill::decimals(step),
+            known: given.is_some(),
+            instead: false,
             unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
         });
     }

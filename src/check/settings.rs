@@ -1,0 +1,44 @@
+//! The user's settings: what a program leaves of them.
+
+use super::explore::Told;
+use super::judge::{Case, Said};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Compares what a run leaves, at its end and after a person has broken it off, with what it found.
+pub fn settings_return(case: &Case<'_>, told: &Told, said: &mut Said) {
+    if told.fault.is_some() {
+        return;
+    }
+    let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
+    compare_settings(case, &told.settings[0], &told.settings[1], &end, "at the end", said);
+    let kept = case.post.check.as_ref().map(|c| c.after_abort.as_slice()).unwrap_or_default();
+    for (place, after) in &told.aborted {
+        let at = told.trunk.get(*place).map_or(0..0, |h| h.at.clone());
+        let what = "broken off here by hand, then started once more to give the settings back";
+        let after: BTreeMap<String, String> =
+            after.iter().filter(|(name, _)| kept.contains(name)).map(|(n, v)| (n.clone(), v.clone())).collect();
+        compare_settings(case, &told.settings[0], &after, &at, what, said);
+    }
+}
+
+/// Says which settings are neither as before nor, where they may be left, off.
+pub fn compare_settings(
+    case: &Case<'_>,
+    before: &BTreeMap<String, String>,
+    after: &BTreeMap<String, String>,
+    at: &Range<usize>,
+    when: &str,
+    said: &mut Said,
+) {
+    let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
+    for (name, value) in after {
+        // what it may leave changed, it may leave off and no otherwise
+        let off = left.contains(name) && case.neutral.get(name) == Some(value);
+        if before.get(name) != Some(value) && !off {
+            let was = before.get(name).map_or("nothing", String::as_str);
+            let says = format!("{when}: the user's setting is not given back: {name}: {was} before, {value} after");
+            said.say(case, "check::not_restored", at, says, "");
+        }
+    }
+}

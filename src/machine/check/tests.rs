@@ -1,0 +1,84 @@
+use crate::axes::AxisName;
+use crate::diag::source;
+
+#[test]
+fn the_built_in_machines_are_good() {
+    let (machines, findings) = super::load(&source("machines.toml", crate::machine::BUILT_IN)).unwrap();
+    assert_eq!(machines.len(), 4);
+    assert!(findings.0.is_empty());
+}
+
+#[test]
+fn a_range_is_written_in_machine_coordinates_and_kept_relative_to_r() {
+    let text = crate::machine::BUILT_IN.replacen("origin = { X = 0.0", "origin = { X = 100.0", 1);
+    let (machines, _) = super::load(&source("machines.toml", text)).unwrap();
+    assert_eq!(machines[0].axis(AxisName::X).unwrap().range, [-550.0, 350.0]);
+}
+
+/// Codes of what is wrong with the built-in machines when `from` is written as `to`, once.
+fn codes(from: &str, to: &str) -> Vec<&'static str> {
+    let text = crate::machine::BUILT_IN.replacen(from, to, 1);
+    assert_ne!(text, crate::machine::BUILT_IN, "{from}");
+    match super::load(&source("m.toml", text)) {
+        Ok((_, findings)) => findings.0.iter().map(|f| f.code).collect(),
+        Err(failure) => failure.0.iter().map(|f| f.code).collect(),
+    }
+}
+
+#[test]
+fn one_slip_is_one_finding() {
+    let range = "range = [-450.0, 450.0]";
+    let cases = [
+        (range, "range = [-1e300, 1e300]", "machine::too_large"),
+        (range, "range = [450.0, -450.0]", "machine::range"),
+        ("direction = [1.0, 0.0, 0.0]", "direction = [0.0, 0.0, 0.0]", "machine::zero_direction"),
+        ("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.005, 0.0]", "machine::not_square"),
+        ("origin = { X = 0.0", "origin = { X = 1e7", "machine::too_large"),
+        ("pivot = [0.0, 0.0, 0.0]", "pivot = [1e7, 0.0, 0.0]", "machine::too_large"),
+        ("carrier = \"table\"\nriser", "carrier = \"base\"\nriser", "machine::block_carrier"),
+    ];
+    for (from, to, code) in cases {
+        assert_eq!(codes(from, to), [code], "{to}");
+    }
+}
+
+#[test]
+fn a_stylus_is_thinner_than_its_ball_and_unlike_the_others() {
+    let at = "\n[[machine.stylus]]\nname = \"long\"\n";
+    let more = |fields: &str| format!("\n[[machine.stylus]]\nname = \"more\"\n{fields}\n{at}");
+    assert_eq!(codes(at, &more("longer = 50.0")), [] as [&str; 0]);
+    assert_eq!(codes(at, &more("ball_radius = 2.0")), [] as [&str; 0]);
+    let wrong =
+        ["longer = 100.0", "longer = 0.0", "longer = -75.0", "longer = nan", "stem_radius = 3.0", "ball_radius = -1.0"];
+    for fields in wrong {
+        assert_eq!(codes(at, &more(fields)), ["machine::stylus"], "{fields}");
+    }
+    assert_eq!(codes(at, &more("longer = 50.0").replace("more", "long")), ["machine::stylus"]);
+    assert_eq!(codes("carrier = \"table\"\ncentre", "carrier = \"base\"\ncentre"), ["machine::block_carrier"]);
+    assert_eq!(codes("carrier = \"table\"\ncentre", "carrier = \"Z\"\ncentre"), ["machine::carrier"]);
+}
+
+#[test]
+fn a_direction_a_little_off_square_is_left_alone() {
+    assert_eq!(codes("direction = [1.0, 0.0, 0.0]", "direction = [1.0, 0.001, 0.0]"), [] as [&str; 0]);
+}
+
+#[test]
+fn blocks_may_touch_but_not_overlap() {
+    let block = |x: f64| {
+        format!(
+            "[[machine.mounting.block]]\nname = \"more\"\ncentre = [{x:?}, 0.0, 900.0]\nsize = [10.0, 10.0, 10.0]\n"
+        )
+    };
+    let at = "[[machine.mounting.block]]";
+    let two = |gap: f64| format!("{}{}{at}", block(0.0), block(gap).replace("more", "less"));
+    assert_eq!(codes(at, &two(9.0)), ["machine::blocks_overlap"]);
+    assert_eq!(codes(at, &two(10.0)), [] as [&str; 0]);
+}
+
+#[test]
+fn numbers_of_another_world_are_said_shortly() {
+    let text = crate::machine::BUILT_IN.replacen("range = [-450.0, 450.0]", "range = [-1e300, 1e300]", 1);
+    let failure = super::load(&source("m.toml", text)).unwrap_err();
+    assert!(failure.to_string().ends_with("range of axis X is [-1e300, 1e300]"), "{failure}");
+}
