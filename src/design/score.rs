@@ -3,8 +3,12 @@
 use super::record::{Assessment, Expected, Score};
 use super::view::Task;
 
-/// The noise of the touches and the scatter of indexing must leave a location error to this share of its typical size.
+/// The noise of a touch alone must leave a location error to this share of its typical size.
 const NOISE_SHARE: f64 = 0.25;
+
+/// With the scatter of indexing the 95 % interval must stay within the typical size: else a usual error could not be told
+/// from none.
+const VISITS_SHARE: f64 = 0.5;
 
 /// A good plan knows location errors to this share of their typical size whatever else acts.
 const UNMODELLED_SHARE: f64 = 1.0;
@@ -53,11 +57,19 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         let over = judged.iter().filter(|p| of(p).is_none_or(|s| s > share * typical(p)));
         over.map(|p| p.name.as_str()).collect()
     };
-    let noisy = coarse(NOISE_SHARE, |p| p.sigma_with_visits);
+    let noisy = coarse(NOISE_SHARE, |p| p.sigma);
     if !noisy.is_empty() {
         let says = format!(
-            "the noise of the touches and of indexing leaves {} uncertain by more than a quarter of its usual size",
+            "the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size",
             noisy.join(", ")
+        );
+        return (Score::NotEnough, format!("{says}{not_for}"));
+    }
+    let scattered = coarse(VISITS_SHARE, |p| p.sigma_with_visits);
+    if !scattered.is_empty() {
+        let says = format!(
+            "with the scatter of indexing {} is uncertain by more than half of its usual size, so that a usual error could not be told from none",
+            scattered.join(", ")
         );
         return (Score::NotEnough, format!("{says}{not_for}"));
     }

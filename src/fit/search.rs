@@ -180,6 +180,8 @@ impl Search<'_> {
         let mut out = if robust.is_empty() || robust.len() > cap { first } else { robust.clone() };
         if robust.len() > cap {
             match self.many_strangers(&robust, &all, &solution) {
+                // few of them after all: the rule for few
+                Some(many) if many.len() <= cap => out = many,
                 Some(many) => {
                     most = (MOST_STRANGERS * n as f64) as usize;
                     out = many;
