@@ -92,12 +92,13 @@ pub struct Where {
     pub on: String,
 }
 
-/// The misfit against a variable.
+/// The misfit against a variable: what of it the model cannot follow, about its mean over the touches. A level is no finding:
+/// the set-ups take it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Shape {
     /// Which variable, as in `where`.
     pub by: String,
-    /// Unit of x.
+    /// Unit of x; `1` for groups of touches, which are numbered.
     pub x_unit: String,
     /// Unit of y.
     pub y_unit: String,

@@ -223,7 +223,10 @@ fn plot(s: &Shape, paper: Paper) -> String {
         }
         grid[row(s.y[i])][c] = curve;
     }
-    let mut out = wrapped(&format!("what is left against {} ({}), {}", plain(&s.by), s.x_unit, s.direction), 2, paper);
+    // a group has a number and no unit
+    let unit = if s.x_unit == "1" { String::new() } else { format!(" ({})", s.x_unit) };
+    let what = format!("what is left against {}{unit}, {}, about its mean", plain(&s.by), s.direction);
+    let mut out = wrapped(&what, 2, paper);
     for (r, line) in grid.iter().enumerate() {
         let label = match r {
             0 => format!("{limit:+8.1}"),
