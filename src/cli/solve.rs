@@ -105,7 +105,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                     Some(why)
                 } else if steps.len() >= args.at_most {
                     Some(format!("{} effects were added, as many as --at-most allows", steps.len()))
+        let mistake = found.mistake();
                 } else {
+            _ if mistake.is_some() => Some(format!(
+                "a gross mistake must be put right first, and the touches made again: {}",
+                mistake.unwrap_or_default()
+            )),
                     propose(first, io);
                     match ask(first, args.yes)? {
                         Reply::Take(id) => {
@@ -149,9 +154,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 args.study.display()
             )),
             (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
-            (Verdict::MissingEffect, _) => {
-                Some("a gross mistake must be put right, and the touches made again".to_owned())
-            }
+            (Verdict::MissingEffect, _) => Some("what is missing is not borne out".to_owned()),
             _ => Some("nothing is left that these touches can show".to_owned()),
         };
         if let Some(stopped) = stopped {
@@ -183,10 +186,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects: fit.outcome.effects.clone(),
         steps,
     };
-    tell(&solution, &fit.outcome, &args.study, io);
+    tell(&solution, &fit, &loaded.catalogue, (&args.study, found.mistake().is_some()), io);
     io.answer(&solution);
-    drop(loaded);
-    Ok(if matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) { Answer::No } else { Answer::Done })
+    let no = matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) || found.most_missed;
+    Ok(if no { Answer::No } else { Answer::Done })
 }
 
 fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
@@ -377,7 +380,16 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
     out
 }
 
-fn tell(s: &Solution, outcome: &Outcome, study: &Path, io: &Io) {
+/// What was found: one name, or those that these touches cannot tell apart, the one that stands in the model first.
+fn found_as(added: &str, same_as: &[String]) -> String {
+    match same_as {
+        [] => added.to_owned(),
+        others => format!("{} (these touches cannot tell which; {added} stands in the model)", one_of(added, others)),
+    }
+}
+
+fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Path, bool), io: &Io) {
+    let outcome = &fit.outcome;
     io.say(format!("\n--- the end: {}", s.stopped));
     let sizes = |id: &str| -> String {
         let of = outcome.parameters.iter().filter(|p: &&Parameter| p.effect == id);
@@ -412,6 +424,10 @@ fn tell(s: &Solution, outcome: &Outcome, study: &Path, io: &Io) {
         io.say(format!("open: {line}"));
     }
     if s.steps.iter().any(|step| !step.same_as.is_empty()) {
+    if mistaken {
+        // what is left over says nothing of the machine
+        return;
+    }
         io.say(format!("next: axiscal plan-next {} --controller … --out next", study.display()));
     }
     io.say(format!("next: axiscal history {}", study.display()));

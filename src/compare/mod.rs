@@ -56,6 +56,9 @@ pub struct Comparison {
     /// True when the noise explains what is left (99.9 %), its size and the way it is spread.
     pub explained_by_noise: bool,
     /// All in a sentence.
+    /// Touches that cannot be used: most of them found nothing.
+    #[serde(default)]
+    pub missed: usize,
     pub says: String,
     /// Ways to split the touches, the one that explains most with the fewest groups first.
     pub splits: Vec<Split>,
@@ -202,7 +205,9 @@ impl Point {
 pub fn compare(fit: &Fit) -> Comparison {
     let points = points(fit);
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
-    let explained_by_noise = fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof);
+    // where most touches found nothing the rest is no sample of the machine
+    let no_sample = fit.data.mostly_missed();
+    let explained_by_noise = !no_sample && (fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof));
     let mut splits = factors::splits(fit, &points, &Misfit::new(fit));
     let rank = |s: &Split| (s.share >= factors::WORTH_NAMING, s.evidence);
     splits.sort_by(|a, b| rank(b).0.cmp(&rank(a).0).then(rank(b).1.total_cmp(&rank(a).1)));
@@ -215,6 +220,12 @@ pub fn compare(fit: &Fit) -> Comparison {
     let says = match (fit.dof, explained_by_noise, first) {
         (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
         (_, true, _) => {
+        _ if no_sample => format!(
+            "{} of {} touches cannot be used, most of them because the search found nothing: what is left over of the others \
+             says nothing of the machine",
+            fit.data.unusable.len(),
+            fit.data.made()
+        ),
             format!("what is left, {rms_um:.2} um, is what {noise_words} leaves: the model does not fail")
         }
         (_, false, Some(split)) => {
@@ -238,6 +249,7 @@ pub fn compare(fit: &Fit) -> Comparison {
         noise_says: fit.noise.says(),
         chi2_per_dof,
         dof: fit.dof,
+        missed: fit.data.unusable.len(),
         explained_by_noise,
         says,
         splits,

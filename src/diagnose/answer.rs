@@ -74,6 +74,22 @@ pub struct Diagnosis {
     pub warnings: Vec<String>,
 }
 
+impl Diagnosis {
+    /// The gross mistake that must be put right before anything smaller can be spoken of: an axis that counts the wrong
+    /// way round, other units, a log of something else, or touches most of which found nothing.
+    #[must_use]
+    pub fn mistake(&self) -> Option<String> {
+        if self.most_missed {
+            let none = || "most touches found nothing".to_owned();
+            return Some(self.candidates.first().map_or_else(none, |c| c.name.clone()));
+        }
+        let right = |g: &&Gross| g.rms_um < super::gross::RIGHT * self.rms_um;
+        let elsewhere = |g: &&Gross| g.hypothesis == super::gross::ELSEWHERE;
+        let found = self.gross.first().filter(right).or_else(|| self.gross.iter().find(elsewhere));
+        found.map(|g| g.says.clone())
+    }
+}
+
 /// On what the misfit depends.
 #[derive(Debug, Clone, Serialize)]
 pub struct Where {

@@ -32,7 +32,9 @@ pub(super) fn put_together(
 ) -> Diagnosis {
     let fit = subject.fit;
     let mut verdict = decision.verdict;
-    let open = if verdict == Verdict::MissingEffect { super::open::open(seen) } else { super::open::Open::default() };
+    // what passes the test and is not borne out stays a question, too
+    let asked = verdict == Verdict::MissingEffect || (decision.named && !beside.shapes_win);
+    let open = if asked { super::open::open(seen) } else { super::open::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
     let gross_found = gross.first().is_some_and(|g| g.rms_um < gross::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)

@@ -151,7 +151,7 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
 pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::Subject) {
     let fit = subject.fit;
     let (missed, made) = (fit.data.unusable.len(), fit.data.observations.len() + fit.data.unusable.len());
-    if !super::missed::mostly(&fit.data) {
+    if !fit.data.mostly_missed() {
         return;
     }
     (out.most_missed, out.faint) = (true, false);

@@ -14,8 +14,12 @@ const WORTH_SHOWING: f64 = 0.05;
 /// The whole answer. `all` also lists groups and plots of what explains nothing.
 #[must_use]
 pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
+    let missed = match c.missed {
+        0 => String::new(),
+        n => format!(" ({n} more cannot be used)"),
+    };
     let mut out = format!(
-        "{}: {} um RMS left over {} touches, noise {} um; chi2/dof {:.2}",
+        "{}: {} um RMS left over {} touches{missed}, noise {} um; chi2/dof {:.2}",
         c.machine,
         significant(c.rms_um),
         c.points.iter().filter(|p| p.used).count(),
