@@ -6,9 +6,12 @@ use super::{Answer, Io, add};
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
 use crate::diagnose::{Options, Subject, Verdict, diagnose};
+use crate::diagnose::words::{list, one_of};
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::fit::{self, Fit};
 use crate::report::fit::{digits, significant};
+use crate::model::catalogue::Catalogue;
+use crate::report::diagnosis::wrong_sign;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -57,6 +60,8 @@ struct Solution {
 struct Step {
     added: String,
     /// Effects that these touches cannot tell from it.
+    /// What was found, in words: never one name where these touches cannot tell it from others.
+    found: String,
     same_as: Vec<String>,
     p_adjusted: f64,
     rms_before_um: f64,
@@ -100,17 +105,17 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
         io.say(&found.says);
         let stopped = match (&found.verdict, found.candidates.first()) {
-            (Verdict::MissingEffect, Some(first)) if first.proposed => {
-                if let Some(why) = unbelievable(first) {
-                    Some(why)
-                } else if steps.len() >= args.at_most {
-                    Some(format!("{} effects were added, as many as --at-most allows", steps.len()))
         let mistake = found.mistake();
-                } else {
+            (Verdict::MissingEffect, Some(first)) if first.proposed => {
             _ if mistake.is_some() => Some(format!(
                 "a gross mistake must be put right first, and the touches made again: {}",
                 mistake.unwrap_or_default()
             )),
+                if let Some(why) = unbelievable(first) {
+                    Some(why)
+                } else if steps.len() >= args.at_most {
+                    Some(format!("{} effects were added, as many as --at-most allows", steps.len()))
+                } else {
                     propose(first, io);
                     match ask(first, args.yes)? {
                         Reply::Take(id) => {
@@ -132,6 +137,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                             }
                             steps.push(Step {
                                 added: id,
+                                found: found_as(&id, &same_as),
                                 same_as,
                                 p_adjusted: first.p_adjusted,
                                 rms_before_um: o.rms_um,
@@ -280,11 +286,14 @@ fn propose(first: &Candidate, io: &Io) {
     if let (false, Some(most)) = (first.not_told.is_empty(), first.moves_um) {
         sizes.push(format!("together up to {} um at a touch", significant(most)));
     }
-    let which = match first.same_as.len() {
-        0 => String::new(),
-        n => format!(" or one of {n} others"),
+    let what = match &first.same_as[..] {
+        [] => format!("{} ({})", first.effect, first.name),
+        others => format!("{}; if it is {}", one_of(&first.effect, others), first.effect),
     };
-    io.say(format!("proposed: {}{which} ({}): {}", first.effect, first.name, sizes.join(", ")));
+    io.say(format!("proposed: {what}: {}", sizes.join(", ")));
+    if !first.wrong_sign.is_empty() {
+        io.say(format!("  {}", wrong_sign(first)));
+    }
     io.say(format!("  {}", first.says));
     io.say(format!("  to confirm it: {}", first.look));
     if let (Some(before), Some(after)) = (first.held_out_before_um, first.held_out_after_um) {
@@ -370,7 +379,7 @@ fn drop_idle(args: &Args, steps: &[Step], fit: &Fit, io: &Io) -> Result<Vec<Stri
 fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
     let mut out = Vec::new();
     for s in steps.iter().filter(|s| !s.same_as.is_empty()) {
-        out.push(format!("{} could as well be {}", s.added, s.same_as.join(" or ")));
+        out.push(format!("{} stands in the model and could as well be {}", s.added, list(&s.same_as)));
     }
     out.extend(outcome.undetermined.iter().map(|u| u.says.clone()));
     out.extend(outcome.weak.iter().map(|w| w.says.clone()));
@@ -404,7 +413,7 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
     for step in &s.steps {
         io.say(format!(
             "found: {}: {} > {} um RMS: {}",
-            step.added,
+            step.found,
             significant(step.rms_before_um),
             significant(step.rms_after_um),
             sizes(&step.added)
@@ -415,6 +424,10 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
         significant(s.rms_um),
         significant(s.noise_um),
         s.held_out_rms_um
+    if mistaken {
+        // what is left over says nothing of the machine
+        return;
+    }
             .map_or_else(String::new, |h| format!("; {} um on set-ups left out of the fit", significant(h)))
     ));
     for id in &s.taken_back {
@@ -424,10 +437,6 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
         io.say(format!("open: {line}"));
     }
     if s.steps.iter().any(|step| !step.same_as.is_empty()) {
-    if mistaken {
-        // what is left over says nothing of the machine
-        return;
-    }
         io.say(format!("next: axiscal plan-next {} --controller … --out next", study.display()));
     }
     io.say(format!("next: axiscal history {}", study.display()));

@@ -176,6 +176,10 @@ pub struct Candidate {
     pub share: f64,
     /// Are the expected sizes usual ones?
     pub plausible: bool,
+    /// Parameters that are positive by nature (lost motion, sag) and would be negative: only a compensation that is set too
+    /// far does that.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wrong_sign: Vec<String>,
     /// Parameters of the model that it makes more than three times less certain.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weakens: Vec<Weakened>,

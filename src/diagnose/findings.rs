@@ -349,6 +349,10 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         weakens: weakened(fit, seen, chosen),
         remains: None,
     }
+        wrong_sign: {
+            let names = &seen.named.columns[chosen];
+            score.wrong_signs(&seen.named.library).into_iter().map(|k| names[k].name.clone()).collect()
+        },
 }
 
 /// By how much an effect of the expected size moves the touch that it moves most, with its standard uncertainty, µm: told

@@ -170,6 +170,7 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         look: effect.look.clone(),
         share: 1.0 - (gross.rms_um / subject.fit.outcome.rms_um).powi(2),
         plausible: true,
+        wrong_sign: Vec::new(),
         weakens: Vec::new(),
         remains: Some(gross.rms_um > GROSS_UM),
     })

@@ -21,6 +21,8 @@ pub struct Column {
     pub unit: String,
     /// Its usual size: columns are per so much of it.
     pub typical: f64,
+    /// Is its size positive by nature?
+    pub positive: bool,
 }
 
 /// A shape parameter whose values are tried.
@@ -128,7 +130,9 @@ impl<'c> Named<'c> {
                     .map(|&c| {
                         let u = &made.unknowns[c];
                         let typical = if u.typical > 0.0 { u.typical } else { 1.0 };
-                        Column { name: u.name.clone(), unit: u.unit.clone(), typical }
+                        let bare = u.name.split('@').next().unwrap_or(&u.name);
+                        let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
+                        Column { name: u.name.clone(), unit: u.unit.clone(), typical, positive }
                     })
                     .collect();
                 for (mut column, c) in values.column_iter_mut().zip(&columns) {
@@ -176,6 +180,7 @@ impl<'c> Named<'c> {
             }
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             library.push_scan(&effect.id, origin, variants, usize::from(scanned[i].is_some()));
+            library.positive_of_last((0..info[i].len()).filter(|&k| info[i][k].positive).collect());
         }
         Self { effects, library, raw_um, columns: info, scanned, left_out }
     }

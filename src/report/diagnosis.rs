@@ -142,6 +142,9 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         if !first.tell_apart.is_empty() {
             out += &wrapped(&format!("  to tell apart: {}", first.tell_apart), 4);
         }
+        if !first.wrong_sign.is_empty() {
+            out += &wrapped(&format!("  {}", wrong_sign(first)), 4);
+        }
         if !first.plausible {
             out += "  its size would be unusual: look at the others of its group first\n";
         }
@@ -162,6 +165,15 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         }
     }
     out
+}
+
+/// What a size of the wrong sign means.
+#[must_use]
+pub fn wrong_sign(c: &Candidate) -> String {
+    format!(
+        "{} would be negative, and it is positive by nature: only a compensation that is set too far makes that",
+        c.wrong_sign.join(", ")
+    )
 }
 
 /// A p-value.
