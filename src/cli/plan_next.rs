@@ -473,6 +473,7 @@ fn write(
     let name = format!("{}.{}", plan.program, nc.extension);
     let proof = super::generate::prove(&loaded.machine, post, plan, &name, &nc, io)?;
     let mut proven = plan.clone();
+    proven.blocks_anew = chosen.label.is_none();
     proven.programs.extend(proof.map(|p| (post.name.clone(), p)));
     files::write_whole(plan_file, proven.to_json().as_bytes())?;
     files::write_whole(&form_file, chosen.text.as_bytes())?;
@@ -559,11 +560,20 @@ fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> 
     let touches = read_log(&files::read_bytes(log)?, log, (&args.controller, None), &loaded.machine, &plan, io)?;
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let runs = loaded.planned();
+    // whoever made the program for blocks put up anew has put them up anew
+    let moved = args.moved || plan.blocks_anew;
+    if moved && !args.moved {
+        io.report(&[Finding::info(
+            "next::blocks_anew",
+            "this program was made for blocks that are put up anew: their set-up counts as unknown",
+        )
+        .help("where they were not moved after all, write the [[data]] by hand with the same mounting")]);
+    }
     let stood = runs.last().and_then(|last| {
         let own = last.plan.touches.last()?.mounting.clone();
         let same = own.as_deref().unwrap_or(&last.plan.mounting).split('#').next() == Some(plan.mounting.as_str());
         let run = last.mounting.clone().unwrap_or_else(|| format!("{}-{}", last.plan.mounting, runs.len()));
-        (same && !args.moved).then(|| (run.clone(), own.map_or(run.clone(), |m| format!("{run}/{m}"))))
+        (same && !moved).then(|| (run.clone(), own.map_or(run.clone(), |m| format!("{run}/{m}"))))
     });
     let joined = study::Joined {
         plan: relative(plan_file, &folder),
