@@ -3,15 +3,16 @@
 
 use super::load::{Loaded, load_study};
 use super::{Answer, Io, add};
+use crate::compare::told;
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
-use crate::diagnose::{Options, Subject, Verdict, diagnose};
 use crate::diagnose::words::{list, one_of};
+use crate::diagnose::{Options, Subject, Verdict, diagnose};
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::fit::{self, Fit};
-use crate::report::fit::{digits, significant};
 use crate::model::catalogue::Catalogue;
 use crate::report::diagnosis::wrong_sign;
+use crate::report::fit::{digits, significant};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -59,9 +60,9 @@ struct Solution {
 #[derive(Debug, Serialize)]
 struct Step {
     added: String,
-    /// Effects that these touches cannot tell from it.
     /// What was found, in words: never one name where these touches cannot tell it from others.
     found: String,
+    /// Effects that these touches cannot tell from it.
     same_as: Vec<String>,
     p_adjusted: f64,
     rms_before_um: f64,
@@ -104,13 +105,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let planned = loaded.planned();
         let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
         io.say(&found.says);
-        let stopped = match (&found.verdict, found.candidates.first()) {
         let mistake = found.mistake();
-            (Verdict::MissingEffect, Some(first)) if first.proposed => {
+        let stopped = match (&found.verdict, found.candidates.first()) {
             _ if mistake.is_some() => Some(format!(
                 "a gross mistake must be put right first, and the touches made again: {}",
                 mistake.unwrap_or_default()
             )),
+            (Verdict::MissingEffect, Some(first)) if first.proposed => {
                 if let Some(why) = unbelievable(first) {
                     Some(why)
                 } else if steps.len() >= args.at_most {
@@ -136,8 +137,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                                 break (loaded, fit, found, refused.unwrap_or_default());
                             }
                             steps.push(Step {
-                                added: id,
                                 found: found_as(&id, &same_as),
+                                added: id,
                                 same_as,
                                 p_adjusted: first.p_adjusted,
                                 rms_before_um: o.rms_um,
@@ -405,10 +406,14 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
         let words: Vec<String> = of
             .map(|p| match p.sigma {
                 Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, p.sigma), significant(sigma), p.unit),
-                None => format!("{} not told alone", p.name),
+                None => match told::bracket(fit, catalogue, p) {
+                    Some(b) => b.says(),
+                    None => format!("{} not told alone", p.name),
+                },
             })
             .collect();
-        words.join(", ")
+        let together = told::together(fit, id).map(|t| t.says());
+        words.into_iter().chain(together).collect::<Vec<_>>().join(", ")
     };
     for step in &s.steps {
         io.say(format!(
@@ -419,11 +424,6 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
             sizes(&step.added)
         ));
     }
-    io.say(format!(
-        "left: {} um RMS of a noise of {} um{}",
-        significant(s.rms_um),
-        significant(s.noise_um),
-        s.held_out_rms_um
     if mistaken {
         // what is left over says nothing of the machine
         return;

@@ -6,6 +6,7 @@ pub mod change;
 mod factors;
 pub mod rungs;
 mod share;
+pub mod told;
 pub mod verify;
 
 pub use share::Share;
