@@ -56,10 +56,10 @@ pub struct Comparison {
     pub dof: usize,
     /// True when the noise explains what is left (99.9 %), its size and the way it is spread.
     pub explained_by_noise: bool,
-    /// All in a sentence.
     /// Touches that cannot be used: most of them found nothing.
     #[serde(default)]
     pub missed: usize,
+    /// All in a sentence.
     pub says: String,
     /// Ways to split the touches, the one that explains most with the fewest groups first.
     pub splits: Vec<Split>,
@@ -218,24 +218,22 @@ pub fn compare(fit: &Fit) -> Comparison {
     let visits_um = um_from_mm(fit.noise.tau_mm);
     let noise_words = noise_words(noise_um, visits_um);
     let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
+    let misses = format!("the model misses the touches by {}", fit.noise.times(chi2_per_dof.sqrt()));
     let says = match (fit.dof, explained_by_noise, first) {
-        (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
-        (_, true, _) => {
         _ if no_sample => format!(
             "{} of {} touches cannot be used, most of them because the search found nothing: what is left over of the others \
              says nothing of the machine",
             fit.data.unusable.len(),
             fit.data.made()
         ),
+        (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
+        (_, true, _) => {
             format!("what is left, {rms_um:.2} um, is what {noise_words} leaves: the model does not fail")
         }
         (_, false, Some(split)) => {
-            format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says)
+            format!("{misses}; {}", split.says)
         }
-        (_, false, None) => format!(
-            "the model misses the touches by {:.1} times their noise, and what is left goes with nothing in particular",
-            chi2_per_dof.sqrt()
-        ),
+        (_, false, None) => format!("{misses}, and what is left goes with nothing in particular"),
     };
     Comparison {
         format: FORMAT.into(),
@@ -250,8 +248,8 @@ pub fn compare(fit: &Fit) -> Comparison {
         noise_says: fit.noise.says(),
         chi2_per_dof,
         dof: fit.dof,
-        missed: fit.data.unusable.len(),
         explained_by_noise,
+        missed: fit.data.unusable.len(),
         says,
         splits,
         worst: worst(fit, &points),
@@ -322,7 +320,8 @@ impl Comparison {
                 self.rms_um, first.says
             )
         } else {
-            format!("the model misses the touches by {:.1} times their noise; {}", self.chi2_per_dof.sqrt(), first.says)
+            let times = noise::times_in_words(self.chi2_per_dof.sqrt(), self.visit_um);
+            format!("the model misses the touches by {times}; {}", first.says)
         };
         self
     }
