@@ -428,7 +428,11 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
         // what is left over says nothing of the machine
         return;
     }
-            .map_or_else(String::new, |h| format!("; {} um on set-ups left out of the fit", significant(h)))
+    io.say(format!(
+        "left: {} um RMS of a noise of {} um{}",
+        significant(s.rms_um),
+        significant(s.noise_um),
+        s.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on index visits left out", significant(h)))
     ));
     for id in &s.taken_back {
         io.say(format!("taken back: {id}"));

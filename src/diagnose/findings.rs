@@ -305,7 +305,10 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         .collect();
     let says = match &not_told[..] {
         [] => effect.says.clone(),
-        some => format!("{} Its {} cannot be told by this plan.", effect.says, words::list(some)),
+        some => {
+            let says = effect.says.trim_end_matches('.');
+            format!("{says}. Its {} cannot be told by this plan", words::list(some))
+        }
     };
     if let Some(scanned) = &seen.named.scanned[chosen] {
         parameters.push(Parameter {
@@ -346,13 +349,13 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         look: effect.look.clone(),
         share: score.delta_ss / total,
         plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,
-        weakens: weakened(fit, seen, chosen),
-        remains: None,
-    }
         wrong_sign: {
             let names = &seen.named.columns[chosen];
             score.wrong_signs(&seen.named.library).into_iter().map(|k| names[k].name.clone()).collect()
         },
+        weakens: weakened(fit, seen, chosen),
+        remains: None,
+    }
 }
 
 /// By how much an effect of the expected size moves the touch that it moves most, with its standard uncertainty, µm: told

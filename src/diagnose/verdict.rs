@@ -121,11 +121,14 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
                 .first()
                 .filter(|g| g.rms_um < super::gross::RIGHT * out.rms_um)
                 .map(|g| format!(" {}.", g.says));
-            let (effect, others) = match out.candidates.first() {
-                Some(c) => (c.effect.as_str(), c.same_as.len()),
-                None => ("an effect", 0),
-            };
-            let one = if others == 0 { effect.to_owned() } else { format!("{effect} or one of {others} others") };
+            let one = out.candidates.first().map_or_else(
+                || "an effect".to_owned(),
+                |c| match &c.same_as[..] {
+                    [] => c.effect.clone(),
+                    [other] => format!("{} or {other}", c.effect),
+                    others => format!("{} or one of {} others", c.effect, others.len()),
+                },
+            );
             let scatter_first = out.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
             match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
                 (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
@@ -192,11 +195,7 @@ fn missing(c: &Candidate, against: &str) -> String {
     let what = if c.same_as.is_empty() {
         format!("Missing: {} ({}).", c.name, c.effect)
     } else {
-        format!(
-            "Missing: one of {} and {}; these touches cannot tell them apart.",
-            c.effect,
-            super::words::list(&c.same_as)
-        )
+        format!("Missing: {}; these touches cannot tell them apart.", super::words::one_of(&c.effect, &c.same_as))
     };
     format!("{what} It would bring the error from {against} to {:.2} um.{rest}", c.rms_after_um)
 }

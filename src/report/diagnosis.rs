@@ -116,11 +116,11 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     let tested = || d.candidates.iter().filter(|c| c.proposed && c.effect != gross::EFFECT);
     if tested().any(rises) {
         out += &wrapped(
-            "* passes the test with all candidates counted in; with so few index visits the touches left out speak neither for \
+            "* passes the test with all candidates counted in; with so few index visits those left out speak neither for \
              nor against it (the error rises by less than its standard error)",
             2,
         );
-    } else if d.candidates.iter().any(|c| c.proposed) {
+    } else if tested().next().is_some() {
         out += &wrapped(
             "* passes the test with all candidates counted in, and touches that had no part in choosing it are predicted \
              better with it (± one standard error of the difference)",
