@@ -174,6 +174,17 @@ fn a_sketch_finds_its_place_and_takes_the_error_away() {
     );
     let left: Vec<f64> = made["places"].as_array().unwrap().iter().map(|p| p["left_um"].as_f64().unwrap()).collect();
     assert!(left.len() > 5 && left[0] < 1.2 && left.iter().any(|l| *l > 1.2 * left[0]), "{left:?}");
+    // the path is the one that the study needs, wherever the call was made
+    let (above, name) = (at.parent().unwrap(), at.file_name().unwrap().to_str().unwrap());
+    let (study, out) = (format!("{name}/study.toml"), format!("{name}/there.toml"));
+    let said = String::from_utf8(axiscal(above, &["sketch-effect", &study, "--out", &out]).stdout).unwrap();
+    assert!(said.contains("effects_file = [\"there.toml\"]"), "{said}");
+    // no known effect explains it: there is nothing to part, and that is said at once
+    let (next, code) = json(at, &["plan-next", "study.toml", "--out", "next", "--controller", "linuxcnc"]);
+    assert_eq!((next["pairs"].as_array().map(Vec::len), code), (Some(0), 1), "{next}");
+    assert!(next["says"].as_str().unwrap().contains("nothing here to part"), "{next}");
+    let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml"]).stdout).unwrap();
+    assert!(said.contains("next: axiscal sketch-effect study.toml"), "{said}");
     // added to the model it leaves the noise
     let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
     let study = study.replace("machine = \"swivel-head\"", "machine = \"swivel-head\"\neffects_file = [\"mine.toml\"]");
@@ -232,6 +243,21 @@ fn a_mistake_is_named_where_most_touches_miss() {
         let candidates = d["candidates"].as_array().unwrap();
         assert!(candidates.iter().all(|c| c["effect"] == "sign-or-axis-swap"), "{parameter}: {d}");
         assert_ne!(d["gross"][0]["hypothesis"], "mm", "dividing by 25.4 is no explanation");
+        // a supposition of yes or no has no size and no chance: its row is words
+        let said = String::from_utf8(axiscal(folder.path(), &["diagnose", "study.toml"]).stdout).unwrap();
+        assert!(!said.contains("1e-300") && !said.contains(&format!("{parameter} 1.00")), "{said}");
+        // and all others stop at it
+        let (c, _) = json(folder.path(), &["compare", "study.toml"]);
+        assert!(c["says"].as_str().unwrap().contains(says) && c["explained_by_noise"] == false, "{}", c["says"]);
+        assert!(c["missed"].as_u64().unwrap() > 0);
+        let (s, code) = json(folder.path(), &["solve", "study.toml", "--yes"]);
+        assert!(code == 1 && s["stopped"].as_str().unwrap().contains(says), "{s}");
+        let said = String::from_utf8(axiscal(folder.path(), &["solve", "study.toml", "--yes"]).stdout).unwrap();
+        assert!(!said.contains("left: "), "{said}");
+        let next = ["plan-next", "study.toml", "--out", "next", "--controller", "linuxcnc"];
+        let (n, code) = json(folder.path(), &next);
+        assert!(code == 1 && n["says"].as_str().unwrap().contains(says), "{n}");
+        assert!(!folder.path().join("next").exists(), "no program for a machine that counts the wrong way round");
     }
 }
 
@@ -255,4 +281,95 @@ fn a_step_in_time_gets_no_name_and_solve_leaves_the_study_alone() {
     let out = axiscal(at, &["diagnose", "study.toml"]);
     let text = String::from_utf8_lossy(&out.stdout);
     assert!(!text.contains("look:") && text.contains("noise: touch"), "{text}");
+}
+
+/// The paper's plan cannot tell which of X and Y is loose, but no machine has a negative lost motion.
+#[test]
+fn solve_names_a_group_and_not_its_first_member() {
+    let folder =
+        folder(&["head", "table"], "seed = 3\n[effects.backlash-y]\nbacklash_Y = 6.0\n[noise]\ntouch_um = 1.0\n", None);
+    let at = folder.path();
+    let (s, _) = json(at, &["solve", "study.toml", "--yes"]);
+    let step = &s["steps"][0];
+    assert_eq!(step["added"], "backlash-y", "{s}");
+    let others: Vec<&str> = step["same_as"].as_array().unwrap().iter().map(|o| o.as_str().unwrap()).collect();
+    assert!(others.contains(&"backlash-x"), "{s}");
+    let found = step["found"].as_str().unwrap();
+    assert!(found.starts_with("one of backlash-y, ") && found.contains("backlash-x"), "{found}");
+    // the study as it was, for a person who reads
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    std::fs::write(at.join("study.toml"), study.replace(", \"backlash-y\"", "")).unwrap();
+    let said = String::from_utf8(axiscal(at, &["solve", "study.toml", "--yes"]).stdout).unwrap();
+    assert!(said.contains("found: one of backlash-y, ") && !said.contains("found: backlash-y:"), "{said}");
+}
+
+/// Half of a run-out of C is an offset of the block: no amplitude has a value of its own, and the whole has.
+#[test]
+fn what_has_no_size_alone_is_told_together_and_a_jump_by_its_neighbours() {
+    let wrong = "seed = 5\n[effects.radial-c-1]\nEXC1c = 6.0\nEYC1s = -6.0\n[noise]\ntouch_um = 1.0\n";
+    let first = folder(&["head", "table"], wrong, None);
+    let (added, _) = json(first.path(), &["add", "study.toml", "radial-c-1", "--dry-run"]);
+    let together = &added["together"][0];
+    let number = |key: &str| together[key].as_f64().unwrap();
+    // counter to the turn: 6 um at every touch from the side
+    assert!((number("moves_um") - 6.0).abs() < 5.0 * number("sigma_um").max(0.1) + 1.0, "{together}");
+    assert!(number("sigma_um") > 0.0 && number("sigma_um") < 1.0, "{together}");
+    let said =
+        String::from_utf8(axiscal(first.path(), &["add", "study.toml", "radial-c-1", "--dry-run"]).stdout).unwrap();
+    assert!(said.contains("together they move a touch by up to"), "{said}");
+
+    let wrong =
+        "seed = 7\n[effects.block-slip]\ndx = 8.0\ndy = -6.0\ndz = 7.0\nfrom_h = 0.6137\n[noise]\ntouch_um = 0.5\n";
+    let second = folder(&["full"], wrong, None);
+    let (added, _) = json(second.path(), &["add", "study.toml", "block-slip"]);
+    let between = &added["between"][0];
+    let (from, to) = (between["from"].as_f64().unwrap(), between["to"].as_f64().unwrap());
+    assert_eq!(between["name"], "from_h", "{between}");
+    assert!(from <= 0.6137 + 0.01 && to >= 0.6137 - 0.01 && to - from < 0.1 && from < to, "{between}");
+}
+
+/// A curve is told about its mean: the level is the set-ups', and its doubt is no doubt of the curve.
+#[test]
+fn the_curve_can_be_read() {
+    let wrong = "seed = 4\n[effects.head-sag]\nhead_sag = 6.0\n[noise]\ntouch_um = 1.0\n";
+    let folder = folder(&["full"], wrong, None);
+    let (d, _) = json(folder.path(), &["diagnose", "study.toml"]);
+    let list =
+        |key: &str| -> Vec<f64> { d["shape"][key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect() };
+    let (y, band) = (list("y"), list("band"));
+    let (low, high) = y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let mut widths = band.clone();
+    widths.sort_by(f64::total_cmp);
+    let median = widths[widths.len() / 2];
+    assert!(low < 0.0 && high > 0.0, "a curve about its mean: {low} to {high}");
+    assert!(high - low > 2.0 * median, "{low} to {high} with a band of {median}");
+}
+
+#[test]
+fn words_are_words() {
+    use axiscal::diagnose::words::{one_of, plain};
+    let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
+    assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
+    assert_eq!(one_of("backlash-x", &[]), "backlash-x");
+    assert_eq!(plain("sX*C"), "the product of the sense of X's last motion and C");
+    assert_eq!(plain("time*block"), "time and block");
+    // with scatter of visits in it the figure is no ratio of the two in um beside it, and says so
+    use axiscal::fit::noise::times_in_words;
+    assert_eq!(times_in_words(2.2, 0.0), "2.2 times their noise");
+    assert_eq!(times_in_words(2.2, 0.5), "2.2 times what touch noise and visit scatter make");
+}
+
+/// Tables are laid out with the signs that are printed: a sign that becomes longer later breaks the line.
+#[test]
+fn tables_of_compare_fit_every_width() {
+    let folder = folder(&["full"], "seed = 4\n[effects.radial-c-2]\nEXC2c = 6.0\n[noise]\ntouch_um = 0.5\n", None);
+    let (c, _) = json(folder.path(), &["compare", "study.toml"]);
+    let c: axiscal::compare::Comparison = serde_json::from_value(c).unwrap();
+    for width in 80..=130 {
+        let paper = axiscal::report::plot::Paper { width, ascii: true, colour: false };
+        let text = axiscal::report::compare::comparison(&c, paper, true);
+        let sentence = |l: &&str| *l != c.says && !l.contains(" um RMS left over ");
+        let wide = text.lines().filter(sentence).find(|l| l.chars().count() > width);
+        assert!(wide.is_none(), "{width}: {wide:?}");
+    }
 }

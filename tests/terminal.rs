@@ -193,6 +193,14 @@ fn bare(text: &str) -> String {
     out
 }
 
+/// Some terminals (a serial line, a build server's pty) do not know their size.
+#[test]
+fn a_terminal_of_no_size_gets_tables_that_can_be_read() {
+    let text = bare(&in_a_terminal(&["compare", "study.toml"], 0, true));
+    let rule = text.lines().find(|l| l.starts_with('\u{2500}')).unwrap();
+    assert!(width(rule.trim_end()) > 60 && text.contains("split by"), "{text}");
+}
+
 #[test]
 fn a_terminal_gets_colours_unless_it_does_not_want_them() {
     for columns in [80, 160] {

@@ -166,7 +166,7 @@ globalThis.axiscalPlots = (() => {
     const noise = view.errors.noise_um;
     const traces = [
       { type: 'scatter', mode: 'lines+markers+text', x, y: view.ladder.map((r) => r.rms_um), line: { color: OKABE.blue, width: 3, shape: 'hv' }, marker: { size: 10, color: OKABE.blue, symbol: view.ladder.map((r) => (r.kind === 'proposed' ? 'circle-open' : 'circle')) }, text: view.ladder.map((r) => `${digits(r.rms_um)}`), textposition: 'top right', name: 'touches that were fitted', hovertemplate: '%{y:.3f} µm<extra>touches that were fitted</extra>', cliponaxis: false },
-      { type: 'scatter', mode: 'markers', x, y: view.ladder.map((r) => r.held_out_rms_um), marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'touches left out (predicted)', hovertemplate: '%{y:.3f} µm<extra>touches left out</extra>' },
+      { type: 'scatter', mode: 'markers', x, y: view.ladder.map((r) => r.held_out_rms_um), marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'index visits left out (predicted)', hovertemplate: '%{y:.3f} µm<extra>index visits left out</extra>' },
     ];
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
     const wide = Math.max(...all) / Math.min(...all) > 12;
@@ -462,7 +462,7 @@ globalThis.axiscalPlots = (() => {
     const part = { symbol: 'circle-open' };
     if (d.verdict === 'too-little-data') return { word: 'cannot be judged yet', ...part };
     if (d.verdict === 'unexplained' && !tried(k)) return { word: 'may be it: these poses cannot tell', ...part };
-    return { word: k === d.candidates[0] ? 'explains part, but not of touches left out' : 'explains part, less than the first', ...part };
+    return { word: k === d.candidates[0] ? 'explains part, but not of index visits left out' : 'explains part, less than the first', ...part };
   }
 
   /** What each candidate would leave. */
@@ -472,7 +472,7 @@ globalThis.axiscalPlots = (() => {
     const y = list.map((k) => safe(k.name).slice(0, 44));
     const traces = [
       { type: 'scatter', mode: 'markers', x: list.map((k) => k.rms_after_um), y, marker: { size: 12, symbol: list.map((k) => standing(view.diagnosis, k).symbol), color: OKABE.blue, line: { width: 2, color: OKABE.blue } }, name: 'error left with it', hovertemplate: '%{x:.2f} µm<extra>left with it</extra>' },
-      { type: 'scatter', mode: 'markers', x: list.map((k) => (tried(k) ? k.held_out_after_um : null)), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'on touches left out', hovertemplate: '%{x:.2f} µm<extra>touches left out</extra>' },
+      { type: 'scatter', mode: 'markers', x: list.map((k) => (tried(k) ? k.held_out_after_um : null)), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'on index visits left out', hovertemplate: '%{x:.2f} µm<extra>index visits left out</extra>' },
     ];
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });

@@ -139,7 +139,7 @@
     if (d.where.length && !view.headline.detail.includes(d.where[0].says)) s.append(make('p', {}, d.where[0].says));
     if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it goes with (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
     if (d.candidates.length) {
-      const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: takes away no more than chance may. Diamond: the same on touches left out.');
+      const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: takes away no more than chance may. Diamond: the same on index visits left out.');
       plot(div, () => P.candidates(div, view));
       const cards = make('div.grid');
       d.candidates.forEach((c, k) => {
@@ -150,7 +150,7 @@
         const mends = d.effects[c.effect]?.mends;
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('on touches left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the fall is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
+            ...fact('on index visits left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the fall is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
             ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(c.same_as.length ? fact('cannot be told from', c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)).join('; ')) : []),

@@ -2,7 +2,7 @@
 
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
-use crate::compare::change;
+use crate::compare::{change, told};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::fit::{self, Fit, held_out};
 use crate::study::edit;
@@ -146,6 +146,17 @@ fn run(
         n_groups: left_out.1.as_ref().map_or(0, |h| h.groups),
     };
     io.say(report::ladder::change((&before.outcome, &after.outcome), &changes, later, &doubt, io.paper(false)));
+    // what has no size of its own is told together, and a jump by the touches on both sides of it
+    let fresh: Vec<&String> = after.outcome.effects.iter().filter(|e| !before.outcome.effects.contains(e)).collect();
+    let together: Vec<told::Together> = fresh.iter().filter_map(|id| told::together(&after, id)).collect();
+    let brackets: Vec<told::Bracket> =
+        changes.new.iter().filter_map(|p| told::bracket(&after, &loaded.catalogue, p)).collect();
+    for t in &together {
+        io.say(format!("{}: what has no value here cannot be told alone; {}", t.effect, t.says()));
+    }
+    for b in &brackets {
+        io.say(format!("{}: no touch lies in between", b.says()));
+    }
     io.say(if args.dry_run {
         format!("{} is as it was (--dry-run)", args.study.display())
     } else {
@@ -154,6 +165,7 @@ fn run(
     let plain = |fit: &Fit| fit::outcome::Outcome { residuals: None, ..fit.outcome.clone() };
     io.answer(&json!({
         "before": plain(&before), "after": plain(&after), "remarks": changes.remarks, "written": !args.dry_run,
+        "together": together, "between": brackets,
         "held_out": {
             "se_before_um": doubt.standard_errors.0, "se_after_um": doubt.standard_errors.1,
             "fall_um": fall.map(|f| f.0), "fall_se_um": fall.map(|f| f.1), "nested_rms_um": nested_rms_um,

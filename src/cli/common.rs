@@ -34,7 +34,9 @@ pub fn print(text: &str) {
 fn columns() -> Option<usize> {
     let stated = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok()).filter(|c| *c > 0);
     let terminal = std::io::IsTerminal::is_terminal(&std::io::stdout());
-    let measured = || console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    // a terminal of no columns does not know how wide it is
+    let measured =
+        || console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns)).filter(|c| *c > 0);
     stated.or_else(|| measured().filter(|_| terminal)).map(|c| c.clamp(40, 400))
 }
 

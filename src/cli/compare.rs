@@ -34,10 +34,18 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut settings = loaded.settings();
     settings.quick = true;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let found = diagnose(subject, &Options { at_most: 1, refit: false, power: false, planned: None })?;
+    let missed = fit.data.mostly_missed();
+    let planned = if missed { loaded.planned() } else { Vec::new() };
+    let found = diagnose(
+        subject,
+        &Options { at_most: 1, refit: false, power: false, planned: missed.then_some(&planned[..]) },
+    )?;
     let leads: Vec<Lead> =
         found.depends.iter().map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() }).collect();
-    let comparison = compare::compare(&fit).led_by(&leads);
+    let mut comparison = compare::compare(&fit).led_by(&leads);
+    if found.most_missed {
+        comparison.says.clone_from(&found.says);
+    }
     if let Some(path) = &args.csv {
         files::write_whole(path, report::compare::csv(&comparison).as_bytes())?;
     }

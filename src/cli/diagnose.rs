@@ -37,7 +37,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     // scatter and bad touches that lie together are put right at the machine, not by a formula
     let at_the_machine = |id: &str| id.starts_with("scatter:") || id.starts_with("not-used:");
     let sketched = found.depends.first().is_some_and(|w| !at_the_machine(&w.id));
-    if matches!(found.verdict, Verdict::MissingEffect) && !io.json {
+    if found.mistake().is_some() {
+        io.say("next: put that right and measure again; smaller errors can be spoken of afterwards");
+    } else if matches!(found.verdict, Verdict::MissingEffect) && !io.json {
         if let Some(first) = found.candidates.first().filter(|c| c.proposed) {
             if first.same_as.is_empty() {
                 io.say_as_it_is(format!("next: axiscal add {} {}", args.study.display(), first.effect));
@@ -57,6 +59,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         }
     } else if found.faint {
         io.say_as_it_is(format!("next: axiscal plan-next {} --out next --controller NAME", args.study.display()));
+        if sketched {
+            io.say_as_it_is(format!("  or: axiscal sketch-effect {} --out my-effects.toml", args.study.display()));
+        }
     } else if matches!(found.verdict, Verdict::Unexplained) && sketched {
         io.say_as_it_is(format!("next: axiscal sketch-effect {} --out my-effects.toml", args.study.display()));
     }

@@ -269,7 +269,7 @@ fn as_json(e: &Effect) -> serde_json::Value {
             json!({ "start": start, "min": bound(min), "max": bound(max), "scan": p.scan })
         });
         json!({ "name": p.name, "alias": p.alias, "iso": p.iso, "unit": p.unit, "typical": p.typical,
-            "source": p.source, "shape": shape })
+            "positive": p.positive, "source": p.source, "shape": shape })
     };
     let term = |t: &Term| {
         json!({ "parameter": e.parameters[t.parameter].name, "place": word(t.place), "dof": dof(t),

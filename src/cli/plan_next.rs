@@ -5,14 +5,14 @@ use super::new::relative;
 use super::{Answer, Io};
 use crate::design::bundle::{Bundle, as_plan, bundles, program_text, without};
 use crate::design::next::{Design, Separation, where_all_have_values};
-use crate::design::questions::Questions;
+use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{Known, Noise, Planned, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::files;
 use crate::fit::{self, Fit, Settings, effects_of};
 use crate::machine::{Machine, Mounting};
-use crate::model::catalogue::Effect;
+use crate::model::catalogue::{Catalogue, Effect};
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
@@ -20,6 +20,7 @@ use crate::report::fit::{number, significant};
 use crate::search::apart::SEEN;
 use crate::study;
 use comfy_table::Cell;
+use nalgebra::DVector;
 use serde_json::json;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -95,11 +96,21 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let look = |settings: &Settings| -> Result<(Fit, diagnose::Diagnosis)> {
         let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), settings)?;
         let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings, fit: &fit };
-        let found = diagnose(subject, &diagnose::Options { power: false, refit: false, ..Default::default() })?;
+        // which mistake made touches miss is asked of the plans
+        let planned = if fit.data.mostly_missed() { loaded.planned() } else { Vec::new() };
+        let planned = fit.data.mostly_missed().then_some(&planned[..]);
+        let found =
+            diagnose(subject, &diagnose::Options { power: false, refit: false, planned, ..Default::default() })?;
         Ok((fit, found))
     };
     let (mut fit, mut found) = look(&settings)?;
-    let open = |d: &diagnose::Diagnosis| d.verdict == Verdict::MissingEffect && !d.open.suspects.is_empty();
+    if let Some(mistake) = found.mistake() {
+        let says = format!("a gross mistake must be put right first, and the touches made again: {mistake}");
+        return Ok(refuse(&says, &found.says, io));
+    }
+    let open = |d: &diagnose::Diagnosis| {
+        matches!(d.verdict, Verdict::MissingEffect | Verdict::Unexplained) && !d.open.suspects.is_empty()
+    };
     if named.is_empty() && !open(&found) {
         // what was added last may stand for others that the same touches could not tell from it: still an open question
         let added = last_added(args, &loaded)?;
@@ -114,7 +125,30 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         }
     }
     let mut setting = Setting::new(&loaded, &settings.effects, &fit)?;
-    let questions = if named.is_empty() {
+    let unexplained = named.is_empty() && !open(&found) && found.verdict == Verdict::Unexplained;
+    let sketched = if unexplained { Sketched::of(&loaded, &settings, &fit) } else { None };
+    // a faint pattern is there or is not: touches tell. A clear one is there, and no known effect stands against another
+    if unexplained && !(found.faint && sketched.is_some()) {
+        let help = match &sketched {
+            Some(_) => format!(
+                "axiscal sketch-effect {} --out my-effects.toml writes what is seen as a formula",
+                args.study.display()
+            ),
+            None => "look for it at the machine: no formula says it".to_owned(),
+        };
+        return Ok(refuse(
+            &format!("nothing here to part: no known effect explains what is left. {}", found.says),
+            &help,
+            io,
+        ));
+    }
+    let questions = if let Some(s) = &sketched {
+        Questions {
+            pairs: vec![Pair { one: s.effect.id.clone(), other: None }],
+            suspects: vec![Suspect { id: s.effect.id.clone(), size: s.size.clone(), shape: None }],
+            says: format!("is this faint pattern there at all? {}", s.says),
+        }
+    } else if named.is_empty() {
         warn(found.warnings.iter(), io);
         if open(&found) {
             // as its tests allow for it
@@ -123,7 +157,14 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         } else {
             let view = View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
             warn(view.left_out.iter().map(|(_, says)| says).filter(|says| !found.warnings.contains(says)), io);
-            Questions::of_plan(&view)
+            let asked = Questions::of_plan(&view);
+            match found.verdict {
+                Verdict::TooLittleData => Questions {
+                    says: format!("{} These effects would be confounded if one of them acted", found.says),
+                    ..asked
+                },
+                _ => asked,
+            }
         }
     } else {
         Questions::named(&args.effects)
@@ -139,7 +180,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for id in &asked {
         let shape = questions.suspects.iter().find(|s| s.id == *id).and_then(|s| s.shape);
         let known = effects.iter().any(|(e, _)| e.id == *id);
-        effects.extend(loaded.catalogue.get(id, &loaded.machine).filter(|_| !known).map(|e| (e, shape)));
+        let own = sketched.as_ref().map(|s| &s.effect).filter(|e| e.id == *id);
+        let effect = own.or_else(|| loaded.catalogue.get(id, &loaded.machine));
+        effects.extend(effect.filter(|_| !known).map(|e| (e, shape)));
     }
     let asked_of = View::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
     if let Some((_, says)) = asked_of.left_out.first() {
@@ -194,6 +237,37 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         return Ok(Answer::No);
     }
     write(args, &loaded, &post, &plan_file, &questions, &chosen, io)
+}
+
+/// Nothing is written, and why.
+fn refuse(says: &str, more: &str, io: &Io) -> Answer {
+    io.say(says);
+    io.say(format!("  {more}"));
+    io.say("  nothing is written");
+    io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": says }));
+    Answer::No
+}
+
+/// What is left over, as an effect that stands in no file.
+struct Sketched {
+    effect: Effect,
+    /// As the data have it, in typical sizes.
+    size: DVector<f64>,
+    says: String,
+}
+
+impl Sketched {
+    /// `None` where formulas have no word for it.
+    fn of(loaded: &Loaded, settings: &Settings, fit: &Fit) -> Option<Self> {
+        let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings, fit };
+        let made = diagnose::sketch::sketch(subject, &|id| loaded.catalogue.knows(id)).ok()?;
+        let mut own = Catalogue::default();
+        own.add_file(&source("sketch", made.toml)).ok()?;
+        let effect = own.get(&made.id, &loaded.machine)?.clone();
+        let factors = effect.parameters.iter().filter(|p| p.shape.is_none()).count();
+        let size = DVector::from_vec(made.sizes);
+        (size.len() == factors).then_some(Self { effect, size, says: made.says })
+    }
 }
 
 /// Effects of the study's model that the last step of its history put there.
@@ -412,6 +486,7 @@ fn write(
     let name = format!("{}.{}", plan.program, nc.extension);
     let proof = super::generate::prove(&loaded.machine, post, plan, &name, &nc, io)?;
     let mut proven = plan.clone();
+    proven.blocks_anew = chosen.label.is_none();
     proven.programs.extend(proof.map(|(p, _)| (post.name.clone(), p)));
     files::write_whole(plan_file, proven.to_json().as_bytes())?;
     files::write_whole(&form_file, chosen.text.as_bytes())?;
@@ -498,11 +573,20 @@ fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> 
     let touches = read_log(&files::read_bytes(log)?, log, (&args.controller, None), &loaded.machine, &plan, io)?;
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let runs = loaded.planned();
+    // whoever made the program for blocks put up anew has put them up anew
+    let moved = args.moved || plan.blocks_anew;
+    if moved && !args.moved {
+        io.report(&[Finding::info(
+            "next::blocks_anew",
+            "this program was made for blocks that are put up anew: their set-up counts as unknown",
+        )
+        .help("where they were not moved after all, write the [[data]] by hand with the same mounting")]);
+    }
     let stood = runs.last().and_then(|last| {
         let own = last.plan.touches.last()?.mounting.clone();
         let same = own.as_deref().unwrap_or(&last.plan.mounting).split('#').next() == Some(plan.mounting.as_str());
         let run = last.mounting.clone().unwrap_or_else(|| format!("{}-{}", last.plan.mounting, runs.len()));
-        (same && !args.moved).then(|| (run.clone(), own.map_or(run.clone(), |m| format!("{run}/{m}"))))
+        (same && !moved).then(|| (run.clone(), own.map_or(run.clone(), |m| format!("{run}/{m}"))))
     });
     let joined = study::Joined {
         plan: relative(plan_file, &folder),

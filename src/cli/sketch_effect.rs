@@ -1,6 +1,7 @@
 //! `axiscal sketch-effect`: a starting formula for what no known effect explains.
 
 use super::load::load_study;
+use super::new::relative;
 use super::{Answer, Io};
 use crate::diag::{Result, source};
 use crate::diagnose::{Subject, sketch::sketch};
@@ -8,7 +9,7 @@ use crate::files;
 use crate::fit;
 use crate::model::catalogue::Catalogue;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `sketch-effect`.
 #[derive(Debug, clap::Args)]
@@ -61,8 +62,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         "{}\n{} = {}\nwritten to {name}: change its id and name to what it is,",
         made.says, made.id, made.formula
     ));
+    // the study's paths are relative to the study
+    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     io.say(format!(
-        "put effects_file = [\"{name}\"] into the study, then: axiscal add {} {}",
+        "put effects_file = [\"{}\"] into the study, then: axiscal add {} {}",
+        relative(&args.out, &folder),
         args.study.display(),
         made.id
     ));

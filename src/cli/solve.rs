@@ -3,11 +3,15 @@
 
 use super::load::{Loaded, load_study};
 use super::{Answer, Io, add};
+use crate::compare::told;
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
+use crate::diagnose::words::{list, one_of};
 use crate::diagnose::{Options, Subject, Verdict, diagnose};
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::fit::{self, Fit};
+use crate::model::catalogue::Catalogue;
+use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -56,6 +60,8 @@ struct Solution {
 #[derive(Debug, Serialize)]
 struct Step {
     added: String,
+    /// What was found, in words: never one name where these touches cannot tell it from others.
+    found: String,
     /// Effects that these touches cannot tell from it.
     same_as: Vec<String>,
     p_adjusted: f64,
@@ -99,7 +105,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let planned = loaded.planned();
         let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
         io.say(&found.says);
+        let mistake = found.mistake();
         let stopped = match (&found.verdict, found.candidates.first()) {
+            _ if mistake.is_some() => Some(format!(
+                "a gross mistake must be put right first, and the touches made again: {}",
+                mistake.unwrap_or_default()
+            )),
             (Verdict::MissingEffect, Some(first)) if first.proposed => {
                 if let Some(why) = unbelievable(first) {
                     Some(why)
@@ -126,6 +137,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                                 break (loaded, fit, found, refused.unwrap_or_default());
                             }
                             steps.push(Step {
+                                found: found_as(&id, &same_as),
                                 added: id,
                                 same_as,
                                 p_adjusted: first.p_adjusted,
@@ -149,9 +161,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 args.study.display()
             )),
             (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
-            (Verdict::MissingEffect, _) => {
-                Some("a gross mistake must be put right, and the touches made again".to_owned())
-            }
+            (Verdict::MissingEffect, _) => Some("what is missing is not borne out".to_owned()),
             _ => Some("nothing is left that these touches can show".to_owned()),
         };
         if let Some(stopped) = stopped {
@@ -183,10 +193,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects: fit.outcome.effects.clone(),
         steps,
     };
-    tell(&solution, &fit.outcome, &args.study, io);
+    tell(&solution, &fit, &loaded.catalogue, (&args.study, found.mistake().is_some()), io);
     io.answer(&solution);
-    drop(loaded);
-    Ok(if matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) { Answer::No } else { Answer::Done })
+    let no = matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) || found.most_missed;
+    Ok(if no { Answer::No } else { Answer::Done })
 }
 
 fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
@@ -277,11 +287,14 @@ fn propose(first: &Candidate, io: &Io) {
     if let (false, Some(most)) = (first.not_told.is_empty(), first.moves_um) {
         sizes.push(format!("together up to {} um at a touch", significant(most)));
     }
-    let which = match first.same_as.len() {
-        0 => String::new(),
-        n => format!(" or one of {n} others"),
+    let what = match &first.same_as[..] {
+        [] => format!("{} ({})", first.effect, first.name),
+        others => format!("{}; if it is {}", one_of(&first.effect, others), first.effect),
     };
-    io.say(format!("proposed: {}{which} ({}): {}", first.effect, first.name, sizes.join(", ")));
+    io.say(format!("proposed: {what}: {}", sizes.join(", ")));
+    if !first.wrong_sign.is_empty() {
+        io.say(format!("  {}", wrong_sign(first)));
+    }
     io.say(format!("  {}", first.says));
     io.say(format!("  to confirm it: {}", first.look));
     if let (Some(before), Some(after)) = (first.held_out_before_um, first.held_out_after_um) {
@@ -367,7 +380,7 @@ fn drop_idle(args: &Args, steps: &[Step], fit: &Fit, io: &Io) -> Result<Vec<Stri
 fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
     let mut out = Vec::new();
     for s in steps.iter().filter(|s| !s.same_as.is_empty()) {
-        out.push(format!("{} could as well be {}", s.added, s.same_as.join(" or ")));
+        out.push(format!("{} stands in the model and could as well be {}", s.added, list(&s.same_as)));
     }
     out.extend(outcome.undetermined.iter().map(|u| u.says.clone()));
     out.extend(outcome.weak.iter().map(|w| w.says.clone()));
@@ -377,33 +390,49 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
     out
 }
 
-fn tell(s: &Solution, outcome: &Outcome, study: &Path, io: &Io) {
+/// What was found: one name, or those that these touches cannot tell apart, the one that stands in the model first.
+fn found_as(added: &str, same_as: &[String]) -> String {
+    match same_as {
+        [] => added.to_owned(),
+        others => format!("{} (these touches cannot tell which; {added} stands in the model)", one_of(added, others)),
+    }
+}
+
+fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Path, bool), io: &Io) {
+    let outcome = &fit.outcome;
     io.say(format!("\n--- the end: {}", s.stopped));
     let sizes = |id: &str| -> String {
         let of = outcome.parameters.iter().filter(|p: &&Parameter| p.effect == id);
         let words: Vec<String> = of
             .map(|p| match p.sigma {
                 Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, p.sigma), significant(sigma), p.unit),
-                None => format!("{} not told alone", p.name),
+                None => match told::bracket(fit, catalogue, p) {
+                    Some(b) => b.says(),
+                    None => format!("{} not told alone", p.name),
+                },
             })
             .collect();
-        words.join(", ")
+        let together = told::together(fit, id).map(|t| t.says());
+        words.into_iter().chain(together).collect::<Vec<_>>().join(", ")
     };
     for step in &s.steps {
         io.say(format!(
             "found: {}: {} > {} um RMS: {}",
-            step.added,
+            step.found,
             significant(step.rms_before_um),
             significant(step.rms_after_um),
             sizes(&step.added)
         ));
     }
+    if mistaken {
+        // what is left over says nothing of the machine
+        return;
+    }
     io.say(format!(
         "left: {} um RMS of a noise of {} um{}",
         significant(s.rms_um),
         significant(s.noise_um),
-        s.held_out_rms_um
-            .map_or_else(String::new, |h| format!("; {} um on set-ups left out of the fit", significant(h)))
+        s.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on index visits left out", significant(h)))
     ));
     for id in &s.taken_back {
         io.say(format!("taken back: {id}"));

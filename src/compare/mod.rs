@@ -6,6 +6,7 @@ pub mod change;
 mod factors;
 pub mod rungs;
 mod share;
+pub mod told;
 pub mod verify;
 
 pub use share::Share;
@@ -55,6 +56,9 @@ pub struct Comparison {
     pub dof: usize,
     /// True when the noise explains what is left (99.9 %), its size and the way it is spread.
     pub explained_by_noise: bool,
+    /// Touches that cannot be used: most of them found nothing.
+    #[serde(default)]
+    pub missed: usize,
     /// All in a sentence.
     pub says: String,
     /// Ways to split the touches, the one that explains most with the fewest groups first.
@@ -202,7 +206,9 @@ impl Point {
 pub fn compare(fit: &Fit) -> Comparison {
     let points = points(fit);
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
-    let explained_by_noise = fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof);
+    // where most touches found nothing the rest is no sample of the machine
+    let no_sample = fit.data.mostly_missed();
+    let explained_by_noise = !no_sample && (fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof));
     let mut splits = factors::splits(fit, &points, &Misfit::new(fit));
     let rank = |s: &Split| (s.share >= factors::WORTH_NAMING, s.evidence);
     splits.sort_by(|a, b| rank(b).0.cmp(&rank(a).0).then(rank(b).1.total_cmp(&rank(a).1)));
@@ -212,18 +218,22 @@ pub fn compare(fit: &Fit) -> Comparison {
     let visits_um = um_from_mm(fit.noise.tau_mm);
     let noise_words = noise_words(noise_um, visits_um);
     let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
+    let misses = format!("the model misses the touches by {}", fit.noise.times(chi2_per_dof.sqrt()));
     let says = match (fit.dof, explained_by_noise, first) {
+        _ if no_sample => format!(
+            "{} of {} touches cannot be used, most of them because the search found nothing: what is left over of the others \
+             says nothing of the machine",
+            fit.data.unusable.len(),
+            fit.data.made()
+        ),
         (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
         (_, true, _) => {
             format!("what is left, {rms_um:.2} um, is what {noise_words} leaves: the model does not fail")
         }
         (_, false, Some(split)) => {
-            format!("the model misses the touches by {:.1} times their noise; {}", chi2_per_dof.sqrt(), split.says)
+            format!("{misses}; {}", split.says)
         }
-        (_, false, None) => format!(
-            "the model misses the touches by {:.1} times their noise, and what is left goes with nothing in particular",
-            chi2_per_dof.sqrt()
-        ),
+        (_, false, None) => format!("{misses}, and what is left goes with nothing in particular"),
     };
     Comparison {
         format: FORMAT.into(),
@@ -239,6 +249,7 @@ pub fn compare(fit: &Fit) -> Comparison {
         chi2_per_dof,
         dof: fit.dof,
         explained_by_noise,
+        missed: fit.data.unusable.len(),
         says,
         splits,
         worst: worst(fit, &points),
@@ -309,7 +320,8 @@ impl Comparison {
                 self.rms_um, first.says
             )
         } else {
-            format!("the model misses the touches by {:.1} times their noise; {}", self.chi2_per_dof.sqrt(), first.says)
+            let times = noise::times_in_words(self.chi2_per_dof.sqrt(), self.visit_um);
+            format!("the model misses the touches by {times}; {}", first.says)
         };
         self
     }

@@ -204,6 +204,7 @@ pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_
         machine_sha256: machine.sha256.clone(),
         program: "pool".into(),
         mounting: mounting.name.clone(),
+        blocks_anew: false,
         controller_frame: ControllerFrame::Axes,
         ball_radius_mm: machine.probe.ball_radius,
         tool_length_mm: machine.tool.length_mm,

@@ -74,6 +74,22 @@ pub struct Diagnosis {
     pub warnings: Vec<String>,
 }
 
+impl Diagnosis {
+    /// The gross mistake that must be put right before anything smaller can be spoken of: an axis that counts the wrong
+    /// way round, other units, a log of something else, or touches most of which found nothing.
+    #[must_use]
+    pub fn mistake(&self) -> Option<String> {
+        if self.most_missed {
+            let none = || "most touches found nothing".to_owned();
+            return Some(self.candidates.first().map_or_else(none, |c| c.name.clone()));
+        }
+        let right = |g: &&Gross| g.rms_um < super::gross::RIGHT * self.rms_um;
+        let elsewhere = |g: &&Gross| g.hypothesis == super::gross::ELSEWHERE;
+        let found = self.gross.first().filter(right).or_else(|| self.gross.iter().find(elsewhere));
+        found.map(|g| g.says.clone())
+    }
+}
+
 /// On what the misfit depends.
 #[derive(Debug, Clone, Serialize)]
 pub struct Where {
@@ -92,12 +108,13 @@ pub struct Where {
     pub on: String,
 }
 
-/// The misfit against a variable.
+/// The misfit against a variable: what of it the model cannot follow, about its mean over the touches. A level is no finding:
+/// the set-ups take it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Shape {
     /// Which variable, as in `where`.
     pub by: String,
-    /// Unit of x.
+    /// Unit of x; `1` for groups of touches, which are numbered.
     pub x_unit: String,
     /// Unit of y.
     pub y_unit: String,
@@ -159,6 +176,10 @@ pub struct Candidate {
     pub share: f64,
     /// Are the expected sizes usual ones?
     pub plausible: bool,
+    /// Parameters that are positive by nature (lost motion, sag) and would be negative: only a compensation that is set too
+    /// far does that.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wrong_sign: Vec<String>,
     /// Parameters of the model that it makes more than three times less certain.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weakens: Vec<Weakened>,

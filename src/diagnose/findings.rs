@@ -32,7 +32,9 @@ pub(super) fn put_together(
 ) -> Diagnosis {
     let fit = subject.fit;
     let mut verdict = decision.verdict;
-    let open = if verdict == Verdict::MissingEffect { super::open::open(seen) } else { super::open::Open::default() };
+    // what passes the test and is not borne out stays a question, too
+    let asked = verdict == Verdict::MissingEffect || (decision.named && !beside.shapes_win);
+    let open = if asked { super::open::open(seen) } else { super::open::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
     let gross_found = gross.first().is_some_and(|g| g.rms_um < gross::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
@@ -303,7 +305,10 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         .collect();
     let says = match &not_told[..] {
         [] => effect.says.clone(),
-        some => format!("{} Its {} cannot be told by this plan.", effect.says, words::list(some)),
+        some => {
+            let says = effect.says.trim_end_matches('.');
+            format!("{says}. Its {} cannot be told by this plan", words::list(some))
+        }
     };
     if let Some(scanned) = &seen.named.scanned[chosen] {
         parameters.push(Parameter {
@@ -344,6 +349,10 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         look: effect.look.clone(),
         share: score.delta_ss / total,
         plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,
+        wrong_sign: {
+            let names = &seen.named.columns[chosen];
+            score.wrong_signs(&seen.named.library).into_iter().map(|k| names[k].name.clone()).collect()
+        },
         weakens: weakened(fit, seen, chosen),
         remains: None,
     }

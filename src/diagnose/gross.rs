@@ -16,7 +16,10 @@ pub const GROSS_UM: f64 = 50.0;
 pub(super) const RIGHT: f64 = 0.1;
 
 /// Effect of the catalogue whose parameters are the suppositions.
-pub(super) const EFFECT: &str = "sign-or-axis-swap";
+pub const EFFECT: &str = "sign-or-axis-swap";
+
+/// The supposition that the log belongs to something else.
+pub(super) const ELSEWHERE: &str = "another-program";
 
 /// All suppositions with the error that they leave, best first.
 #[must_use]
@@ -120,7 +123,7 @@ fn elsewhere(subject: Subject) -> Option<Gross> {
     by.sort_by(f64::total_cmp);
     let median = by.get(n / 2).copied().unwrap_or(0.0);
     (median > FAR_MM).then(|| Gross {
-        hypothesis: "another-program".to_owned(),
+        hypothesis: ELSEWHERE.to_owned(),
         says: format!(
             "half of the touches lie more than {median:.0} mm off where the plan has them: a log of another program or machine, or another origin"
         ),
@@ -167,6 +170,7 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         look: effect.look.clone(),
         share: 1.0 - (gross.rms_um / subject.fit.outcome.rms_um).powi(2),
         plausible: true,
+        wrong_sign: Vec::new(),
         weakens: Vec::new(),
         remains: Some(gross.rms_um > GROSS_UM),
     })

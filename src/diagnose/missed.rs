@@ -12,16 +12,12 @@ use crate::design::Planned;
 use crate::geometry::apply;
 use crate::machine::{Carrier, Machine};
 use crate::model::catalogue::Effect;
-use crate::model::data::Data;
 use crate::model::formula::{VARIABLES, slot};
 use crate::program::plan::{Plan, PlanTouch};
 use crate::units::deg_from_rad;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::HashMap;
-
-/// More touches than this share may not be missing.
-const MOST_MISSED: f64 = 0.2;
 
 /// A mistake is named when so many hits and misses are as it would make them …
 const AGREES: f64 = 0.85;
@@ -31,13 +27,6 @@ const CLEARLY: f64 = 0.1;
 
 /// Places along a search that are looked at.
 const PLACES: usize = 40;
-
-/// Is that so many that the rest is no sample of the machine?
-#[must_use]
-pub(super) fn mostly(data: &Data) -> bool {
-    let (missed, made) = (data.unusable.len(), data.observations.len() + data.unusable.len());
-    missed as f64 > MOST_MISSED * made as f64
-}
 
 /// Mistakes that would have made these touches miss, best first.
 #[must_use]

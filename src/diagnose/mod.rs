@@ -245,7 +245,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     };
     let verdict = verdict::of(&seen, &beside);
     let mut gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
-    if let Some(planned) = options.planned.filter(|_| missed::mostly(&fit.data)) {
+    if let Some(planned) = options.planned.filter(|_| fit.data.mostly_missed()) {
         let missed = missed::hypotheses(subject, planned);
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);

@@ -2,7 +2,7 @@
 
 use super::evidence::Evidence;
 use crate::fit::candidates::{Columns, Variant, variants, with_values};
-use crate::fit::{Fit, around, scan};
+use crate::fit::{Fit, around, between, scan};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
@@ -21,6 +21,8 @@ pub struct Column {
     pub unit: String,
     /// Its usual size: columns are per so much of it.
     pub typical: f64,
+    /// Is its size positive by nature?
+    pub positive: bool,
 }
 
 /// A shape parameter whose values are tried.
@@ -99,9 +101,16 @@ fn closer(
         let score = Search::new(evidence.question(), &library).scores.into_iter().next()?;
         Some((values[score.variant], score.delta_ss))
     };
-    let Some((coarse, gain)) = best_of(&values) else { return values };
-    let around = around(shaped[which], &fit.data, &values, coarse);
-    if let Some((fine, _)) = best_of(&around).filter(|(_, better)| *better > gain) {
+    let Some((_, gain)) = best_of(&values) else { return values };
+    // the misfit that a pitch leaves goes up and down with it: its best place may be between any two values
+    let mut tried = values.clone();
+    if shaped[which].between.is_none() {
+        tried.extend(between(&values));
+        tried.sort_by(f64::total_cmp);
+    }
+    let Some((coarse, _)) = best_of(&tried) else { return values };
+    let around: Vec<f64> = around(shaped[which], &fit.data, &tried, coarse).into_iter().chain([coarse]).collect();
+    if let Some((fine, _)) = best_of(&around).filter(|(fine, better)| *better > gain && !values.contains(fine)) {
         values.push(fine);
         values.sort_by(f64::total_cmp);
     }
@@ -177,7 +186,9 @@ impl<'c> Named<'c> {
                     .map(|&c| {
                         let u = &made.unknowns[c];
                         let typical = if u.typical > 0.0 { u.typical } else { 1.0 };
-                        Column { name: u.name.clone(), unit: u.unit.clone(), typical }
+                        let bare = u.name.split('@').next().unwrap_or(&u.name);
+                        let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
+                        Column { name: u.name.clone(), unit: u.unit.clone(), typical, positive }
                     })
                     .collect();
                 for (mut column, c) in values.column_iter_mut().zip(&columns) {
@@ -225,6 +236,7 @@ impl<'c> Named<'c> {
             }
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             library.push_scan(&effect.id, origin, variants, usize::from(scanned[i].is_some()));
+            library.positive_of_last((0..info[i].len()).filter(|&k| info[i][k].positive).collect());
         }
         Self { effects, library, raw_um, columns: info, scanned, left_out }
     }

@@ -7,7 +7,7 @@ use super::{Options, Subject, missed, noise_um, verdict};
 /// The answer, before any search.
 pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
     let fit = subject.fit;
-    let planned = options.planned.filter(|_| missed::mostly(&fit.data));
+    let planned = options.planned.filter(|_| fit.data.mostly_missed());
     let n = fit.data.observations.len();
     let mut out = Diagnosis {
         format: FORMAT,

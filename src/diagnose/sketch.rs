@@ -20,6 +20,8 @@ pub struct Sketch {
     pub formula: String,
     /// The row of the effects file.
     pub toml: String,
+    /// Sizes of its terms as the data have them, in their typical sizes.
+    pub sizes: Vec<f64>,
     /// Places where it may act, the one that leaves least first.
     pub tried: Vec<places::Tried>,
 }
@@ -71,7 +73,7 @@ fn write(
     let own = places::Tried::of(d);
     let place = tried.first().unwrap_or(&own);
     let mut terms = String::new();
-    let mut formula = Vec::new();
+    let (mut formula, mut sizes) = (Vec::new(), Vec::new());
     for (i, (dof, which, size, sigma)) in place.terms.iter().enumerate() {
         let text = d.terms.get(*which).and_then(|t| t.formula.clone()).unwrap_or_default();
         let text = match (&d.shape, &shape_name) {
@@ -79,6 +81,7 @@ fn write(
             _ => text,
         };
         let (unit, typical) = (places::unit_of(dof), size.abs().max(*sigma).max(0.1));
+        sizes.push(size / typical);
         let _ = writeln!(
             terms,
             "  {{ parameter = \"{prefix}_{}\", unit = \"{unit}\", dof = \"{dof}\", formula = \"{text}\", typical = {} }},",
@@ -105,7 +108,7 @@ fn write(
             plain(shape.max)
         );
     }
-    Sketch { id, says, formula: formula.join(" "), toml, tried: tried.to_vec() }
+    Sketch { id, says, formula: formula.join(" "), toml, sizes, tried: tried.to_vec() }
 }
 
 /// Replaces a whole word.

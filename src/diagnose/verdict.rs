@@ -128,15 +128,15 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
                 .first()
                 .filter(|g| g.rms_um < super::gross::RIGHT * out.rms_um)
                 .map(|g| format!(" {}.", g.says));
-            let (effect, others, share) = match out.candidates.first() {
-                Some(c) => (c.effect.as_str(), c.same_as.len(), c.share),
-                None => ("an effect", 0, 0.0),
-            };
-            let one = match others {
-                0 => effect.to_owned(),
-                1 => format!("{effect} or another one"),
-                _ => format!("{effect} or one of {others} others"),
-            };
+            let one = out.candidates.first().map_or_else(
+                || "an effect".to_owned(),
+                |c| match &c.same_as[..] {
+                    [] => c.effect.clone(),
+                    [other] => format!("{} or {other}", c.effect),
+                    others => format!("{} or one of {} others", c.effect, others.len()),
+                },
+            );
+            let share = out.candidates.first().map_or(0.0, |c| c.share);
             let part = format!("{:.0} %", (100.0 * share).round());
             let scatter_first = out.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
             match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
@@ -163,7 +163,7 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
 pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::Subject) {
     let fit = subject.fit;
     let (missed, made) = (fit.data.unusable.len(), fit.data.observations.len() + fit.data.unusable.len());
-    if !super::missed::mostly(&fit.data) {
+    if !fit.data.mostly_missed() {
         return;
     }
     (out.most_missed, out.faint) = (true, false);
@@ -204,11 +204,7 @@ fn missing(c: &Candidate, against: &str) -> String {
     let what = if c.same_as.is_empty() {
         format!("Missing: {} ({}).", c.name, c.effect)
     } else {
-        format!(
-            "Missing: one of {} and {}; these touches cannot tell them apart.",
-            c.effect,
-            super::words::list(&c.same_as)
-        )
+        format!("Missing: {}; these touches cannot tell them apart.", super::words::one_of(&c.effect, &c.same_as))
     };
     format!("{what} It would bring the error from {against} to {:.2} um.{rest}", c.rms_after_um)
 }

@@ -17,6 +17,15 @@ pub fn list(words: &[String]) -> String {
     }
 }
 
+/// `one of a, b, c`: the first leads.
+#[must_use]
+pub fn one_of(first: &str, others: &[String]) -> String {
+    match others {
+        [] => first.to_owned(),
+        others => format!("one of {first}, {}", others.join(", ")),
+    }
+}
+
 /// What a variable is called in `where`.
 #[must_use]
 pub fn by(on: &str, is_rotary: &dyn Fn(&str) -> bool) -> String {
@@ -52,9 +61,17 @@ pub fn plain(by: &str) -> String {
             "approach" => "the direction of approach".to_owned(),
             "X" | "Y" | "Z" => of("the position of", by),
             CONSTANT => "what is the same at every touch".to_owned(),
+            product if product.contains('*') => format!("the product of {}", factors(product)),
             other => format!("the {other}"),
         },
     }
+}
+
+/// The factors of a product in words: `sX*C`.
+fn factors(product: &str) -> String {
+    let rotary = |name: &str| matches!(name, "A" | "B" | "C");
+    let each: Vec<String> = product.split('*').map(|factor| plain(&by(factor, &rotary))).collect();
+    each.join(" and ")
 }
 
 /// A variable of formulas that stands for something that a person can look at: an axis, time, temperature, feed.
@@ -122,7 +139,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
         "L" => ("the length of the stylus".to_owned(), "longer against shorter".to_owned()),
         "feed" => ("the feed".to_owned(), "fast against slow".to_owned()),
         "approach" => ("the direction of approach".to_owned(), "around the probe".to_owned()),
-        on if on.contains('*') => (on.replace('*', " and "), "both together".to_owned()),
+        on if on.contains('*') => (factors(on), "both together".to_owned()),
         on => match (on.strip_suffix(" before"), on.strip_prefix('s')) {
             (Some(axis), _) => (format!("where {axis} stood before"), "the way it came from".to_owned()),
             (_, Some(axis)) if axis.len() == 1 => {

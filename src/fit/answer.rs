@@ -211,8 +211,8 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
     let limit = noise::chi2_limit(fit.dof, fit.noise.dof);
     if fit.dof > 0 && chi2_per_dof > limit && (dof == 0 || chi2 > limit * dof as f64) {
         out.push(format!(
-            "the touches miss the model by {:.1} times their noise: something is missing in it, and the uncertainties count the noise only (`axiscal diagnose` looks for it)",
-            chi2_per_dof.sqrt()
+            "the touches miss the model by {}: something is missing in it, and the uncertainties count the noise only (`axiscal diagnose` looks for it)",
+            fit.noise.times(chi2_per_dof.sqrt())
         ));
     }
     out

@@ -23,7 +23,7 @@ pub mod uncertainty;
 
 pub use knowledge::effects_of;
 pub use rank::{held_first, observe_plan};
-pub use shapes::{around, scan, start_shapes};
+pub use shapes::{around, between, scan, start_shapes};
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
@@ -96,7 +96,8 @@ pub struct Fit {
     pub theta: Vec<f64>,
     /// Measured less model along the outward normal, mm, per observation.
     pub residual_mm: Vec<f64>,
-    /// Externally studentised residuals, per observation; 0 for touches that are not used.
+    /// Externally studentised residuals, per observation; of a touch that is not used, how far it is off what the others say
+    /// in standard deviations.
     pub studentised: Vec<f64>,
     /// 1 for each touch that is used, else 0.
     pub weight: Vec<f64>,
@@ -338,7 +339,12 @@ fn identify_from(
             covariance[(i, j)] = solution.covariance[(a, b)];
         }
     }
-    let studentised = snoop.studentised();
+    let mut studentised = snoop.studentised();
+    // a touch that is not used stands by how far it is off what the others say
+    let scale2 = search.scale2(&solution, 0.0);
+    for &i in rejected.keys() {
+        studentised[i] = search.off(&solution, i, scale2).1;
+    }
     let seen = search.seen_at(&solution.theta);
     let strangers_beyond = search.beyond;
     drop(search.touches);

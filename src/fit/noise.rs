@@ -104,6 +104,17 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
     Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm, repeats_agree }
 }
 
+/// A misfit of so many times what the noise makes, in words: with scatter of index visits it is no ratio of the two figures
+/// in µm that stand beside it, and the words say so.
+#[must_use]
+pub fn times_in_words(times: f64, visit_um: f64) -> String {
+    if visit_um > 0.0 {
+        format!("{times:.1} times what touch noise and visit scatter make")
+    } else {
+        format!("{times:.1} times their noise")
+    }
+}
+
 impl Noise {
     /// In words, for the screen.
     #[must_use]
@@ -131,6 +142,12 @@ impl Noise {
             um_from_mm(self.sigma_mm),
             um_from_mm(self.tau_mm)
         )
+    }
+
+    /// A misfit of so many times what the noise makes (√(χ²/dof)), in words.
+    #[must_use]
+    pub fn times(&self, times: f64) -> String {
+        times_in_words(times, um_from_mm(self.tau_mm))
     }
 
     /// Two-sided 95 % factor for a standard uncertainty of which `visit_share` of the variance goes back to τ

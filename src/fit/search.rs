@@ -282,13 +282,13 @@ impl Search<'_> {
         (0..gaps.len()).filter(|&i| all[i] > 0.0 && gaps[i].abs() > limit).collect()
     }
 
-    fn scale2(&self, solution: &solve::Solution, noise_dof: f64) -> f64 {
+    pub fn scale2(&self, solution: &solve::Solution, noise_dof: f64) -> f64 {
         let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank) as f64;
         (solution.chi2 + noise_dof) / (dof + noise_dof).max(1.0)
     }
 
     /// How far touch i is off what the fit says, mm and in standard deviations.
-    fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
+    pub fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
         let (gap, row) = self.touches.row(&solution.theta, i);
         let (sigma, tau) = self.touches.noise_mm();
         snoop::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)

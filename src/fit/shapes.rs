@@ -86,6 +86,14 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
             };
             let values = scan(&effect.parameters[i], &fit.data).unwrap_or_else(|| tried(&effect.parameters[i]));
             try_all(&values, &mut best);
+            let mut values = values;
+            if effect.parameters[i].between.is_none() {
+                // what goes up and down with the number has its best place anywhere
+                let finer = between(&values);
+                try_all(&finer, &mut best);
+                values.extend(finer);
+                values.sort_by(f64::total_cmp);
+            }
             // a jump may also come in mid-visit, and a number lie between those that were tried
             try_all(&around(&effect.parameters[i], &fit.data, &values, best[k]), &mut best);
         }
@@ -132,23 +140,26 @@ pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
 }
 
 /// Values between one of a scan's values and its neighbours, for a closer look: the places of a jump that the scan did not try,
-/// or so many steps of a number that changes smoothly.
+/// or some steps of a number that changes smoothly.
 #[must_use]
 pub fn around(p: &Parameter, data: &Data, scanned: &[f64], best: f64) -> Vec<f64> {
-    /// Between two neighbours.
-    const STEPS: usize = 4;
     let below = scanned.iter().copied().filter(|v| *v < best).fold(f64::NEG_INFINITY, f64::max);
     let above = scanned.iter().copied().filter(|v| *v > best).fold(f64::INFINITY, f64::min);
     let mut out = match p.between {
         Some(variable) => places(data, variable, false),
-        None => [(below, best), (best, above)]
-            .into_iter()
-            .filter(|(from, to)| from.is_finite() && to.is_finite())
-            .flat_map(|(from, to)| (1..STEPS).map(move |i| from + (to - from) * i as f64 / STEPS as f64))
-            .collect(),
+        None => between(scanned),
     };
     out.retain(|v| *v > below && *v < above && !scanned.contains(v));
     out
+}
+
+/// Steps between the values of a scan.
+#[must_use]
+pub fn between(scanned: &[f64]) -> Vec<f64> {
+    /// From one value to the next.
+    const STEPS: usize = 4;
+    let gaps = scanned.windows(2).filter(|w| w[0].is_finite() && w[1].is_finite());
+    gaps.flat_map(|w| (1..STEPS).map(|i| w[0] + (w[1] - w[0]) * i as f64 / STEPS as f64)).collect()
 }
 
 /// Half-way between successive values of a variable: of all touches, or where the next index visit begins.

@@ -34,6 +34,14 @@ impl Rejection {
     /// In words.
     #[must_use]
     pub fn reason(&self) -> String {
+        // a touch that a wide misfit hides is told by the fit in which the rest votes first, and that is why it is out
+        if belongs(self.standardised) {
+            return format!(
+                "{:+.1} um off what the other touches say: a robust fit, in which far touches count little, leaves it out with \
+                 others: a chip, a drop or a double touch?",
+                um_from_mm(self.off_mm)
+            );
+        }
         format!(
             "{:+.1} um off what the other touches say ({:.1} standard deviations): a chip, a drop or a double touch?",
             um_from_mm(self.off_mm),

@@ -97,6 +97,14 @@ pub enum Per {
     Block,
 }
 
+/// The sign that a size has by its nature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum SignAsWritten {
+    /// Lost motion, sag: only a compensation that is set too far makes it negative.
+    Positive,
+}
+
 /// Frame of a displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -118,6 +126,8 @@ pub struct TermAsWritten {
     pub iso: Option<String>,
     /// The paper's symbol.
     pub alias: Option<String>,
+    /// `positive`: the sign that its size has by nature; a size of the other sign is named after the others.
+    pub sign: Option<SignAsWritten>,
     /// um mm urad mrad deg um/m um/h um/K ppm/K ms s h 1
     #[schemars(with = "String")]
     pub unit: Spanned<String>,

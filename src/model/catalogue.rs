@@ -62,6 +62,8 @@ pub struct Parameter {
     pub typical: f64,
     /// Where that size comes from.
     pub source: String,
+    /// True where its size is positive by nature: lost motion, sag.
+    pub positive: bool,
     /// For a shape parameter: start, lowest and highest value.
     pub shape: Option<(f64, f64, f64)>,
     /// Values of a shape parameter to be tried; empty where the search from its start is enough.

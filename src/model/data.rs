@@ -70,6 +70,23 @@ pub struct Data {
     pub poses: Vec<usize>,
 }
 
+/// More touches than this share may not be missing.
+const MOST_MISSED: f64 = 0.2;
+
+impl Data {
+    /// Touches that were made, usable or not.
+    #[must_use]
+    pub fn made(&self) -> usize {
+        self.observations.len() + self.unusable.len()
+    }
+
+    /// Are so many touches missing that the rest is no sample of the machine?
+    #[must_use]
+    pub fn mostly_missed(&self) -> bool {
+        self.unusable.len() as f64 > MOST_MISSED * self.made() as f64
+    }
+}
+
 /// Assembles runs. Positions mm and deg in R, lengths mm.
 #[must_use]
 pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {

@@ -97,7 +97,7 @@ fn errors(view: &View) -> Chart {
         rungs.iter().enumerate().filter_map(|(i, r)| Some(point(r.held_out_rms_um?, i as f64))).collect();
     if !points.is_empty() {
         c.marks.push(Mark::Points {
-            series: "touches left out".to_owned(),
+            series: "index visits left out".to_owned(),
             look: look(INK, Shape::Diamond, false),
             points,
         });
@@ -235,7 +235,7 @@ fn ladder(view: &View) -> Chart {
         view.ladder.iter().enumerate().filter_map(|(i, r)| Some(point(i as f64, r.held_out_rms_um?))).collect();
     if !held.is_empty() {
         c.marks.push(Mark::Points {
-            series: "touches left out".to_owned(),
+            series: "index visits left out".to_owned(),
             look: look(RED, Shape::Diamond, false),
             points: held,
         });
@@ -385,7 +385,7 @@ fn candidates(view: &View) -> Chart {
         .filter_map(|(i, k)| Some(point(k.held_out_after_um.filter(|h| *h > 0.0)?, i as f64)))
         .collect();
     c.marks.push(Mark::Points {
-        series: "touches left out".to_owned(),
+        series: "index visits left out".to_owned(),
         look: look(RED, Shape::Diamond, false),
         points: held,
     });

@@ -66,6 +66,7 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
         machine_sha256: machine.sha256.clone(),
         program: spec.name.clone(),
         mounting: one.label.clone(),
+        blocks_anew: false,
         controller_frame: ControllerFrame::Axes,
         ball_radius_mm: one.machine.probe.ball_radius,
         tool_length_mm: one.machine.tool.length_mm,

@@ -120,6 +120,7 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
         machine_sha256: machine.sha256.clone(),
         program: spec.name.clone(),
         mounting: first.map(|p| p.label.clone()).unwrap_or_default(),
+        blocks_anew: false,
         controller_frame: if options.tcp { ControllerFrame::Tcp } else { ControllerFrame::Axes },
         ball_radius_mm: own.probe.ball_radius,
         tool_length_mm: own.tool.length_mm,

@@ -23,6 +23,9 @@ pub struct Plan {
     /// The artefact's mounting.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub mounting: String,
+    /// The blocks are put up for this program, and stand nowhere that an earlier one knows.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub blocks_anew: bool,
     /// What the controller's coordinates mean: axis positions, or the place in the workpiece under its transformation.
     #[serde(default, skip_serializing_if = "ControllerFrame::is_axes")]
     pub controller_frame: ControllerFrame,
@@ -46,6 +49,11 @@ pub struct Plan {
     /// What the programs do that were written for this plan, by controller: `check` shows whether one was changed.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub programs: BTreeMap<String, Proof>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 /// What a program does, as [`crate::check`] has found it.

@@ -14,15 +14,19 @@ const WORTH_SHOWING: f64 = 0.05;
 /// The whole answer. `all` also lists groups and plots of what explains nothing.
 #[must_use]
 pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
+    let missed = match c.missed {
+        0 => String::new(),
+        n => format!(" ({n} more cannot be used)"),
+    };
     let mut out = format!(
-        "{}: {} um RMS left over {} touches, noise {} um; chi2/dof {:.2}",
+        "{}: {} um RMS left over {} touches{missed}, noise {} um; chi2/dof {:.2}",
         c.machine,
         significant(c.rms_um),
         c.points.iter().filter(|p| p.used).count(),
         significant(c.noise_um),
         c.chi2_per_dof
     );
-    out += &c.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on touches left out", significant(h)));
+    out += &c.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on index visits left out", significant(h)));
     let noise = super::prose::sentence(&format!("noise: {}", c.noise_says), paper.width, 0, 2);
     out += &format!("\n{noise}\n{}\n\n", c.says);
     let mut t = table(&["split by", "share", "groups", "what it says"]);
@@ -31,7 +35,7 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
             Cell::new(&s.by),
             number(format!("{:.0} %", 100.0 * s.share)),
             number(if s.groups.is_empty() { "-".to_owned() } else { s.groups.len().to_string() }),
-            Cell::new(&s.says),
+            Cell::new(paper.plain(s.says.clone())),
         ]);
     }
     t.set_width(paper.width.min(160) as u16);
@@ -53,7 +57,7 @@ fn groups(s: &Split, paper: Paper) -> String {
     let mut t = table(&["value", "touches", "mean um", "RMS um"]);
     for g in &s.groups {
         t.add_row(vec![
-            number(&g.value),
+            number(paper.plain(g.value.clone())),
             number(g.n),
             number(format!("{:+.2}", g.mean_um)),
             number(format!("{:.2}", g.rms_um)),
@@ -73,8 +77,8 @@ fn worst(c: &Comparison, paper: Paper) -> String {
             number(w.line),
             number(format!("{:+.2}", w.residual_um)),
             number(if w.rejected.is_some() { "-".into() } else { format!("{:+.1}", w.standardised) }),
-            Cell::new(&w.block),
-            Cell::new(&w.face),
+            Cell::new(paper.plain(w.block.clone())),
+            Cell::new(paper.plain(w.face.clone())),
             Cell::new(pose.join(" ")),
             Cell::new(if w.rejected.is_some() { "not used" } else { "" }),
         ]);

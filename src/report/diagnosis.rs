@@ -4,6 +4,7 @@ use super::fit::{digits, number, significant, table};
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
 use crate::diagnose::answer::{Candidate, Diagnosis, Shape, Verdict};
+use crate::diagnose::gross;
 use crate::diagnose::words::plain;
 use comfy_table::Cell;
 
@@ -83,6 +84,15 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     let missing = d.verdict != Verdict::Adequate;
     let mut t = table(&["candidate", "p (Holm)", "error um", "held out um", "share"]);
     for c in &d.candidates {
+        if c.effect == gross::EFFECT {
+            // a mistake of yes or no: it has neither a size nor a chance, and an error only where it was fitted
+            let (error, share) = match c.proposed {
+                true => (significant(c.rms_after_um), format!("{:.0} %", 100.0 * c.share)),
+                false => ("-".to_owned(), "-".to_owned()),
+            };
+            t.add_row(vec![Cell::new(&c.name), number("-"), number(error), number("-"), number(share)]);
+            continue;
+        }
         let held = match (c.held_out_before_um, c.held_out_after_um) {
             // nothing could be predicted: 0 against 0 says nothing
             (Some(before), Some(after)) if before > 0.0 || after > 0.0 => {
@@ -103,20 +113,21 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     let mut out = if missing { String::new() } else { "tried, and none of them needed:\n".to_owned() };
     out += &format!("{t}\n");
     let rises = |c: &Candidate| c.held_out_before_um.zip(c.held_out_after_um).is_some_and(|(b, a)| a >= b);
-    if d.candidates.iter().any(|c| c.proposed && rises(c)) {
+    let tested = || d.candidates.iter().filter(|c| c.proposed && c.effect != gross::EFFECT);
+    if tested().any(rises) {
         out += &wrapped(
-            "* passes the test with all candidates counted in; with so few index visits the touches left out speak neither for \
+            "* passes the test with all candidates counted in; with so few index visits those left out speak neither for \
              nor against it (the error rises by less than its standard error)",
             2,
         );
-    } else if d.candidates.iter().any(|c| c.proposed) {
+    } else if tested().next().is_some() {
         out += &wrapped(
             "* passes the test with all candidates counted in, and touches that had no part in choosing it are predicted \
              better with it (± one standard error of the difference)",
             2,
         );
     }
-    for c in d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0) {
+    for c in d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0 && c.effect != gross::EFFECT) {
         let which = if c.same_as.is_empty() { c.effect.clone() } else { format!("if it is {}", c.effect) };
         out += &wrapped(&format!("{which}: {}", sizes(c)), 2);
         if !c.same_as.is_empty() {
@@ -130,6 +141,9 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         out += &wrapped(&format!("  look: {}", first.look), 4);
         if !first.tell_apart.is_empty() {
             out += &wrapped(&format!("  to tell apart: {}", first.tell_apart), 4);
+        }
+        if !first.wrong_sign.is_empty() {
+            out += &wrapped(&format!("  {}", wrong_sign(first)), 4);
         }
         if !first.plausible {
             out += "  its size would be unusual: look at the others of its group first\n";
@@ -151,6 +165,15 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         }
     }
     out
+}
+
+/// What a size of the wrong sign means.
+#[must_use]
+pub fn wrong_sign(c: &Candidate) -> String {
+    format!(
+        "{} would be negative, and it is positive by nature: only a compensation that is set too far makes that",
+        c.wrong_sign.join(", ")
+    )
 }
 
 /// A p-value.
@@ -223,7 +246,10 @@ fn plot(s: &Shape, paper: Paper) -> String {
         }
         grid[row(s.y[i])][c] = curve;
     }
-    let mut out = wrapped(&format!("what is left against {} ({}), {}", plain(&s.by), s.x_unit, s.direction), 2, paper);
+    // a group has a number and no unit
+    let unit = if s.x_unit == "1" { String::new() } else { format!(" ({})", s.x_unit) };
+    let what = format!("what is left against {}{unit}, {}, about its mean", plain(&s.by), s.direction);
+    let mut out = wrapped(&what, 2, paper);
     for (r, line) in grid.iter().enumerate() {
         let label = match r {
             0 => format!("{limit:+8.1}"),

@@ -45,7 +45,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     );
     out += &format!("error left {} um RMS; chi2/dof {:.3}", significant(o.rms_um), o.chi2_per_dof);
     if let Some(held_out) = o.held_out_rms_um {
-        out += &format!("; {} um on set-ups left out of the fit", significant(held_out));
+        out += &format!("; {} um on index visits left out", significant(held_out));
     }
     out += &format!("\nnoise: {}\n", o.noise_says);
     out += &format!(

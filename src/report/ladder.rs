@@ -58,7 +58,7 @@ pub fn change(
     };
     row("error left, um RMS", significant(before.rms_um), significant(after.rms_um));
     row(
-        "on touches left out, um RMS",
+        "on index visits left out, um RMS",
         with_error(before.held_out_rms_um, doubt.standard_errors.0),
         with_error(after.held_out_rms_um, doubt.standard_errors.1),
     );
@@ -79,7 +79,7 @@ pub fn change(
     if let Some((fall, se)) = doubt.fall {
         let how = if doubt.nested_rms_um.is_some() { "" } else { "; you chose the effect knowing all touches" };
         out += &format!(
-            "on touches left out it {} by {} ± {} um (one standard error, {} index visits in turn{how})\n",
+            "on index visits left out it {} by {} ± {} um (one standard error, {} visits in turn{how})\n",
             if fall < 0.0 { "rises" } else { "falls" },
             digits(fall.abs(), Some(se)),
             two_digits(se),
@@ -147,7 +147,7 @@ pub fn history(h: &History, paper: Paper) -> String {
     let mut out = format!("{t}\n{}\n", sentence(note, paper.width, 0, 0));
     for (title, p) in [
         ("error left, um RMS, by step", points(&|s| Some(s.rms_um))),
-        ("error on touches left out, um RMS, by step", points(&|s| s.held_out_rms_um)),
+        ("error on index visits left out, um RMS, by step", points(&|s| s.held_out_rms_um)),
     ] {
         let drawn = line(title, &p, paper);
         if !drawn.is_empty() {

@@ -21,7 +21,7 @@ impl Paper {
         self.width.saturating_sub(16).clamp(20, 120)
     }
 
-    /// Text as this paper can show it: in a pipe rules and signs become ASCII. `±` stays: no number is without it.
+    /// Text as this paper can show it (cells before the table is laid out: `..` is wider than `…`): in a pipe rules and signs become ASCII. `±` stays: no number is without it.
     #[must_use]
     pub fn plain(&self, text: String) -> String {
         if self.ascii {

@@ -8,7 +8,7 @@ use super::library::{Library, Origin};
 use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
 use super::score::{Question, Score, Search};
 use super::shapes::Function;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
 /// Points of a curve.
@@ -43,9 +43,9 @@ pub struct SketchShape {
 /// A point of a curve: what the misfit is at a value of the variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurvePoint {
-    /// Value of the variable, in its unit; number of the group for groups.
+    /// Value of the variable, in its unit; number of the group from 1 for groups.
     pub x: f64,
-    /// Size of the misfit, in the unit of the dependence.
+    /// Size of the misfit, in the unit of the dependence, against its mean over the touches.
     pub y: f64,
     /// Standard uncertainty of y.
     pub sigma: f64,
@@ -127,7 +127,7 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
     for candidate in order {
         let shape = &generics.shapes[candidate];
         if out.iter().all(|d| d.on != shape.depends_on) {
-            out.push(dependence(&search.scores[candidate], shape, features, generics, total));
+            out.push(dependence(&search, &search.scores[candidate], shape, features, generics, total));
         }
     }
     if let Some(mut score) = same.ranking().first().map(|&c| same.scores[c].clone()) {
@@ -136,7 +136,7 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
         score.p_adjusted = (score.p * tested as f64 * FAMILY_LEVEL / GENERIC_LEVEL).min(1.0);
         score.candidate = constants[score.candidate];
         let passes = |d: &Dependence| d.p_adjusted < FAMILY_LEVEL;
-        let constant = dependence(&score, &generics.shapes[score.candidate], features, generics, total);
+        let constant = dependence(&search, &score, &generics.shapes[score.candidate], features, generics, total);
         // beside something that changes it is the level of that
         let at = usize::from(out.first().is_some_and(passes) || !passes(&constant)).min(out.len());
         out.insert(at, constant);
@@ -144,7 +144,14 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
     out
 }
 
-fn dependence(score: &Score, shape: &Shape, features: &Features, generics: &Generics, total: f64) -> Dependence {
+fn dependence(
+    search: &Search,
+    score: &Score,
+    shape: &Shape,
+    features: &Features,
+    generics: &Generics,
+    total: f64,
+) -> Dependence {
     let candidate = &generics.library.candidates()[score.candidate];
     let all = &shape.functions[score.variant];
     // of a shape in several directions at once, the one that shows it best speaks for it
@@ -193,23 +200,70 @@ fn dependence(score: &Score, shape: &Shape, features: &Features, generics: &Gene
                 max: if above.is_finite() { above } else { start + start.abs().max(1e-3) },
             }
         }),
-        curve: curve(score, shape, features, &kept),
+        curve: curve(search, score, shape, features, &kept),
     }
 }
 
-fn curve(score: &Score, shape: &Shape, features: &Features, kept: &Range<usize>) -> Vec<CurvePoint> {
+/// Combinations of functions of which the model leaves less than this share (of the best one's share) are no part of the
+/// curve: the model follows them by itself, and their size is anybody's guess.
+const LEAST_LEFT: f64 = 0.1;
+
+/// What of a sum of functions the model cannot follow: the matrix that takes sizes to those of that part. From the
+/// directions v of VᵀRV = 1, VᵀLV = diag(share left), with R = JᵀJ and L = JᵀPJ.
+fn beyond_the_model(columns: &DMatrix<f64>, left: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = columns.ncols();
+    let (raw, gram) = (columns.tr_mul(columns), left.tr_mul(left));
+    let scale: Vec<f64> = (0..n).map(|i| if raw[(i, i)] > 0.0 { raw[(i, i)].sqrt() } else { 1.0 }).collect();
+    let scaled = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(i, j)] / (scale[i] * scale[j]));
+    let own = scaled(&raw).symmetric_eigen();
+    let kept: Vec<usize> = (0..n).filter(|&i| own.eigenvalues[i] > 1e-9 * own.eigenvalues.max()).collect();
+    // W: directions in which the functions differ at the touches, of unit norm there
+    let mut w = own.eigenvectors.select_columns(&kept);
+    for (mut column, &i) in w.column_iter_mut().zip(&kept) {
+        column /= own.eigenvalues[i].sqrt();
+    }
+    let shares = (w.transpose() * scaled(&gram) * &w).symmetric_eigen();
+    let least = LEAST_LEFT * shares.eigenvalues.max();
+    let seen: Vec<usize> = (0..kept.len()).filter(|&i| shares.eigenvalues[i] >= least).collect();
+    let v = w * shares.eigenvectors.select_columns(&seen);
+    let onto = &v * (v.transpose() * scaled(&raw));
+    DMatrix::from_fn(n, n, |i, j| onto[(i, j)] * scale[j] / scale[i])
+}
+
+/// The curve as a contrast: what the model follows by itself is left out, and so is its mean over the touches, because
+/// neither is told by what is left over. Its uncertainty is that of the contrast.
+fn curve(search: &Search, score: &Score, shape: &Shape, features: &Features, kept: &Range<usize>) -> Vec<CurvePoint> {
     let functions = &shape.functions[score.variant][kept.clone()];
-    let estimate = score.estimate.rows(kept.start, kept.len());
-    let covariance = score.covariance.view((kept.start, kept.start), (kept.len(), kept.len())).into_owned();
-    let point = |x: f64, values: DVector<f64>| CurvePoint {
-        x,
-        y: estimate.dot(&values),
-        sigma: values.dot(&(&covariance * &values)).max(0.0).sqrt(),
+    if functions.is_empty() {
+        return Vec::new();
+    }
+    let columns = search.columns(score.candidate).columns(kept.start, kept.len()).into_owned();
+    let beyond = beyond_the_model(&columns, &search.question.base.project_columns(&columns));
+    let estimate = &beyond * score.estimate.rows(kept.start, kept.len());
+    let covariance = score.covariance.view((kept.start, kept.start), (kept.len(), kept.len()));
+    let covariance = &beyond * covariance * beyond.transpose();
+    // touches count by how much they see of the direction
+    let direction = match (shape.direction, functions.first()) {
+        (None, Some(Function::Along { direction, .. })) => Some(*direction),
+        (direction, _) => direction,
+    };
+    let weight = |i: usize| direction.map_or(1.0, |d| features.directions[d].weight[i].powi(2));
+    let n_touches = features.block.len();
+    let total: f64 = (0..n_touches).map(weight).sum();
+    let mean = |f: &Function| -> f64 {
+        let f = if let Function::Along { of, .. } = f { of.as_ref() } else { f };
+        let sum: f64 = (0..n_touches).map(|i| weight(i) * f.at_row(features, i)).sum();
+        if total > 0.0 { sum / total } else { 0.0 }
+    };
+    let means = DVector::from_iterator(functions.len(), functions.iter().map(mean));
+    let point = |x: f64, values: DVector<f64>| {
+        let values = values - &means;
+        CurvePoint { x, y: estimate.dot(&values), sigma: values.dot(&(&covariance * &values)).max(0.0).sqrt() }
     };
     match shape.variables[..] {
         [] if shape.depends_on == CONSTANT => Vec::new(),
         [] => (0..functions.len())
-            .map(|i| point(i as f64, DVector::from_fn(functions.len(), |k, _| f64::from(u8::from(i == k)))))
+            .map(|i| point((i + 1) as f64, DVector::from_fn(functions.len(), |k, _| f64::from(u8::from(i == k)))))
             .collect(),
         [v] if !shape.depends_on.contains('*') => {
             let values = &features.variables[v].values;

@@ -30,6 +30,8 @@ pub struct Member {
     pub leader_after_p: f64,
     /// Is its expected size at most [`PLAUSIBLE`] typical sizes?
     pub plausible: bool,
+    /// Would a size that is positive by nature (lost motion, sag) be negative?
+    pub wrong_sign: bool,
 }
 
 /// One finding.
@@ -38,7 +40,7 @@ pub struct Group {
     /// The most significant candidate.
     pub leader: usize,
     /// The leader and every candidate after which it adds nothing ([`super::apart`]): as likely as the leader first, then
-    /// fewest parameters, plausible size, user's own, p-value.
+    /// the right sign, fewest parameters, plausible size, user's own, p-value.
     pub members: Vec<Member>,
 }
 
@@ -102,6 +104,7 @@ impl Search<'_> {
                     separation: self.scores[leader].noncentrality * (1.0 - alignment),
                     leader_after_p,
                     plausible: self.scores[j].relative_size() <= PLAUSIBLE,
+                    wrong_sign: !self.scores[j].wrong_signs(self.library).is_empty(),
                 })
             })
             .collect();
@@ -112,12 +115,12 @@ impl Search<'_> {
     }
 
     /// Sorts members: what comes first is named first. Those that are as likely as the leader go by simplicity; those
-    /// that are clearly less likely come after them, however simple they are.
-    fn rank_of(&self, m: &Member, best: f64) -> (f64, usize, bool, bool, f64) {
+    /// that are clearly less likely come after them, however simple they are, and a size of the wrong sign after the right ones.
+    fn rank_of(&self, m: &Member, best: f64) -> (f64, bool, usize, bool, bool, f64) {
         let score = &self.scores[m.candidate];
         let behind = if best.is_finite() { ((score.ln_p - best) / AS_LIKELY).floor().max(0.0) } else { 0.0 };
         let origin = self.library.candidates()[m.candidate].origin;
-        (behind, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
+        (behind, m.wrong_sign, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
     }
 
     fn span(&self, candidate: usize) -> (usize, usize) {

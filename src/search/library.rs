@@ -49,6 +49,8 @@ pub struct Candidate {
     pub n_scanned: usize,
     /// One of a few shapes that are looked for before all others, with a share of the level of their own.
     pub expected: bool,
+    /// Parameters (by place in a variant) whose size is positive by nature.
+    pub positive: Vec<usize>,
 }
 
 /// Candidates with their columns: derivative of the whitened gap by each parameter in units of its typical size.
@@ -91,7 +93,14 @@ impl Library {
             spans.push(Variant { shape, columns: first..first + columns.ncols() });
         }
         if !spans.is_empty() {
-            self.candidates.push(Candidate { id: id.into(), origin, variants: spans, n_scanned, expected: false });
+            self.candidates.push(Candidate {
+                id: id.into(),
+                origin,
+                variants: spans,
+                n_scanned,
+                expected: false,
+                positive: Vec::new(),
+            });
         }
     }
 
@@ -99,6 +108,13 @@ impl Library {
     pub(super) fn expect_last(&mut self) {
         if let Some(last) = self.candidates.last_mut() {
             last.expected = true;
+        }
+    }
+
+    /// Sizes of the last candidate that are positive by nature, by place in its variants.
+    pub fn positive_of_last(&mut self, places: Vec<usize>) {
+        if let Some(last) = self.candidates.last_mut() {
+            last.positive = places;
         }
     }
 

@@ -93,6 +93,14 @@ impl Score {
         self.visible() && self.p_adjusted < multiplicity::FAMILY_LEVEL
     }
 
+    /// Places of parameters that are positive by nature and clearly (two standard uncertainties) negative here.
+    #[must_use]
+    pub fn wrong_signs(&self, library: &Library) -> Vec<usize> {
+        let negative =
+            |&&k: &&usize| k < self.estimate.len() && self.estimate[k] < -2.0 * self.covariance[(k, k)].max(0.0).sqrt();
+        library.candidates()[self.candidate].positive.iter().filter(negative).copied().collect()
+    }
+
     /// Largest expected size of a parameter, in typical sizes.
     #[must_use]
     pub fn relative_size(&self) -> f64 {

@@ -320,6 +320,7 @@ mod tests {
             look: String::new(),
             share: 0.9,
             plausible: true,
+            wrong_sign: Vec::new(),
             weakens: Vec::new(),
             remains: None,
         }

@@ -86,7 +86,7 @@ fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &m
 }
 
 fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out: &mut Vec<Next>) {
-    if m.diagnosis.most_missed {
+    if m.diagnosis.mistake().is_some() {
         out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
         return;
     }

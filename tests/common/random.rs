@@ -71,6 +71,7 @@ pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng
         machine_sha256: String::new(),
         program: "random".into(),
         mounting: mounting.name.clone(),
+        blocks_anew: false,
         controller_frame: ControllerFrame::Axes,
         ball_radius_mm: machine.probe.ball_radius,
         tool_length_mm: machine.tool.length_mm,

@@ -190,7 +190,11 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
     let mut values = Vec::new();
     for p in &effect.parameters {
         let (value, is_shape) = match id {
-            _ if p.shape.is_none() => (p.typical * normal(rng), false),
+            _ if p.shape.is_none() => {
+                let size = p.typical * normal(rng);
+                // no machine has a negative lost motion or a head that rises by its weight
+                (if p.positive { size.abs() } else { size }, false)
+            }
             "block-slip" => (rng.random_range(0.15..0.85) * bench.hours(), true),
             _ if p.name.starts_with("pitch") => {
                 (*[5.0, 8.0, 10.0, 12.0, 16.0].get(rng.random_range(0..5)).unwrap(), true)

@@ -43,6 +43,7 @@ pub fn empty_plan(machine: &Machine, mounting: &str) -> Plan {
         machine_sha256: String::new(),
         program: "by-hand".to_owned(),
         mounting: mounting.to_owned(),
+        blocks_anew: false,
         controller_frame: crate::program::plan::ControllerFrame::Axes,
         ball_radius_mm: 3.0,
         tool_length_mm: machine.tool.length_mm,
