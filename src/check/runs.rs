@@ -5,6 +5,7 @@ use super::code::{Code, Expr, Var, What};
 use super::explore::{Limits, Told, explore};
 use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Rate, Run, Start, Vm};
+use super::seconds::Clock;
 use super::world::World;
 use super::{heidenhain, macro_b, ngc, sinumerik};
 use crate::axes::{AxisName, Position};
@@ -269,7 +270,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             moved: true,
             asked: false,
             turned_near,
-            seconds: 0.0,
+            clock: Clock::default(),
         };
         Run::new(code, D::begin(start, self.post, self.machine), vm)
     }

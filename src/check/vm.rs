@@ -1,6 +1,6 @@
 //! The axes of the machine that runs a program, and the record of what happened.
 
-use super::seconds::event_s;
+use super::seconds::Clock;
 use super::world::World;
 use crate::axes::{AxisName, Position};
 use std::ops::Range;
@@ -173,8 +173,8 @@ pub struct Vm {
     pub asked: bool,
     /// The angles near which axes that count from 0 to 360 are counted when they first move, deg.
     pub turned_near: Position,
-    /// Since the program began, without the time in which it waits for a person, s.
-    pub seconds: f64,
+    /// Since the program began, without the time in which it waits for a person.
+    pub clock: Clock,
 }
 
 impl Vm {
@@ -182,7 +182,7 @@ impl Vm {
     pub fn clock_s(&self, tick_s: f64) -> f64 {
         // no tick falls on a moment that a program of round numbers meets: a last digit would then be a matter of rounding
         const AFTER_A_TICK: f64 = 0.123_457;
-        ((self.seconds / tick_s + AFTER_A_TICK).floor() * tick_s).max(0.0)
+        ((self.clock.seconds / tick_s + AFTER_A_TICK).floor() * tick_s).max(0.0)
     }
 
     /// Is the probe deflected here?
@@ -193,7 +193,7 @@ impl Vm {
     /// Notes an event.
     pub fn note(&mut self, event: Event) {
         self.asked &= !matches!(event, Event::Move { .. } | Event::Probe { .. });
-        self.seconds += event_s(&event);
+        self.clock.pass(&event);
         match &event {
             // several stops without a move between them are one
             Event::Wait(_) if self.moved => {
