@@ -206,7 +206,7 @@ fn dependence(
 
 /// Combinations of functions of which the model leaves less than this share (of the best one's share) are no part of the
 /// curve: the model follows them by itself, and their size is anybody's guess.
-const LEAST_LEFT: f64 = 0.1;
+const LEAST_LEFT: f64 = 0.05;
 
 /// What of a sum of functions the model cannot follow: the matrix that takes sizes to those of that part. From the
 /// directions v of VᵀRV = 1, VᵀLV = diag(share left), with R = JᵀJ and L = JᵀPJ.

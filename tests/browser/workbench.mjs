@@ -77,7 +77,7 @@ async function wholeLoop(t) {
   holds(text(folder).includes('"squareness-xy"'), "the study on the disk does not follow");
   await told(page);
   equal(await page.getAttribute("#verdict", "data-verdict"), "adequate", "verdict after");
-  holds(await number(page, "held-out") < 2 * noise, "the error on touches left out");
+  holds(await number(page, "held-out") < 2 * noise, "the error on index visits left out");
   await picture(page, t, "workbench-after");
 
   // and the compensation is written beside the study
