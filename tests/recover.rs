@@ -22,7 +22,7 @@ fn location(machine: &str) -> [(&'static str, [&'static str; 4]); 2] {
     }
 }
 
-/// Random location errors (30 um, 0.003 deg) and block set-ups (0.1 mm, 1 mrad), and a pretravel.
+/// Random location errors (30 um, 0.003 deg) and block set-ups (0.1 mm, 1 mrad).
 fn wrong(machine: &axiscal::machine::Machine, rng: &mut ChaCha8Rng) -> (Scenario, Vec<(String, f64)>) {
     let mut scenario = Scenario::flawless();
     let mut truth = Vec::new();
@@ -37,8 +37,9 @@ fn wrong(machine: &axiscal::machine::Machine, rng: &mut ChaCha8Rng) -> (Scenario
         scenario = scenario.with(machine, effect, &values).unwrap();
         truth.extend(values.iter().map(|(name, value)| ((*name).to_owned(), *value)));
     }
-    scenario = scenario.with(machine, "pretravel", &[("pretravel", 0.003_21)]).unwrap();
-    truth.push(("pretravel".to_owned(), 0.003_21));
+    // none: on a block that stands a milliradian askew the probe goes on along its approach, the model's ball along the face's
+    // normal, and 3 um of it differ by 1e-9 mm
+    truth.push(("pretravel".to_owned(), 0.0));
     for mounting in &machine.mountings {
         for block in &mounting.blocks {
             let shift = [0; 3].map(|_| rng.random_range(-0.1..0.1));
