@@ -202,16 +202,16 @@ fn poses_at_which_an_effect_has_no_value_are_left_out_and_said() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     study(dir, "");
-    let own = "[[effect]]\nid = \"mine\"\nname = \"Mine\"\nat = \"B\"\nterms = [{ parameter = \"mine\", unit = \"um\", \
-               dof = \"dy\", formula = \"sqrt(-B)\" }]\n";
+    let own = "[[effect]]\nid = \"mine\"\nname = \"Mine\"\nat = \"reading\"\nterms = [{ parameter = \"mine\", unit = \"um\", \
+               dof = \"X\", formula = \"0 - sX/2 + 0*sqrt(-B)\" }]\n";
     std::fs::write(dir.join("own.toml"), own).unwrap();
     let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
     std::fs::write(dir.join("study.toml"), format!("effects_file = [\"own.toml\"]\n{text}")).unwrap();
-    let asked = ["--effects", "mine,axial-b-1", "--minutes", "10", "--moved", "--json"];
+    let asked = ["--effects", "mine,backlash-y", "--minutes", "10", "--moved", "--json"];
     let out =
         axiscal(dir, &[&["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc"][..], &asked].concat());
     let said = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{said}");
+    assert!(out.status.success(), "{said}\n{}", String::from_utf8_lossy(&out.stdout));
     // the paper's programs tilt the head to one side only
     assert!(said.contains("has no value at") && said.contains("the program does not go there"), "{said}");
     let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();

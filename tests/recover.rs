@@ -131,6 +131,13 @@ fn gauges(machine: &str) -> Vec<Vec<&'static str>> {
     std::iter::once(vec![]).chain(each).chain([many]).collect()
 }
 
+/// What the rounding of a reading makes of a value: a position of some 300 mm is known to 6e-14 mm, and a model of many effects that
+/// are nearly alike turns that into so much more.
+fn rounding(fit: &axiscal::fit::Fit, sigma_noise: Option<f64>) -> f64 {
+    const READING_MM: f64 = 6e-14;
+    READING_MM * sigma_noise.unwrap_or(0.0) / fit.noise.sigma_mm
+}
+
 /// Every program alone, and models with gauges: what is called identified comes back exactly, whatever is planted in the
 /// locations and the set-ups of the blocks and in values that leave no trace. No touch is rejected.
 #[test]
@@ -159,7 +166,7 @@ fn every_program_alone_and_models_with_gauges_are_exact() {
                 let off = (p.value - planted).abs();
                 if p.status != Status::Identified {
                     assert!(p.sigma.is_none(), "{case} {}", p.name);
-                } else if off < 1e-10 {
+                } else if off < 1e-10_f64.max(rounding(&fit, p.sigma_noise)) {
                     n_exact += 1;
                 } else {
                     wrong_ones.push(format!(
