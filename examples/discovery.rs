@@ -126,8 +126,8 @@ fn main() {
     }
     // two axes with 0.5 um each, as the machine file declares
     let declared_um = 0.5f64.hypot(0.5);
-    let clean_cases: [(&str, &str, fn() -> Bench, f64, u64); 4] = [
-        ("clean-paper", "paper's plan", Bench::paper, 0.0, 3),
+    let clean_cases = [
+        ("clean-paper", "paper's plan", Bench::paper as fn() -> Bench, 0.0, 3),
         ("clean-paper-visits", "paper's plan, 0.7 um per visit as declared", Bench::paper, declared_um, 5),
         ("clean-full", "full", Bench::full, 0.0, 4),
         ("clean-full-visits", "full, 0.5 um per visit", Bench::full, 0.5, 6),

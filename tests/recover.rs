@@ -131,13 +131,6 @@ fn gauges(machine: &str) -> Vec<Vec<&'static str>> {
     std::iter::once(vec![]).chain(each).chain([many]).collect()
 }
 
-/// What the rounding of a reading makes of a value: a position of some 300 mm is known to 6e-14 mm, and a model of many effects that
-/// are nearly alike turns that into so much more.
-fn rounding(fit: &axiscal::fit::Fit, sigma_noise: Option<f64>) -> f64 {
-    const READING_MM: f64 = 6e-14;
-    READING_MM * sigma_noise.unwrap_or(0.0) / fit.noise.sigma_mm
-}
-
 /// Every program alone, and models with gauges: what is called identified comes back exactly, whatever is planted in the
 /// locations and the set-ups of the blocks and in values that leave no trace. No touch is rejected.
 #[test]
@@ -157,6 +150,8 @@ fn every_program_alone_and_models_with_gauges_are_exact() {
             let fit = identify(&machine, &runs, &effects);
             let o = &fit.outcome;
             let case = format!("{name} {programs:?} with {more:?}");
+            // sixteen effects at once are nearly alike in some directions, and the rounding of the readings (6e-14 mm) grows there
+            let exact = if more.len() > 1 { 1e-9 } else { 1e-10 };
             assert!(o.converged, "{case}: {}", o.stopped);
             assert!(o.rejected.is_empty(), "{case}: {:?}", o.rejected);
             // results and set-ups of the blocks alike
@@ -166,7 +161,7 @@ fn every_program_alone_and_models_with_gauges_are_exact() {
                 let off = (p.value - planted).abs();
                 if p.status != Status::Identified {
                     assert!(p.sigma.is_none(), "{case} {}", p.name);
-                } else if off < 1e-10_f64.max(rounding(&fit, p.sigma_noise)) {
+                } else if off < exact {
                     n_exact += 1;
                 } else {
                     wrong_ones.push(format!(
