@@ -5,7 +5,7 @@
 //! shapes come to, by what they leave and what they cost (Schwarz's criterion). Either side pays for the parameters that act
 //! and not for those that it has besides: a block that slips in X alone is a slip all the same.
 
-use crate::search::generic::Generics;
+use crate::search::generic::{CONSTANT, Generics};
 use crate::search::{Basis, KEPT, Library, Question, Search};
 use nalgebra::{DMatrix, DVector};
 
@@ -108,7 +108,9 @@ pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, fi
     let names = way(question, named, false, Some(first));
     let shapes = way(question, &generics.library, true, None);
     let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
-    let better = (shapes.after_first + BETTER < names.after_first).then_some(shape);
+    // visits that each stand elsewhere follow anything, and what is the same at every touch is a part of many effects
+    let speaks = !["visit", CONSTANT].contains(&generics.shapes[shape].depends_on.as_str());
+    let better = (speaks && shapes.after_first + BETTER < names.after_first).then_some(shape);
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
     Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }
