@@ -101,17 +101,16 @@ fn closer(
         let score = Search::new(evidence.question(), &library).scores.into_iter().next()?;
         Some((values[score.variant], score.delta_ss))
     };
-    let Some((_, gain)) = best_of(&values) else { return values };
+    let Some(coarse) = best_of(&values) else { return values };
     // the misfit that a pitch leaves goes up and down with it: its best place may be between any two values
-    let mut tried = values.clone();
-    if shaped[which].between.is_none() {
-        tried.extend(between(&values));
-        tried.sort_by(f64::total_cmp);
-    }
-    let Some((coarse, _)) = best_of(&tried) else { return values };
-    let around: Vec<f64> = around(shaped[which], &fit.data, &tried, coarse).into_iter().chain([coarse]).collect();
-    if let Some((fine, _)) = best_of(&around).filter(|(fine, better)| *better > gain && !values.contains(fine)) {
-        values.push(fine);
+    let finer = if shaped[which].between.is_none() { between(&values) } else { Vec::new() };
+    let better = |one: (f64, f64), other: Option<(f64, f64)>| other.filter(|o| o.1 > one.1).unwrap_or(one);
+    let best = better(coarse, best_of(&finer));
+    let mut tried = [&values[..], &finer].concat();
+    tried.sort_by(f64::total_cmp);
+    let best = better(best, best_of(&around(shaped[which], &fit.data, &tried, best.0)));
+    if best != coarse {
+        values.push(best.0);
         values.sort_by(f64::total_cmp);
     }
     values
