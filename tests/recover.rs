@@ -150,8 +150,6 @@ fn every_program_alone_and_models_with_gauges_are_exact() {
             let fit = identify(&machine, &runs, &effects);
             let o = &fit.outcome;
             let case = format!("{name} {programs:?} with {more:?}");
-            // sixteen effects at once are nearly alike in some directions, and the rounding of the readings (6e-14 mm) grows there
-            let exact = if more.len() > 1 { 1e-9 } else { 1e-10 };
             assert!(o.converged, "{case}: {}", o.stopped);
             assert!(o.rejected.is_empty(), "{case}: {:?}", o.rejected);
             // results and set-ups of the blocks alike
@@ -159,6 +157,8 @@ fn every_program_alone_and_models_with_gauges_are_exact() {
                 let planted = truth.iter().find(|(n, _)| *n == p.name).map(|t| t.1);
                 let Some(planted) = planted else { continue };
                 let off = (p.value - planted).abs();
+                // what has a part in a gauge of sixteen nearly alike effects carries the rounding of the readings (6e-14 mm) there
+                let exact = if more.len() > 1 && p.moves_with_unseen.is_some() { 1e-9 } else { 1e-10 };
                 if p.status != Status::Identified {
                     assert!(p.sigma.is_none(), "{case} {}", p.name);
                 } else if off < exact {
