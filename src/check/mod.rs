@@ -35,7 +35,7 @@ use crate::program::scene::Scene;
 use crate::simulate::Errorless;
 use judge::Case;
 use run::Event;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use world::World;
 
 /// What a program is checked against.
@@ -225,6 +225,7 @@ fn with_parts(
         machine,
         post,
         plan: against.plan,
+        digest: OnceLock::new(),
         scenes: &scenes,
         mountings: &parts.iter().map(|p| &p.mounting).collect::<Vec<_>>(),
         world: &world,

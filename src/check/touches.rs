@@ -5,6 +5,7 @@ use super::judge::{Case, Said};
 use super::run::{Event, Probe};
 use crate::axes::{AxisMap, Position};
 use crate::log;
+use crate::post::digest;
 use crate::program::plan::PlanTouch;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -195,7 +196,16 @@ fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut Said) {
     let mut complain = |message: &str| {
         said.say(case, "check::log", end, format!("the log that it writes: {message}"), "");
     };
-    match log::read(text.as_bytes(), "the log that the program writes", writer, case.machine, plan) {
+    let known = || case.digest.get_or_init(|| digest(plan)).clone();
+    match log::read_digested(
+        text.as_bytes(),
+        "the log that the program writes",
+        writer,
+        case.machine,
+        plan,
+        None,
+        known,
+    ) {
         Ok((log, findings)) => {
             findings.0.iter().for_each(|f| complain(&f.message));
             if !log.complete {

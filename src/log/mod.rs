@@ -84,6 +84,19 @@ pub fn read_run(
     plan: &Plan,
     run: Option<usize>,
 ) -> Result<(MatchedLog, Findings)> {
+    read_digested(bytes, name, writer, machine, plan, run, || digest(plan))
+}
+
+/// The same where the plan's digest is known to who reads many logs of one plan.
+pub(crate) fn read_digested(
+    bytes: &[u8],
+    name: &str,
+    writer: Writer<'_>,
+    machine: &Machine,
+    plan: &Plan,
+    run: Option<usize>,
+    digest: impl FnOnce() -> String,
+) -> Result<(MatchedLog, Findings)> {
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
         Writer::Controller(post) => parse_run(bytes, name, post, run)?,
@@ -111,7 +124,7 @@ pub fn read_run(
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());
     if let Some(header) = &parsed.header {
-        belongs(header, machine, plan, &places, &mut findings).map_err(|f| joined(&findings, f))?;
+        belongs(header, machine, plan, digest, &places, &mut findings).map_err(|f| joined(&findings, f))?;
     }
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
@@ -138,6 +151,7 @@ fn belongs(
     header: &LogHeader,
     machine: &Machine,
     plan: &Plan,
+    digest: impl FnOnce() -> String,
     places: &Places<'_>,
     findings: &mut Findings,
 ) -> Result<()> {
@@ -151,7 +165,7 @@ fn belongs(
             .help("use the plan that `axiscal generate` wrote together with the program");
         return Err(places.at_line(finding, header.line).into());
     }
-    if header.digest != digest(plan) {
+    if header.digest != digest() {
         let message =
             format!("the program that wrote this log was made from another plan ({} touches)", header.touches);
         let finding = Finding::warning("log::other_plan", message).help(

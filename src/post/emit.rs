@@ -123,6 +123,8 @@ pub(super) struct Writer<'a> {
     back_off: String,
     /// A move has been written.
     moving: bool,
+    /// What all templates are given that is the same in the whole program.
+    of_program: Value,
 }
 
 impl<'a> Writer<'a> {
@@ -168,8 +170,10 @@ impl<'a> Writer<'a> {
             way: String::new(),
             back_off: String::new(),
             moving: false,
+            of_program: Value::UNDEFINED,
         };
         writer.check_input()?;
+        writer.of_program = writer.of_program()?;
         Ok(writer)
     }
 
@@ -203,7 +207,7 @@ impl<'a> Writer<'a> {
     // ------------------------------------------------------------------------------------------------- rendering
 
     pub(super) fn render(&mut self, template: &str, context: Value) -> Result<()> {
-        let rendered = self.post.render(template, context! { ..context, ..self.common()? })?;
+        let rendered = self.post.render(template, context! { ..context, ..self.common() })?;
         if self.post.uses_labels(template) {
             self.label += LABELS_PER_STEP;
             if let Some(last) = self.post.last_label.filter(|last| self.label > *last) {
@@ -220,17 +224,25 @@ impl<'a> Writer<'a> {
     }
 
     /// What all templates are given.
-    fn common(&self) -> Result<Value> {
+    fn common(&self) -> Value {
         let next = self.next_touch();
-        let of_axes = |what: &dyn Fn(AxisName) -> String| map(self.axes.iter().map(|a| (a.to_string(), what(*a))));
-        let names = |axes: &[AxisName]| axes.iter().map(ToString::to_string).collect::<Vec<_>>();
-        let rotary: Vec<AxisName> = self.axes.iter().copied().filter(|a| a.is_rotary()).collect();
-        Ok(context! {
+        context! {
             label => self.label,
             next => next.id,
             next_says => next.says,
             last => self.last.id,
             last_says => self.last.says.clone(),
+            first_move => !self.moving,
+            ..self.of_program.clone()
+        }
+    }
+
+    /// The part of it that stays as it is.
+    fn of_program(&self) -> Result<Value> {
+        let of_axes = |what: &dyn Fn(AxisName) -> String| map(self.axes.iter().map(|a| (a.to_string(), what(*a))));
+        let names = |axes: &[AxisName]| axes.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let rotary: Vec<AxisName> = self.axes.iter().copied().filter(|a| a.is_rotary()).collect();
+        Ok(context! {
             result => of_axes(&|a| self.result(a)),
             axes => names(&self.axes),
             rotary => names(&rotary),
@@ -246,7 +258,6 @@ impl<'a> Writer<'a> {
             touches => self.plan.touches.len(),
             log_decimals => self.post.log.decimals,
             seconds => self.path.seconds,
-            first_move => !self.moving,
             slow_feed => self.length(self.machine.probe.slow_feed),
             log_name => self.post.log_name(self.plan)?,
             log_head => log_text::head(self.post, self.plan),
@@ -548,8 +559,8 @@ impl<'a> Writer<'a> {
     /// The files that the control needs beside the program.
     fn beside(&self) -> Result<Vec<SideFile>> {
         let one = |(index, says): (usize, &String)| {
-            let name = self.post.render(&format!("companion {index} name"), self.common()?)?;
-            let mut text = self.post.render(&format!("companion {index}"), self.common()?)?;
+            let name = self.post.render(&format!("companion {index} name"), self.common())?;
+            let mut text = self.post.render(&format!("companion {index}"), self.common())?;
             text.push('\n');
             let name = name_of(name.trim(), |c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_'));
             Ok(SideFile { name, says: says.clone(), text: self.post.ended(text) })
