@@ -525,3 +525,35 @@ fn a_plan_file_and_an_effect_of_ones_own() {
     assert!(a.effects.iter().any(|e| e.effect == "my-sag"));
     assert!(a.parameters.iter().all(|p| p.name != "EX0C"));
 }
+
+/// With the blocks' sizes unknown too, a face that looks down makes two combinations one: it parts neither by itself, and is not
+/// said to. And what holds the backlash of Z on a machine whose spindle never lies is a face that only a disc or a star meets.
+#[test]
+fn a_remedy_that_leaves_another_combination_is_none() {
+    let machine = common::machine("swivel-head");
+    let catalogue = Catalogue::built_in().unwrap();
+    let ask = |machine: &Machine, programs: &[&str], effects: &[&str]| {
+        let request = Request {
+            task: task(machine, &catalogue, effects),
+            runs: programs.iter().map(|p| plan(machine, p)).collect(),
+            names: programs.iter().map(|p| (*p).to_owned()).collect(),
+            probe: NOISE,
+            acting_tau_mm: Some(0.0),
+        };
+        assess(&request).unwrap()
+    };
+    let a = ask(&machine, &["head", "table"], &[&DEFAULT[..], &["block-size"]].concat());
+    let about = |name: &str| a.undetermined.iter().filter(|u| u.combination.contains_key(name)).collect::<Vec<_>>();
+    for name in ["pretravel", "size_Z"] {
+        assert!(!about(name).is_empty(), "{:#?}", a.undetermined);
+        for u in about(name) {
+            assert!(u.parted_by.iter().all(|h| !h.contains("looks down")), "{u:#?}");
+        }
+    }
+    let machine = common::machine("trunnion");
+    let a = ask(&machine, &["full"], &["location-a", "location-c", "block-setup", "pretravel"]);
+    let z = a.effects.iter().find(|e| e.effect == "backlash-z").unwrap();
+    assert!(!z.visible && z.habits.iter().any(|h| h == "downward-face"), "{z:?}");
+    assert!(z.tell_apart.contains("a disc or a star"), "{}", z.tell_apart);
+    assert!(a.parameters.iter().all(|p| !p.holds.contains(&"backlash-z".to_owned())));
+}
