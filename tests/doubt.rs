@@ -371,6 +371,22 @@ fn the_doubt_of_the_thermometer_is_a_row_of_its_own() {
     assert!((of(&whole) / of(&half) - 2.0).abs() < 1e-9);
 }
 
+/// A pitch of an amplitude that the touches do not show cannot be told, and takes nothing else with it.
+#[test]
+fn a_pitch_of_nothing_leaves_the_errors_told() {
+    let machine = machine("swivel-head");
+    for seed in 30..34 {
+        let runs = measured(&machine, seed);
+        for pitch in ["pitch-x", "pitch-y", "warm-up"] {
+            let o = fit(&machine, &runs, &[&MODEL[..], &[pitch]].concat(), Settings::default()).outcome;
+            for name in ["EX0B", "EZ0B", "EA0B", "EC0B", "EX0C", "EY0C", "EA0C", "EB0C"] {
+                let p = o.parameters.iter().find(|p| p.name == name).unwrap();
+                assert!(p.status == Status::Identified, "{seed} {pitch}: {name} is {:?}; {:?}", p.status, o.warnings);
+            }
+        }
+    }
+}
+
 /// A combination that is nearly, but not quite, without a trace is said too: an effect that differs from the place of C by
 /// a ten-millionth only.
 #[test]

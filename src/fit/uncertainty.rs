@@ -84,7 +84,8 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     if fit.seen.unseen.is_empty() {
         return DVector::zeros(p);
     }
-    let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
+    let rooms = rooms_of_shapes(fit);
+    let typical = |c: usize| rooms.get(&c).copied().unwrap_or(fit.model.unknowns[fit.free[c]].typical);
     let each: Vec<DVector<f64>> = fit
         .seen
         .unseen
@@ -97,6 +98,41 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     // less than this is the rounding of a value that stays where it is
     const LEAST: f64 = 1e-11;
     DVector::from_fn(p, |c, _| Some(basis.row(c).norm() * typical(c)).filter(|m| *m > LEAST).unwrap_or(0.0))
+}
+
+/// How far a shape parameter that leaves no trace may go, by its place among the free unknowns: until what it does has changed by all
+/// that its effect does. Where the touches do not show the effect either, whatever pitch it has moves nothing by more than the
+/// uncertainty of its size, which is counted already.
+fn rooms_of_shapes(fit: &Fit) -> BTreeMap<usize, f64> {
+    /// Standard uncertainties from which a size is shown.
+    const SHOWN: f64 = 3.0;
+    /// Share of its usual size that a shape of nothing may go.
+    const NONE: f64 = 1e-9;
+    let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
+    let is_unseen = |c: &usize| fit.seen.unseen.iter().any(|v| v[*c].abs() > 1e-9);
+    let shapes: Vec<usize> = (0..fit.free.len()).filter(|&c| unknown(c).shape).filter(is_unseen).collect();
+    if shapes.is_empty() {
+        return BTreeMap::new();
+    }
+    let theta = fit.free_theta();
+    let gram = fit.with_touches(fit.noise.tau_mm, |t| t.normal(&theta, true).gram);
+    let room = |c: usize| {
+        let own = |k: &usize| unknown(*k).effect == unknown(c).effect && !unknown(*k).shape;
+        let sizes: Vec<usize> = (0..fit.free.len()).filter(own).collect();
+        let sigma = |k: usize| fit.covariance[(fit.free[k], fit.free[k])].max(0.0).sqrt();
+        let (slope, typical) = (gram[(c, c)], unknown(c).typical);
+        // all that it does, in units of the noise
+        let product = |a: usize, b: usize| theta[a] * theta[b] * gram[(a, b)];
+        let square: f64 = sizes.iter().map(|&a| sizes.iter().map(|&b| product(a, b)).sum::<f64>()).sum();
+        let small = |k: &usize| theta[*k].abs() < SHOWN * sigma(*k);
+        // the shape was chosen as the best of many: chance makes more of it than of a size
+        let by_chance = SHOWN * SHOWN * (sizes.len() + 1) as f64;
+        if slope <= 0.0 || square < by_chance || sizes.iter().all(small) {
+            return (c, NONE * typical);
+        }
+        (c, (square.max(0.0) / slope).sqrt().clamp(NONE * typical, typical))
+    };
+    shapes.into_iter().map(room).collect()
 }
 
 /// A source of uncertainty that the touches cannot show.
