@@ -66,6 +66,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 format!("{:.2}", r.standardised),
             ]);
         }
+        crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
     io.answer(&outcome);

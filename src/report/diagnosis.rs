@@ -1,6 +1,7 @@
 //! The answer of `diagnose`: the verdict first, then what may be missing, then on what the misfit depends.
 
 use super::fit::{digits, number, significant, table};
+use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
 use crate::diagnose::answer::{Candidate, Diagnosis, Shape, Verdict};
@@ -109,7 +110,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
             number(format!("{:.0} %", 100.0 * c.share)),
         ]);
     }
-    t.set_width(paper.width.min(100) as u16);
+    lay(&mut t, paper.width.min(100), &[]);
     let mut out = if missing { String::new() } else { "tried, and none of them needed:\n".to_owned() };
     out += &format!("{t}\n");
     let rises = |c: &Candidate| c.held_out_before_um.zip(c.held_out_after_um).is_some_and(|(b, a)| a >= b);
