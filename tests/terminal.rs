@@ -158,7 +158,8 @@ fn tables(text: &str) -> Vec<Columns> {
             rules = (rules + 1) % 3;
         } else if rules == 1 {
             // heads are separated by two blanks at least, and stand at the left of their columns
-            let begins = (0..letters.len()).filter(|&i| letters[i] != ' ' && letters[i.saturating_sub(2)..i] == [' ', ' ']);
+            let begins =
+                (0..letters.len()).filter(|&i| letters[i] != ' ' && letters[i.saturating_sub(2)..i] == [' ', ' ']);
             let mut begins: Vec<usize> = begins.collect();
             begins.insert(0, 0);
             begins.dedup_by_key(|b| if *b == 1 { 0 } else { *b });
