@@ -385,6 +385,7 @@ const SAG: Blind = ("stylus-sag", "gx = gy = 0 where the spindle never leans");
 /// What `full` cannot see on each machine. Nothing else may be blind, least of all an axis's own motions.
 #[test]
 fn full_leaves_only_what_no_touch_can_show() {
+    // pairs: as many as there are today with the noise of the touches alone; a further one is looked at
     for (name, location, expected, most_pairs) in [
         (
             "swivel-head",
@@ -392,7 +393,7 @@ fn full_leaves_only_what_no_touch_can_show() {
             // the ball stands at Ry(B)·(EX0B, 0, EZ0B − L), L longer with every stylus by the same amount. B's own zero is seen: it
             // moves the ball by L across the tool, and two styli have two L; nothing stands between B and the tool
             &[ZERO_C, BACKLASH_Z, TABLE_LOAD, ("tool-length", "−EZ0B: behind the rotation of B, along the tool")][..],
-            16,
+            19,
         ),
         (
             "double-head",
@@ -404,7 +405,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 BACKLASH_Z,
                 ("tool-length", "−EZ0A: behind the rotation of A, along the tool"),
             ],
-            27,
+            29,
         ),
         (
             "trunnion",
@@ -425,7 +426,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 YAW[1],
                 SAG,
             ],
-            18,
+            20,
         ),
         (
             "swivel-table-b",
