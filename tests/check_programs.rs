@@ -295,12 +295,38 @@ fn the_transformation_is_switched_off_again() {
     let of = |word: &str, n: usize| codes(&post, &machine, &generated, &without_line(&post, &text, word, n));
     assert!(of("M129", 0).contains(&"check::not_run"), "{:?}", of("M129", 0));
     assert!(of("M129", 1).contains(&"check::not_restored"), "{:?}", of("M129", 1));
-    for (control, off) in [("fanuc", "G49"), ("haas", "G49")] {
+}
+
+/// With No. 5006#6 (TOS) = 0 a G49 takes Z along by the length that acts: the program begins only where none does, and takes its own
+/// off where Z stands.
+#[test]
+fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
+    let (machine, long) = (machine("trunnion"), generated(&machine("trunnion"), "full", true));
+    let table = generated(&machine, "basic", false);
+    for control in ["fanuc", "haas"] {
         let post = controller(control);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
-        let last = text.lines().filter(|l| *l == off).count() - 1;
-        let found = codes(&post, &machine, &generated, &without_line(&post, &text, off, last));
-        assert!(found.contains(&"check::not_restored"), "{control}: {found:?}");
+        let of = |generated: &Generated| post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = of(&table);
+        assert!(!text.lines().any(|l| l.contains("G49")), "{control}");
+        // it does not look whether a length acts
+        let look = text.lines().find(|l| l.starts_with("IF[#4008EQ49]")).unwrap();
+        let blind = without(&text, look, "GOTO9");
+        let found = codes(&post, &machine, &table, &blind);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // nor when it takes it off by itself
+        let found = codes(&post, &machine, &table, &blind.replacen("G40 G69 G80", "G40 G49 G69 G80", 1));
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // under the transformation: where Z stands, and nowhere else
+        let text = of(&long);
+        let off = text.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
+        for instead in ["G49", "G0 G49 Z[#5043]"] {
+            let found = codes(&post, &machine, &long, &text.replace(off, instead));
+            assert!(!found.is_empty(), "{control} {instead}");
+        }
+        // with the rotary axes turned which axes a G49 moves is not known
+        let end = text.rfind("M5\n").unwrap();
+        let found = codes(&post, &machine, &long, &format!("{}G49\n{}", &text[..end], &text[end..]));
+        assert!(!found.is_empty(), "{control}");
     }
 }
 

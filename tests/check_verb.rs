@@ -97,6 +97,9 @@ fn a_program_that_begins_later_must_be_meant_so() {
     };
     later("1").assert().code(1).stderr(predicate::str::contains("begins at set-up 2"));
     later("2").assert().code(0);
+    later("7").assert().code(1).stderr(predicate::str::contains("there is no set-up 7: the program has 2"));
+    edited(folder.path(), "small.h", "Q1600 = +2", "Q1600 = +7");
+    later("7").assert().code(1).stderr(predicate::str::contains("the program begins at set-up 7: the program has 2"));
 }
 
 #[test]

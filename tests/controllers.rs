@@ -188,6 +188,50 @@ fn a_program_that_stops_for_another_stylus() {
     }
 }
 
+/// What the operator is told is told whole: a control that shows longer messages is sent the same program.
+#[test]
+fn no_message_is_cut() {
+    for (machine_name, program, frames) in [
+        ("swivel-head", "head", &[false, true][..]),
+        ("swivel-head", "table", &[false, true]),
+        ("swivel-head", "full", &[false]),
+        ("double-head", "double-head", &[false, true]),
+        ("trunnion", "basic", &[false, true]),
+        ("trunnion", "full", &[false, true]),
+        ("swivel-table-b", "basic", &[false, true]),
+    ] {
+        let machine = machine(machine_name);
+        for tcp in frames {
+            let generated = generated(&machine, program, *tcp);
+            for name in CONTROLLERS {
+                let post = controller(name);
+                if *tcp && program == "full" && !post.tcp.as_ref().unwrap().other_stylus {
+                    continue;
+                }
+                let width = post.comment.message_width;
+                let wide = variant(name, "[comment]\nmessage_width = 4000\nunverified = \"as wide as it wants\"\n");
+                assert_ne!(wide.comment.message_width, width);
+                let messages = |post: &Postprocessor| -> Vec<String> {
+                    let shown = ["MSG(", "#3006=", "QS1600", "(DEBUG,"];
+                    let text = written(post, &machine, &generated).text;
+                    text.lines().filter(|l| shown.iter().any(|s| l.contains(s))).map(str::to_owned).collect()
+                };
+                let (cut, whole) = (messages(&post), messages(&wide));
+                assert!(!cut.is_empty(), "{name}");
+                for (cut, whole) in cut.iter().zip(&whole) {
+                    assert_eq!(cut, whole, "{name}, {machine_name}, {program}, tcp {tcp}");
+                }
+                assert_eq!(cut.len(), whole.len());
+                // with the longest number in it a SINUMERIK shows 124 characters
+                for line in cut.iter().filter_map(|l| l.strip_prefix("MSG(\"")) {
+                    let shown = line.trim_end_matches("\")").replace("\"<<AXC_OFF<<\"", "-0.123456");
+                    assert!(shown.len() <= 124, "{}: {shown}", shown.len());
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn emitted_programs_are_those_in_the_tree() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/emitted");

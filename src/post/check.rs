@@ -62,6 +62,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
             dialect: c.dialect,
             from: c.from.get_ref().clone(),
             leaves: c.leaves.clone(),
+            stays_on: c.stays_on.clone(),
             further_offsets: c.further_offsets.as_ref().map_or(FANUC_OFFSETS, |g| {
                 if ![FANUC_OFFSETS, HAAS_OFFSETS].contains(g.get_ref()) {
                     let says = format!("further_offsets is {}", g.get_ref());
@@ -410,7 +411,7 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
         // `value` is the control's own expression: it must not be cleaned away
         let mut clean = rule.clean(&text);
         if let Some(width) = rule.message_width {
-            clean = clean.chars().take(width).collect();
+            clean = shortened(&clean, width);
         }
         let template = state.env().get_template("message")?;
         loop {
@@ -425,8 +426,16 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
             }
             // a message that is too long loses its end rather than stopping the program's making
             let keep = clean.chars().count().saturating_sub(excess);
-            clean = clean.chars().take(keep).collect();
+            clean = shortened(&clean, keep);
         }
     });
     env
+}
+
+/// The words of a text that find room in so many characters; where not even the first one does, its beginning.
+fn shortened(text: &str, width: usize) -> String {
+    let Some((end, next)) = text.char_indices().nth(width) else { return text.to_owned() };
+    let kept = text.get(..end).unwrap_or(text);
+    let words = if next == ' ' { Some(kept) } else { kept.rsplit_once(' ').map(|(words, _)| words) };
+    words.unwrap_or(kept).trim_end_matches([' ', ',', ':']).to_owned()
 }
