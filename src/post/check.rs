@@ -409,12 +409,15 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
     let rule = comment.clone();
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away
-        let mut clean = rule.clean(&text);
-        if let Some(width) = rule.message_width {
-            clean = shortened(&clean, width);
-        }
+        let clean = rule.clean(&text);
+        let parts = match (rule.message_width, &value) {
+            (None, _) => vec![clean],
+            // several messages, one after the other, rather than one that is cut
+            (Some(width), None) => pieces(&clean, width),
+            (Some(width), Some(_)) => vec![shortened(&clean, width)],
+        };
         let template = state.env().get_template("message")?;
-        loop {
+        let one = |mut clean: String| loop {
             let filled = match &value {
                 Some(value) => clean.replace("{}", value),
                 None => clean.clone(),
@@ -427,9 +430,30 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
             // a message that is too long loses its end rather than stopping the program's making
             let keep = clean.chars().count().saturating_sub(excess);
             clean = shortened(&clean, keep);
-        }
+        };
+        let messages: Vec<String> = parts.into_iter().map(one).collect::<Result<_, _>>()?;
+        Ok::<String, minijinja::Error>(messages.iter().map(|m| m.trim_end_matches('\n')).collect::<Vec<_>>().join("\n"))
     });
     env
+}
+
+/// A text in pieces of at most so many characters, between words; a word that is longer is cut.
+fn pieces(text: &str, width: usize) -> Vec<String> {
+    let mut pieces = vec![String::new()];
+    for word in text.split(' ').filter(|w| !w.is_empty()) {
+        let word: Vec<char> = word.chars().collect();
+        for part in word.chunks(width.max(1)) {
+            match pieces.last_mut() {
+                Some(piece) if piece.is_empty() => piece.extend(part),
+                Some(piece) if piece.chars().count() + 1 + part.len() <= width => {
+                    piece.push(' ');
+                    piece.extend(part);
+                }
+                _ => pieces.push(part.iter().collect()),
+            }
+        }
+    }
+    pieces
 }
 
 /// The words of a text that find room in so many characters; where not even the first one does, its beginning.
