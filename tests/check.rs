@@ -245,16 +245,24 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
 
 #[test]
 fn a_probe_that_is_not_ready_is_found_before_the_first_move() {
-    for (controller, says) in
-        [("linuxcnc", "(DEBUG"), ("fanuc", "#3006=1(PROBE"), ("haas", "#3006=1(PROBE"), ("heidenhain", "STOP")]
-    {
+    for (controller, says) in [
+        ("linuxcnc", "(DEBUG,axiscal: the probe"),
+        ("fanuc", "#3006=1(PROBE"),
+        ("haas", "#3006=1(PROBE"),
+        ("heidenhain", "QS1600 = \"AXISCAL: the probe"),
+    ] {
         let mut original = original(controller, None);
         original.plan.programs.clear();
         // the message and the stop behind it taken out: it would go on with the probe deflected
         let text = original.without_numbers();
         let lines: Vec<&str> = text.split_inclusive('\n').collect();
         let message = lines.iter().position(|l| l.starts_with(says)).unwrap();
-        let to = message + if controller == "linuxcnc" { 2 } else { 3 };
+        let to = message
+            + match controller {
+                "linuxcnc" => 2,
+                "heidenhain" => 5,
+                _ => 3,
+            };
         let edited: String = lines[..message].iter().chain(&lines[to..]).copied().collect();
         let codes = original.codes(&original.numbered(&edited));
         assert!(codes.contains(&"check::goes_on"), "{controller}: {codes:?}");
