@@ -23,12 +23,12 @@ fn every_random_edit_is_refused_or_moves_identically() {
         let original = original(controller, None);
         let fates = original.fates(edits(), 20260101);
         let number = |fate: Fate| fates.iter().filter(|(_, f)| *f == fate).count();
-        let each = [Fate::NotRead, Fate::Refused, Fate::Changed, Fate::Same, Fate::Escaped];
+        let each = [Fate::NotRead, Fate::Refused, Fate::Changed, Fate::Unproven, Fate::Same, Fate::Escaped];
         println!("{controller}: {:?}", each.map(|fate| (fate.clone(), number(fate))));
         let escaped: Vec<&String> = fates.iter().filter(|(_, f)| *f == Fate::Escaped).map(|(w, _)| w).collect();
         assert!(escaped.is_empty(), "{controller}: {escaped:#?}");
         // a check that refuses everything, or lets everything pass as the same, would show nothing
-        for fate in [Fate::NotRead, Fate::Refused, Fate::Same] {
+        for fate in [Fate::NotRead, Fate::Refused, Fate::Unproven, Fate::Same] {
             assert!(fates.iter().any(|(_, f)| *f == fate), "{controller}: no edit was {fate:?}");
         }
     }
@@ -80,7 +80,7 @@ fn edits_by_hand_are_caught() {
             }),
             ("a stop removed", {
                 let stop = if linuxcnc { "o<axiscal> return [1]" } else { "GOTO9" };
-                with(&t, stop, if linuxcnc { 2 } else { 3 }, &|_| String::new())
+                with(&t, stop, if linuxcnc { 3 } else { 5 }, &|_| String::new())
             }),
             ("the units not set", with(&t, "G21", 1, &|l| l.replace("G21 ", ""))),
             ("absolute coordinates not set", with(&t, "G21", 1, &|l| l.replace("G90 ", ""))),
@@ -245,18 +245,182 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
 
 #[test]
 fn a_probe_that_is_not_ready_is_found_before_the_first_move() {
-    for (controller, says) in
-        [("linuxcnc", "(DEBUG"), ("fanuc", "#3006=1(PROBE"), ("haas", "#3006=1(PROBE"), ("heidenhain", "STOP")]
-    {
+    for (controller, says) in [
+        ("linuxcnc", "(DEBUG,axiscal: the probe"),
+        ("fanuc", "#3006=1(PROBE"),
+        ("haas", "#3006=1(PROBE"),
+        ("heidenhain", "QS1600 = \"AXISCAL: the probe"),
+    ] {
         let mut original = original(controller, None);
         original.plan.programs.clear();
         // the message and the stop behind it taken out: it would go on with the probe deflected
         let text = original.without_numbers();
         let lines: Vec<&str> = text.split_inclusive('\n').collect();
         let message = lines.iter().position(|l| l.starts_with(says)).unwrap();
-        let to = message + if controller == "linuxcnc" { 2 } else { 3 };
+        let to = message
+            + match controller {
+                "linuxcnc" => 2,
+                "heidenhain" => 5,
+                _ => 3,
+            };
         let edited: String = lines[..message].iter().chain(&lines[to..]).copied().collect();
         let codes = original.codes(&original.numbered(&edited));
         assert!(codes.contains(&"check::goes_on"), "{controller}: {codes:?}");
+    }
+}
+
+/// The number of the first line (from 1) that differs.
+fn first_other_line(one: &str, two: &str) -> usize {
+    1 + one.lines().zip(two.lines()).position(|(a, b)| a != b).unwrap()
+}
+
+/// Every place that holds a text, with what stands there instead.
+fn all(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "{from:?} does not stand in the program");
+    text.replace(from, to)
+}
+
+#[test]
+fn what_no_run_can_show_is_named_by_its_line_and_refused() {
+    for (controller, cases) in [
+        (
+            "fanuc",
+            &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]"), ("#3000=1(", "#3000=1(X")][..],
+        ),
+        ("haas", &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]")]),
+        ("sinumerik", &[("ABS(AXC_OFF)>1", "ABS(AXC_OFF)>1.15"), ("ABS(AXC_OFF)>1", "AXC_OFF>1")]),
+        ("heidenhain", &[("GT +1 GOTO", "GT +1.1 GOTO"), ("GT +0.25 GOTO", "GT +0.26 GOTO")]),
+        ("linuxcnc", &[("GT 1]]", "GT 1.1]]"), ("GT 0.25]]", "GT 0.26]]")]),
+    ] {
+        let original = original(controller, None);
+        for (from, to) in cases {
+            let edited = original.text.replacen(from, to, 1);
+            assert_ne!(edited, original.text, "{controller}: {from}");
+            let (code, line, says) = original.finding(&edited);
+            assert_eq!(
+                (code, line),
+                ("check::changed", first_other_line(&original.text, &edited)),
+                "{controller} {from}: {says}"
+            );
+        }
+    }
+    // and it says why, where the program does the same in every run
+    let original = original("fanuc", None);
+    let (_, _, says) = original.finding(&original.text.replacen("GT0.25]", "GT0.26]", 1));
+    assert!(says.contains("not the statement that axiscal wrote") && says.contains("not proven"), "{says}");
+}
+
+#[test]
+fn remarks_blanks_and_how_a_number_is_spelled_do_not_matter() {
+    for (controller, edits) in [
+        ("fanuc", &[("(TOUCH 1", "(TOUCH ONE"), ("GT1.]", "GT1.0]"), ("\n", "\r\n"), ("N640", "N99")][..]),
+        ("linuxcnc", &[("(touch 1", "(touch one"), ("GT 1]]", "GT 1.0]]"), ("G38.3 ", "  G38.3  "), ("\n", "\r\n")]),
+        ("sinumerik", &[("; touch 1", "; touch one"), (">1\n", ">1.0\n"), ("\n", " \r\n")]),
+        ("heidenhain", &[("; touch 1", "; touch one"), ("GT +1 GOTO", "GT +1.0 GOTO")]),
+    ] {
+        let original = original(controller, None);
+        for (from, to) in edits {
+            let edited = original.text.replace(from, to);
+            assert!(edited != original.text || *from == "N640", "{controller}: {from}");
+            // a label with what goes to it
+            let edited = if *from == "N640" { edited.replace("GOTO640", "GOTO99") } else { edited };
+            assert_eq!(original.fate(&edited), Fate::Same, "{controller}: {from:?} {:?}", original.codes(&edited));
+        }
+    }
+}
+
+#[test]
+fn a_plan_of_an_older_version_says_that_it_does_not_know_the_statements() {
+    let mut original = original("fanuc", None);
+    for proof in original.plan.programs.values_mut() {
+        proof.statements.clear();
+        proof.statements_sha256.clear();
+    }
+    let (code, _, says) = original.finding(&original.text);
+    assert_eq!(code, "check::older_plan", "{says}");
+    assert_eq!(original.codes(&original.text.replacen("GT0.25]", "GT0.26]", 1)), ["check::older_plan"]);
+    assert_eq!(original.codes(&with(&original.text, "M5", 1, &|_| String::new())), ["check::changed"]);
+}
+
+#[test]
+fn late_contacts_reference_systems_holds_and_signs_are_seen_without_a_program_to_compare_with() {
+    for (controller, cases) in [
+        (
+            "fanuc",
+            &[
+                ("LT0.02]GOTO", "LT002]GOTO", "check::goes_on"),
+                ("LT0.02]GOTO", "LT0.09]GOTO", "check::goes_on"),
+                ("#3004=2", "#3004=3", "check::not_run"),
+                ("G0 ", "G-0 ", "check::not_understood"),
+                ("G4 P10", "G4 P-10", "check::not_understood"),
+                ("M5", "M-5", "check::not_understood"),
+            ][..],
+        ),
+        ("haas", &[("LT0.02]GOTO", "LT002]GOTO", "check::goes_on"), ("#3004=2", "#3004=3", "check::not_run")]),
+        ("linuxcnc", &[("G0 ", "G-0 ", "check::not_understood"), ("M5 ", "M-5 ", "check::not_understood")]),
+        ("sinumerik", &[("G0 ", "G-0 ", "check::not_understood"), ("M5\n", "M-5\n", "check::not_understood")]),
+        (
+            "heidenhain",
+            &[("REFERENCE SYSTEM:1", "REFERENCE SYSTEM:0", "check::not_run"), ("M5", "M-5", "check::not_understood")],
+        ),
+    ] {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        for (from, to, code) in cases {
+            let codes = original.codes(&all(&original.text, from, to));
+            assert!(codes.contains(code), "{controller}: {from} to {to}: {codes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_set_up_that_does_not_exist_moves_nothing() {
+    for (controller, line, number) in [
+        ("fanuc", "#1=", "#1={n}\n"),
+        ("haas", "#1=", "#1={n}\n"),
+        ("heidenhain", "FN 0: Q1600 = ", "FN 0: Q1600 = +{n}\r\n"),
+        ("linuxcnc", "#<_axiscal_from> = ", "#<_axiscal_from> = {n}\n"),
+        ("sinumerik", "DEF INT AXC_FROM=", "DEF INT AXC_FROM={n}\n"),
+    ] {
+        let original = original(controller, None);
+        let t = original.without_numbers();
+        for n in ["7", "0", "1.5"] {
+            if controller == "sinumerik" && n == "1.5" {
+                continue; // an INT
+            }
+            let edited = original.numbered(&with(&t, line, 1, &|_| number.replace("{n}", n)));
+            for from in [1, 7] {
+                let (checked, no_setup) = original.begun(&edited, from);
+                assert!(no_setup, "{controller} {n}: {:?}", checked.findings);
+            }
+        }
+        // the first line with which the program says so, taken out with its stop: then it would move
+        let (checked, no_setup) = original.begun(&original.text, 7);
+        assert!(no_setup, "{controller}: {:?}", checked.findings);
+        let (checked, no_setup) =
+            original.begun(&original.numbered(&with(&t, line, 1, &|_| number.replace("{n}", "2"))), 2);
+        assert!(!no_setup && checked.findings.is_empty(), "{controller}: {:?}", checked.findings);
+    }
+}
+
+#[test]
+fn a_program_that_does_not_look_at_the_number_of_the_set_up_is_found() {
+    for (controller, from, to) in [
+        ("fanuc", "IF[#1LE2]GOTO28\n", "GOTO28\n"),
+        ("haas", "IF[#1LE2]GOTO28\n", "GOTO28\n"),
+        ("heidenhain", "", ""),
+        ("linuxcnc", "o7 if [#<_task> AND", "o7 if [0 AND"),
+        ("sinumerik", "IF (AXC_FROM<1) OR (AXC_FROM>2)\n", "IF AXC_FROM<1\n"),
+    ] {
+        let mut original = original(controller, None);
+        original.plan.programs.clear();
+        let edited = if to.is_empty() {
+            let line = "FN 11: IF +Q1600 GT +2 GOTO LBL 25";
+            original.numbered(&with(&original.without_numbers(), line, 1, &|_| String::new()))
+        } else {
+            all(&original.text, from, to)
+        };
+        let codes = original.codes(&edited);
+        assert!(codes.contains(&"check::start"), "{controller}: {codes:?}");
     }
 }

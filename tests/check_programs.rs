@@ -295,13 +295,50 @@ fn the_transformation_is_switched_off_again() {
     let of = |word: &str, n: usize| codes(&post, &machine, &generated, &without_line(&post, &text, word, n));
     assert!(of("M129", 0).contains(&"check::not_run"), "{:?}", of("M129", 0));
     assert!(of("M129", 1).contains(&"check::not_restored"), "{:?}", of("M129", 1));
-    for (control, off) in [("fanuc", "G49"), ("haas", "G49")] {
+}
+
+/// With No. 5006#6 (TOS) = 0 a G49 takes Z along by the length that acts: the program begins only where none does, and takes its own
+/// off where Z stands.
+#[test]
+fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
+    let machine = machine("trunnion");
+    let (plain, table) = (generated(&machine, "basic", false), generated(&machine, "basic", true));
+    for control in ["fanuc", "haas"] {
         let post = controller(control);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
-        let last = text.lines().filter(|l| *l == off).count() - 1;
-        let found = codes(&post, &machine, &generated, &without_line(&post, &text, off, last));
-        assert!(found.contains(&"check::not_restored"), "{control}: {found:?}");
+        let of = |generated: &Generated| post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = of(&plain);
+        assert!(!text.contains("G49"), "{control}");
+        // it does not look whether a length acts
+        let look = text.lines().find(|l| l.starts_with("IF[#4008EQ49]")).unwrap();
+        let blind = without(&text, look, "GOTO9");
+        let found = codes(&post, &machine, &plain, &blind);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // nor when it takes it off by itself
+        let found = codes(&post, &machine, &plain, &blind.replacen("G40 G69 G80", "G40 G49 G69 G80", 1));
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // with the rotary axes turned which axes a G49 moves is not known
+        let text = of(&table);
+        let end = text.rfind("M5\n").unwrap();
+        let found = codes(&post, &machine, &table, &format!("{}G49\n{}", &text[..end], &text[end..]));
+        assert!(!found.is_empty(), "{control}");
     }
+    // at a stop for another stylus: where Z stands, and nowhere else
+    let long = generated(&machine, "full", true);
+    let post = controller("fanuc");
+    let text = post.program(&machine, &long.plan, &long.path).unwrap().text;
+    let off = text.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
+    let found = codes(&post, &machine, &long, &text.replace(off, "G49"));
+    assert!(
+        found.iter().any(|c| [
+            "check::collision",
+            "check::unguarded",
+            "check::unknown_start",
+            "check::not_run",
+            "check::start"
+        ]
+        .contains(c)),
+        "{found:?}"
+    );
 }
 
 /// A control reads macro statements ahead: without a block to wait the program would compute from where it has not arrived yet.

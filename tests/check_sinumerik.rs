@@ -160,7 +160,7 @@ fn edits_by_hand_are_caught_with_the_right_words() {
             "a sign changed",
             with(&t, "G0 SUPA X=-", 1, &|l| l.replace("=-", "=")),
             "check::stops",
-            "further along the approach",
+            "off along the approach",
         ),
         (
             "a place over the block",

@@ -101,7 +101,7 @@ fn holds_to_the_rules(post: &Postprocessor, nc: &NcProgram, what: &str) {
         }
         let moves = ["G0 ", "G1 ", "G31 "].iter().any(|g| line.starts_with(g));
         if post.number.always_mark && moves {
-            for word in line.split(' ').skip(1).filter(|w| !w.contains(['[', '#'])) {
+            for word in line.split(' ').skip(1).filter(|w| !w.contains(['[', '#']) && !w.starts_with('G')) {
                 assert!(word.contains('.'), "a word without its point: {}", place());
             }
         }
@@ -184,6 +184,64 @@ fn a_program_that_stops_for_another_stylus() {
             holds_to_the_rules(&post, &program.unwrap(), name);
         } else {
             assert_eq!(program.unwrap_err().0[0].code, "post::other_stylus");
+        }
+    }
+}
+
+/// The texts of the messages of a program, as any control spells them.
+fn messages(text: &str) -> Vec<String> {
+    let forms =
+        [("MSG(\"AXISCAL: ", "\")"), ("#3006=1(", ")"), ("QS1600 = \"AXISCAL: ", "\""), ("(DEBUG,axiscal: ", ")")];
+    let shown = |line: &str| {
+        forms.into_iter().find_map(|(begins, ends)| {
+            let (_, message) = line.split_once(begins)?;
+            message.trim_end().strip_suffix(ends).map(str::to_owned)
+        })
+    };
+    text.lines().filter_map(shown).collect()
+}
+
+/// What the operator is told is told whole: a control that shows longer messages is sent the same program.
+#[test]
+fn no_message_is_cut() {
+    for (machine_name, program, frames) in [
+        ("swivel-head", "head", &[false, true][..]),
+        ("swivel-head", "table", &[false, true]),
+        ("swivel-head", "full", &[false]),
+        ("double-head", "double-head", &[false, true]),
+        ("trunnion", "basic", &[false, true]),
+        ("trunnion", "full", &[false, true]),
+        ("swivel-table-b", "basic", &[false, true]),
+    ] {
+        let machine = machine(machine_name);
+        for tcp in frames {
+            let generated = generated(&machine, program, *tcp);
+            for name in CONTROLLERS {
+                let post = controller(name);
+                if *tcp && program == "full" && !post.tcp.as_ref().unwrap().other_stylus {
+                    continue;
+                }
+                let width = post.comment.message_width;
+                let wide = variant(name, "[comment]\nmessage_width = 4000\nunverified = \"as wide as it wants\"\n");
+                assert_ne!(wide.comment.message_width, width);
+                let (cut, whole) = (
+                    messages(&written(&post, &machine, &generated).text),
+                    messages(&written(&wide, &machine, &generated).text),
+                );
+                assert!(!cut.is_empty(), "{name}");
+                // in one message or in several
+                let words = |of: &[String]| of.join(" ");
+                assert!(words(&cut) == words(&whole), "{name}, {machine_name}, {program}, tcp {tcp}");
+                assert!(
+                    width.is_none_or(|w| cut.iter().all(|m| m.replace("\"<<AXC_OFF<<\"", "{}").len() <= w)),
+                    "{name}"
+                );
+                // with the longest number in it a SINUMERIK shows 124 characters
+                for message in cut.iter().filter(|_| name == "sinumerik") {
+                    let shown = format!("AXISCAL: {}", message.replace("\"<<AXC_OFF<<\"", "-0.123456"));
+                    assert!(shown.len() <= 124, "{}: {shown}", shown.len());
+                }
+            }
         }
     }
 }

@@ -98,6 +98,8 @@ pub struct Limits {
     pub placement_mm: f64,
     /// Way back between search and measuring touch, mm.
     pub back_off_mm: f64,
+    /// A guarded move that ends so near its end counts as one without contact, mm; `None`: the control says whether there was one.
+    pub guard_mm: Option<f64>,
     /// Probing moves from the beginning at which branches are followed. A run from a later set-up differs from the whole one
     /// at its beginning: after some set-ups what goes wrong there goes wrong in the whole run, or in the run from there, too.
     pub probes: usize,
@@ -200,7 +202,12 @@ fn deviations(vm: &Vm, probe: &Probe, outcome: Outcome, limits: Limits) -> Vec<D
         return Vec::new();
     }
     if !outcome.hit {
-        return vec![Deviation::Contact(0.0), Deviation::Contact(0.5)];
+        // a program that looks how near its end the move came must see a contact just before it, too
+        const BEFORE_THE_END_MM: f64 = 1.0;
+        let way = way_mm(probe);
+        let late = [Some(BEFORE_THE_END_MM), limits.guard_mm.map(|mm| 2.0 * mm)].into_iter().flatten();
+        let late = late.filter(|mm| *mm < 0.5 * way).map(|mm| 1.0 - mm / way);
+        return [0.0, 0.5].into_iter().chain(late).map(Deviation::Contact).collect();
     }
     if vm.hits == 0 {
         const OUTSIDE: f64 = 1.2;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! text → ngc, macro_b, heidenhain (grammar of a dialect) → code → run (one machine) → explore (what may happen)
-//!      → judge, touches (limits, shapes, plan, stops, settings), proof (does it still do what was written?)
+//!      → judge, touches (limits, shapes, plan, stops, settings), proof, statements (is it still what was written?)
 //! ```
 //!
 //! The grammars are strict: what they do not know is an error with its place, never skipped. Nothing here knows how a
@@ -23,6 +23,7 @@ mod runs;
 mod seconds;
 mod settings;
 mod sinumerik;
+mod statements;
 mod touches;
 mod vm;
 mod world;
@@ -238,16 +239,10 @@ fn with_parts(
     findings.extend(
         told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
     );
-    if let Some(begins) = program.begins_at().filter(|b| *b != against.from.max(1)) {
-        findings.push(
-            Finding::error("check::begins_later", format!("the program begins at set-up {begins}"))
-                .help(format!("write 1 back, or say that it is meant so with --from {begins}"))
-                .at(source, program.begins_in()),
-        );
-    }
-    let proof = proof::proof(told.runs.iter().chain(&told.others).chain(&told.refused));
+    findings.extend(begins(post, program, against.from.max(1), source));
+    let proof = proof::proof(told.runs.iter().chain(&told.others).chain(&told.refused), program.statements());
     if let Some(plan) = against.plan {
-        findings.extend(as_written(plan, post, &proof, first.map(|t| &t.trunk), source));
+        findings.extend(as_written(plan, post, &proof, program, first.map(|t| &t.trunk), source));
     }
     let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
     Ok(Checked {
@@ -256,7 +251,7 @@ fn with_parts(
         moves: trunk.iter().filter(|h| matches!(h.event, Event::Move { .. } | Event::Probe { .. })).count(),
         stops: told.stops,
         setups: told.setups,
-        declined: told.runs.iter().filter(|t| t.declines()).map(|t| t.from).collect(),
+        declined: told.runs.iter().filter(|t| t.declines() && t.from <= told.setups).map(|t| t.from).collect(),
         branches: told.runs.iter().map(|t| t.branches.len()).sum(),
         seconds: seconds::seconds(trunk),
         findings,
@@ -264,24 +259,68 @@ fn with_parts(
     })
 }
 
-/// Does the program still do what `generate` wrote?
+/// Does it begin where it is meant to?
+fn begins(post: &Postprocessor, program: &runs::Program, meant: u32, source: &Source) -> Option<Finding> {
+    let begins = program.begins_at()?;
+    // a run behind the last set-up gives the settings back, where the postprocessor file says so
+    let gives_back = post.check.as_ref().is_some_and(|rule| !rule.after_abort.is_empty());
+    let (setups, last) = (program.setups(), program.setups() + u32::from(gives_back));
+    let there_are = match setups {
+        1 => "the program has one".to_owned(),
+        n => format!("the program has {n}"),
+    };
+    let lacks = |says: String| {
+        Finding::error("check::no_setup", says)
+            .help(format!("a number from 1 to {setups}"))
+            .at(source, program.begins_in())
+    };
+    match begins {
+        u32::MAX => Some(lacks("the program is told to begin at a number that is no set-up".to_owned())),
+        n if !(1..=last).contains(&n) => Some(lacks(format!("the program begins at set-up {n}: {there_are}"))),
+        _ if meant > last => Some(lacks(format!("there is no set-up {meant}: {there_are}"))),
+        n if n != meant => Some(
+            Finding::error("check::begins_later", format!("the program begins at set-up {n}"))
+                .help(format!("write 1 back, or say that it is meant so with --from {n}"))
+                .at(source, program.begins_in()),
+        ),
+        _ => None,
+    }
+}
+
+/// Is the program still what `generate` wrote?
 fn as_written(
     plan: &Plan,
     post: &Postprocessor,
     proof: &Proof,
+    program: &runs::Program,
     trunk: Option<&Vec<run::Happened>>,
     source: &Source,
 ) -> Option<Finding> {
+    const HELP: &str =
+        "was it edited? `axiscal generate` writes it anew; change the postprocessor file rather than the program";
     let written = plan.programs.get(&post.name)?;
+    let other = statements::first_other(written, proof).map(|i| program.place(i));
     if written.sha256 == proof.sha256 {
-        return None;
+        if written.statements_sha256.is_empty() {
+            let says = "the plan is of an older version and does not hold the program's statements: a limit in a condition that was changed is not found";
+            return Some(
+                Finding::warning("check::older_plan", says).help("`axiscal generate` writes plan and program anew"),
+            );
+        }
+        let says = "this is not the statement that axiscal wrote: in all runs that were tried the program does the same, but what it does here where something goes wrong is not proven";
+        return other.map(|at| Finding::error("check::changed", says).help(HELP).at(source, at));
     }
     let same = proof::same_lines(written, proof);
     let lines = trunk.into_iter().flatten().filter(|h| matches!(h.event, Event::Log(_)));
     let places: Vec<_> = lines.map(|h| h.at.clone()).collect();
     let before = same.checked_sub(1).and_then(|i| places.get(i)).map_or(0, |at| at.end);
     let all_the_same = same == written.lines.len() && same == proof.lines.len();
-    let (at, says) = if all_the_same {
+    let (at, says) = if let Some(at) = other {
+        (
+            at,
+            "here the program is not the one that axiscal wrote, and does otherwise (moves, log, messages, or what it does when something goes wrong)",
+        )
+    } else if all_the_same {
         let says = "the program does otherwise than the one that axiscal wrote: when it starts again at a set-up, in the settings that it leaves, or after its last line";
         (before..before, says)
     } else {
@@ -291,9 +330,5 @@ fn as_written(
             "here the program does otherwise than the one that axiscal wrote (moves, log, messages, or what it does when something goes wrong)",
         )
     };
-    Some(
-        Finding::error("check::changed", says)
-            .help("was it edited? `axiscal generate` writes it anew; change the postprocessor file rather than the program")
-            .at(source, at),
-    )
+    Some(Finding::error("check::changed", says).help(HELP).at(source, at))
 }

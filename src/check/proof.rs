@@ -1,4 +1,5 @@
-//! What a program does, as a text and as a digest: two programs with one digest move identically.
+//! What a program does, as a text and as a digest: two programs with one digest move identically
+//! in every run that is tried. That they do so whatever happens their statements show ([`super::statements`]).
 //!
 //! "Identically" means: in the run from the beginning, whatever state it finds the control in, and in the runs from each
 //! set-up, the same moves in the same order (targets to 0.001 µm, rapid or feed, stopping at contact or not), the same lines in
@@ -13,8 +14,11 @@ use crate::program::plan::Proof;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 
-/// The proof of the runs of a program.
-pub fn proof<'a>(runs: impl Iterator<Item = &'a Told>) -> Proof {
+/// The proof of a program: its runs, and its statements ([`super::statements`]).
+pub fn proof<'a>(
+    runs: impl Iterator<Item = &'a Told>,
+    (statements_sha256, statements): (String, Vec<String>),
+) -> Proof {
     let mut all = Sha256::new();
     let mut lines = Vec::new();
     for (n, told) in runs.enumerate() {
@@ -43,7 +47,7 @@ pub fn proof<'a>(runs: impl Iterator<Item = &'a Told>) -> Proof {
         );
         all.update(text.as_bytes());
     }
-    Proof { sha256: hex(&all.finalize()), lines }
+    Proof { sha256: hex(&all.finalize()), lines, statements_sha256, statements }
 }
 
 /// The line of the log (from 0) up to which another program still does the same.
@@ -51,7 +55,7 @@ pub fn same_lines(one: &Proof, other: &Proof) -> usize {
     one.lines.iter().zip(&other.lines).take_while(|(a, b)| a == b).count()
 }
 
-fn hex(bytes: &[u8]) -> String {
+pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut hex, byte| {
         let _ = write!(hex, "{byte:02x}");
         hex

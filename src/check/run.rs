@@ -44,10 +44,14 @@ pub enum Start {
     Third,
     /// Something acts on the program's coordinates that none of its words takes off: it must see that and not move.
     Obstructed,
+    /// A tool length acts that the program cannot take off without a move: it must see that and not move.
+    LengthActs,
 }
 
 /// The language of a control: what words, variables and G numbers mean.
 pub trait Dialect: Clone + Send + Sync {
+    /// States in which a program must see that it cannot begin, because it cannot switch off what acts.
+    const OBSTRUCTED: &'static [Start] = &[];
     /// The control before the program.
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self;
     /// What outlives a program that is broken off by hand; `None`: nothing that a further run of the program could use.
@@ -75,10 +79,6 @@ pub trait Dialect: Clone + Send + Sync {
     /// # Errors
     /// When it cannot be.
     fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String>;
-    /// Must a program look whether its coordinates are those of the axes, because it cannot switch off all that acts on them?
-    fn sees_offsets(&self) -> bool {
-        false
-    }
     /// A move ended: where its result is kept.
     fn probed(&mut self, probe: &Probe, outcome: Outcome, stands: &Position);
     /// The control latches all axes at the contact and lets them run out behind it; `false`: a cycle that keeps X, Y, Z and itself

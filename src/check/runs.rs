@@ -7,7 +7,7 @@ use super::proof::write_event;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Rate, Run, Start, Vm};
 use super::seconds::Clock;
 use super::world::World;
-use super::{heidenhain, macro_b, ngc, sinumerik};
+use super::{heidenhain, macro_b, ngc, sinumerik, statements};
 use crate::axes::{AxisName, Position};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
@@ -69,7 +69,24 @@ impl Program {
         }
     }
 
-    /// Where that stands.
+    /// Set-ups at which it can begin.
+    pub fn setups(&self) -> u32 {
+        self.setups
+    }
+
+    /// The digest of its statements, wherever it is told to begin.
+    pub fn statements(&self) -> (String, Vec<String>) {
+        // Fanuc and Haas: a number without its point counts least increments
+        statements::statements(&self.from(1), self.dialect == DialectName::MacroB)
+    }
+
+    /// Where a statement stands; behind the last one, where that ends.
+    pub fn place(&self, statement: usize) -> Range<usize> {
+        let end = || self.code.statements.last().map_or(0..0, |s| s.at.end..s.at.end);
+        self.code.statements.get(statement).map_or_else(end, |s| s.at.clone())
+    }
+
+    /// Where it is told at which set-up it begins.
     pub fn begins_in(&self) -> Range<usize> {
         let at = self.from.as_ref().and_then(|(_, at)| self.code.statements.get(*at));
         at.map_or(0..0, |s| s.at.clone())
@@ -176,6 +193,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let limits = Limits {
             placement_mm: self.machine.probe.placement_tolerance,
             back_off_mm: self.machine.probe.back_off,
+            guard_mm: self.post.settings.get("missed_within").and_then(|mm| mm.trim().parse().ok()),
             probes: usize::MAX,
         };
         let last = self.codes.len();
@@ -204,18 +222,16 @@ impl<'a, D: Dialect> Runs<'a, D> {
             findings.dedup();
         }
         let refused = self.refused(beginning);
-        findings.extend(refused.iter().filter_map(moves_all_the_same));
+        findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));
         let neutral = D::begin(Start::Fresh, self.post, self.machine).settings();
         All { runs, others, neutral, refused, findings, setups: self.program.setups, stops, clear_from_anywhere }
     }
 
-    /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And one in
-    /// which the program's coordinates are not those of the axes, where the program must look.
+    /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And those in
+    /// which the program must look before it moves.
     fn refused(&self, beginning: Position) -> Vec<Told> {
         const ELSEWHERE_DEG: f64 = 0.01;
-        let obstructed = D::begin(Start::Obstructed, self.post, self.machine)
-            .sees_offsets()
-            .then(|| self.told(1, Start::Obstructed, beginning, None));
+        let obstructed = D::OBSTRUCTED.iter().map(|start| self.told(1, *start, beginning, None));
         let elsewhere = |axis: AxisName, by: f64| {
             let mut at = beginning;
             at.set(axis, at.get(axis) + by);
@@ -223,7 +239,20 @@ impl<'a, D: Dialect> Runs<'a, D> {
         };
         let rotary = self.machine.rotary().filter(|_| self.tcp());
         let turned = rotary.flat_map(|a| [ELSEWHERE_DEG, -ELSEWHERE_DEG].map(|by| elsewhere(a.name, by)));
-        turned.chain(obstructed).collect()
+        turned.chain(obstructed).chain(self.nowhere(beginning)).collect()
+    }
+
+    /// Runs that are told to begin at a set-up that the program does not have, nor takes for the order to give settings back.
+    fn nowhere(&self, beginning: Position) -> Vec<Told> {
+        if self.program.from.is_none() {
+            return Vec::new();
+        }
+        let told = |setup: u32| {
+            let code = self.program.from(setup);
+            let run = self.run(&code, Start::Awkward, beginning, 0, false);
+            Told { start: Start::Awkward, ..explore(run, setup, None, &|_| None) }
+        };
+        [0, self.program.setups + 2].map(told).into()
     }
 
     fn tcp(&self) -> bool {
@@ -408,12 +437,21 @@ impl<'a, D: Dialect> Runs<'a, D> {
 }
 
 /// It begins where it must not.
-fn moves_all_the_same(told: &Told) -> Option<(Range<usize>, String)> {
+fn moves_all_the_same(told: &Told, setups: u32) -> Option<(Range<usize>, String)> {
     let moves = told.trunk.iter().find(|h| is_motion(h))?;
-    let says = if told.start == Start::Obstructed {
-        "with a mirror image left on by the user (G51.1), which the program's words do not take off, it moves: it must first see that its coordinates are those of the axes"
-    } else {
-        "under the control's own transformation the program must not move unless the rotary axes stand at 0: begun with one at 0.01 deg, it does"
+    let says = match told.start {
+        _ if !(1..=setups).contains(&told.from) => {
+            "told to begin at a set-up that it does not have, it moves: it must say that there is none"
+        }
+        Start::Obstructed => {
+            "with a mirror image left on by the user (G51.1), which the program's words do not take off, it moves: it must first see that its coordinates are those of the axes"
+        }
+        Start::LengthActs => {
+            "with a tool length left on by the user (G43) it moves: G49 itself may take Z along by that length (No. 5006#6 TOS = 0), so it must first see that none acts (#4008 is 49)"
+        }
+        _ => {
+            "under the control's own transformation the program must not move unless the rotary axes stand at 0: begun with one at 0.01 deg, it does"
+        }
     };
     Some((moves.at.clone(), says.to_owned()))
 }

@@ -2,6 +2,7 @@
 
 use super::explore::Told;
 use super::judge::{Case, Said};
+use crate::program::plan::ControllerFrame;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -32,7 +33,9 @@ pub fn compare_settings(
     said: &mut Said,
 ) {
     let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
-    for (name, value) in after {
+    let tcp = case.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
+    let stays = case.post.check.as_ref().map(|c| c.stays_on.as_slice()).filter(|_| tcp).unwrap_or_default();
+    for (name, value) in after.iter().filter(|(name, _)| !stays.contains(name)) {
         // what it may leave changed, it may leave off and no otherwise
         let off = left.contains(name) && case.neutral.get(name) == Some(value);
         if before.get(name) != Some(value) && !off {

@@ -62,6 +62,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
             dialect: c.dialect,
             from: c.from.get_ref().clone(),
             leaves: c.leaves.clone(),
+            stays_on: c.stays_on.clone(),
             further_offsets: c.further_offsets.as_ref().map_or(FANUC_OFFSETS, |g| {
                 if ![FANUC_OFFSETS, HAAS_OFFSETS].contains(g.get_ref()) {
                     let says = format!("further_offsets is {}", g.get_ref());
@@ -408,12 +409,15 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
     let rule = comment.clone();
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away
-        let mut clean = rule.clean(&text);
-        if let Some(width) = rule.message_width {
-            clean = clean.chars().take(width).collect();
-        }
+        let clean = rule.clean(&text);
+        let parts = match (rule.message_width, &value) {
+            (None, _) => vec![clean],
+            // several messages, one after the other, rather than one that is cut
+            (Some(width), None) => pieces(&clean, width),
+            (Some(width), Some(_)) => vec![shortened(&clean, width)],
+        };
         let template = state.env().get_template("message")?;
-        loop {
+        let one = |mut clean: String| loop {
             let filled = match &value {
                 Some(value) => clean.replace("{}", value),
                 None => clean.clone(),
@@ -425,8 +429,37 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
             }
             // a message that is too long loses its end rather than stopping the program's making
             let keep = clean.chars().count().saturating_sub(excess);
-            clean = clean.chars().take(keep).collect();
-        }
+            clean = shortened(&clean, keep);
+        };
+        let messages: Vec<String> = parts.into_iter().map(one).collect::<Result<_, _>>()?;
+        Ok::<String, minijinja::Error>(messages.iter().map(|m| m.trim_end_matches('\n')).collect::<Vec<_>>().join("\n"))
     });
     env
+}
+
+/// A text in pieces of at most so many characters, between words; a word that is longer is cut.
+fn pieces(text: &str, width: usize) -> Vec<String> {
+    let mut pieces = vec![String::new()];
+    for word in text.split(' ').filter(|w| !w.is_empty()) {
+        let word: Vec<char> = word.chars().collect();
+        for part in word.chunks(width.max(1)) {
+            match pieces.last_mut() {
+                Some(piece) if piece.is_empty() => piece.extend(part),
+                Some(piece) if piece.chars().count() + 1 + part.len() <= width => {
+                    piece.push(' ');
+                    piece.extend(part);
+                }
+                _ => pieces.push(part.iter().collect()),
+            }
+        }
+    }
+    pieces
+}
+
+/// The words of a text that find room in so many characters; where not even the first one does, its beginning.
+fn shortened(text: &str, width: usize) -> String {
+    let Some((end, next)) = text.char_indices().nth(width) else { return text.to_owned() };
+    let kept = text.get(..end).unwrap_or(text);
+    let words = if next == ' ' { Some(kept) } else { kept.rsplit_once(' ').map(|(words, _)| words) };
+    words.unwrap_or(kept).trim_end_matches([' ', ',', ':']).to_owned()
 }

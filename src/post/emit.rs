@@ -298,7 +298,15 @@ impl<'a> Writer<'a> {
             self.post.name
         )];
         head.extend(self.path.head.iter().cloned());
-        head.push(format!("the log is {} in {}", self.post.log_name(self.plan)?, self.post.log.place));
+        // a setting stands there by its name: {folder}
+        let place = self
+            .post
+            .settings
+            .iter()
+            .fold(self.post.log.place.clone(), |place, (name, value)| place.replace(&format!("{{{name}}}"), value));
+        let name = self.post.log_name(self.plan)?;
+        let folder = place.ends_with(['\\', '/']);
+        head.push(if folder { format!("the log is {place}{name}") } else { format!("the log is {name} in {place}") });
         if let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) {
             head.push(format!("coordinates are the tool's place in the workpiece: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());

@@ -64,6 +64,13 @@ pub struct Proof {
     /// Of what happens up to each line of the log, the run from the beginning only: the first eight digits. They show
     /// where a program was changed.
     pub lines: Vec<String>,
+    /// Digest of its statements as they are read: remarks, blanks, numbers of blocks and how a number is spelled do not matter.
+    /// Empty in plans of older versions.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub statements_sha256: String,
+    /// Two digits for what stands up to each statement, 32 of them in a piece: they show which one was changed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub statements: Vec<String>,
 }
 
 /// What the controller's coordinates mean.

@@ -19,6 +19,7 @@ pub struct Original {
     pub text: String,
     pub beside: Vec<(String, Source)>,
     pub sha256: String,
+    pub statements_sha256: String,
 }
 
 /// A program of a few touches of one block at two angles: all kinds of moves, small enough for thousands of edits.
@@ -74,8 +75,10 @@ pub fn original(controller: &str, built_in: Option<&str>) -> Original {
     assert!(wrong.is_empty(), "{controller}: {wrong:#?}");
     assert_eq!(checked.touches, plan.touches.len());
     let sha256 = checked.proof.sha256.clone();
+    let statements_sha256 = checked.proof.statements_sha256.clone();
+    assert!(!statements_sha256.is_empty());
     plan.programs.insert(post.name.clone(), checked.proof);
-    Original { machine, post, plan, text, beside, sha256 }
+    Original { machine, post, plan, text, beside, sha256, statements_sha256 }
 }
 
 /// What became of an edited program.
@@ -87,7 +90,9 @@ pub enum Fate {
     Refused,
     /// Refused only because it does otherwise than what was written.
     Changed,
-    /// It moves identically.
+    /// Refused only because it is not what was written: in every run that is tried it does the same.
+    Unproven,
+    /// It moves identically: it is the same statements.
     Same,
     /// Neither refused nor the same: what must not be.
     Escaped,
@@ -103,9 +108,15 @@ impl Original {
                 let errors: Vec<&str> =
                     checked.findings.iter().filter(|f| f.severity == Severity::Error).map(|f| f.code).collect();
                 if errors.is_empty() {
-                    return if checked.proof.sha256 == self.sha256 { Fate::Same } else { Fate::Escaped };
+                    let proof = &checked.proof;
+                    let same = proof.sha256 == self.sha256 && proof.statements_sha256 == self.statements_sha256;
+                    return if same { Fate::Same } else { Fate::Escaped };
                 }
-                if errors.iter().all(|c| *c == "check::changed") { Fate::Changed } else { Fate::Refused }
+                match errors.iter().all(|c| *c == "check::changed") {
+                    true if checked.proof.sha256 == self.sha256 => Fate::Unproven,
+                    true => Fate::Changed,
+                    false => Fate::Refused,
+                }
             }
         }
     }
@@ -118,6 +129,29 @@ impl Original {
             Err(failure) => failure.0.iter().map(|f| f.code).collect(),
             Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
         }
+    }
+
+    /// What an edited text is refused as changed for, or else its first finding: code, line from 1, what it says.
+    #[allow(dead_code)] // the example does not ask for it
+    pub fn finding(&self, text: &str) -> (&'static str, usize, String) {
+        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
+        let findings = match check(&self.machine, &self.post, &source("edited", text), &against) {
+            Err(failure) => failure.0,
+            Ok(checked) => checked.findings,
+        };
+        let changed = findings.iter().find(|f| f.code == "check::changed");
+        let finding = changed.or(findings.first()).expect("nothing is found");
+        let line = finding.place().and_then(|p| p.split(':').nth(1)?.parse().ok()).unwrap_or(0);
+        (finding.code, line, finding.message.clone())
+    }
+
+    /// A text that is meant to begin at a set-up, checked; and whether it says that there is no such set-up.
+    #[allow(dead_code)] // the example does not ask for it
+    pub fn begun(&self, text: &str, from: u32) -> (axiscal::check::Checked, bool) {
+        let against = Against { plan: Some(&self.plan), beside: &self.beside, from, ..Against::default() };
+        let checked = check(&self.machine, &self.post, &source("edited", text), &against).unwrap();
+        let no_setup = checked.findings.iter().any(|f| f.code == "check::no_setup");
+        (checked, no_setup)
     }
 
     /// The text without its block numbers, where it has any.

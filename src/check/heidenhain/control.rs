@@ -134,6 +134,12 @@ impl Heidenhain {
         if in_machine && self.tcpm == Tcpm::On {
             return Err("REFERENCE SYSTEM:1 stands under M128".to_owned());
         }
+        if !in_machine && self.tcpm != Tcpm::On {
+            return Err(
+                "cycle 4 moves in the system of the workpiece, where a basic rotation turns its way: REFERENCE SYSTEM:1 is missing"
+                    .to_owned(),
+            );
+        }
         let first = value("PROBE") as u32;
         if !OWN.contains(&first) || !OWN.contains(&(first + 3)) {
             return Err(format!(
@@ -252,6 +258,8 @@ impl Dialect for Heidenhain {
             "INCH" => self.inch = head.value == 1.0,
             "PLANE" => self.tilted = false,
             "ANGLE" => self.angle = Some(head.value),
+            // the only rotation of cycle 10 that is read is none
+            "NO ROTATION" => {}
             "NO SHIFT" => self.shift = [0.0; 6],
             "SHIFT" => {
                 if words.iter().any(|w| w.address.starts_with('I')) {

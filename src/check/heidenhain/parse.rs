@@ -389,6 +389,7 @@ impl<'a> Reader<'a> {
             Cycle::Rotation => {
                 scan.need("CYCL DEF 10.1 ROT+0", "CYCL DEF 10.1 ROT+0: axiscal knows no other rotation")?;
                 scan.end()?;
+                self.code.push(at, What::Block(vec![number("NO ROTATION", 0.0)]));
             }
             Cycle::WorkingPlane => {
                 scan.need("CYCL DEF 19.1 A+0 B+0 C+0", "CYCL DEF 19.1 A+0 B+0 C+0: axiscal knows no other plane")?;

@@ -153,6 +153,7 @@ impl MacroB {
             170 | 180 | 190 => self.plane = tenth as f64 / 10.0,
             200 | 210 => self.inch = tenth == 200,
             400 => self.cutter = false,
+            // what it does where a length acts: `without_length`
             490 => self.tool_on = false,
             540 | 550 | 560 | 570 | 580 | 590 => (self.system, self.system_p) = (tenth as f64 / 10.0, 0.0),
             541 | 1540 => {
@@ -242,6 +243,28 @@ impl MacroB {
         }))
     }
 
+    /// G49 while a length acts. With No. 5006#6 (TOS) = 0 it moves Z by that length where no Z stands in its block, with 1 it does
+    /// not (B-63943EN-1/02 p. 1654): here it does, and where Z then stands is not known. With a Z both go there.
+    fn without_length(&mut self, names_z: bool, vm: &mut Vm) -> Result<(), String> {
+        const SAME: f64 = 1e-6;
+        let axes = vm.world.axes(vm.part, &vm.at);
+        let turned = AxisName::ALL.into_iter().any(|a| a.is_rotary() && axes.get(a).abs() > SAME);
+        if vm.world.is_tcp() && turned {
+            return Err("G49 ends the transformation while the rotary axes do not stand at 0: which axes then move is not known"
+                .to_owned());
+        }
+        self.tool_on = false;
+        if names_z {
+            return Ok(());
+        }
+        let mut to = [None; 6];
+        to[AxisName::Z.index()] = Some(vm.at.get(AxisName::Z) - self.tool_mm);
+        vm.go(&to, Rate::Rapid, true)?;
+        vm.known[AxisName::Z.index()] = false;
+        self.ahead = true;
+        Ok(())
+    }
+
     fn may_move(&self) -> Result<(), String> {
         if self.cutter {
             return Err("it moves with cutter compensation on: G40 is missing".to_owned());
@@ -293,6 +316,11 @@ impl MacroB {
                     21.0
                 }
             }
+            4008 => match (self.tool_on, vm.world.is_tcp()) {
+                (false, _) => 49.0,
+                (true, false) => 43.0,
+                (true, true) => 43.4,
+            },
             4012 | 4014 => self.system,
             4130 => self.system_p,
             5021..=5026 => {
@@ -342,6 +370,8 @@ const GROUPS: [&[i64]; 7] = [
 ];
 
 impl Dialect for MacroB {
+    const OBSTRUCTED: &'static [Start] = &[Start::Obstructed, Start::LengthActs];
+
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
         let mut numbers = [None; 6];
         let there = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some());
@@ -375,13 +405,13 @@ impl Dialect for MacroB {
             system: match start {
                 Start::Awkward => 56.0,
                 Start::Third => post.check.as_ref().map_or(54.0, |c| c.further_offsets),
-                Start::Fresh | Start::Obstructed => 54.0,
+                Start::Fresh | Start::Obstructed | Start::LengthActs => 54.0,
             },
             system_p: if third { 7.0 } else { 0.0 },
             cutter: awkward,
             rotated: awkward,
-            tool_on: awkward || third,
-            tool_mm: if awkward || third { 33.5 } else { 0.0 },
+            tool_on: start == Start::LengthActs,
+            tool_mm: if start == Start::LengthActs { 33.5 } else { 0.0 },
             stored_mm: if awkward || third { 120.25 } else { 0.0 },
             offsets: awkward || third,
             external: some([0.625, -1.5, 2.25, 0.125, 0.25, -0.5]),
@@ -432,6 +462,9 @@ impl Dialect for MacroB {
         let mut over = false;
         for m in numbers("M").collect::<Vec<_>>() {
             over |= self.auxiliary(m, words, vm)?;
+        }
+        if gs.contains(&490) && self.tool_on {
+            self.without_length(motion.is_some() && words.iter().any(|w| w.address == "Z"), vm)?;
         }
         for g in gs.iter().filter(|g| !matches!(g, 0 | 10 | 310 | 520 | 434 | 2340)) {
             self.mode(*g, words)?;
@@ -494,13 +527,15 @@ impl Dialect for MacroB {
         self.own.contains_key(var)
     }
 
-    fn sees_offsets(&self) -> bool {
-        true
-    }
-
     fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String> {
         match var {
             Var::Number(3001) => self.seconds = vm.clock_s(MILLISECOND_S) - value / 1000.0,
+            // bit 0 takes feed hold away, bit 2 exact stop
+            Var::Number(3004) if value != 0.0 && value != 2.0 => {
+                return Err(format!(
+                    "#3004={value} is not known here: 2 takes the feed override away, 0 gives it back"
+                ));
+            }
             Var::Number(3004) => self.holds = value,
             Var::Number(1..=33) => {
                 self.own.insert(var.clone(), value);

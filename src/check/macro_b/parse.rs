@@ -170,6 +170,9 @@ impl Reader {
             let Some((length, address)) = axis.or_else(other) else {
                 return Err(line.not_understood(left, "a word that axiscal knows"));
             };
+            if "GMPH".contains(address) && left[length..].starts_with(['+', '-']) {
+                return Err(line.fault(left, format!("the number behind {address} has no sign")));
+            }
             let (after, (value, point)) =
                 cut(word_value).parse(&left[length..]).map_err(|e| line.unread(&e, "the value of a word"))?;
             if words.iter().any(|w| w.address == address) && address != "G" {
@@ -377,6 +380,10 @@ mod tests {
             ("%\nO1\n#3006=1\n", 12),
             ("%\nO1\n(A(B)\n", 7),
             ("%\nO1\nX1.\n%\n", 11),
+            ("%\nO1\nG-0 X1.\n%\n", 5),
+            ("%\nO1\nG4 P-10\n%\n", 8),
+            ("%\nO1\nM+5\n%\n", 5),
+            ("%\nO1\nN-5\n%\n", 5),
         ] {
             let fault = read(text).unwrap_err();
             if fault.at.start != place {

@@ -149,6 +149,9 @@ impl Reader {
             let Some(address) = ADDRESSES.into_iter().find(|a| *a == letter) else {
                 return Err(line.not_understood(left, "a word that axiscal knows"));
             };
+            if "GMPL".contains(address) && left[1..].starts_with(['+', '-']) {
+                return Err(line.fault(left, format!("the number behind {address} has no sign")));
+            }
             let (after, (value, point)) =
                 cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of a word"))?;
             if words.iter().any(|w| w.address == address) && address != "G" && address != "M" {
@@ -465,6 +468,9 @@ mod tests {
             ("%\n%\nG0\n", 4),
             ("(LOG,%x)\n", 7),
             ("G0 X[1\n", 4),
+            ("G-0 X1\n", 0),
+            ("G4 P-1\n", 3),
+            ("M+5\n", 0),
         ] {
             let fault = parse(text).unwrap_err();
             if fault.at.start != place {
