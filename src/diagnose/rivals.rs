@@ -22,6 +22,9 @@ const BETTER: f64 = 4.0;
 /// What a shape still takes after the first effect counts when it is so much of all that there was to explain.
 const SHARE: f64 = 0.1;
 
+/// Everything stands elsewhere from one moment on, in whatever direction of the machine.
+const JUMP: &str = "shape:t-step:any";
+
 /// What came of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Weighed {
@@ -29,6 +32,8 @@ pub(super) struct Weighed {
     pub shapes_win: bool,
     /// Index of the first shape, where it alone is better than the first effect alone.
     pub better: Option<usize>,
+    /// A jump of everything at one moment, in a frame that stands still, does no worse than the first effect.
+    pub jump: bool,
 }
 
 /// Where a way ends.
@@ -107,13 +112,17 @@ fn acting(end: &End, columns: &DMatrix<f64>) -> DMatrix<f64> {
 pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, first: usize) -> Weighed {
     let names = way(question, named, false, Some(first));
     let shapes = way(question, &generics.library, true, None);
-    let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
+    let jump = generics.library.position(JUMP).map(|j| way(question, &generics.library, true, Some(j)));
+    let jump = jump.is_some_and(|j| j.after_first.is_finite() && j.after_first < names.after_first + CLEARLY);
+    let Some(&shape) = shapes.steps.first() else {
+        return Weighed { jump, ..Weighed::default() };
+    };
     // visits that each stand elsewhere follow anything, and what is the same at every touch is a part of many effects
     let speaks = !["visit", CONSTANT].contains(&generics.shapes[shape].depends_on.as_str());
     let better = (speaks && shapes.after_first + BETTER < names.after_first).then_some(shape);
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
-    Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }
+    Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better, jump }
 }
 
 /// Is much of it left to a shape once the first effect is in the model, and to no second effect?
