@@ -187,14 +187,16 @@ fn a_moved_block_is_drawn_and_sketched() {
     let listed = said.lines().filter(|l| l.contains("not used:") && l.contains("full/b")).count();
     assert!(listed <= 1, "{said}");
     let text = std::fs::read_to_string(at.join("study.toml")).unwrap();
-    let text = text.replace("machine = \"swivel-head\"", "machine = \"swivel-head\"\neffects_file = [\"my-effects.toml\"]");
+    let text =
+        text.replace("machine = \"swivel-head\"", "machine = \"swivel-head\"\neffects_file = [\"my-effects.toml\"]");
     std::fs::write(at.join("study.toml"), &text).unwrap();
     let (added, code) = json(at, &["add", "study.toml", "sketch-moved-block"]);
     let noise = added["after"]["noise_um"].as_f64().unwrap();
     assert!(code == 0 && added["after"]["rms_um"].as_f64().unwrap() < 1.2 * noise, "{added}");
     // a word of the whole study below [[data]] belongs to the run: said so
     let below = text.replace("effects_file = [\"my-effects.toml\"]\n", "");
-    let below = below.replace("controller = \"linuxcnc\"\n", "controller = \"linuxcnc\"\neffects_file = [\"my-effects.toml\"]\n");
+    let below = below
+        .replace("controller = \"linuxcnc\"\n", "controller = \"linuxcnc\"\neffects_file = [\"my-effects.toml\"]\n");
     std::fs::write(at.join("below.toml"), below).unwrap();
     let out = axiscal(at, &["identify", "below.toml"]);
     let said = String::from_utf8_lossy(&out.stderr);

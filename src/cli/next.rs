@@ -57,7 +57,10 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                     None => vec![format!("next: axiscal add {study} {}", first.effect)],
                     Some(other) => vec![
                         format!("next: look at the machine whether it is that, or whether {other}"),
-                        format!("  either way this takes it out of the other errors: axiscal add {study} {}", first.effect),
+                        format!(
+                            "  either way this takes it out of the other errors: axiscal add {study} {}",
+                            first.effect
+                        ),
                     ],
                 };
             }
@@ -65,10 +68,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             let ids: Vec<&str> = std::iter::once(&first.effect).chain(&first.same_as).map(String::as_str).collect();
             vec![
                 format!("next: {}", plan_next(loaded)),
-                format!(
-                    "  or, when you know which it is: axiscal add {study} EFFECT, with one of {}",
-                    ids.join(", ")
-                ),
+                format!("  or, when you know which it is: axiscal add {study} EFFECT, with one of {}", ids.join(", ")),
             ]
         }
         Verdict::Unexplained if found.faint && found.touches_would_tell() => {

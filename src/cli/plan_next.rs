@@ -126,7 +126,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let mut setting = Setting::new(&loaded, &settings.effects, &fit)?;
     let unexplained = named.is_empty() && !open(&found) && found.verdict == Verdict::Unexplained;
-    let sketched = if unexplained && found.touches_would_tell() { Sketched::of(&loaded, &settings, &fit) } else { None };
+    let sketched =
+        if unexplained && found.touches_would_tell() { Sketched::of(&loaded, &settings, &fit) } else { None };
     // a faint pattern is there or is not: touches tell. A clear one is there, and no known effect stands against another
     if unexplained && !(found.faint && sketched.is_some()) {
         let help = match found.sketchable {

@@ -9,7 +9,7 @@ use crate::model::catalogue::Place;
 use crate::model::data::Origin;
 use crate::model::formula::slot;
 use crate::search::dependence::Dependence;
-use crate::search::generic::{Features, Kind};
+use crate::search::generic::{Direction, Features, Kind};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out_in};
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -186,7 +186,7 @@ pub(super) fn put_together(
         && depends.first().is_some_and(|w| !at_the_machine(&w.id))
         && super::sketch::best(&seen.dependences).is_ok();
     let moved_block = drawn.filter(|_| unexplained).and_then(|d| words::moved_block(d, fit)).map(str::to_owned);
-    jump_of_what(subject, beside, &mut candidates);
+    jump_of_what(subject, seen, features, &mut candidates);
     Diagnosis {
         format: FORMAT,
         verdict,
@@ -221,14 +221,22 @@ pub(super) fn put_together(
     }
 }
 
-/// Blocks that all stand elsewhere from some moment on are one reading of a jump, where a jump in a frame that stands still
-/// does as well: then the machine or the probe may have made it.
-fn jump_of_what(subject: Subject, beside: &Beside, candidates: &mut [Candidate]) {
-    let Some(first) = candidates.first_mut().filter(|c| c.proposed && beside.jump) else { return };
-    let of_blocks = subject.catalogue.get(&first.effect, subject.machine).is_some_and(|e| {
-        e.parameters.iter().any(|p| p.between == Some(slot::HOURS)) && e.terms.iter().all(|t| t.place == Place::Block)
-    });
-    if of_blocks {
+/// Blocks that all stand elsewhere from some moment on are one reading of a jump. Where a jump at the same moment in a frame
+/// that stands still does as well, the machine or the probe may have made it.
+fn jump_of_what(subject: Subject, seen: &Examination, features: &Features, candidates: &mut [Candidate]) {
+    let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
+    let chosen = group.first();
+    let effect = seen.named.effects[chosen];
+    let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
+    let of_blocks = effect.id == first.effect && jumps && effect.terms.iter().all(|t| t.place == Place::Block);
+    let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
+    let at_h = seen.named.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
+    let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
+    let n = features.block.len();
+    let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
+    let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
+    let columns = seen.evidence.whiten(subject.fit, raw_mm);
+    if super::rivals::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }

@@ -239,7 +239,6 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     };
     let beside = verdict::Beside {
         shapes_win: weighed.shapes_win,
-        jump: weighed.jump,
         better: weighed.better.map(|shape| generics.shapes[shape].depends_on.clone()),
         gathered: gathered::gathered(fit, &features),
         scatter: scatter(fit, machine, &evidence),

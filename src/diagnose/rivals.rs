@@ -22,9 +22,6 @@ const BETTER: f64 = 4.0;
 /// What a shape still takes after the first effect counts when it is so much of all that there was to explain.
 const SHARE: f64 = 0.1;
 
-/// Everything stands elsewhere from one moment on, in whatever direction of the machine.
-const JUMP: &str = "shape:t-step:any";
-
 /// What came of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Weighed {
@@ -32,8 +29,6 @@ pub(super) struct Weighed {
     pub shapes_win: bool,
     /// Index of the first shape, where it alone is better than the first effect alone.
     pub better: Option<usize>,
-    /// A jump of everything at one moment, in a frame that stands still, does no worse than the first effect.
-    pub jump: bool,
 }
 
 /// Where a way ends.
@@ -48,17 +43,24 @@ struct End {
     criterion: f64,
 }
 
+impl End {
+    /// Before the first step.
+    fn start(question: Question) -> Self {
+        Self {
+            residual: question.base.project(question.residual),
+            basis: question.base.clone(),
+            cost: 0,
+            steps: Vec::new(),
+            after_first: f64::INFINITY,
+            criterion: f64::INFINITY,
+        }
+    }
+}
+
 /// Adds what passes its test, the first candidate given or found.
 fn way(question: Question, library: &Library, generic: bool, first: Option<usize>) -> End {
     let n = question.residual.len() as f64;
-    let mut end = End {
-        residual: question.base.project(question.residual),
-        basis: question.base.clone(),
-        cost: 0,
-        steps: Vec::new(),
-        after_first: f64::INFINITY,
-        criterion: f64::INFINITY,
-    };
+    let mut end = End::start(question);
     while end.steps.len() < MOST_STEPS {
         let search = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, library);
         let found = if generic { search.leading_shape() } else { search.leader() };
@@ -112,17 +114,30 @@ fn acting(end: &End, columns: &DMatrix<f64>) -> DMatrix<f64> {
 pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, first: usize) -> Weighed {
     let names = way(question, named, false, Some(first));
     let shapes = way(question, &generics.library, true, None);
-    let jump = generics.library.position(JUMP).map(|j| way(question, &generics.library, true, Some(j)));
-    let jump = jump.is_some_and(|j| j.after_first.is_finite() && j.after_first < names.after_first + CLEARLY);
-    let Some(&shape) = shapes.steps.first() else {
-        return Weighed { jump, ..Weighed::default() };
-    };
+    let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
     // visits that each stand elsewhere follow anything, and what is the same at every touch is a part of many effects
     let speaks = !["visit", CONSTANT].contains(&generics.shapes[shape].depends_on.as_str());
     let better = (speaks && shapes.after_first + BETTER < names.after_first).then_some(shape);
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
-    Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better, jump }
+    Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }
+}
+
+/// What columns leave and cost by themselves, by the criterion.
+fn alone(question: Question, columns: &DMatrix<f64>) -> f64 {
+    let n = question.residual.len() as f64;
+    let mut end = End::start(question);
+    let acting = acting(&end, columns);
+    if acting.ncols() == 0 || end.basis.extend(&acting, KEPT) == 0 {
+        return f64::INFINITY;
+    }
+    let left = end.basis.project(&end.residual).norm_squared().max(f64::MIN_POSITIVE);
+    n * left.ln() + acting.ncols() as f64 * n.ln()
+}
+
+/// Do these columns explain what an effect explains, with no clear doubt?
+pub(super) fn as_well(question: Question, effect: &DMatrix<f64>, columns: &DMatrix<f64>) -> bool {
+    alone(question, columns) < alone(question, effect) + CLEARLY
 }
 
 /// Is much of it left to a shape once the first effect is in the model, and to no second effect?

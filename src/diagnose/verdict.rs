@@ -36,8 +36,6 @@ pub(super) struct Beside {
     pub shapes_win: bool,
     /// What the best shape depends on, where it is better than the first effect.
     pub better: Option<String>,
-    /// A jump of the machine or the probe does no worse than the first effect.
-    pub jump: bool,
     /// Touches that were not used and lie together.
     pub gathered: Option<Gathered>,
     /// Scatter of index visits that nothing explains, and the declared one, mm.

@@ -75,7 +75,10 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
     }
     for o in d.outliers.iter().filter(|o| !moved(o)) {
         let back = if o.comes_back { "; it belongs to the rest once the first candidate is in the model" } else { "" };
-        out += &wrapped(&format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason), 2);
+        out += &wrapped(
+            &format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason),
+            2,
+        );
     }
     let large: Vec<String> = d
         .power

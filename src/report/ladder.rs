@@ -164,7 +164,9 @@ pub fn history(h: &History, paper: Paper) -> String {
     let changed = noises.windows(2).any(|w| other_noise((w[0].1, w[0].2), (w[1].1, w[1].2)));
     let noise_note = match changed {
         true => {
-            let each = noises.iter().map(|(k, noise, visit)| format!("{k}: {} and {}", significant(*noise), significant(*visit)));
+            let each = noises
+                .iter()
+                .map(|(k, noise, visit)| format!("{k}: {} and {}", significant(*noise), significant(*visit)));
             let line = format!(
                 "chi2/dof is held against the noise of a touch and of index visits as each fit finds it, um: step {}",
                 each.collect::<Vec<_>>().join("; ")

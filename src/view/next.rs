@@ -143,7 +143,11 @@ fn unexplained(m: &Material, out: &mut Vec<Next>) {
         out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
     }
     if !d.sketchable || d.moved_block.is_some() {
-        out.push(Next::new("Put it right at the machine", capital(&crate::diagnose::words::at_the_machine(d)) + ".", ""));
+        out.push(Next::new(
+            "Put it right at the machine",
+            capital(&crate::diagnose::words::at_the_machine(d)) + ".",
+            "",
+        ));
     }
     if !d.sketchable {
         return;
