@@ -257,7 +257,7 @@ fn solvers(results: &[Size]) -> String {
 }
 
 fn whole_process(peers: &Peers, folder: &Path) -> String {
-    let [ours, theirs] = identify_both(peers, folder, 40);
+    let [ours, plain, theirs] = identify_both(peers, folder, 40);
     let mut out = String::from(
         "## Whole process: `identify` on the paper's 356 touches\n\nFrom the call to the answer in JSON, files read \
          included; median (fastest) run.\n\n| program | ms | ratio |\n|---|---|---|\n",
@@ -265,6 +265,9 @@ fn whole_process(peers: &Peers, folder: &Path) -> String {
     let ours = ours.expect("our own program always runs");
     let row = |t: &comparison::Times| format!("{} ({})", milliseconds(t.median_s), milliseconds(t.least_s));
     writeln!(out, "| `axiscal identify --quick` | {} | 1 |", row(&ours)).unwrap();
+    if let Some(t) = plain {
+        writeln!(out, "| `axiscal identify` | {} | {:.1} |", row(&t), t.median_s / ours.median_s).unwrap();
+    }
     match theirs {
         Some(t) => {
             writeln!(out, "| SciPy (`benches/peers/identify.py`) | {} | {:.0} |", row(&t), t.median_s / ours.median_s)

@@ -362,3 +362,24 @@ fn a_study_without_a_touch_that_is_used() {
         }
     }
 }
+
+/// A reference point that no machine has is a slip of the keyboard: values stated there would be of no use.
+#[test]
+fn a_reference_beyond_any_machine_is_refused() {
+    let job = Job(tempfile::tempdir().unwrap());
+    let call = |at: &str| job.call(&["assess", "--machine", "swivel-head", "--plan", "table", "--reference", at]);
+    for at in ["1e300,0,0", "0,-1000001,0", "0,0,1e7"] {
+        let out = call(at);
+        assert_eq!(out.status.code(), Some(2), "{at}: {}", said(&out));
+        assert!(
+            said(&out).contains("more than a kilometre off") && said(&out).contains("X,Y,Z in mm"),
+            "{}",
+            said(&out)
+        );
+    }
+    for at in ["nan,0,0", "1,2", "here"] {
+        let out = call(at);
+        assert!(out.status.code() == Some(2) && said(&out).contains("is no point"), "{at}: {}", said(&out));
+    }
+    assert_eq!(call("0,0,-202.684").status.code(), Some(0));
+}

@@ -339,6 +339,54 @@ fn a_temperature_row_without_temperatures_is_not_zero() {
     assert!((of(&without) / of(&warm) - 1.0).abs() < 1e-9, "{} {}", of(&without), of(&warm));
 }
 
+/// At 20 °C the thermal rows make nothing, which is said; the thermometer's own doubt acts there too, by all that goes with it.
+#[test]
+fn the_doubt_of_the_thermometer_is_a_row_of_its_own() {
+    let machine = machine("swivel-head");
+    let runs = measured(&machine, 23);
+    let stated = |rows: &[(&str, f64)]| {
+        let runs: Vec<_> = runs
+            .iter()
+            .cloned()
+            .map(|(plan, mut touches)| {
+                touches.iter_mut().for_each(|t| t.temperature_deg_c = Some(20.0));
+                (plan, touches)
+            })
+            .collect();
+        let type_b = rows.iter().map(|(name, sigma)| ((*name).to_owned(), *sigma)).collect();
+        fit(&machine, &runs, &MODEL, Settings { type_b, ..Settings::default() }).outcome
+    };
+    let of = |o: &axiscal::fit::outcome::Outcome| {
+        o.parameters.iter().find(|p| p.name == "EZ0B").unwrap().sigma_type_b.unwrap()
+    };
+    let nothing = stated(&[("expansion", 2.0)]);
+    assert!(nothing.warnings.iter().any(|w| w.contains("expansion makes nothing")), "{:?}", nothing.warnings);
+    assert!(of(&nothing) == 0.0);
+    let half = stated(&[("temperature", 0.5)]);
+    let whole = stated(&[("temperature", 1.0)]);
+    assert_eq!((half.type_b[0].name.as_str(), half.type_b[0].unit.as_str()), ("temperature", "K"));
+    assert!(half.warnings.iter().all(|w| !w.contains("makes nothing")), "{:?}", half.warnings);
+    // 0.5 K of some 10 ppm/K over the height of the blocks above R, as EZ0B: µm and not nothing
+    assert!((1e-5..1e-2).contains(&of(&half)), "{}", of(&half));
+    assert!((of(&whole) / of(&half) - 2.0).abs() < 1e-9);
+}
+
+/// A pitch of an amplitude that the touches do not show cannot be told, and takes nothing else with it.
+#[test]
+fn a_pitch_of_nothing_leaves_the_errors_told() {
+    let machine = machine("swivel-head");
+    for seed in 30..34 {
+        let runs = measured(&machine, seed);
+        for pitch in ["pitch-x", "pitch-y", "warm-up"] {
+            let o = fit(&machine, &runs, &[&MODEL[..], &[pitch]].concat(), Settings::default()).outcome;
+            for name in ["EX0B", "EZ0B", "EA0B", "EC0B", "EX0C", "EY0C", "EA0C", "EB0C"] {
+                let p = o.parameters.iter().find(|p| p.name == name).unwrap();
+                assert!(p.status == Status::Identified, "{seed} {pitch}: {name} is {:?}; {:?}", p.status, o.warnings);
+            }
+        }
+    }
+}
+
 /// A combination that is nearly, but not quite, without a trace is said too: an effect that differs from the place of C by
 /// a ten-millionth only.
 #[test]

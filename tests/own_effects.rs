@@ -360,6 +360,135 @@ fn an_effect_without_a_value_spoils_no_other_one() {
     }
 }
 
+/// Twenty machines, each with its own noise and its blocks anywhere: what is said of a user's effect and of the errors beside
+/// it holds the truth as often as it claims, and errors scatter as their uncertainties say.
+#[test]
+fn a_users_effect_is_covered_by_its_interval() {
+    const RUNS: u64 = 20;
+    let machine = machine("swivel-head");
+    let mut catalogue = Catalogue::built_in().unwrap();
+    catalogue.add_file(&source("my-effects.toml", MINE)).unwrap();
+    let plan = plan(&machine, "head");
+    let settings = axiscal::fit::Settings {
+        effects: ["location-b", "block-setup", "pretravel", "my-sag"].map(str::to_owned).to_vec(),
+        touch_sigma_mm: Some(1e-3),
+        visit_sigma_mm: Some(0.0),
+        quick: true,
+        ..Default::default()
+    };
+    let truth =
+        [("sag", 12.0), ("EX0B", 0.021), ("EZ0B", -0.015), ("EA0B", 0.0031), ("EC0B", -0.002), ("pretravel", 0.004)];
+    let text = "effects_file = [\"my-effects.toml\"]\n[effects.my-sag]\nsag = 12.0\n[effects.pretravel]\npretravel = 0.004\n\
+                [effects.location-b]\nEX0B = 0.021\nEZ0B = -0.015\nEA0B = 0.0031\nEC0B = -0.002\n";
+    let open = |name: &str| Ok(source(name, MINE));
+    let (planted, _) = simulate::scenario::parse_with(&source("s.toml", text), &machine, &open).unwrap();
+    let mut covered = std::collections::BTreeMap::<&str, (usize, f64)>::new();
+    for seed in 1..=RUNS {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut scenario = planted.clone().with_noise(1e-3, 0.0, seed);
+        for block in &machine.mounting(&plan.mounting).unwrap().blocks {
+            let shift = [0; 3].map(|_| rng.random_range(-0.1..0.1));
+            let tilt = [0; 3].map(|_| rng.random_range(-1e-3..1e-3));
+            scenario = scenario.with_block(&plan.mounting, &block.name, shift, tilt);
+        }
+        let touches = touch(&machine, &plan, &scenario, None);
+        let run = Run { plan: &plan, touches: &touches, mounting: None, started_s: None };
+        let fit = axiscal::fit::identify(&machine, &catalogue, &[run], &settings).unwrap();
+        assert!(fit.outcome.undetermined.is_empty() && fit.outcome.rejected.len() < 3, "{:?}", fit.outcome.warnings);
+        for (name, truth) in truth {
+            let p = fit.outcome.parameters.iter().find(|p| p.name == name).unwrap();
+            let error = p.value - truth;
+            let (n, sum) = covered.entry(name).or_default();
+            *n += usize::from(error.abs() <= p.expanded.unwrap());
+            *sum += (error / p.sigma.unwrap()).powi(2);
+        }
+    }
+    println!("{covered:?}");
+    // 19 of 20 are expected; 15 or fewer has a chance of 3 in a thousand, and so has a mean square below 0.37 or above 2
+    for (name, (n, sum)) in &covered {
+        let mean_square = sum / RUNS as f64;
+        assert!(*n >= 16 && (0.37..2.0).contains(&mean_square), "{name}: {n} of {RUNS}, mean square {mean_square}");
+    }
+    // all together: they share noise and touches
+    let n: usize = covered.values().map(|c| c.0).sum();
+    let mean_square = covered.values().map(|c| c.1).sum::<f64>() / (RUNS as usize * truth.len()) as f64;
+    assert!((106..=119).contains(&n) && (0.6..1.5).contains(&mean_square), "{n} of 120, mean square {mean_square}");
+}
+
+/// A time constant of an effect that does not act stands where the search began, and that is not the file's `start`: what is
+/// said of it is true.
+#[test]
+fn a_shape_that_leaves_no_trace_is_said_to_stand_at_the_best_of_its_range() {
+    const WARM: &str = "[[effect]]\nid = \"warm-z\"\nat = \"tool\"\nterms = [{ parameter = \"grow\", unit = \"um\", dof = \"dz\", \
+                        formula = \"1 - exp(-t/tau)\" }]\nshape = [{ parameter = \"tau\", unit = \"h\", start = 0.5, min = 0.1, max = 5.0 }]\n";
+    let machine = machine("swivel-head");
+    let mut catalogue = Catalogue::built_in().unwrap();
+    catalogue.add_file(&source("warm.toml", WARM)).unwrap();
+    let plan = plan(&machine, "head");
+    let settings = axiscal::fit::Settings {
+        effects: ["location-b", "block-setup", "pretravel", "warm-z"].map(str::to_owned).to_vec(),
+        visit_sigma_mm: Some(0.0),
+        quick: true,
+        ..Default::default()
+    };
+    let mut stood = Vec::new();
+    for seed in 1..=4 {
+        let touches = touch(&machine, &plan, &Scenario::flawless().with_noise(1e-3, 0.0, seed), None);
+        let run = Run { plan: &plan, touches: &touches, mounting: None, started_s: None };
+        let fit = axiscal::fit::identify(&machine, &catalogue, &[run], &settings).unwrap();
+        let o = &fit.outcome;
+        let tau = o.parameters.iter().find(|p| p.name == "tau").unwrap();
+        println!("{seed}: tau {} {:?}; {:?}", tau.value, tau.status, o.undetermined);
+        if let Some(u) = o.undetermined.iter().find(|u| u.combination.contains_key("tau")) {
+            assert!(u.says.contains("fits best") && !u.says.contains("convention"), "{}", u.says);
+            stood.push(tau.value);
+        }
+    }
+    assert!(stood.len() >= 2 && stood.iter().any(|v| (v - 0.5).abs() > 1e-6), "{stood:?}");
+    assert!(stood.iter().all(|v| (0.1..=5.0).contains(v)), "{stood:?}");
+}
+
+/// What a file may not hold, each with its place and what to do.
+#[test]
+fn what_could_never_be_used_is_refused() {
+    let file = |id: &str, parameter: &str, formula: &str, shape: &str| {
+        format!(
+            "[[effect]]\nid = {id:?}\nat = \"B\"\nterms = [{{ parameter = {parameter:?}, unit = \"um\", dof = \"dx\", formula = {formula:?} }}]\n{shape}"
+        )
+    };
+    let inside =
+        |name: &str| format!("shape = [{{ parameter = {name:?}, unit = \"h\", start = 0.5, min = 0.1, max = 5 }}]\n");
+    let long = vec!["sin(B)"; 2000].join(" + ");
+    let mut cases = vec![
+        (file("", "p", "sin(B)", ""), "effects::id", "no id", "w.toml:2:"),
+        (file(" ", "p", "sin(B)", ""), "effects::id", "no id", "w.toml:2:"),
+        (file("w", "p", "sin(B)", &inside("tau")), "effects::shape", "\"tau\" stands in no formula", "w.toml:5:"),
+        // a word of which it is a part is another one
+        (
+            file("w", "p", "sin(B)*taue", &(inside("tau") + "")),
+            "effects::shape",
+            "\"tau\" stands in no formula",
+            "w.toml:5:",
+        ),
+        (file("w", "p", &long, ""), "effects::formula", "is 17997 characters long, and 4000 at most", "w.toml:4:"),
+    ];
+    for word in ["pi", "PI", "e", "E", "L", "sin"] {
+        cases.push((file("w", word, "sin(B)", ""), "effects::parameter", "cannot be the name", "w.toml:4:"));
+        let both = file("w", "p", "sin(B)", &inside(word));
+        cases.push((both, "effects::parameter", "cannot be the name", "w.toml:5:"));
+    }
+    for (text, code, says, place) in cases {
+        let failure = Catalogue::default().add_file(&source("w.toml", &text)).unwrap_err();
+        let found = failure.0.iter().find(|f| f.code == code).unwrap_or_else(|| panic!("{code}: {:?}", failure.0));
+        assert!(found.message.contains(says), "{}", found.message);
+        assert!(found.place().unwrap().starts_with(place), "{says}: {:?}", found.place());
+        assert!(found.help.is_some(), "{says}");
+    }
+    Catalogue::default().add_file(&source("w.toml", file("w", "p", "1 - exp(-t/tau)", &inside("tau")))).unwrap();
+    let terms = vec!["sin(B)"; 400].join(" + ");
+    Catalogue::default().add_file(&source("w.toml", file("w", "p", &terms, ""))).unwrap();
+}
+
 #[test]
 fn a_constant_without_a_value_is_refused() {
     for formula in ["0/0", "1/0", "sqrt(-1)", "ln(0 - 2)"] {

@@ -144,6 +144,127 @@ fn a_pipe_of_no_stated_width_gets_tables_of_eighty_columns() {
     }
 }
 
+/// A table as it stands on the paper: the heads of its columns with what is below each, line by line.
+type Columns = Vec<(String, Vec<String>)>;
+
+/// The tables of a text that have their heads on one line each.
+fn tables(text: &str) -> Vec<Columns> {
+    let mut out: Vec<Columns> = Vec::new();
+    let mut rules = 0;
+    for line in text.lines() {
+        let letters: Vec<char> = line.chars().collect();
+        if line.starts_with("---") {
+            // above the head, below it, and at the end
+            rules = (rules + 1) % 3;
+        } else if rules == 1 {
+            // heads are separated by two blanks at least, and stand at the left of their columns
+            let begins =
+                (0..letters.len()).filter(|&i| letters[i] != ' ' && letters[i.saturating_sub(2)..i] == [' ', ' ']);
+            let mut begins: Vec<usize> = begins.collect();
+            begins.insert(0, 0);
+            begins.dedup_by_key(|b| if *b == 1 { 0 } else { *b });
+            let until = begins.iter().skip(1).copied().chain([letters.len()]);
+            let head = |(from, to): (&usize, usize)| letters[*from..to].iter().collect::<String>().trim().to_owned();
+            let heads = begins.iter().zip(until).map(head);
+            out.push(heads.map(|h| (h, Vec::new())).collect());
+            let last = out.last_mut().unwrap();
+            last.iter_mut().zip(&begins).for_each(|(c, b)| c.1.push(b.to_string()));
+        } else if rules == 2 {
+            let columns = out.last_mut().unwrap();
+            let begins: Vec<usize> = columns.iter().map(|c| c.1[0].parse().unwrap()).collect();
+            for (i, (_, cells)) in columns.iter_mut().enumerate() {
+                let to = begins.get(i + 1).copied().unwrap_or(letters.len()).min(letters.len());
+                cells.push(letters[begins[i].min(to)..to].iter().collect::<String>().trim().to_owned());
+            }
+        }
+    }
+    for (_, cells) in out.iter_mut().flatten() {
+        cells.remove(0);
+    }
+    out
+}
+
+/// The lines of a text that stand in tables.
+fn in_tables(text: &str) -> Vec<&str> {
+    let mut rules = 0;
+    text.lines()
+        .filter(|l| {
+            let rule = l.starts_with("---");
+            rules += usize::from(rule);
+            !rule && rules % 3 != 0
+        })
+        .collect()
+}
+
+fn is_number(word: &str) -> bool {
+    word.parse::<f64>().is_ok()
+}
+
+/// A number that is cut in two is two wrong ones. What a narrow paper has no room for it leaves out and says so.
+#[test]
+fn a_number_is_never_broken() {
+    let adding: &[&str] = &["add", "study.toml", "radial-c-2", "--dry-run"];
+    let residuals: &[&str] = &["identify", "study.toml", "--residuals"];
+    let mut n_compared = 0;
+    for args in READING.into_iter().chain([adding, residuals]) {
+        let printed = |columns: Option<&str>| String::from_utf8(axiscal(folder(), columns, args).stdout).unwrap();
+        let wide = printed(Some("160"));
+        for narrow in [printed(Some("80")), printed(None)] {
+            let sentences = narrow.replace("\n  ", " ");
+            let left_out = sentences.lines().find_map(|l| l.strip_prefix("too narrow here for: ")).unwrap_or_default();
+            let left_out: Vec<&str> = left_out.split(" (").next().unwrap().split(", ").collect();
+            let mut words: std::collections::BTreeMap<&str, i64> = std::collections::BTreeMap::new();
+            let lines = in_tables(&narrow);
+            for word in lines.iter().flat_map(|l| l.split_whitespace()) {
+                *words.entry(word).or_default() += 1;
+            }
+            for (head, cells) in tables(&wide).iter().flatten() {
+                if left_out.contains(&head.as_str()) {
+                    continue;
+                }
+                for word in cells.iter().flat_map(|c| c.split_whitespace()).filter(|w| is_number(w)) {
+                    let left = words.get_mut(word).map_or(-1, |n| {
+                        *n -= 1;
+                        *n
+                    });
+                    assert!(left >= 0, "{args:?}: {word} of {head:?} is broken or gone:\n{narrow}");
+                    n_compared += 1;
+                }
+                // an interval is no number without its sign
+                for interval in cells.iter().filter(|c| c.starts_with("± ")) {
+                    // a column without a head stands behind it in `verify`
+                    let interval = interval.split_whitespace().take(2).collect::<Vec<_>>().join(" ");
+                    assert!(lines.iter().any(|l| l.contains(&interval)), "{args:?}: {interval}:\n{narrow}");
+                }
+            }
+        }
+    }
+    println!("{n_compared} numbers compared");
+    assert!(n_compared > 1000, "{n_compared}");
+}
+
+/// By value, interval and status a reader decides: they stay on the narrowest paper, on one line with the name and the unit.
+#[test]
+fn a_parameter_has_its_value_interval_and_unit_on_one_line() {
+    let printed = |columns: &str| {
+        String::from_utf8(axiscal(folder(), Some(columns), &["identify", "study.toml"]).stdout).unwrap()
+    };
+    let wide = tables(&printed("160")).swap_remove(0);
+    let column = |head: &str| wide.iter().find(|(h, _)| h == head).map(|(_, cells)| cells.clone()).unwrap();
+    let (names, values, units, intervals) = (column("parameter"), column("value"), column("unit"), column("95 %"));
+    assert!(names.len() > 8);
+    for columns in ["80", "64"] {
+        let narrow = printed(columns);
+        let lines = in_tables(&narrow);
+        assert!(lines[0].contains("status"), "{narrow}");
+        for i in 0..names.len() {
+            let parts = [&names[i], &values[i], &units[i], &intervals[i]];
+            let one = |l: &&&str| parts.iter().all(|p| format!(" {l} ").contains(&format!(" {p} ")));
+            assert_eq!(lines.iter().filter(one).count(), 1, "{parts:?}:\n{narrow}");
+        }
+    }
+}
+
 /// What a verb prints in a terminal of so many columns.
 fn in_a_terminal(args: &[&str], columns: u16, no_color: bool) -> String {
     let size = PtySize { rows: 40, cols: columns, pixel_width: 0, pixel_height: 0 };

@@ -156,7 +156,7 @@
             ...(c.same_as.length ? fact('cannot be told from', c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)).join('; ')) : []),
             ...(c.tell_apart ? fact('what tells them apart', c.tell_apart) : []),
             ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
-          make('p', {}, c.says), make('p', {}, make('strong', {}, 'Look: '), c.look), mends ? make('p', {}, make('strong', {}, 'Mends it: '), mends) : null));
+          make('p', {}, c.says), c.look ? make('p', {}, make('strong', {}, 'Look: '), c.look) : null, mends ? make('p', {}, make('strong', {}, 'Mends it: '), mends) : null));
       });
       s.append(f, cards);
     }

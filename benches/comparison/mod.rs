@@ -203,7 +203,7 @@ pub struct Times {
 }
 
 /// `axiscal identify` and SciPy's script on a study of the paper's touches, each run `repeats` times; their answers agree.
-pub fn identify_both(peers: &Peers, folder: &Path, repeats: usize) -> [Option<Times>; 2] {
+pub fn identify_both(peers: &Peers, folder: &Path, repeats: usize) -> [Option<Times>; 3] {
     let study = write_study(folder);
     let run = |command: &mut Command| -> (Times, BTreeMap<String, f64>) {
         let mut times_s = Vec::new();
@@ -224,6 +224,10 @@ pub fn identify_both(peers: &Peers, folder: &Path, repeats: usize) -> [Option<Ti
     };
     let (ours, our_values) =
         run(Command::new(env!("CARGO_BIN_EXE_axiscal")).args(["identify", "--quick", "--json"]).arg(&study));
+    // with the figures that need the whole catalogue; nothing else of the answer may change
+    let (plain, plain_values) =
+        run(Command::new(env!("CARGO_BIN_EXE_axiscal")).args(["identify", "--json"]).arg(&study));
+    assert_eq!(our_values, plain_values, "--quick and the whole answer hold the same values");
     let theirs = peers.0.get("python").map(|python| {
         let script = self::folder().join("identify.py");
         let (times, values) = run(Command::new(python).arg(script).arg(&study));
@@ -233,7 +237,7 @@ pub fn identify_both(peers: &Peers, folder: &Path, repeats: usize) -> [Option<Ti
         }
         times
     });
-    [Some(ours), theirs]
+    [Some(ours), Some(plain), theirs]
 }
 
 /// The paper's head and table runs with everything that the whole-process comparison reads; noise-free, so that two noise

@@ -252,6 +252,7 @@ fn control(
         let shown = spelling.and_then(|s| v.names.get(s)).or(v.names.values().next()).cloned().unwrap_or_default();
         t.add_row(vec![Cell::new(shown), show(v.old), show(v.new), show(v.new - v.old), Cell::new(v.unit)]);
     }
+    crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
     io.say(format!("{}\n{t}", tables.says));
     if let Some(record) = &export.compensation.tables {
         for grid in &record.grids {
@@ -397,6 +398,7 @@ fn say(export: &Export, args: &Args, io: &Io) {
             Cell::new(&term.unit),
         ]);
     }
+    crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
     io.say(format!("By the kinematics component:\n{t}"));
     say_left("which leaves", &export.component.left, args, io);
     say_left("LinuxCNC without the component (stock/) leaves", &export.stock.left, args, io);

@@ -66,11 +66,15 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 format!("{:.2}", r.standardised),
             ]);
         }
+        crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
     io.answer(&outcome);
     Ok(Answer::Done)
 }
+
+/// No machine is as large: a reference beyond it is a slip of the keyboard, mm.
+const FARTHEST_MM: f64 = 1e6;
 
 /// Reads a reference point.
 ///
@@ -90,6 +94,10 @@ pub fn reference(word: &str, machine: &Machine) -> Result<Vector3<f64>> {
         .filter(|v: &f64| v.is_finite())
         .collect();
     match numbers[..] {
+        [x, y, z] if [x, y, z].iter().any(|v| v.abs() > FARTHEST_MM) => {
+            Err(Failure::new("cli::reference", format!("reference {word:?} is more than a kilometre off the machine"))
+                .help("X,Y,Z in mm in R, for instance 0,0,-202.684"))
+        }
         [x, y, z] if word.split([',', ' ']).filter(|w| !w.is_empty()).count() == 3 => Ok(Vector3::new(x, y, z)),
         _ => Err(Failure::new("cli::reference", format!("reference {word:?} is no point"))
             .help("write pivot, ball, table, or X,Y,Z in mm in R, for instance 0,0,-202.684")),

@@ -517,7 +517,7 @@ fn write(
             }),
         ]);
     }
-    t.set_width(io.paper(false).width.min(120) as u16);
+    crate::report::lay::lay(&mut t, io.paper(false).width.min(120), &[]);
     io.say(io.paper(false).plain(t.to_string()));
     let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
     io.say(format!(

@@ -14,6 +14,9 @@ use nalgebra::{DMatrix, DVector};
 /// A direction is parted when less than this share of it (the cosine of an angle) is left among what leaves no trace.
 const LEFT: f64 = 0.9;
 
+/// A direction with less than this weight in a combination does not stand in it.
+const STANDS_IN: f64 = 0.1;
+
 /// Variations that are named at most.
 const MOST_NAMED: usize = 2;
 
@@ -69,20 +72,31 @@ pub(super) fn part(
     remedies: &[Remedy],
     undetermined: &mut [Undetermined],
 ) -> Vec<String> {
+    let own: Vec<DVector<f64>> = directions.iter().flatten().map(|d| d / d.norm().max(f64::MIN_POSITIVE)).collect();
+    if own.is_empty() {
+        return Vec::new();
+    }
+    let all = DMatrix::from_columns(&own);
+    let within = orthonormal(&all, 1e-6);
+    // a direction that stands in any combination that stays dark is not parted, though it may not be dark by itself
+    let still_in: Vec<DVector<f64>> = remedies.iter().map(|r| shares(&all, &common(&within, &r.left))).collect();
+    let mut place = 0;
     for (said, direction) in undetermined.iter_mut().zip(directions) {
-        let Some(direction) = direction else { continue };
-        let parts = |r: &&Remedy| r.left.tr_mul(direction).norm() < LEFT * direction.norm();
-        said.parted_by = remedies.iter().filter(parts).take(MOST_NAMED).map(|r| r.says.clone()).collect();
+        if direction.is_none() {
+            continue;
+        }
+        let parts = |(r, shares): (&'_ Remedy, &DVector<f64>)| (shares[place] < STANDS_IN).then(|| r.says.clone());
+        said.parted_by = remedies.iter().zip(&still_in).filter_map(parts).take(MOST_NAMED).collect();
+        place += 1;
         if !said.parted_by.is_empty() {
             said.says = format!("{}; what parts them: {}", said.says, said.parted_by.join("; or "));
         }
     }
-    let own: Vec<DVector<f64>> = directions.iter().flatten().map(|d| d / d.norm().max(f64::MIN_POSITIVE)).collect();
     if own.len() < 2 {
         return Vec::new();
     }
     // each further variation for what the ones before it leave, the most for its time first
-    let mut open = orthonormal(&DMatrix::from_columns(&own), 1e-6);
+    let mut open = within;
     let mut out = Vec::new();
     while open.ncols() > 0 {
         let tried = remedies.iter().map(|r| (r, common(&open, &r.left)));
@@ -99,6 +113,13 @@ pub(super) fn part(
         out.push(format!("{} combination(s) are left that no variation of these touches tells", open.ncols()));
     }
     out
+}
+
+/// The largest weight of each direction (unit columns) in the combinations that make up a space of theirs.
+fn shares(directions: &DMatrix<f64>, space: &DMatrix<f64>) -> DVector<f64> {
+    let weights = directions.clone().svd(true, true).solve(space, 1e-6);
+    let weights = weights.unwrap_or_else(|_| DMatrix::from_element(directions.ncols(), space.ncols(), 1.0));
+    DVector::from_fn(directions.ncols(), |i, _| weights.row(i).iter().fold(0.0_f64, |m, w| m.max(w.abs())))
 }
 
 /// What two spaces have in common, as far as their directions go together by more than [`LEFT`].

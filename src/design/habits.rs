@@ -263,15 +263,19 @@ impl Pool<'_> {
     }
 
     fn downward_face(&mut self, all: &[Visit]) {
-        let spindle =
+        let upright =
             |v: &Visit| self.machine.tool_frame(&v.pose()).rotation * self.machine.tool.direction.into_inner();
-        let found = all.iter().find_map(|v| {
+        let lies = |v: &Visit| upright(v).z.abs() < 0.3;
+        // where the spindle lies a straight stylus comes to it, else a disc or a star
+        let star = !all.iter().any(lies);
+        let change = Change { star, ..Change::default() };
+        let found = all.iter().filter(|v| star || lies(v)).find_map(|v| {
             let plan = self.plan(v.run);
             let top = v.touches.iter().find(|t| {
                 let carrier = self.machine.carrier(&t.carrier);
                 carrier.is_some_and(|c| {
                     let n = self.machine.carrier_frame(c, &v.pose()).rotation * Vector3::from(t.normal);
-                    n.z > 0.9 && spindle(v).z.abs() < 0.3
+                    n.z > 0.9
                 })
             })?;
             let block = plan.block_of(top)?;
@@ -285,17 +289,18 @@ impl Pool<'_> {
                     let other = p - n * (2.0 * (p - c).dot(&n));
                     let face = turned_face(&t.face);
                     let mirrored = PlanTouch { point: other.into(), normal: (-n).into(), face, ..(*t).clone() };
-                    again(self.machine, plan, &mirrored, &Change::default())
+                    again(self.machine, plan, &mirrored, &change)
                 })
                 .collect();
             (!below.is_empty()).then(|| (v.run, vec![below]))
         });
         if let Some(added) = found {
+            let (with, more_s) = if star { (" with a disc or a star on the stylus,", STYLUS_S) } else { ("", 0.0) };
             self.push(
                 "downward-face",
-                "touch a face that looks down, on a block that overhangs what bears it".into(),
+                format!("touch a face that looks down,{with} on a block that overhangs what bears it"),
                 vec![added],
-                MOUNTING_S,
+                MOUNTING_S + more_s,
             );
         }
     }

@@ -101,7 +101,7 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     let equal = |id: &str| a.parameters.iter().any(|p| p.holds.iter().any(|h| h == id));
     let invisible = a.effects.iter().filter(|e| !e.visible && e.typical_um > 0.0 && !equal(&e.effect)).count();
     if invisible > MOST_INVISIBLE {
-        reasons.push(format!("{invisible} effects leave no trace"));
+        reasons.push(traceless(a, &equal));
     }
     if a.alias_pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
         reasons.push(format!("{} pairs of effects cannot be told apart", a.alias_pairs));
@@ -117,6 +117,25 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
         return (Score::Good, format!("{says}{not_for}"));
     }
     (Score::Enough, format!("it tells {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")))
+}
+
+/// How many effects leave no trace, as the list of effects counts them, and which of them no touches would show.
+fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
+    let all: Vec<&super::record::Seen> = a.effects.iter().filter(|e| !e.visible).collect();
+    let held = a.parameters.iter().filter(|p| !p.holds.is_empty());
+    let mut not_counted: Vec<String> =
+        held.map(|p| format!("{}, which {} holds", p.holds.join(", "), p.name)).collect();
+    let still = all.iter().filter(|e| e.typical_um <= 0.0 && !equal(&e.effect));
+    let still: Vec<&str> = still.map(|e| e.effect.as_str()).collect();
+    if !still.is_empty() {
+        not_counted.push(format!("{}, which move nothing here", still.join(", ")));
+    }
+    let but = if not_counted.is_empty() {
+        String::new()
+    } else {
+        format!(" (not counted against it: {})", not_counted.join("; "))
+    };
+    format!("{} effects leave no trace{but}", all.len())
 }
 
 fn is_location(effect: &str) -> bool {

@@ -28,6 +28,8 @@ pub struct Change {
     pub length_mm: Option<f64>,
     /// Feed of the measuring touch, mm/min.
     pub feed_mm_min: Option<f64>,
+    /// A disc or a star on the stylus meets a face that looks away from the spindle.
+    pub star: bool,
 }
 
 /// Touches of one index visit.
@@ -94,7 +96,7 @@ pub fn again(machine: &Machine, plan: &Plan, touch: &PlanTouch, change: &Change)
     let radius_mm = touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm);
     let carrier = machine.carrier(&touch.carrier)?;
     let at = pose.position();
-    if !faces_the_spindle(machine, carrier, &at, &touch.normal.into()) {
+    if !change.star && !faces_the_spindle(machine, carrier, &at, &touch.normal.into()) {
         return None;
     }
     for (name, angle) in pose.iter() {

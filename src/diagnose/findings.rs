@@ -345,9 +345,9 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
     } else {
         held_out_in(
             seen.evidence.question(),
-            &seen.named.library,
+            &seen.named.library.only(chosen),
             &seen.evidence.visits,
-            Choice::Given(chosen),
+            Choice::Given(0),
             &|visit, e| seen.colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e),
         )
     };
@@ -395,7 +395,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         held_out_before_um: Some(held.before).filter(|x| x.is_finite()),
         held_out_after_um: Some(held.after).filter(|x| x.is_finite()),
         held_out_se_um: Some(held.fall_error).filter(|x| x.is_finite()),
-        nested: first && seen.search.leader().is_some(),
+        nested: first && seen.search.leader().is_some() && !seen.given,
         parameters,
         not_told,
         moves_um: moves.map(|m| m.0),

@@ -35,7 +35,7 @@ use crate::search::{LackOfFit, Question, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::{Diagnosis, Verdict};
 use evidence::Evidence;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use named::Named;
 use std::collections::HashMap;
 
@@ -90,8 +90,10 @@ pub struct Examination<'a> {
     pub dependences: Vec<Dependence>,
     /// Against pure error.
     pub lack_of_fit: LackOfFit,
-    /// The choice redone without the touches that judge it.
+    /// The choice redone without the touches that judge it ...
     pub nested: HeldOut,
+    /// ... or, where that bears nothing out, the first finding behind it that held-out touches bear out by itself.
+    pub given: bool,
     /// Whitened errors of a visit into µm ([`Evidence::colours_um`]).
     pub colours_um: HashMap<usize, DMatrix<f64>>,
 }
@@ -153,20 +155,54 @@ pub fn examine<'a>(
     let (order, jacobian) = ordering
         .and_then(|o| Some((o.search(&search)?, &o.evidence.jacobian)))
         .unwrap_or_else(|| (search.clone(), &evidence.jacobian));
+    let colour = |visit: usize, e: &DVector<f64>| colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e);
+    let nested = held_out_in(question, &named.library, &evidence.visits, Choice::Redone, &colour);
+    let mut groups = order.groups(at_most);
+    let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &colour, &nested);
+    let given = behind.is_some();
     Examination {
-        groups: order.groups(at_most),
+        groups,
         order,
         jacobian,
         dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),
-        nested: held_out_in(question, &named.library, &evidence.visits, Choice::Redone, &|visit, e| {
-            colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e)
-        }),
+        nested: behind.unwrap_or(nested),
+        given,
         colours_um,
         evidence,
         named,
         search,
     }
+}
+
+/// Where held-out touches do not bear out the first finding, one behind it that they do comes before it: of two effects that act
+/// at once the stronger may live in a few visits, and predict none of them from the others.
+fn borne_out_behind(
+    groups: &mut [Group],
+    search: &Search,
+    visits: &[usize],
+    colour: crate::search::held_out::Colour,
+    nested: &HeldOut,
+) -> Option<HeldOut> {
+    /// What comes second by chance is never as sure.
+    const SURE: f64 = 1e-4;
+    if search.leader().is_none() || verdict::bears_out(nested) {
+        return None;
+    }
+    for place in 1..groups.len() {
+        let candidate = groups[place].first();
+        if search.scores[candidate].p_adjusted > SURE || !search.scores[candidate].proposed() {
+            continue;
+        }
+        let own = search.library.only(candidate);
+        let mut held = held_out_in(search.question, &own, visits, Choice::Given(0), colour);
+        if held.falls() {
+            held.folds.iter_mut().for_each(|f| f.chosen = f.chosen.map(|_| candidate));
+            groups[..=place].rotate_right(1);
+            return Some(held);
+        }
+    }
+    None
 }
 
 /// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
@@ -239,7 +275,8 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     };
     let beside = verdict::Beside {
         shapes_win: weighed.shapes_win,
-        better: weighed.better.map(|shape| generics.shapes[shape].depends_on.clone()),
+        // a shape that goes with the first by probability says nothing against the one that is borne out behind it
+        better: weighed.better.filter(|_| !seen.given).map(|shape| generics.shapes[shape].depends_on.clone()),
         gathered: gathered::gathered(fit, &features),
         scatter: scatter(fit, machine, &evidence),
     };

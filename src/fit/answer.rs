@@ -129,7 +129,7 @@ pub(super) fn outcome(
         residuals: Some(residuals(fit)),
         warnings: [
             warnings(fit, effects, solution, chi2_per_dof),
-            type_b.iter().filter_map(uncertainty::TypeB::warning).collect(),
+            type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             left_out.unwrap_or_default(),
         ]
         .concat(),

@@ -39,6 +39,9 @@ pub struct Noise {
     pub visit_dof: Option<f64>,
     /// What tests for missing effects use, mm: the 90 % upper bound of τ, or the declared value.
     pub tau_test_mm: f64,
+    /// Standard deviation of touches of one point in visits of one pose, each visit displaced freely, mm, where it is so much above
+    /// that of touches right after each other that it counts for nothing: something changes between the visits and is no noise.
+    pub later_mm: Option<f64>,
     /// There are repeats enough, and they agree to the last digit: they say nothing of the noise.
     pub repeats_agree: bool,
 }
@@ -78,8 +81,12 @@ pub struct Sample {
 pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
     let immediate = immediate_repeats(samples);
     let revisits = revisits(samples);
-    // a revisit also repeats each point once the visit's displacement is taken off
-    let (squares, dof) = (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1);
+    // a revisit also repeats each point once the visit's displacement is taken off, unless something else changes meanwhile
+    let later_mm = later(immediate, revisits.within);
+    let (squares, dof) = match later_mm {
+        Some(_) => immediate,
+        None => (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1),
+    };
     let from_repeats = (dof >= LEAST_REPEATS).then(|| (squares / dof as f64).sqrt());
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
     let repeats_agree = from_repeats.is_some_and(|s| s <= 1e-9);
@@ -101,7 +108,18 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
         None if n_poses < 2 => fixed(0.0, "one pose"),
         None => fixed(known.declared_tau_mm, "declared"),
     };
-    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm, repeats_agree }
+    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm, later_mm, repeats_agree }
+}
+
+/// The standard deviation of touches that come back later, mm, where it is above that of touches right after each other by more than
+/// chance makes once in a thousand. Both: sum of squares, degrees of freedom.
+fn later(at_once: (f64, usize), later: (f64, usize)) -> Option<f64> {
+    if at_once.1 < LEAST_REPEATS || later.1 == 0 || at_once.0 <= 0.0 {
+        return None;
+    }
+    let variance = |(squares, dof): (f64, usize)| squares / dof as f64;
+    let limit = quantiles::fisher_999(later.1 as f64, at_once.1 as f64);
+    (variance(later) > limit * variance(at_once)).then(|| variance(later).sqrt())
 }
 
 /// A misfit of so many times what the noise makes, in words: with scatter of index visits it is no ratio of the two figures
@@ -120,7 +138,16 @@ impl Noise {
     #[must_use]
     pub fn says(&self) -> String {
         let sigma = match (self.source, self.dof) {
-            ("repeats", Some(dof)) => format!("from repeated touches, {dof:.0} degrees of freedom"),
+            ("repeats", Some(dof)) => {
+                let from = format!("from repeated touches, {dof:.0} degrees of freedom");
+                self.later_mm.map_or(from, |later| {
+                    format!(
+                        "from touches right after each other, {dof:.0} degrees of freedom; the same points later on differ by {:.2} um, \
+                         which is more than noise",
+                        um_from_mm(later)
+                    )
+                })
+            }
             ("study", _) => "as the study states".to_owned(),
             _ if self.repeats_agree => "the probe's declared repeatability: the repeats agree exactly (a log that was rounded, or made without noise?)".to_owned(),
             _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
@@ -322,6 +349,44 @@ mod tests {
         assert_eq!((noise.source, noise.visit_source), ("repeats", "one pose"));
         assert!((noise.sigma_mm - 2f64.sqrt() * 1e-3).abs() < 1e-15);
         assert!((noise.coverage(0.0) - 2.228).abs() < 1e-3);
+    }
+
+    /// Drift between two visits is not the noise of a touch.
+    #[test]
+    fn what_changes_between_visits_is_no_noise() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(12);
+        let mut draw = |scale: f64| -> f64 {
+            let x: f64 = StandardNormal.sample(&mut rng);
+            x * scale
+        };
+        let mut run = |stretch: f64| -> Noise {
+            let mut samples = Vec::new();
+            for visit in 0..2 {
+                for point in 0..60 {
+                    let mut normal = Vector3::zeros();
+                    normal[point % 3] = if point % 2 == 0 { 1.0 } else { -1.0 };
+                    let grown = stretch * visit as f64 * (point as f64 / 30.0 - 1.0);
+                    for _ in 0..if visit == 0 { 2 } else { 1 } {
+                        let residual_mm = 0.01 * point as f64 + grown + draw(1e-3);
+                        samples.push(Sample {
+                            residual_mm,
+                            normal,
+                            repeat: 100 * visit + point,
+                            visit,
+                            pose: 0,
+                            point,
+                        });
+                    }
+                }
+            }
+            estimate(&samples, &known())
+        };
+        let calm = run(0.0);
+        assert!(calm.later_mm.is_none() && calm.dof > Some(60.0), "{calm:?}");
+        let grown = run(6e-3);
+        assert_eq!(grown.dof, Some(60.0));
+        assert!((grown.sigma_mm / 1e-3 - 1.0).abs() < 0.3, "{grown:?}");
+        assert!(grown.later_mm.is_some_and(|l| l > 2e-3) && grown.says().contains("more than noise"), "{grown:?}");
     }
 
     #[test]

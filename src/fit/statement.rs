@@ -84,6 +84,10 @@ fn one(
     };
     let says = match (&members[..], &physical[..]) {
         ([], _) => "a combination of many parameters leaves no trace in these touches".to_owned(),
+        ([one], [(u, _)]) if u.shape && effects.iter().any(|e| e.id == u.effect && !e.per_block) => format!(
+            "{one} leaves no trace in these touches: its value is not known; it stands where its search begins, at the value of \
+             its range that fits best"
+        ),
         ([one], _) => format!(
             "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
         ),
@@ -120,7 +124,11 @@ fn what_is_seen(a: (&Unknown, f64), b: (&Unknown, f64)) -> String {
         let what = if factor < 0.0 { "difference" } else { "sum" };
         return format!("their {what} ({} {sign} {})", a.0.name, b.0.name);
     }
-    let unit = if unit_a == unit_b { String::new() } else { format!(" {unit_a}/{unit_b}") };
+    let unit = match (unit_a, unit_b) {
+        (a, b) if a == b => String::new(),
+        (a, "1") => format!(" {a}"),
+        (a, b) => format!(" {a}/{b}"),
+    };
     format!("{} {sign} {}{unit} * {}", a.0.name, digits(factor.abs()), b.0.name)
 }
 
@@ -133,7 +141,9 @@ fn trade(physical: &[(&Unknown, f64)], with_blocks: bool) -> String {
         .map(|p| {
             let (amount, unit) = plain(*p);
             let x = amount / one;
-            format!("{}{} {unit} of {}", if x < 0.0 { '-' } else { '+' }, digits(x.abs()), p.0.name)
+            // a number without a dimension has no unit beside it
+            let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+            format!("{}{}{unit} of {}", if x < 0.0 { '-' } else { '+' }, digits(x.abs()), p.0.name)
         })
         .chain(with_blocks.then(|| "a set-up of the blocks that goes with it".to_owned()))
         .collect();

@@ -84,7 +84,8 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     if fit.seen.unseen.is_empty() {
         return DVector::zeros(p);
     }
-    let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
+    let rooms = rooms_of_shapes(fit);
+    let typical = |c: usize| rooms.get(&c).copied().unwrap_or(fit.model.unknowns[fit.free[c]].typical);
     let each: Vec<DVector<f64>> = fit
         .seen
         .unseen
@@ -99,6 +100,41 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     DVector::from_fn(p, |c, _| Some(basis.row(c).norm() * typical(c)).filter(|m| *m > LEAST).unwrap_or(0.0))
 }
 
+/// How far a shape parameter that leaves no trace may go, by its place among the free unknowns: until what it does has changed by all
+/// that its effect does. Where the touches do not show the effect either, whatever pitch it has moves nothing by more than the
+/// uncertainty of its size, which is counted already.
+fn rooms_of_shapes(fit: &Fit) -> BTreeMap<usize, f64> {
+    /// Standard uncertainties from which a size is shown.
+    const SHOWN: f64 = 3.0;
+    /// Share of its usual size that a shape of nothing may go.
+    const NONE: f64 = 1e-9;
+    let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
+    let is_unseen = |c: &usize| fit.seen.unseen.iter().any(|v| v[*c].abs() > 1e-9);
+    let shapes: Vec<usize> = (0..fit.free.len()).filter(|&c| unknown(c).shape).filter(is_unseen).collect();
+    if shapes.is_empty() {
+        return BTreeMap::new();
+    }
+    let theta = fit.free_theta();
+    let gram = fit.with_touches(fit.noise.tau_mm, |t| t.normal(&theta, true).gram);
+    let room = |c: usize| {
+        let own = |k: &usize| unknown(*k).effect == unknown(c).effect && !unknown(*k).shape;
+        let sizes: Vec<usize> = (0..fit.free.len()).filter(own).collect();
+        let sigma = |k: usize| fit.covariance[(fit.free[k], fit.free[k])].max(0.0).sqrt();
+        let (slope, typical) = (gram[(c, c)], unknown(c).typical);
+        // all that it does, in units of the noise
+        let product = |a: usize, b: usize| theta[a] * theta[b] * gram[(a, b)];
+        let square: f64 = sizes.iter().map(|&a| sizes.iter().map(|&b| product(a, b)).sum::<f64>()).sum();
+        let small = |k: &usize| theta[*k].abs() < SHOWN * sigma(*k);
+        // the shape was chosen as the best of many: chance makes more of it than of a size
+        let by_chance = SHOWN * SHOWN * (sizes.len() + 1) as f64;
+        if slope <= 0.0 || square < by_chance || sizes.iter().all(small) {
+            return (c, NONE * typical);
+        }
+        (c, (square.max(0.0) / slope).sqrt().clamp(NONE * typical, typical))
+    };
+    shapes.into_iter().map(room).collect()
+}
+
 /// A source of uncertainty that the touches cannot show.
 #[derive(Debug, Clone)]
 pub(super) struct TypeB {
@@ -107,21 +143,59 @@ pub(super) struct TypeB {
     pub sigma: f64,
     /// What one standard uncertainty of it makes of each free unknown, with its sign, in the unknown's unit.
     pub makes: DVector<f64>,
-    /// It goes with the temperature, and no touch carries one: it is counted for a room 1 K off 20 °C.
-    pub per_kelvin: bool,
+    /// What a reader must not miss.
+    pub warning: Option<String>,
 }
 
+/// The type B row of the thermometer, K: what the temperature's own uncertainty makes of all that goes with the temperature.
+const THERMOMETER: &str = "temperature";
+
 impl TypeB {
-    /// What a reader must not miss.
-    pub fn warning(&self) -> Option<String> {
-        self.per_kelvin.then(|| {
-            format!(
-                "type B: {} goes with the temperature, and no touch carries one: it is counted as if everything had been \
-                 touched 1 K off 20 °C; multiply its uncertainty by the kelvins that the room may be off, or log the temperature",
-                self.name
-            )
-        })
+    fn new(name: &str, unit: &str, sigma: f64, moved: &DVector<f64>, per_kelvin: bool) -> Self {
+        let warning = if per_kelvin {
+            Some(format!(
+                "type B: {name} goes with the temperature, and no touch carries one: it is counted as if everything had been \
+                 touched 1 K off 20 °C; multiply its uncertainty by the kelvins that the room may be off, or log the temperature"
+            ))
+        } else if moved.amax() == 0.0 {
+            Some(format!(
+                "type B: {name} makes nothing of these touches, and adds nothing to any uncertainty; where it goes with the \
+                 temperature they are at 20 °C: state the doubt of the thermometer, {THERMOMETER} = … (K)"
+            ))
+        } else {
+            None
+        };
+        Self { name: name.to_owned(), unit: unit.to_owned(), sigma, makes: moved * sigma, warning }
     }
+}
+
+/// The touches with everything warmer by so many kelvins.
+fn warmer(fit: &Fit, kelvins: f64) -> Vec<Observation> {
+    let at = |o: &Observation| {
+        let mut warm = o.clone();
+        warm.state[slot::TEMPERATURE] += kelvins;
+        warm
+    };
+    fit.data.observations.iter().map(at).collect()
+}
+
+/// What one kelvin more, everywhere and unknown, makes of the free unknowns: by the effects that go with the temperature, each at
+/// the size that the model has for it, or at its typical one.
+fn per_kelvin_of_all(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> DVector<f64> {
+    let mut column = DVector::zeros(fit.data.observations.len());
+    let (cold, warm) = (warmer(fit, 0.0), warmer(fit, 1.0));
+    let with_t = |e: &&Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
+    let effects = catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.discrete && !e.per_block);
+    for effect in effects.filter(with_t).filter(|e| without_value(e, &warm).is_empty()) {
+        let at = |o: &[Observation]| columns(machine, &[effect], &fit.data, o, fit.model.reference, None);
+        let (before, after) = (at(&cold), at(&warm));
+        for (c, u) in before.unknowns.iter().enumerate().filter(|(_, u)| !u.shape) {
+            let known = fit.model.unknowns.iter().position(|own| own.name == u.name);
+            let size = known.map_or(u.typical, |i| fit.theta[i]);
+            column += (after.values.column(c) - before.values.column(c)) * size;
+        }
+    }
+    sensitivity(fit, &column)
 }
 
 /// Type B rows as the user states them: by name of a parameter of an effect that is not in the model.
@@ -144,24 +218,30 @@ pub(super) fn type_b(
             );
             continue;
         }
+        let is_size = sigma.is_finite() && sigma > 0.0;
         let owner = catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper).find_map(|e| {
             let p = e.parameters.iter().position(|p| crate::symbols::same(&p.name, word))?;
             Some((e, p))
         });
-        let Some((effect, which)) = owner else {
-            findings.push(
-                Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
-                    .help("`axiscal effects` lists them, for instance size_X (block-size), dL (tool-length), expansion (ambient-scale)"),
-            );
+        let is_thermometer = owner.is_none() && word == THERMOMETER;
+        if is_thermometer && is_size {
+            out.push(TypeB::new(word, "K", sigma, &per_kelvin_of_all(fit, machine, catalogue), false));
             continue;
-        };
-        if !(sigma.is_finite() && sigma > 0.0) {
+        }
+        if (owner.is_some() || is_thermometer) && !is_size {
             findings.push(
                 Finding::error("model::type_b", format!("uncertainty of {word} is {sigma}"))
                     .help("write a positive number in the parameter's unit"),
             );
             continue;
         }
+        let Some((effect, which)) = owner else {
+            findings.push(
+                Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
+                    .help("`axiscal effects` lists them, for instance size_X (block-size), dL (tool-length), expansion (ambient-scale); and temperature, K, for the thermometer"),
+            );
+            continue;
+        };
         if let Some(bad) = without_value(effect, &fit.data.observations).first() {
             findings.push(
                 Finding::error("model::no_value", format!("{word} cannot be a type B row: {}", bad.says()))
@@ -171,19 +251,14 @@ pub(super) fn type_b(
         }
         let with_t = effect.terms.iter().any(|t| t.parameter == which && t.formula.variables().contains(&"T"));
         let per_kelvin = with_t && fit.data.observations.iter().all(|o| !o.has_temperature);
-        let at = |o: &Observation| {
-            let mut warm = o.clone();
-            warm.state[slot::TEMPERATURE] += f64::from(u8::from(per_kelvin));
-            warm
-        };
-        let observations: Vec<Observation> = fit.data.observations.iter().map(at).collect();
+        let observations = warmer(fit, if per_kelvin { 1.0 } else { 0.0 });
         let column = columns(machine, &[effect], &fit.data, &observations, fit.model.reference, None)
             .values
             .column(which)
             .into_owned();
         let moved = sensitivity(fit, &column);
         let p = &effect.parameters[which];
-        out.push(TypeB { name: p.name.clone(), unit: p.unit.clone(), sigma, makes: moved * sigma, per_kelvin });
+        out.push(TypeB::new(&p.name, &p.unit, sigma, &moved, per_kelvin));
     }
     if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
 }

@@ -6,6 +6,7 @@
 //! or at all touches of a block; what is left per touch is a handful of 3 × 3 products.
 
 use super::catalogue::Place;
+use super::formula::slot;
 use super::predict::{Active, Changes, Model, Observation};
 use crate::axes::{AxisName, Position};
 use crate::geometry::Displacement;
@@ -421,6 +422,16 @@ impl At<'_> {
                 }
             }
         }
+        // a late trigger is a way on along the commanded line, against the planned normal: contact was that much before it
+        let mut planned = Vector3::zeros();
+        if let Some(i) = batch.roles.trigger {
+            planned.copy_from_slice(&o.state[slot::NORMAL_IN_R..slot::NORMAL_IN_R + 3]);
+            let back = planned * by_slot(i).get(0);
+            for link in model.workpiece.iter().chain(&model.tool).filter(|l| !l.axis.name.is_rotary()) {
+                let name = link.axis.name;
+                shown.set(name, shown.get(name) + back.dot(&link.axis.direction));
+            }
+        }
         let pose = &batch.poses[batch.pose[touch] as usize];
         let rotary = |axis: &Axis, at: usize| -> &Rigid {
             let by_reading = if batch.roles.reading.is_some() { turned[axis.name.index()].as_ref() } else { None };
@@ -487,17 +498,15 @@ impl At<'_> {
             met.push(point);
             point = at_slot(i).rigid.undo(&point);
         }
-        let late = batch.roles.trigger.map_or(0.0, |i| by_slot(i).get(0));
-        let gap = o.normal.dot(&(point - o.point)) - o.ball_radius + late;
+        let gap = o.normal.dot(&(point - o.point)) - o.ball_radius;
         if !derive {
             return gap;
         }
 
         // --- derivatives: g = d gap / d point is carried back through the same places
         gradient.fill([0.0; 6]);
-        if let Some(i) = batch.roles.trigger {
-            gradient[i][0] = 1.0;
-        }
+        let mut along = 0.0;
+        let on_line = |axis: &Axis, g: &Vector3<f64>| g.dot(&axis.direction) * planned.dot(&axis.direction);
         let mut g = o.normal;
         // a place on the workpiece side is undone: q = E⁻¹·p, dq = −Rᵀ·dE·q
         let mut back = met.iter().rev();
@@ -518,6 +527,8 @@ impl At<'_> {
             if link.axis.name.is_rotary() {
                 at_rotary -= 1;
                 g = rotary(&link.axis, at_rotary).r * g;
+            } else if batch.roles.trigger.is_some() {
+                along += on_line(&link.axis, &g);
             }
             if let Some(p) = back.next()
                 && let Some(i) = batch.roles.reading
@@ -553,6 +564,8 @@ impl At<'_> {
             if link.axis.name.is_rotary() {
                 g = rotary(&link.axis, at_rotary).r.tr_mul(&g);
                 at_rotary += 1;
+            } else if batch.roles.trigger.is_some() {
+                along += on_line(&link.axis, &g);
             }
             if let Some(i) = link.after {
                 applied(back.next(), i, &mut g, gradient);
@@ -560,6 +573,9 @@ impl At<'_> {
         }
         if let Some(i) = batch.roles.tool {
             applied(back.next(), i, &mut g, gradient);
+        }
+        if let Some(i) = batch.roles.trigger {
+            gradient[i][0] = along;
         }
         gap
     }

@@ -2,7 +2,7 @@
 
 use super::as_written::{EffectAsWritten, File, Frame, Per, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten};
 use super::catalogue::{Effect, Parameter, Place, Term};
-use super::formula::{FUNCTIONS, Formula, VARIABLES};
+use super::formula::{CONSTANTS, FUNCTIONS, Formula, LONGEST, VARIABLES};
 use super::mistake;
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
@@ -62,12 +62,12 @@ impl<'a> Check<'a> {
     fn name(&mut self, name: &str, span: &std::ops::Range<usize>) {
         let word = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-        if !word || VARIABLES.contains(&name) || FUNCTIONS.contains(&name) {
+        if !word || [&VARIABLES[..], &FUNCTIONS, &CONSTANTS].iter().any(|words| words.contains(&name)) {
             self.error(
                 span,
                 "effects::parameter",
                 format!("{name:?} cannot be the name of a parameter"),
-                "letters, digits and _, and none of the variables and functions of formulas",
+                "letters, digits and _, and none of the variables, functions and constants (pi, e) of formulas",
             );
         }
     }
@@ -122,6 +122,9 @@ impl<'a> Check<'a> {
         let mut needs = self.axes(&w.needs);
         let unless = self.axes(&w.unless);
         let terms: Vec<Term> = w.terms.iter().filter_map(|t| self.term(w, t, &names, &mut needs)).collect();
+        if !self.built_in {
+            self.usable(w);
+        }
         if w.terms.is_empty() {
             self.error(
                 &w.id.span(),
@@ -152,6 +155,32 @@ impl<'a> Check<'a> {
             terms,
             built_in: self.built_in,
         })
+    }
+
+    /// An effect needs an id to be put into a model by, and a number that no formula uses would never be known.
+    fn usable(&mut self, w: &EffectAsWritten) {
+        if w.id.get_ref().trim().is_empty() {
+            self.error(
+                &w.id.span(),
+                "effects::id",
+                "an effect has no id".to_owned(),
+                "write a word, such as id = \"my-sag\"",
+            );
+        }
+        let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let used =
+            |name: &str| w.terms.iter().any(|t| t.formula.get_ref().split(|c| !part(c)).any(|word| word == name));
+        for s in &w.shape {
+            let name = s.parameter.get_ref();
+            if !w.terms.is_empty() && !used(name) {
+                self.error(
+                    &s.parameter.span(),
+                    "effects::shape",
+                    format!("shape parameter {name:?} stands in no formula of {:?}", w.id.get_ref()),
+                    "write it into a formula, or take it out of shape",
+                );
+            }
+        }
     }
 
     /// The parameter that a term is multiplied by; one parameter may stand before several terms.
@@ -326,12 +355,17 @@ impl<'a> Check<'a> {
                 Some(Term { parameter, place, component, formula })
             }
             Err(message) => {
+                let help = if text.len() > LONGEST {
+                    "write it shorter, or as several terms of one parameter"
+                } else {
+                    "angles A B C are radians inside a formula; unary minus binds tighter than ^: write -(x^2)"
+                };
                 let place = mistake::find(text, names).and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
                     &place.unwrap_or_else(|| t.formula.span()),
                     "effects::formula",
                     format!("formula of {:?}: {message}", w.id.get_ref()),
-                    "angles A B C are radians inside a formula; unary minus binds tighter than ^: write -(x^2)",
+                    help,
                 );
                 None
             }

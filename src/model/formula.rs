@@ -57,6 +57,12 @@ pub type State = [f64; VARIABLES.len()];
 pub const FUNCTIONS: [&str; 15] =
     ["sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "ln", "sqrt", "abs", "sign", "floor", "mod", "step"];
 
+/// Numbers that have a name, or that a reader takes a word for: no parameter may be called so.
+pub const CONSTANTS: [&str; 4] = ["pi", "PI", "e", "E"];
+
+/// Bytes of a formula at most: the expression crate takes a time that grows with the square of its terms.
+pub const LONGEST: usize = 4000;
+
 /// The operators of a formula: those of the expression crate that docs/guide/effects.md names, and `sign`, `mod`, `step`.
 #[derive(Clone, Debug)]
 pub struct Words;
@@ -123,6 +129,9 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
+        if text.len() > LONGEST {
+            return Err(format!("it is {} characters long, and {LONGEST} at most are read", text.chars().count()));
+        }
         if let Some(wrong) = super::mistake::find(text, shapes) {
             return Err(wrong.says);
         }

@@ -1,15 +1,16 @@
 //! The gap at a touch and its derivatives, for any serial chain.
 //!
-//! At the trigger the ball's centre stands a ball radius (less the pre-travel) off the real face. With q the ball's
-//! centre in the frame of the real block, n and p the nominal normal and contact point, the gap is
+//! At contact the ball's centre stands a ball radius off the real face. With q the ball's centre in the frame of the real
+//! block, n and p the nominal normal and contact point, the gap is
 //!
 //! ```text
-//! g(θ) = n·(q − p) − r + trigger(θ)        q = E_block⁻¹ · (carrier chain)⁻¹ · E_base · (tool chain) · ball
+//! g(θ) = n·(q − p) − r        q = E_block⁻¹ · (carrier chain)⁻¹ · E_base · (tool chain) · ball
 //! ```
 //!
-//! and g = 0 at the true parameters θ. With θ = 0 it is the reading of the method (recorded less nominal, along the
-//! outward normal), so g is "measured less model", mm. Errors stand in the chain as exact transforms; nothing is
-//! linearised and nothing is expanded for one machine.
+//! with the linear axes where they stood at contact: a trigger that comes late has let them go on by as much along the
+//! commanded line, against the planned normal. g = 0 at the true parameters θ. With θ = 0 it is the reading of the method
+//! (recorded less nominal, along the outward normal), so g is "measured less model", mm. Errors stand in the chain as
+//! exact transforms; nothing is linearised and nothing is expanded for one machine.
 
 use super::catalogue::{Effect, Place, Term};
 use super::formula::State;

@@ -1,6 +1,7 @@
 //! The answer of `assess` as text.
 
 use super::fit::{number, significant, table};
+use super::lay::lay;
 use super::plot::Paper;
 use crate::design::record::{Advice, Assessment, Seen};
 use comfy_table::Cell;
@@ -55,7 +56,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
             Cell::new(p.holds.join(", ")),
         ]);
     }
-    t.set_width(paper.width.min(120) as u16);
+    lay(&mut t, paper.width.min(120), &[]);
     *out += &format!(
         "expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second and third)\n{t}\n\n",
         significant(a.noise_um),
@@ -78,7 +79,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
             Cell::new(short(e, a)),
         ]);
     }
-    t.set_width(paper.width.min(120) as u16);
+    lay(&mut t, paper.width.min(120), &[]);
     *out += &format!("{t}\n");
     let invisible: Vec<&Seen> = a.effects.iter().filter(|e| !e.visible).collect();
     if !invisible.is_empty() {
@@ -148,7 +149,7 @@ fn side_by_side(first: &Assessment, paper: Paper, out: &mut String) {
             of(a).and_then(|q| q.sigma_with_unmodelled).map_or_else(|| "not told".into(), significant)
         });
     }
-    t.set_width(paper.width.min(160) as u16);
+    lay(&mut t, paper.width.min(160), &[]);
     *out += &format!("{t}\n");
     for (a, name) in all.iter().zip(&names) {
         *out += &format!("{name} is {}: {}\n", a.score.word(), a.says);

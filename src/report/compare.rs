@@ -1,6 +1,7 @@
 //! A comparison as tables and plots, and as CSV.
 
 use super::fit::{number, significant, table};
+use super::lay::lay;
 use super::plot::{Paper, scatter};
 use crate::compare::{Comparison, Split};
 use comfy_table::Cell;
@@ -38,7 +39,7 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
             Cell::new(paper.plain(s.says.clone())),
         ]);
     }
-    t.set_width(paper.width.min(160) as u16);
+    lay(&mut t, paper.width.min(160), &[]);
     out += &format!("{t}\nshares are of the misfit beyond the noise, each split taken alone: they overlap\n");
     let shown = |s: &&Split| !s.groups.is_empty() && (all || s.share >= WORTH_SHOWING);
     for s in c.splits.iter().filter(shown).take(if all { usize::MAX } else { LISTED }) {
@@ -63,7 +64,7 @@ fn groups(s: &Split, paper: Paper) -> String {
             number(format!("{:.2}", g.rms_um)),
         ]);
     }
-    t.set_width(paper.width.min(60) as u16);
+    lay(&mut t, paper.width.min(60), &[]);
     t.to_string()
 }
 
@@ -83,7 +84,7 @@ fn worst(c: &Comparison, paper: Paper) -> String {
             Cell::new(if w.rejected.is_some() { "not used" } else { "" }),
         ]);
     }
-    t.set_width(paper.width.min(120) as u16);
+    lay(&mut t, paper.width.min(120), &[]);
     t.to_string()
 }
 

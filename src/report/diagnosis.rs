@@ -1,6 +1,7 @@
 //! The answer of `diagnose`: the verdict first, then what may be missing, then on what the misfit depends.
 
-use super::fit::{digits, number, significant, table};
+use super::fit::{digits, number, significant, table, with_unit};
+use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
 use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape, Verdict};
@@ -129,7 +130,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
             number(format!("{:.0} %", 100.0 * c.share)),
         ]);
     }
-    t.set_width(paper.width.min(100) as u16);
+    lay(&mut t, paper.width.min(100), &[]);
     let mut out = if missing { String::new() } else { "tried, and none of them needed:\n".to_owned() };
     out += &format!("{t}\n");
     let rises = |c: &Candidate| c.held_out_before_um.zip(c.held_out_after_um).is_some_and(|(b, a)| a >= b);
@@ -157,11 +158,15 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     // what nothing speaks for is not explained, and nobody is sent to look for it
     if let Some(first) = d.candidates.first().filter(|c| missing && (c.proposed || d.most_missed)) {
         let which = if first.same_as.is_empty() { String::new() } else { format!("if it is {}: ", first.effect) };
-        out += &wrapped(&format!("{which}{}: {}", first.name, first.says), 2);
+        // an effect of a person's own may say nothing of either
+        let says = if first.says.is_empty() { String::new() } else { format!(": {}", first.says) };
+        out += &wrapped(&format!("{which}{}{says}", first.name), 2);
         if let Some(other) = &first.or_else {
             out += &wrapped(&format!("  or {other}: these touches cannot tell"), 4);
         }
-        out += &wrapped(&format!("  look: {}", first.look), 4);
+        if !first.look.is_empty() {
+            out += &wrapped(&format!("  look: {}", first.look), 4);
+        }
         if !first.tell_apart.is_empty() {
             out += &wrapped(&format!("  to tell apart: {}", first.tell_apart), 4);
         }
@@ -230,8 +235,11 @@ fn sizes(c: &Candidate) -> String {
         .parameters
         .iter()
         .map(|p| match p.sigma {
-            Some(s) => format!("{} {} ± {} {}", p.name, digits(p.value, Some(s)), significant(s), p.unit),
-            None => format!("{} {} {}", p.name, significant(p.value), p.unit),
+            Some(s) => {
+                let amount = format!("{} ± {}", digits(p.value, Some(s)), significant(s));
+                format!("{} {}", p.name, with_unit(amount, &p.unit))
+            }
+            None => format!("{} {}", p.name, with_unit(significant(p.value), &p.unit)),
         })
         .collect();
     let more = each.len() > MOST;

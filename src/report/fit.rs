@@ -1,5 +1,6 @@
 //! The answer of `identify` as a table with its remarks.
 
+use super::lay::lay;
 use super::plot::Paper;
 use crate::fit::outcome::{Outcome, Parameter, Rejected, Status};
 use crate::model::data::ELSEWHERE;
@@ -36,7 +37,21 @@ pub fn digits(value: f64, sigma: Option<f64>) -> String {
         Some(s) if s > 0.0 && s.is_finite() => (1 - s.log10().floor() as i32).clamp(0, 12) as usize,
         _ => 6,
     };
-    format!("{value:.decimals$}")
+    unsigned_zero(format!("{value:.decimals$}"))
+}
+
+/// A value that is zero to its printed digits has no sign.
+fn unsigned_zero(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+        _ => text,
+    }
+}
+
+/// An amount in words: a number without a dimension has no unit beside it.
+#[must_use]
+pub fn with_unit(amount: impl std::fmt::Display, unit: &str) -> String {
+    if unit == "1" { amount.to_string() } else { format!("{amount} {unit}") }
 }
 
 /// The whole answer.
@@ -83,14 +98,22 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         cells.push(Cell::new(status(p.status, paper.width < ROOMY)));
         t.add_row(cells);
     }
-    // numbers are never broken: a name is, where it must
-    t.set_width(paper.width.min(120) as u16);
+    // numbers are never broken: a name is, where it must. What a reader decides by stays on any paper: value, 95 % and status
+    let left_out = lay(&mut t, paper.width.min(120), &["probe noise", "std. unc.", "unmodelled"]);
     out += &t.to_string();
     out.push('\n');
-    out += "probe noise: standard uncertainty from the touches' own noise alone; std. unc.: with all that the fit counts\n";
-    if unmodelled {
+    let shown = |head: &str| !left_out.iter().any(|h| h == head);
+    match (shown("probe noise"), shown("std. unc.")) {
+        (true, _) => {
+            out += "probe noise: standard uncertainty from the touches' own noise alone; std. unc.: with all that the fit counts\n";
+        }
+        (false, true) => out += "std. unc.: standard uncertainty with all that the fit counts\n",
+        (false, false) => {}
+    }
+    if unmodelled && shown("unmodelled") {
         out += "unmodelled: standard uncertainty if every effect that the model leaves out acts at its typical size\n";
     }
+    out += &left_out_says(&left_out);
     let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
     if !blocks.is_empty() {
         let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
@@ -147,11 +170,19 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     paper.plain(out)
 }
 
+/// What a table does not show for want of room; nothing where it shows all.
+pub(super) fn left_out_says(heads: &[String]) -> String {
+    if heads.is_empty() {
+        return String::new();
+    }
+    format!("too narrow here for: {} (a wider terminal, COLUMNS=120 or --json has it)\n", heads.join(", "))
+}
+
 /// Three significant digits, plainly written where that is readable.
 #[must_use]
 pub fn significant(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
-        return format!("{x}");
+        return unsigned_zero(format!("{x}"));
     }
     let magnitude = x.abs().log10().floor() as i32;
     if (-7..6).contains(&magnitude) { format!("{x:.*}", (2 - magnitude).max(0) as usize) } else { format!("{x:.2e}") }
@@ -181,6 +212,11 @@ mod tests {
     fn digits_follow_the_uncertainty() {
         assert_eq!(digits(0.029_984_56, Some(2.3e-4)), "0.02998");
         assert_eq!(digits(12.3, Some(4.0)), "12.3");
+        assert_eq!(digits(-0.3, Some(40.0)), "0");
+        assert_eq!(digits(-0.000_01, Some(0.1)), "0.00");
+        assert_eq!(digits(-0.3, Some(4.0)), "-0.3");
+        assert_eq!(significant(-0.0), "0");
+        assert_eq!((with_unit("0.3", "1"), with_unit("0.3", "um")), ("0.3".into(), "0.3 um".into()));
         assert_eq!(significant(0.000_234_5), "0.000235");
         assert_eq!(significant(1234.5), "1234");
     }

@@ -1,6 +1,7 @@
 //! A changed model, the ladder of models, and two studies side by side.
 
 use super::fit::{digits, number, significant, table};
+use super::lay::lay;
 use super::plot::{Paper, line};
 use super::prose::sentence;
 use crate::compare::change::Change;
@@ -74,7 +75,7 @@ pub fn change(
         let unit = &p.unit;
         row(&format!("{}, {unit}", p.name), stated(p.before), stated(p.after));
     }
-    t.set_width(paper.width.min(100) as u16);
+    lay(&mut t, paper.width.min(100), &[]);
     let mut out = format!("{t}\n");
     if other_noise((before.noise_um, before.visit_um), (after.noise_um, after.visit_um)) {
         let line = format!(
@@ -107,6 +108,7 @@ pub fn change(
                 number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
             ]);
         }
+        lay(&mut t, paper.width.min(100), &[]);
         out += &format!("\n{t}\n");
     }
     for r in &c.remarks {
@@ -151,7 +153,7 @@ pub fn history(h: &History, paper: Paper) -> String {
         }
         t.add_row(row);
     }
-    t.set_width(paper.width.min(120) as u16);
+    lay(&mut t, paper.width.min(120), &[]);
     let note = if nested {
         "held out: each index visit is left out of the fit in turn, ± one standard error; nested: the choice of the effect is \
          redone each time as well (-: a person chose it, knowing all touches)"
@@ -202,7 +204,7 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
     row("readings, blocks placed, um RMS", v.before.readings_rms_um, v.after.readings_rms_um);
     row("left by the model, um RMS", v.before.fit_rms_um, v.after.fit_rms_um);
     row("noise of a touch, um", v.before.noise_um, v.after.noise_um);
-    t.set_width(paper.width.min(100) as u16);
+    lay(&mut t, paper.width.min(100), &[]);
     out += &format!("{t}\n\n");
     let mut t = table(&["error", "unit", "before", "after", "difference", "95 %", ""]);
     for r in &v.parameters {
@@ -220,7 +222,7 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
             }),
         ]);
     }
-    t.set_width(paper.width.min(110) as u16);
+    lay(&mut t, paper.width.min(110), &[]);
     out += &format!("{t}\n");
     for r in &v.remarks {
         out += &format!("note: {r}\n");

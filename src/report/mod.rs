@@ -5,5 +5,6 @@ pub mod compare;
 pub mod diagnosis;
 pub mod fit;
 pub mod ladder;
+pub mod lay;
 pub mod plot;
 pub mod prose;

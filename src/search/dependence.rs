@@ -91,7 +91,7 @@ pub struct Dependence {
 
 /// The generic search: what the misfit depends on, best first, one entry per variable or pair.
 ///
-/// The leader of the ranking goes first, unless a simpler shape (fewer variables, then smaller p) says the same. What is the
+/// The leader of the ranking goes first, unless a simpler shape (fewer variables, then smaller p; any before groups of visits) says the same. What is the
 /// same at every touch depends on no variable: it is a finding of its own, and taken off before variables are looked at, or
 /// each group of touches and each step near an end of the run would be credited with it.
 #[must_use]
@@ -115,8 +115,10 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
     if let Some(&leader) = ranking.first() {
         let passes = search.scores[leader].proposed();
         let group = search.group_of(leader, &ranking);
+        // a level for each index visit says whatever goes with pose or time, and why it does of none: it is what is left over
         let key = |m: &Member| {
-            (generics.shapes[m.candidate].depends_on.matches('*').count(), search.scores[m.candidate].ln_p)
+            let on = &generics.shapes[m.candidate].depends_on;
+            (if on == "visit" { usize::MAX } else { on.matches('*').count() }, search.scores[m.candidate].ln_p)
         };
         let alike = group.members.iter().filter(|m| search.scores[m.candidate].proposed() == passes);
         let simplest = alike.min_by(|a, b| {

@@ -163,6 +163,21 @@ impl Library {
         DMatrixView::from_slice(&self.data, self.n_rows, self.n_columns())
     }
 
+    /// A library of one of the candidates, with all its variants.
+    #[must_use]
+    pub fn only(&self, candidate: usize) -> Self {
+        let mut own = Self::new(self.n_rows);
+        let mut one = self.candidates[candidate].clone();
+        for variant in &mut one.variants {
+            let span = variant.columns.clone();
+            let first = own.n_columns();
+            own.data.extend_from_slice(&self.data[span.start * self.n_rows..span.end * self.n_rows]);
+            variant.columns = first..first + span.len();
+        }
+        own.candidates.push(one);
+        own
+    }
+
     /// Columns of one variant, N × q.
     #[must_use]
     pub fn columns(&self, candidate: usize, variant: usize) -> DMatrix<f64> {

@@ -91,7 +91,10 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         return;
     }
     let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
-    out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
+    // an effect of a person's own may not say where
+    if !first.look.is_empty() {
+        out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
+    }
     if !first.same_as.is_empty() {
         out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
     }

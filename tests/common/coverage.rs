@@ -310,6 +310,27 @@ pub fn check(case: &Case, summary: &Summary, k: f64) -> Vec<String> {
     wrong
 }
 
+/// What must hold of all cases together: runs of different cases share nothing, so that many more of them are judged at once
+/// and both sides are near. An interval that is 5 % too narrow or too wide does not pass.
+#[allow(dead_code)] // of the small count
+pub fn check_together(all: &[Summary], k: f64) -> Vec<String> {
+    let n_cases = all.len() as f64;
+    let mean = |of: &dyn Fn(&Row) -> f64| -> f64 {
+        all.iter().map(|s| s.rows.iter().map(of).sum::<f64>() / s.rows.len() as f64).sum::<f64>() / n_cases
+    };
+    // as in `check`, a quarter of the parameters of a case counts as drawn apart
+    let n: f64 = all.iter().map(|s| s.runs as f64 * (s.rows.len() as f64 / 4.0).max(1.0)).sum();
+    let (covered, ratio) = (mean(&|r| r.covered), mean(&|r| r.ratio.powi(2)).sqrt());
+    let mut wrong = Vec::new();
+    if (covered - 0.95).abs() > 0.004 + k * (0.95 * 0.05 / n).sqrt() {
+        wrong.push(format!("all cases: covered in {:.2} %", 100.0 * covered));
+    }
+    if (ratio - 1.0).abs() > 0.01 + k / (2.0 * n).sqrt() {
+        wrong.push(format!("all cases: RMS error {ratio:.4} of its bound"));
+    }
+    wrong
+}
+
 /// Where χ² stands in its own distribution, 0 to 1: what the repeats say themselves (σ̂² on ν degrees of freedom) is taken
 /// out of it, and the rest per degree of freedom is F on (dof − ν, ν); with a stated σ it is χ² on dof.
 fn lack_of_fit(chi2: f64, dof: usize, noise_dof: Option<f64>) -> f64 {
