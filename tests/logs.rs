@@ -47,7 +47,8 @@ fn check(case: &Case, machine: &Machine, plan: &Plan, post: &Postprocessor) -> R
     let (touches, findings) = match log::read(&bytes, case.file, writer, machine, plan) {
         Ok((read, findings)) => {
             let one = |t: &log::Touch| format!("{}{}", t.id, if t.status == Status::Miss { "!" } else { "" });
-            (Some(read.touches.iter().map(one).collect::<Vec<_>>().join(" ")), findings.0)
+            let usable = read.touches.iter().filter(|t| t.status != Status::Elsewhere);
+            (Some(usable.map(one).collect::<Vec<_>>().join(" ")), findings.0)
         }
         Err(failure) => (None, failure.0),
     };

@@ -229,6 +229,8 @@ pub fn step(loaded: &Loaded, fit: &Fit) -> Step {
         held_out_se_um: held_out::by_visit(fit).and_then(|h| h.standard_error_um),
         later_run_rms_um: held_out::later_run(fit).map(|h| h.rms_um),
         chi2_per_dof: o.chi2_per_dof,
+        noise_um: Some(o.noise_um),
+        visit_um: Some(o.visit_um),
         unknowns: o.unknowns,
         data_sha256: loaded.data_sha256.clone(),
         ..Step::default()

@@ -54,7 +54,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.say(format!("not told by this data: {}", u.says));
     }
     if !comparison.explained_by_noise || !leads.is_empty() {
-        io.say_as_it_is(format!("next: axiscal diagnose {}", args.study.display()));
+        io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
     }
     io.answer(&comparison);
     Ok(Answer::Done)

@@ -249,7 +249,8 @@ fn located<T>(result: Result<T>, study: &Source) -> Result<T> {
 }
 
 /// A controller is a name, or a postprocessor file relative to the study.
-fn controller_path(word: &str, folder: &Path) -> String {
+#[must_use]
+pub fn controller_path(word: &str, folder: &Path) -> String {
     let file = folder.join(word);
     if word.ends_with(".toml") && file.is_file() { file.display().to_string() } else { word.to_owned() }
 }

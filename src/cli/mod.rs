@@ -19,6 +19,7 @@ mod identify;
 pub mod load;
 mod machines;
 mod new;
+mod next;
 mod parse;
 mod plan_next;
 mod programs;

@@ -49,6 +49,8 @@ struct Parsed<'a> {
     planned: usize,
     hits: usize,
     misses: usize,
+    /// Touches far from their places: they are among those that are missing, too.
+    elsewhere: usize,
     missing: Vec<u64>,
     touches: Vec<serde_json::Value>,
 }
@@ -95,15 +97,20 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
         for axis in AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()) {
             object.insert(axis.to_string(), (t.position.get(axis) + 0.0).into());
         }
-        let status = if t.status == Status::Hit { "hit" } else { "miss" };
+        let status = match t.status {
+            Status::Hit => "hit",
+            Status::Miss => "miss",
+            Status::Elsewhere => "elsewhere",
+        };
         object.insert("status".into(), status.into());
         t.time_s.into_iter().for_each(|v| drop(object.insert("time_s".into(), v.into())));
         t.temperature_deg_c.into_iter().for_each(|v| drop(object.insert("temperature_degC".into(), v.into())));
         object.insert("line".into(), t.line.into());
         serde_json::Value::Object(object)
     });
-    let have: std::collections::BTreeSet<u64> = read.touches.iter().map(|t| t.id).collect();
-    let hits = read.touches.iter().filter(|t| t.status == Status::Hit).count();
+    let usable = read.touches.iter().filter(|t| t.status != Status::Elsewhere);
+    let have: std::collections::BTreeSet<u64> = usable.map(|t| t.id).collect();
+    let count = |status: Status| read.touches.iter().filter(|t| t.status == status).count();
     Parsed {
         format: "axiscal-parse/1",
         machine: &plan.machine,
@@ -114,8 +121,9 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
         run: read.runs.iter().find(|r| r.taken).map(|r| r.number),
         run_list: read.runs.iter().map(run_record).collect(),
         planned: plan.touches.len(),
-        hits,
-        misses: read.touches.len() - hits,
+        hits: count(Status::Hit),
+        misses: count(Status::Miss),
+        elsewhere: count(Status::Elsewhere),
         missing: plan.touches.iter().map(|t| t.id).filter(|id| !have.contains(id)).collect(),
         touches: touches.collect(),
     }
@@ -159,7 +167,7 @@ fn summary(plan: &Plan, read: &MatchedLog) -> String {
         let low = offs.iter().copied().fold(f64::INFINITY, f64::min);
         let high = offs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let range = if offs.is_empty() { String::new() } else { format!("{low:+.3} .. {high:+.3}") };
-        let absent = touches.iter().filter(|t| t.is_none()).count();
+        let absent = touches.iter().filter(|t| t.is_none_or(|t| t.status == Status::Elsewhere)).count();
         table.add_row([
             stage.to_owned(),
             block.to_owned(),
@@ -175,7 +183,8 @@ fn summary(plan: &Plan, read: &MatchedLog) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    let (done, planned) = (read.touches.len(), plan.touches.len());
+    let done = read.touches.iter().filter(|t| t.status != Status::Elsewhere).count();
+    let planned = plan.touches.len();
     let lacks =
         if done < planned { format!(" ({} NOT READ: the warnings say why)", planned - done) } else { String::new() };
     format!(

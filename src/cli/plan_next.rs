@@ -126,15 +126,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let mut setting = Setting::new(&loaded, &settings.effects, &fit)?;
     let unexplained = named.is_empty() && !open(&found) && found.verdict == Verdict::Unexplained;
-    let sketched = if unexplained { Sketched::of(&loaded, &settings, &fit) } else { None };
+    let sketched =
+        if unexplained && found.touches_would_tell() { Sketched::of(&loaded, &settings, &fit) } else { None };
     // a faint pattern is there or is not: touches tell. A clear one is there, and no known effect stands against another
     if unexplained && !(found.faint && sketched.is_some()) {
-        let help = match &sketched {
-            Some(_) => format!(
-                "axiscal sketch-effect {} --out my-effects.toml writes what is seen as a formula",
-                args.study.display()
-            ),
-            None => "look for it at the machine: no formula says it".to_owned(),
+        let help = match found.sketchable {
+            true => format!("{} writes what is seen as a formula", super::next::sketch_effect(&loaded)),
+            false => diagnose::words::at_the_machine(&found),
         };
         return Ok(refuse(
             &format!("nothing here to part: no known effect explains what is left. {}", found.says),
@@ -226,7 +224,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     if chosen.separations.iter().all(|s| s.told < SAFELY) {
         let says = format!(
-            "no program of {:.0} minutes that this machine can run tells any of these effects apart: {}",
+            "no program of {:.0} minutes that this machine can run would tell any of these effects apart: {}",
             args.minutes,
             says(&questions)
         );
@@ -463,8 +461,8 @@ fn says(questions: &Questions) -> String {
     };
     let named = questions.pairs.iter().take(MOST_SAID).map(pair).collect::<Vec<_>>().join(", ");
     match questions.pairs.len().saturating_sub(MOST_SAID) {
-        0 => format!("tells {named}"),
-        more => format!("tells {named} and {more} more pairs"),
+        0 => named,
+        more => format!("{named} and {more} more pairs"),
     }
 }
 

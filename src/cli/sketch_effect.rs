@@ -59,13 +59,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     Catalogue::built_in()?.add_file(&source(&name, text.clone()))?;
     files::write_whole(&args.out, text.as_bytes())?;
     io.say(format!(
-        "{}\n{} = {}\nwritten to {name}: change its id and name to what it is,",
+        "{}\n{} = {}\nwritten to {name}: its name is for you to change (and its id: then `add` takes the new one)",
         made.says, made.id, made.formula
     ));
     // the study's paths are relative to the study
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     io.say(format!(
-        "put effects_file = [\"{}\"] into the study, then: axiscal add {} {}",
+        "put effects_file = [\"{}\"] into the study, above the first [[data]], then: axiscal add {} {}",
         relative(&args.out, &folder),
         args.study.display(),
         made.id

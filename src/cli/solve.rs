@@ -6,11 +6,10 @@ use super::{Answer, Io, add};
 use crate::compare::told;
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
-use crate::diagnose::words::{list, one_of};
+use crate::diagnose::words::{self, list, one_of};
 use crate::diagnose::{Options, Subject, Verdict, diagnose};
 use crate::fit::outcome::{Outcome, Parameter, Status};
 use crate::fit::{self, Fit};
-use crate::model::catalogue::Catalogue;
 use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
 use nalgebra::{DMatrix, DVector};
@@ -137,7 +136,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                                 break (loaded, fit, found, refused.unwrap_or_default());
                             }
                             steps.push(Step {
-                                found: found_as(&id, &same_as),
+                                found: found_as(&id, &same_as, first.or_else.as_deref()),
                                 added: id,
                                 same_as,
                                 p_adjusted: first.p_adjusted,
@@ -156,10 +155,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             (Verdict::Unexplained, _) if found.faint => {
                 Some("what is left is as small as the noise, but for a pattern too faint to name".to_owned())
             }
-            (Verdict::Unexplained, _) => Some(format!(
-                "no known effect explains what is left: `axiscal sketch-effect {} --out my-effects.toml` writes its curve as a formula",
-                args.study.display()
+            (Verdict::Unexplained, _) if found.sketchable => Some(format!(
+                "no known effect explains what is left: `{}` writes its curve as a formula",
+                super::next::sketch_effect(&loaded)
             )),
+            (Verdict::Unexplained, _) => {
+                Some(format!("no known effect explains what is left: {}", words::at_the_machine(&found)))
+            }
             (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
             (Verdict::MissingEffect, _) => Some("what is missing is not borne out".to_owned()),
             _ => Some("nothing is left that these touches can show".to_owned()),
@@ -193,7 +195,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects: fit.outcome.effects.clone(),
         steps,
     };
-    tell(&solution, &fit, &loaded.catalogue, (&args.study, found.mistake().is_some()), io);
+    tell(&solution, &fit, &loaded, found.mistake().is_some(), io);
     io.answer(&solution);
     let no = matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) || found.most_missed;
     Ok(if no { Answer::No } else { Answer::Done })
@@ -216,7 +218,7 @@ fn left_out(fit: &Fit) -> String {
 fn unbelievable(first: &Candidate) -> Option<String> {
     (!first.plausible).then(|| {
         format!(
-            "the first proposal ({}) would need more than {:.0} times its usual size: it is a name for something else. \
+            "the first proposal ({}) would need more than {:.0} times its usual size: it may be a name for something else. \
              `axiscal add` puts it in if you know better",
             first.effect,
             crate::search::groups::PLAUSIBLE
@@ -288,7 +290,10 @@ fn propose(first: &Candidate, io: &Io) {
         sizes.push(format!("together up to {} um at a touch", significant(most)));
     }
     let what = match &first.same_as[..] {
-        [] => format!("{} ({})", first.effect, first.name),
+        [] => match &first.or_else {
+            Some(other) => format!("{} ({}, or {other}: these touches cannot tell)", first.effect, first.name),
+            None => format!("{} ({})", first.effect, first.name),
+        },
         others => format!("{}; if it is {}", one_of(&first.effect, others), first.effect),
     };
     io.say(format!("proposed: {what}: {}", sizes.join(", ")));
@@ -391,14 +396,17 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
 }
 
 /// What was found: one name, or those that these touches cannot tell apart, the one that stands in the model first.
-fn found_as(added: &str, same_as: &[String]) -> String {
+fn found_as(added: &str, same_as: &[String], or_else: Option<&str>) -> String {
     match same_as {
-        [] => added.to_owned(),
+        [] => match or_else {
+            Some(other) => format!("{added}, or {other}: these touches cannot tell"),
+            None => added.to_owned(),
+        },
         others => format!("{} (these touches cannot tell which; {added} stands in the model)", one_of(added, others)),
     }
 }
 
-fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Path, bool), io: &Io) {
+fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
     let outcome = &fit.outcome;
     io.say(format!("\n--- the end: {}", s.stopped));
     let sizes = |id: &str| -> String {
@@ -406,7 +414,7 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
         let words: Vec<String> = of
             .map(|p| match p.sigma {
                 Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, p.sigma), significant(sigma), p.unit),
-                None => match told::bracket(fit, catalogue, p) {
+                None => match told::bracket(fit, &loaded.catalogue, p) {
                     Some(b) => b.says(),
                     None => format!("{} not told alone", p.name),
                 },
@@ -441,7 +449,7 @@ fn tell(s: &Solution, fit: &Fit, catalogue: &Catalogue, (study, mistaken): (&Pat
         io.say(format!("open: {line}"));
     }
     if s.steps.iter().any(|step| !step.same_as.is_empty()) {
-        io.say(format!("next: axiscal plan-next {} --controller … --out next", study.display()));
+        io.say_as_it_is(format!("next: {}", super::next::plan_next(loaded)));
     }
-    io.say(format!("next: axiscal history {}", study.display()));
+    io.say_as_it_is(format!("next: axiscal history {}", super::next::quoted(&loaded.path)));
 }

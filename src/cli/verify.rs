@@ -4,6 +4,7 @@ use super::load::{Loaded, load_study};
 use super::{Answer, Io};
 use crate::compare::verify::{Figures, Question, Verdict, verify};
 use crate::diag::{Failure, Result};
+use crate::diagnose::{self, Options, Subject, diagnose};
 use crate::fit::{self, Fit, Settings};
 use crate::program::plan::ControllerFrame;
 use crate::report;
@@ -49,15 +50,33 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             };
             points(&b.plan) == points(&a.plan)
         });
-    let answer = verify(
+    let mut answer = verify(
         (&first.outcome, figures(&before, &first)?),
         (&second.outcome, figures(&after, &second)?),
         question,
         same_plans,
     );
+    let missing = still_missing(&after, &second)?;
+    answer.remarks.splice(0..0, missing);
     io.say(report::ladder::verification(&answer, io.paper(false)));
+    for (lacks, effects) in [(&after, &answer.only_before), (&before, &answer.only_after)] {
+        if !effects.is_empty() {
+            let study = super::next::quoted(&lacks.path);
+            io.say_as_it_is(format!("next: axiscal add {study} {}", effects.join(" ")));
+        }
+    }
     io.answer(&answer);
-    Ok(if answer.verdict == Verdict::NotImproved { Answer::No } else { Answer::Done })
+    let no = matches!(answer.verdict, Verdict::NotImproved | Verdict::ModelsDiffer);
+    Ok(if no { Answer::No } else { Answer::Done })
+}
+
+/// What the runs after show that their model lacks: its errors are then not those of the machine.
+fn still_missing(after: &Loaded, fit: &Fit) -> Result<Option<String>> {
+    let settings = Settings { quick: true, ..after.settings() };
+    let subject = Subject { machine: &after.machine, catalogue: &after.catalogue, settings: &settings, fit };
+    let found = diagnose(subject, &Options { at_most: 1, refit: false, power: false, planned: None })?;
+    let missing = found.verdict == diagnose::Verdict::MissingEffect || found.mistake().is_some();
+    Ok(missing.then(|| format!("`axiscal diagnose` says of the study after: {}", found.says)))
 }
 
 /// A run with the transformation off reads the bare machine, whatever pins are set.

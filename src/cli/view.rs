@@ -42,7 +42,9 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
     let diagnosis = {
         let quick = Settings { quick: true, ..settings.clone() };
         let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &quick, fit: &fit };
-        diagnose(subject, &Options::default())?
+        let missed = fit.data.mostly_missed();
+        let planned = if missed { loaded.planned() } else { Vec::new() };
+        diagnose(subject, &Options { planned: missed.then_some(&planned[..]), ..Options::default() })?
     };
     let tried: Vec<Vec<String>> =
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();

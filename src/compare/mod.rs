@@ -221,8 +221,7 @@ pub fn compare(fit: &Fit) -> Comparison {
     let misses = format!("the model misses the touches by {}", fit.noise.times(chi2_per_dof.sqrt()));
     let says = match (fit.dof, explained_by_noise, first) {
         _ if no_sample => format!(
-            "{} of {} touches cannot be used, most of them because the search found nothing: what is left over of the others \
-             says nothing of the machine",
+            "{} of {} touches cannot be used: what is left over of the others says nothing of the machine",
             fit.data.unusable.len(),
             fit.data.made()
         ),

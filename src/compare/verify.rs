@@ -78,6 +78,8 @@ pub enum Verdict {
     Changed,
     /// None does.
     NotChanged,
+    /// The studies hold other models: an error of one stands in others of the other.
+    ModelsDiffer,
 }
 
 /// Two studies side by side.
@@ -100,10 +102,30 @@ pub struct Verification {
     /// Errors that only one of them identifies: nothing is said of their change.
     #[serde(default)]
     pub not_compared: Vec<Alone>,
+    /// Effects of the study before that the model after lacks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub only_before: Vec<String>,
+    /// Effects of the study after that the model before lacks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub only_after: Vec<String>,
     /// In words.
     pub says: String,
     /// What a reader must not miss.
     pub remarks: Vec<String>,
+}
+
+impl Verification {
+    /// Do the two hold other models? Then no change of an error is spoken of: an effect that one of them lacks stands in its
+    /// other errors.
+    #[must_use]
+    pub fn models_differ(&self) -> bool {
+        !(self.only_before.is_empty() && self.only_after.is_empty())
+    }
+}
+
+/// Effects of one model that the other lacks.
+fn lacking(of: &Outcome, other: &Outcome) -> Vec<String> {
+    of.effects.iter().filter(|e| !other.effects.contains(e)).cloned().collect()
 }
 
 /// Compares two fits; `figures` of both beside them.
@@ -138,8 +160,10 @@ pub fn verify(
         .collect();
     // with eight errors side by side one of them differs by more than its 95 % in every third pair of equal machines
     let adjusted = holm(&rows.iter().map(|r| r.p_adjusted).collect::<Vec<f64>>());
+    let (only_before, only_after) = (lacking(before, after), lacking(after, before));
+    let differ = !(only_before.is_empty() && only_after.is_empty());
     for (row, p) in rows.iter_mut().zip(adjusted) {
-        (row.p_adjusted, row.changed) = (p, p < FAMILY_LEVEL);
+        (row.p_adjusted, row.changed) = (p, p < FAMILY_LEVEL && !differ);
     }
     let not_compared = [(before, after, "before"), (after, before, "after")]
         .into_iter()
@@ -163,6 +187,7 @@ pub fn verify(
     let verdict = match question {
         Question::Compensation if improved => Verdict::Improved,
         Question::Compensation => Verdict::NotImproved,
+        Question::Change if differ => Verdict::ModelsDiffer,
         Question::Change if n_changed > 0 => Verdict::Changed,
         Question::Change => Verdict::NotChanged,
     };
@@ -179,6 +204,9 @@ pub fn verify(
                 rows.len()
             )
         }
+        Verdict::ModelsDiffer => {
+            format!("not comparable: the two studies hold other models; {readings}")
+        }
         Verdict::NotChanged => {
             format!("no change: none of {} errors differs by more than its doubt; {readings}", rows.len())
         }
@@ -186,6 +214,15 @@ pub fn verify(
     let mut remarks = Vec::new();
     if !same_plans {
         remarks.push("the two studies touched other points: compare the errors, not the RMS of the readings".into());
+    }
+    for (word, other, effects) in [("before", "after", &only_before), ("after", "before", &only_after)] {
+        if !effects.is_empty() {
+            remarks.push(format!(
+                "the study {other} lacks {} of the model {word}: what they do stands in its other errors, which are not \
+                 compared until both hold the same model",
+                effects.join(", ")
+            ));
+        }
     }
     for (word, other) in [("before", "after"), ("after", "before")] {
         let names: Vec<&str> = not_compared.iter().filter(|a| a.told_by == word).map(|a| a.name.as_str()).collect();
@@ -199,7 +236,7 @@ pub fn verify(
     if rows.is_empty() {
         remarks.push("no error is identified by both studies".into());
     }
-    if question == Question::Compensation {
+    if question == Question::Compensation && !differ {
         for r in rows.iter().filter(|r| r.changed && r.after.0.abs() > r.before.0.abs()) {
             remarks.push(format!("{} is larger than before: its sign or its unit may be wrong in the control", r.name));
         }
@@ -217,6 +254,8 @@ pub fn verify(
         after: second,
         parameters: rows,
         not_compared,
+        only_before,
+        only_after,
         says,
         remarks,
     }

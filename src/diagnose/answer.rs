@@ -28,6 +28,15 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// The verdict in a sentence.
     pub says: String,
+    /// Does `sketch-effect` have a formula for what is named first? What it cannot write is put right at the machine.
+    #[serde(skip)]
+    pub sketchable: bool,
+    /// Block that stands elsewhere from some moment on, where that is what is named first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moved_block: Option<String>,
+    /// Faces that lie elsewhere: `full/a +X`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faces: Vec<String>,
     /// With `unexplained`: the noise explains all that is left but for a pattern too faint to name. No reason to take the
     /// machine apart.
     pub faint: bool,
@@ -75,13 +84,20 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Would further touches tell whether a faint pattern is there? Those of a block that moved are made already.
+    #[must_use]
+    pub fn touches_would_tell(&self) -> bool {
+        self.sketchable && self.moved_block.is_none()
+    }
+
     /// The gross mistake that must be put right before anything smaller can be spoken of: an axis that counts the wrong
     /// way round, other units, a log of something else, or touches most of which found nothing.
     #[must_use]
     pub fn mistake(&self) -> Option<String> {
         if self.most_missed {
+            let named = self.gross.iter().find(|g| g.in_place.is_some()).map(|g| g.says.clone());
             let none = || "most touches found nothing".to_owned();
-            return Some(self.candidates.first().map_or_else(none, |c| c.name.clone()));
+            return Some(self.candidates.first().map(|c| c.name.clone()).or(named).unwrap_or_else(none));
         }
         let right = |g: &&Gross| g.rms_um < super::gross::RIGHT * self.rms_um;
         let elsewhere = |g: &&Gross| g.hypothesis == super::gross::ELSEWHERE;
@@ -126,6 +142,12 @@ pub struct Shape {
     pub y: Vec<f64>,
     /// Half the width of its 95 % band.
     pub band: Vec<f64>,
+    /// Names of the groups of touches that x numbers, where it numbers groups.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<String>,
+    /// Block whose touches it is of, where it is of one alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<String>,
     /// What kind of thing does that.
     pub kind: String,
 }
@@ -166,6 +188,9 @@ pub struct Candidate {
     pub moves_sigma_um: Option<f64>,
     /// Effects that these touches cannot tell from it.
     pub same_as: Vec<String>,
+    /// What else would do the same to these touches and is no effect with a name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub or_else: Option<String>,
     /// Which touches would tell them apart.
     pub tell_apart: String,
     /// What it is.
@@ -226,6 +251,9 @@ pub struct Gross {
     /// Where most touches are missing: share of the hits and misses that are as it would make them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub agrees: Option<f64>,
+    /// Where touches of the log are far from their places: share of all touches that would be where they belong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_place: Option<f64>,
 }
 
 /// A touch that was not used.
@@ -237,6 +265,10 @@ pub struct Outlier {
     pub run: usize,
     /// Why.
     pub reason: String,
+    /// The block as it stood.
+    pub block: String,
+    /// Its face.
+    pub face: String,
     /// True where it belongs to the rest once the first candidate is in the model.
     pub comes_back: bool,
 }

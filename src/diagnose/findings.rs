@@ -5,7 +5,11 @@ use super::evidence::Evidence;
 use super::verdict::{Beside, Decision};
 use super::{Examination, Subject, gross, noise_um, tell, words};
 use crate::fit::Fit;
-use crate::search::generic::{Features, Kind};
+use crate::model::catalogue::Place;
+use crate::model::data::Origin;
+use crate::model::formula::slot;
+use crate::search::dependence::Dependence;
+use crate::search::generic::{Direction, Features, Kind};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out_in};
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -59,14 +63,17 @@ pub(super) fn put_together(
     let powers = if options.power {
         let detectable = power::power(&seen.evidence.base, &seen.named.library, Some(&used_rows(seen)), noise_um(fit));
         let not_found = detectable.iter().filter(|p| !found.iter().any(|g| g.holds(p.candidate)));
-        let mut powers: Vec<Power> = not_found
+        // how far what would be found is from the usual size: noncentrality goes with the square of the size
+        let mut powers: Vec<(f64, Power)> = not_found
             .filter_map(|p| {
                 let effect = seen.named.effects[p.candidate].id.clone();
-                Some(Power { effect, minimal_detectable_um: p.minimal_detectable? })
+                let from_usual = (power::SEEN / p.at_typical.max(f64::MIN_POSITIVE)).ln().abs();
+                Some((from_usual, Power { effect, minimal_detectable_um: p.minimal_detectable? }))
             })
             .collect();
-        powers.sort_by(|a, b| b.minimal_detectable_um.total_cmp(&a.minimal_detectable_um));
-        powers
+        // what could nearly have been seen, or only just, goes first: the hopeless need another program
+        powers.sort_by(|a, b| a.0.total_cmp(&b.0));
+        powers.into_iter().map(|p| p.1).collect()
     } else {
         Vec::new()
     };
@@ -137,7 +144,9 @@ pub(super) fn put_together(
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
     let shape = drawn.and_then(|d| {
-        let kind = features.variables.iter().find(|v| v.name == d.on).map(|v| v.kind);
+        let variable = d.on.strip_suffix("*block").unwrap_or(&d.on);
+        let kind = features.variables.iter().find(|v| v.name == variable).map(|v| v.kind);
+        let moved = words::moved_block(d, fit);
         let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };
         (!d.curve.is_empty()).then(|| Shape {
             by: by(&d.on),
@@ -154,18 +163,37 @@ pub(super) fn put_together(
             x: d.curve.iter().map(|p| to_deg(p.x)).collect(),
             y: d.curve.iter().map(|p| p.y).collect(),
             band: d.curve.iter().map(|p| 1.96 * p.sigma).collect(),
+            labels: d.groups.iter().filter_map(|&g| words::group(&d.on, g, fit, features)).collect(),
+            block: moved.map(str::to_owned),
             // where an effect is named, its own words say what does that
             kind: if candidates.iter().any(|c| c.proposed) { String::new() } else { words::kind(d) },
         })
     });
     let outliers = fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).map(|(&i, reason)| {
         let o = &fit.data.observations[i];
-        Outlier { id: o.id, run: o.run + 1, reason: reason.clone(), comes_back: false }
+        let Origin { block, face, .. } = fit.data.origins[i].clone();
+        Outlier { id: o.id, run: o.run + 1, reason: reason.clone(), block, face, comes_back: false }
     });
+    let unexplained = verdict == Verdict::Unexplained;
+    let first_by = depends.first().map_or("", |w| w.by.as_str());
+    let faces = if unexplained && first_by == "face" { faces(fit, features, drawn) } else { Vec::new() };
+    if let (Some(first), false) = (depends.first_mut(), faces.is_empty()) {
+        first.says += &format!(": clean {}", faces.join(", "));
+    }
+    // scatter and bad touches that lie together are put right at the machine, not by a formula
+    let at_the_machine = |id: &str| id.starts_with("scatter:") || id.starts_with("not-used:");
+    let sketchable = unexplained
+        && depends.first().is_some_and(|w| !at_the_machine(&w.id))
+        && super::sketch::best(&seen.dependences).is_ok();
+    let moved_block = drawn.filter(|_| unexplained).and_then(|d| words::moved_block(d, fit)).map(str::to_owned);
+    jump_of_what(subject, seen, features, &mut candidates);
     Diagnosis {
         format: FORMAT,
         verdict,
         says: String::new(),
+        sketchable,
+        moved_block,
+        faces,
         faint: false,
         most_missed: false,
         rms_um: fit.outcome.rms_um,
@@ -191,6 +219,40 @@ pub(super) fn put_together(
         warnings: seen.named.left_out.clone(),
         open,
     }
+}
+
+/// Blocks that all stand elsewhere from some moment on are one reading of a jump. Where a jump at the same moment in a frame
+/// that stands still does as well, the machine or the probe may have made it.
+fn jump_of_what(subject: Subject, seen: &Examination, features: &Features, candidates: &mut [Candidate]) {
+    let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
+    let chosen = group.first();
+    let effect = seen.named.effects[chosen];
+    let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
+    let of_blocks = effect.id == first.effect && jumps && effect.terms.iter().all(|t| t.place == Place::Block);
+    let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
+    let at_h = seen.named.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
+    let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
+    let n = features.block.len();
+    let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
+    let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
+    let columns = seen.evidence.whiten(subject.fit, raw_mm);
+    if super::rivals::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
+        first.or_else = Some("the probe or the machine itself jumped".to_owned());
+    }
+}
+
+/// Faces that lie elsewhere: those on which touches were left out, or else those whose mean stands out from the others.
+fn faces(fit: &Fit, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
+    /// Standard uncertainties beyond which a face stands out from twenty.
+    const FAR: f64 = 3.5;
+    let of_touches = super::gathered::faces(fit, features);
+    let named = |i: &usize| words::group("face", features.face[*i], fit, features);
+    if !of_touches.is_empty() {
+        return of_touches.iter().filter_map(named).collect();
+    }
+    let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
+    let out = d.curve.iter().zip(&d.groups).filter(|(p, _)| p.y.abs() > FAR * p.sigma);
+    out.filter_map(|(_, &g)| words::group("face", g, fit, features)).collect()
 }
 
 /// What is no shape and no effect, but a finding: scatter of visits, and bad touches that lie together.
@@ -344,6 +406,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
             .filter(|m| m.candidate != chosen)
             .map(|m| seen.named.effects[m.candidate].id.clone())
             .collect(),
+        or_else: None,
         tell_apart: String::new(),
         says,
         look: effect.look.clone(),

@@ -3,6 +3,7 @@
 
 use crate::fit::Fit;
 use crate::search::generic::Features;
+use crate::search::multiplicity::FAMILY_LEVEL;
 use statrs::distribution::{DiscreteCDF, Hypergeometric};
 
 /// Fewer touches than this may lie together by chance.
@@ -56,6 +57,21 @@ pub(super) fn gathered(fit: &Fit, features: &Features) -> Option<Gathered> {
         }
     }
     best
+}
+
+/// Faces on which more of the touches that were not used lie than by chance, where it is known that faces differ: an
+/// observation of each.
+pub(super) fn faces(fit: &Fit, features: &Features) -> Vec<usize> {
+    let bad: Vec<usize> = fit.rejected.iter().filter(|(_, why)| !why.starts_with("taken out")).map(|r| *r.0).collect();
+    let n_faces = features.face.iter().max().map_or(0, |m| m + 1);
+    let each = (0..n_faces).filter_map(|face| {
+        let of = features.face.iter().filter(|f| **f == face).count();
+        let here: Vec<usize> = bad.iter().copied().filter(|&i| features.face.get(i) == Some(&face)).collect();
+        let chance = Hypergeometric::new(features.face.len() as u64, of as u64, bad.len() as u64).ok()?;
+        let p = n_faces as f64 * chance.sf((here.len() as u64).saturating_sub(1));
+        (here.len() >= LEAST && p < FAMILY_LEVEL).then(|| here[0])
+    });
+    each.collect()
 }
 
 impl Gathered {

@@ -18,6 +18,9 @@ pub(super) const RIGHT: f64 = 0.1;
 /// Effect of the catalogue whose parameters are the suppositions.
 pub const EFFECT: &str = "sign-or-axis-swap";
 
+/// The supposition that lengths are in the other unit, in words.
+const INCH: &str = "the log is in inches and was read as millimetres";
+
 /// The supposition that the log belongs to something else.
 pub(super) const ELSEWHERE: &str = "another-program";
 
@@ -58,6 +61,7 @@ fn signs_and_swaps(subject: Subject) -> Vec<Gross> {
                 says: in_words(&supposed.name),
                 rms_um: fit.outcome.rms_um,
                 agrees: None,
+                in_place: None,
             })
         })
         .collect()
@@ -78,7 +82,7 @@ pub(super) fn in_words(name: &str) -> String {
 /// Lengths in the other unit.
 fn units(subject: Subject) -> Vec<Gross> {
     [
-        ("inch", mm_from_inch(1.0), "the log is in inches and was read as millimetres"),
+        ("inch", mm_from_inch(1.0), INCH),
         ("mm", 1.0 / mm_from_inch(1.0), "the log is in millimetres and was read as inches"),
     ]
     .into_par_iter()
@@ -86,7 +90,7 @@ fn units(subject: Subject) -> Vec<Gross> {
         let data = scaled(&subject.fit.data, factor);
         let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
         let rms_um = fair(fit.outcome.rms_um, factor, subject.fit.outcome.rms_um);
-        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um, agrees: None })
+        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um, agrees: None, in_place: None })
     })
     .collect()
 }
@@ -129,6 +133,23 @@ fn elsewhere(subject: Subject) -> Option<Gross> {
         ),
         rms_um: subject.fit.outcome.rms_um,
         agrees: None,
+        in_place: None,
+    })
+}
+
+/// What the reading of the logs supposes where touches lie far from their places.
+pub(super) fn of_log(subject: Subject) -> Option<Gross> {
+    let s = subject.fit.data.supposed.as_ref()?;
+    Some(Gross {
+        hypothesis: s.name.clone(),
+        says: match s.name.as_str() {
+            "inch" => INCH.to_owned(),
+            "swap_XYZ" => "axes X, Y and Z are taken for each other".to_owned(),
+            names => names.split(' ').map(in_words).collect::<Vec<_>>().join(", and "),
+        },
+        rms_um: subject.fit.outcome.rms_um,
+        agrees: None,
+        in_place: Some(s.right as f64 / s.of.max(1) as f64),
     })
 }
 
@@ -165,6 +186,7 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         moves_um: None,
         moves_sigma_um: None,
         same_as: Vec::new(),
+        or_else: None,
         tell_apart: String::new(),
         says: effect.says.clone(),
         look: effect.look.clone(),

@@ -58,6 +58,7 @@ pub(super) fn hypotheses(subject: Subject, planned: &[Planned]) -> Vec<Gross> {
             says: in_words(name),
             rms_um: subject.fit.outcome.rms_um,
             agrees: Some(agrees),
+            in_place: None,
         })
         .collect();
     let agrees = |g: &Gross| g.agrees.unwrap_or(0.0);

@@ -282,7 +282,10 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     };
     let verdict = verdict::of(&seen, &beside);
     let mut gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
-    if let Some(planned) = options.planned.filter(|_| fit.data.mostly_missed()) {
+    if let Some(supposed) = gross::of_log(subject) {
+        gross.retain(|g| g.hypothesis != supposed.hypothesis);
+        gross.insert(0, supposed);
+    } else if let Some(planned) = options.planned.filter(|_| fit.data.mostly_missed()) {
         let missed = missed::hypotheses(subject, planned);
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);
@@ -300,7 +303,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         }
         findings::outliers_again(&mut out, fit, &again);
     }
-    verdict::says(&mut out, fit, verdict, &beside);
+    verdict::says(&mut out, subject, verdict, &beside);
     verdict::not_when_touches_are_missing(&mut out, subject);
     Ok(out)
 }

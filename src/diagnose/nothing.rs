@@ -2,7 +2,7 @@
 
 use super::answer::{Diagnosis, FORMAT, Verdict};
 use super::open::Open;
-use super::{Options, Subject, missed, noise_um, verdict};
+use super::{Options, Subject, gross, missed, noise_um, verdict};
 
 /// The answer, before any search.
 pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
@@ -16,6 +16,9 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
             "Too few touches to judge: none is used{}. Take touches back in, or measure again.",
             if n == 0 { String::new() } else { format!(", all {n} are taken out") }
         ),
+        sketchable: false,
+        moved_block: None,
+        faces: Vec::new(),
         faint: false,
         most_missed: false,
         rms_um: fit.outcome.rms_um,
@@ -27,7 +30,10 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         depends: Vec::new(),
         shape: None,
         candidates: Vec::new(),
-        gross: planned.map(|p| missed::hypotheses(subject, p)).unwrap_or_default(),
+        gross: match gross::of_log(subject) {
+            Some(supposed) => vec![supposed],
+            None => planned.map(|p| missed::hypotheses(subject, p)).unwrap_or_default(),
+        },
         outliers: Vec::new(),
         tested: 0,
         power: Vec::new(),

@@ -43,17 +43,24 @@ struct End {
     criterion: f64,
 }
 
+impl End {
+    /// Before the first step.
+    fn start(question: Question) -> Self {
+        Self {
+            residual: question.base.project(question.residual),
+            basis: question.base.clone(),
+            cost: 0,
+            steps: Vec::new(),
+            after_first: f64::INFINITY,
+            criterion: f64::INFINITY,
+        }
+    }
+}
+
 /// Adds what passes its test, the first candidate given or found.
 fn way(question: Question, library: &Library, generic: bool, first: Option<usize>) -> End {
     let n = question.residual.len() as f64;
-    let mut end = End {
-        residual: question.base.project(question.residual),
-        basis: question.base.clone(),
-        cost: 0,
-        steps: Vec::new(),
-        after_first: f64::INFINITY,
-        criterion: f64::INFINITY,
-    };
+    let mut end = End::start(question);
     while end.steps.len() < MOST_STEPS {
         let search = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, library);
         let found = if generic { search.leading_shape() } else { search.leader() };
@@ -114,6 +121,23 @@ pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, fi
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
     Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }
+}
+
+/// What columns leave and cost by themselves, by the criterion.
+fn alone(question: Question, columns: &DMatrix<f64>) -> f64 {
+    let n = question.residual.len() as f64;
+    let mut end = End::start(question);
+    let acting = acting(&end, columns);
+    if acting.ncols() == 0 || end.basis.extend(&acting, KEPT) == 0 {
+        return f64::INFINITY;
+    }
+    let left = end.basis.project(&end.residual).norm_squared().max(f64::MIN_POSITIVE);
+    n * left.ln() + acting.ncols() as f64 * n.ln()
+}
+
+/// Do these columns explain what an effect explains, with no clear doubt?
+pub(super) fn as_well(question: Question, effect: &DMatrix<f64>, columns: &DMatrix<f64>) -> bool {
+    alone(question, columns) < alone(question, effect) + CLEARLY
 }
 
 /// Is much of it left to a shape once the first effect is in the model, and to no second effect?

@@ -36,20 +36,61 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
         .unwrap_or_else(|| Evidence::of(subject.fit));
     let generics = shapes(subject.fit, &evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
+    let best = best(&all)?;
+    let share = super::findings::beyond_the_noise(&evidence, best.share, best.terms.len());
+    if best.on == words::MOVED_BLOCK {
+        return Ok(write_moved(subject, (best, share), taken));
+    }
+    let tried = places::tried(subject, &evidence, best);
+    Ok(write(subject, (best, share), &tried, taken))
+}
+
+/// What a formula is written for, of all that the misfit depends on: what `diagnose` names first, or nothing, because the
+/// second would be sketched from what the first has left in it.
+///
+/// # Errors
+/// When nothing is significant, or formulas have no word for the first.
+pub(super) fn best(all: &[Dependence]) -> Result<&Dependence> {
     let level = crate::search::multiplicity::FAMILY_LEVEL;
-    let significant: Vec<&Dependence> = all.iter().filter(|d| d.p_adjusted < level).collect();
-    let Some(first) = significant.first() else {
+    let Some(first) = all.iter().find(|d| d.p_adjusted < level) else {
         return Err(Failure::new("sketch::nothing_left", "what is left over depends on nothing that can be seen")
             .help("`axiscal diagnose` says whether the model fits; more touches at more poses show smaller errors"));
     };
-    // what `diagnose` names first, or nothing: the second would be sketched from what the first has left in it
-    let Some(best) = Some(*first).filter(|d| d.terms.iter().all(|t| t.formula.is_some())) else {
-        return Err(Failure::new("sketch::no_formula", format!("formulas have no word for {}: {}", first.on, words::kind(first)))
-            .help("a block that moved, a dirty face or a pose that does not come back is put right on the machine, not by a formula"));
-    };
-    let tried = places::tried(subject, &evidence, best);
-    let share = super::findings::beyond_the_noise(&evidence, best.share, best.terms.len());
-    Ok(write(subject, (best, share), &tried, taken))
+    if first.on == words::MOVED_BLOCK || first.terms.iter().all(|t| t.formula.is_some()) {
+        return Ok(first);
+    }
+    let says = format!("no formula is written for what goes with {}: {}", words::plain(&first.on), words::kind(first));
+    Err(Failure::new("sketch::no_formula", says)
+        .help("a dirty face, a block of another size or a pose that does not come back is put right on the machine"))
+}
+
+/// A block that stands elsewhere from some moment on: formulas do not name a block, but an effect may have a size for each.
+fn write_moved(subject: Subject, (d, share): (&Dependence, f64), taken: &dyn Fn(&str) -> bool) -> Sketch {
+    let id = free_id("moved-block", taken);
+    let prefix = id.replace('-', "_");
+    let says = words::says(d, share, subject.fit, subject.machine);
+    let size = d.terms.first().map_or(0.0, |t| t.size.abs().max(t.sigma));
+    let typical = plain(size.max(0.1));
+    let formula = format!("step(t - {})", plain(d.scanned));
+    let terms: String = ["dx", "dy", "dz"]
+        .map(|dof| {
+            format!("  {{ parameter = \"{prefix}_{dof}\", unit = \"um\", dof = \"{dof}\", formula = \"{formula}\", typical = {typical} }},\n")
+        })
+        .concat();
+    let block = words::moved_block(d, subject.fit).unwrap_or_default();
+    let toml = format!(
+        "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: block {block} moved\"\nsays = \"{}\"\nlook = \"{}\"\n# every block has sizes of its own: those of the blocks that stood still come to nothing\nper = \"block\"\nat = \"block\"\nterms = [\n{terms}]\n",
+        says.replace('"', "'"),
+        words::kind(d).replace('"', "'"),
+    );
+    let formula = format!("{formula} [block dx dy dz, each block by itself]");
+    Sketch { id, says, formula, toml, sizes: Vec::new(), tried: Vec::new() }
+}
+
+/// An id that nothing has yet.
+fn free_id(stem: &str, taken: &dyn Fn(&str) -> bool) -> String {
+    let free = |n: usize| if n == 1 { format!("sketch-{stem}") } else { format!("sketch-{stem}-{n}") };
+    (1..).map(free).find(|id| !taken(id)).unwrap_or_else(|| format!("sketch-{stem}"))
 }
 
 /// Six digits without an exponent.
@@ -65,8 +106,7 @@ fn write(
     taken: &dyn Fn(&str) -> bool,
 ) -> Sketch {
     let stem: String = d.on.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let free = |n: usize| if n == 1 { format!("sketch-{stem}") } else { format!("sketch-{stem}-{n}") };
-    let id = (1..).map(free).find(|id| !taken(id)).unwrap_or_else(|| format!("sketch-{stem}"));
+    let id = free_id(&stem, taken);
     let prefix: String = id.replace('-', "_");
     let says = words::says(d, share, subject.fit, subject.machine);
     let shape_name = d.shape.as_ref().map(|s| format!("{prefix}_{}", s.name));

@@ -87,7 +87,8 @@ fn faint(out: &Diagnosis, fit: &Fit) -> bool {
 }
 
 /// Says the verdict in a sentence: the terminal, the report and the workbench say it as it is said here.
-pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &Beside) {
+pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decision, beside: &Beside) {
+    let fit = subject.fit;
     out.faint = beside.gathered.is_none() && beside.scatter.is_none() && faint(out, fit);
     let against = format!("{:.2} um RMS against {:.2} um noise", out.rms_um, out.noise_um);
     out.says = match out.verdict {
@@ -110,7 +111,21 @@ pub(super) fn says(out: &mut Diagnosis, fit: &Fit, decision: Decision, beside: &
             let named = out.candidates.first().map_or_else(String::new, |c| missing(c, &against));
             let better = beside.better.as_ref().and_then(|on| out.depends.iter().find(|w| w.on == *on));
             let better = better.map_or_else(String::new, |w| {
-                format!(" A shape without a name describes it better, so that the name may be wrong: {}.", w.says)
+                // what depends on the effect's own variable has the same words: what counts is what goes beyond it
+                let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
+                match own {
+                    Some(c) => format!(
+                        " Another form of the same dependence describes it better: {:.0} % more of what is left goes with {} \
+                         than {} takes, so that the name may be wrong or not all.",
+                        (100.0 * (w.share - c.share)).max(0.0),
+                        super::words::plain(&w.by),
+                        c.effect
+                    ),
+                    None => format!(
+                        " A shape without a name describes it better, so that the name may be wrong: {}.",
+                        w.says
+                    ),
+                }
             });
             named + &better
         }
@@ -174,6 +189,19 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
     out.power.clear();
     out.not_seen.clear();
     out.outliers.clear();
+    (out.moved_block, out.sketchable) = (None, false);
+    out.faces.clear();
+    if let Some((s, first)) = fit.data.supposed.as_ref().zip(out.gross.first()) {
+        let says = &first.says;
+        out.says = format!(
+            "{} of {} touches are far from their places. It looks as if {says}: that would put {} of them where they belong. \
+             Correct it in the machine file or the log and measure again; nothing can be said about small effects before.",
+            s.far, s.of, s.right
+        );
+        out.candidates.extend(super::gross::of_misses(subject, &[first]));
+        out.verdict = Verdict::MissingEffect;
+        return;
+    }
     let named: Vec<&super::answer::Gross> = out.gross.iter().filter(|g| g.agrees.is_some()).collect();
     if let Some(first) = named.first() {
         let alike: Vec<&super::answer::Gross> = named.iter().copied().filter(|g| g.agrees == first.agrees).collect();
@@ -189,9 +217,10 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
         );
         return;
     }
+    let far = fit.data.unusable.iter().filter(|u| u.reason == crate::model::data::ELSEWHERE).count();
+    let why = if 2 * far > missed { "they are far from their places" } else { "the search found nothing" };
     out.says = format!(
-        "{missed} of {made} touches cannot be used, most of them because the search found nothing: nothing can be said about small \
-         effects. Does an axis count the other way round, are two exchanged, do the blocks stand where the plan says, does the \
+        "{missed} of {made} touches cannot be used, most of them because {why}: nothing can be said about small effects. Does an axis count the other way round, are two exchanged, do the blocks stand where the plan says, does the \
          log belong to this plan?"
     );
 }
@@ -202,7 +231,10 @@ fn missing(c: &Candidate, against: &str) -> String {
         _ => "",
     };
     let what = if c.same_as.is_empty() {
-        format!("Missing: {} ({}).", c.name, c.effect)
+        match &c.or_else {
+            Some(other) => format!("Missing: {} ({}), or {other}: these touches cannot tell.", c.name, c.effect),
+            None => format!("Missing: {} ({}).", c.name, c.effect),
+        }
     } else {
         format!("Missing: {}; these touches cannot tell them apart.", super::words::one_of(&c.effect, &c.same_as))
     };

@@ -1,11 +1,15 @@
 //! Findings in the words of the shop floor.
 
+use super::answer::Diagnosis;
 use super::features::direction_words;
 use crate::fit::Fit;
 use crate::machine::Machine;
 use crate::search::dependence::Dependence;
-use crate::search::generic::CONSTANT;
+use crate::search::generic::{CONSTANT, Features};
 use crate::units::deg_from_rad;
+
+/// What a shape depends on where one block stands elsewhere from some moment on.
+pub(super) const MOVED_BLOCK: &str = "t*block";
 
 /// `a`, `a or b`, `a, b or c`.
 #[must_use]
@@ -127,8 +131,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
             },
         ),
         "t*block" => {
-            let number: Option<usize> = d.id.split("block-").nth(1).and_then(|w| w.split(':').next()?.parse().ok());
-            let block = number.and_then(|n| fit.data.set_ups.get(n)).map_or("one block", |s| s.label.as_str());
+            let block = moved_block(d, fit).unwrap_or("");
             (format!("block {block}"), format!("it stands elsewhere from {:.2} h after the first touch on", d.scanned))
         }
         "T" => ("the temperature".to_owned(), "smoothly".to_owned()),
@@ -159,6 +162,52 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
     format!("{percent} % of what is left goes with {on} ({how}), {direction}")
 }
 
+/// The block that stands elsewhere from some moment on.
+#[must_use]
+pub fn moved_block<'a>(d: &Dependence, fit: &'a Fit) -> Option<&'a str> {
+    let number = d.groups.first().filter(|_| d.on == MOVED_BLOCK)?;
+    fit.data.set_ups.get(*number).map(|s| s.label.as_str())
+}
+
+/// What a person calls a group of touches that x numbers: `full/a +X`, `full/a`, `visit 3`.
+#[must_use]
+pub fn group(on: &str, number: usize, fit: &Fit, features: &Features) -> Option<String> {
+    match on {
+        "face" => {
+            let origin = fit.data.origins.get(features.face.iter().position(|f| *f == number)?)?;
+            Some(format!("{} {}", origin.block, origin.face))
+        }
+        "block" => fit.data.set_ups.get(number).map(|s| s.label.clone()),
+        "visit" => Some(format!("visit {}", number + 1)),
+        _ => None,
+    }
+}
+
+/// Does an effect's own formula speak of a variable?
+pub(super) fn speaks_of(subject: super::Subject, effect: &str, variable: &str) -> bool {
+    let effect = subject.catalogue.get(effect, subject.machine);
+    effect.is_some_and(|e| e.terms.iter().any(|t| t.formula.variables().into_iter().any(|v| v == variable)))
+}
+
+/// What to do at the machine about a finding that no formula says.
+#[must_use]
+pub fn at_the_machine(found: &Diagnosis) -> String {
+    if !found.faces.is_empty() {
+        return format!("clean {} and touch them again", found.faces.join(", "));
+    }
+    if let Some(block) = &found.moved_block {
+        return format!("clamp block {block} anew and measure again");
+    }
+    match found.depends.first().map(|w| w.by.as_str()) {
+        Some("face") => "clean the faces of the blocks and touch them again",
+        Some("block") => "look whether a block is loose or dirty, clamp and clean it, and measure again",
+        Some("visit") => "look for play or dirt in the clamping and indexing of the rotary axes, and measure again",
+        Some(_) => "look for it at the machine: no formula says it",
+        None => "measure again with more touches: what is left depends on nothing that these show",
+    }
+    .to_owned()
+}
+
 fn harmonic(d: &Dependence) -> String {
     if form(d) == "order" { turns(d.scanned) } else { "smoothly over the turn".to_owned() }
 }
@@ -173,7 +222,7 @@ pub fn kind(d: &Dependence) -> String {
         ("t", "period") => "something that cycles: a cooling unit, a lubrication pump, doors and draughts",
         ("t", "exponential") => "warming up: it moves fast at first and comes to rest",
         ("t", _) => "slow change: temperature, creep of a clamp",
-        ("t*block", _) => "a moved block: loose, knocked, or dirt under it",
+        ("t*block", _) => "a block was knocked or slid: a loose clamp, dirt under it, a collision",
         (CONSTANT, _) => "an offset that the model does not hold: a zero point, a length, a position error of an axis",
         ("block", _) => "a block that stands or measures otherwise than the rest: loose, tilted, another size",
         ("face", _) => "single faces that lie elsewhere: chips, burrs, coolant",

@@ -187,6 +187,12 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
             uncertainty::MOST_UNMODELLED
         ));
     }
+    if let Some(s) = &fit.data.supposed {
+        out.push(format!(
+            "{} of {} touches are far from their places; {} would be right if {}: put that right first, these values are of the touches that happen to stand where the plan has them",
+            s.far, s.of, s.right, s.says
+        ));
+    }
     let n_out = fit.rejected.values().filter(|r| !r.starts_with("taken out")).count();
     let n = fit.data.observations.len();
     let share = |count: usize| 100.0 * count as f64 / n.max(1) as f64;

@@ -195,7 +195,8 @@ pub fn write(machine: &Machine, touches: &[Touch]) -> String {
         if warmed {
             let _ = write!(text, ",{}", optional(touch.temperature_deg_c));
         }
-        text.push_str(if touch.status == Status::Hit { ",hit\n" } else { ",miss\n" });
+        // what is far from its place stands there as the control gave it: whoever reads it finds the same
+        text.push_str(if touch.status == Status::Miss { ",miss\n" } else { ",hit\n" });
     }
     text
 }

@@ -91,7 +91,7 @@ pub(super) fn match_at(
         findings.push(at(swaps::explain(machine, &pairs, bad), line));
         return findings.finish(Vec::new());
     }
-    if let Some(finding) = swaps::hint(machine, &pairs, &good) {
+    if let Some(finding) = swaps::hint(machine, &pairs) {
         findings.push(finding);
     }
     let mut implausible = Capped::few();
@@ -101,9 +101,8 @@ pub(super) fn match_at(
         let position = complete(planned, raw);
         if !good {
             implausible.push(|| at(not_here(machine, planned, &position), raw.line));
-            continue;
         }
-        if raw.status == Status::Miss {
+        if good && raw.status == Status::Miss {
             missed.push(|| {
                 let message = format!(
                     "touch {} (block {}, face {}) was missed: the probe did not trigger",
@@ -116,7 +115,7 @@ pub(super) fn match_at(
         touches.push(Touch {
             id: planned.id,
             position,
-            status: raw.status,
+            status: if good { raw.status } else { Status::Elsewhere },
             time_s: raw.time_s,
             temperature_deg_c: raw.temperature_deg_c,
             line: raw.line,
@@ -133,7 +132,7 @@ pub(super) fn match_at(
                 .help("the rest is used; what can no longer be told from it, the fit will say"),
         );
     }
-    if touches.is_empty() {
+    if touches.iter().all(|t| t.status == Status::Elsewhere) {
         findings.push(
             Finding::error("log::no_match", "no touch of the log can be used with this plan")
                 .help("is this the plan that the program was made with?"),

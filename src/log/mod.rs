@@ -25,6 +25,7 @@ pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use reader::Reader;
 pub use record::LogHeader;
 pub use runs::RunFound;
+pub use swaps::{Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
 
 use crate::axes::{AxisMap, AxisName};
@@ -48,7 +49,7 @@ pub enum Writer<'a> {
 /// A log, read and matched to its plan.
 #[derive(Debug, Clone)]
 pub struct MatchedLog {
-    /// In the order of the plan, each once; missed touches are among them.
+    /// In the order of the plan, each once; missed touches and those far from their places are among them.
     pub touches: Vec<Touch>,
     /// Every touch of the plan is read, and the log is not cut off.
     pub complete: bool,
@@ -142,7 +143,8 @@ pub(crate) fn read_digested(
         );
         return Err(Failure(findings.0));
     }
-    let complete = touches.len() == plan.touches.len() && parsed.ending != Ending::CutOff;
+    let usable = touches.iter().filter(|t| t.status != Status::Elsewhere).count();
+    let complete = usable == plan.touches.len() && parsed.ending != Ending::CutOff;
     Ok((MatchedLog { touches, complete, ending: parsed.ending, runs: parsed.runs }, findings))
 }
 

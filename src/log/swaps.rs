@@ -9,35 +9,66 @@ use crate::program::plan::PlanTouch;
 use crate::units::mm_from_inch;
 use nalgebra::Vector3;
 
-/// A mistake: what it says, what undoes it.
+/// A mistake: its name, what it says, what undoes it.
 struct Mistake {
+    name: String,
     says: String,
     help: &'static str,
     undo: Box<dyn Fn(Position) -> Position>,
 }
 
-/// The finding where some touches (not most) lie far from their places and one simple mistake explains nearly all of them
-/// without harm to the rest: the sign of a rotary axis shows only in the poses where it is not 0.
-pub(super) fn hint(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], good: &[bool]) -> Option<Finding> {
-    let bad = good.iter().filter(|g| !**g).count();
-    if bad < 3 {
+/// What would put the touches that are far from their places where they belong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Supposed {
+    /// `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`: as the effect of gross mistakes calls its parameters.
+    pub name: String,
+    /// In words: "the sign of B were the other one".
+    pub says: String,
+    /// What to look at.
+    pub help: &'static str,
+    /// So many touches are far from their places …
+    pub far: usize,
+    /// … so many would be right …
+    pub right: usize,
+    /// … of so many.
+    pub of: usize,
+}
+
+/// The one simple mistake that explains nearly all touches that lie far from their places, without harm to the rest: the
+/// sign of a rotary axis shows only in the poses where it is not 0. Each touch with its position and the axes that the
+/// log holds.
+#[must_use]
+pub fn suppose(machine: &Machine, touches: &[(&PlanTouch, Position, [bool; 6])]) -> Option<Supposed> {
+    let fits_as = |undo: &dyn Fn(Position) -> Position| -> Vec<bool> {
+        touches.iter().map(|(planned, at, present)| fits(machine, planned, &undo(*at), *present)).collect()
+    };
+    let good = fits_as(&|p| p);
+    let far = good.iter().filter(|g| !**g).count();
+    if far < 3 {
         return None;
     }
     mistakes(machine).into_iter().find_map(|mistake| {
-        let right = |(planned, raw): &(&PlanTouch, RawTouch)| {
-            fits(machine, planned, &(mistake.undo)(whole(raw, planned)), raw.present)
-        };
-        let mended = pairs.iter().zip(good).filter(|(pair, good)| !**good && right(pair)).count();
-        let all = pairs.iter().filter(|pair| right(pair)).count();
-        (mended * 10 >= bad * 9 && all * 10 >= pairs.len() * 9).then(|| {
-            let message = format!(
-                "{bad} of {} touches are far from their places; {all} would be right if {}",
-                pairs.len(),
-                mistake.says
-            );
-            Finding::warning("log::swapped", message).help(mistake.help)
+        let mended = fits_as(&mistake.undo);
+        let right = mended.iter().filter(|m| **m).count();
+        let of_far = mended.iter().zip(&good).filter(|(m, g)| **m && !**g).count();
+        (of_far * 10 >= far * 9 && right * 10 >= touches.len() * 9).then(|| Supposed {
+            name: mistake.name,
+            says: mistake.says,
+            help: mistake.help,
+            far,
+            right,
+            of: touches.len(),
         })
     })
+}
+
+/// The finding where some touches (not most) lie far from their places and one simple mistake explains it.
+pub(super) fn hint(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)]) -> Option<Finding> {
+    let touches: Vec<(&PlanTouch, Position, [bool; 6])> =
+        pairs.iter().map(|(planned, raw)| (*planned, whole(raw, planned), raw.present)).collect();
+    let Supposed { says, help, far, right, of, .. } = suppose(machine, &touches)?;
+    let message = format!("{far} of {of} touches are far from their places; {right} would be right if {says}");
+    Some(Finding::warning("log::swapped", message).help(help))
 }
 
 /// The axis positions of a touch; axes that the log lacks stand at the plan's pose.
@@ -80,14 +111,15 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
     let mut all = Vec::new();
     let [x, y, z] = [0usize, 1, 2];
     let orders = [
-        ([y, x, z], "X and Y"),
-        ([z, y, x], "X and Z"),
-        ([x, z, y], "Y and Z"),
-        ([y, z, x], "X, Y and Z"),
-        ([z, x, y], "X, Y and Z"),
+        ([y, x, z], "X and Y", "swap_XY"),
+        ([z, y, x], "X and Z", "swap_ZX"),
+        ([x, z, y], "Y and Z", "swap_YZ"),
+        ([y, z, x], "X, Y and Z", "swap_XYZ"),
+        ([z, x, y], "X, Y and Z", "swap_XYZ"),
     ];
-    for (order, names) in orders {
+    for (order, names, name) in orders {
         all.push(Mistake {
+            name: name.to_owned(),
             says: format!("the columns {names} were exchanged"),
             help: columns,
             undo: Box::new(move |p| p.with_xyz_mm(Vector3::new(p.0[order[0]], p.0[order[1]], p.0[order[2]]))),
@@ -96,6 +128,7 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
     let rotary: Vec<AxisName> = machine.rotary().map(|a| a.name).collect();
     if let [first, second] = rotary[..] {
         all.push(Mistake {
+            name: format!("swap_{first}{second}"),
             says: format!("the columns {first} and {second} were exchanged"),
             help: columns,
             undo: Box::new(move |mut p| {
@@ -105,6 +138,7 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
         });
     }
     all.push(Mistake {
+        name: "inch".to_owned(),
         says: "the numbers were inches".into(),
         help: "the program sets millimetres: was the log written by it?",
         undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(mm_from_inch))),
@@ -119,6 +153,7 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
             axes.iter().enumerate().filter(|(i, _)| subset >> i & 1 == 1).map(|(_, a)| *a).collect();
         let names: Vec<String> = turned.iter().map(ToString::to_string).collect();
         all.push(Mistake {
+            name: names.iter().map(|n| format!("flip_{n}")).collect::<Vec<_>>().join(" "),
             says: format!("the sign of {} were the other one", names.join(" and ")),
             help: signs,
             undo: Box::new(move |mut p| {
@@ -140,6 +175,7 @@ fn shift(pairs: &[(&PlanTouch, RawTouch)], whole: impl Fn(&RawTouch, &PlanTouch)
     };
     let by = Vector3::new(median(0)?, median(1)?, median(2)?);
     Some(Mistake {
+        name: "shift".to_owned(),
         says: format!("all were shifted by X {:.3} Y {:.3} Z {:.3} mm", by.x, by.y, by.z),
         help: "is `origin` in machines.toml the machine position at the origin of R? was another offset active in that run?",
         undo: Box::new(move |p| p.with_xyz_mm(p.xyz_mm() - by)),

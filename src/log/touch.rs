@@ -9,6 +9,8 @@ pub enum Status {
     Hit,
     /// It did not: the position is where the search ended.
     Miss,
+    /// The position is far from where this touch can be: it is kept as the log has it, and not used.
+    Elsewhere,
 }
 
 /// One touch as the log gives it. Positions are NC coordinates in R (mm, deg), not corrected for the ball.

@@ -3,7 +3,7 @@
 use super::formula::{State, VARIABLES, slot};
 use super::predict::{Observation, SetUp};
 use crate::axes::{AxisMap, AxisName, Position};
-use crate::log::{Status, Touch};
+use crate::log::{Status, Supposed, Touch, suppose};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Plan, PlanBlock, PlanTouch};
 use crate::units::{hours_from_s, rad_from_deg};
@@ -68,7 +68,13 @@ pub struct Data {
     /// For each visit: visits of equal poses share a number. The rotary axes were moved there in the same sense, the
     /// same blocks and stylus and the same orientation of the spindle are in use: only scatter and time part them.
     pub poses: Vec<usize>,
+    /// Where touches of a run are far from their places: the one simple mistake that would explain it. What is left of such
+    /// a run is no sample of the machine, however many touches it has.
+    pub supposed: Option<Supposed>,
 }
+
+/// Why a touch that is far from its place is not used.
+pub const ELSEWHERE: &str = "far from its place";
 
 /// More touches than this share may not be missing.
 const MOST_MISSED: f64 = 0.2;
@@ -80,10 +86,11 @@ impl Data {
         self.observations.len() + self.unusable.len()
     }
 
-    /// Are so many touches missing that the rest is no sample of the machine?
+    /// Is what can be used no sample of the machine: are too many touches missing, or just those that a simple mistake puts
+    /// elsewhere?
     #[must_use]
     pub fn mostly_missed(&self) -> bool {
-        self.unusable.len() as f64 > MOST_MISSED * self.made() as f64
+        self.supposed.is_some() || self.unusable.len() as f64 > MOST_MISSED * self.made() as f64
     }
 }
 
@@ -101,6 +108,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let mut last_sense = [0.0; 6];
         let mut before = Before::default();
         visits.last = None;
+        data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run));
         for touch in run.touches {
             let Some(planned) = run.plan.touch(touch.id) else {
                 data.unusable.push(Unusable {
@@ -119,6 +127,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             previous = Some(planned);
             let reason = match touch.status {
                 Status::Miss => Some("the search ended without a trigger"),
+                Status::Elsewhere => Some(ELSEWHERE),
                 Status::Hit if touch.position.0.iter().any(|v| !v.is_finite()) => Some("a position is not a number"),
                 Status::Hit => None,
             };
@@ -191,6 +200,15 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         }
     }
     data
+}
+
+/// What would put the touches of a run that are far from their places where they belong.
+fn elsewhere(machine: &Machine, run: &Run) -> Option<Supposed> {
+    if !run.touches.iter().any(|t| t.status == Status::Elsewhere) {
+        return None;
+    }
+    let planned = |t: &Touch| Some((run.plan.touch(t.id)?, t.position, [true; 6]));
+    suppose(machine, &run.touches.iter().filter_map(planned).collect::<Vec<_>>())
 }
 
 /// What the touches of one index visit have in common.

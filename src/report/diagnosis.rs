@@ -4,13 +4,16 @@ use super::fit::{digits, number, significant, table, with_unit};
 use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
-use crate::diagnose::answer::{Candidate, Diagnosis, Shape, Verdict};
+use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape, Verdict};
 use crate::diagnose::gross;
 use crate::diagnose::words::plain;
 use comfy_table::Cell;
 
 /// Rows of the small plot.
 const ROWS: usize = 11;
+
+/// Groups of touches that are named below the plot.
+const MOST_NAMED: usize = 6;
 
 /// Effects named with their smallest detectable size.
 const MOST_POWER: usize = 4;
@@ -49,17 +52,34 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
         }
     }
     for g in d.gross.iter().take(3) {
-        out += &match g.agrees {
-            Some(agrees) => wrapped(
+        out += &match (g.in_place, g.agrees) {
+            (Some(share), _) => wrapped(
+                &format!("tried: {}: {:.0} % of the touches would be where they belong", g.says, 100.0 * share),
+                2,
+            ),
+            (_, Some(agrees)) => wrapped(
                 &format!("tried: {}: {:.0} % of the touches would hit or miss as they did", g.says, 100.0 * agrees),
                 2,
             ),
-            None => wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2),
+            _ => wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2),
         };
     }
-    for o in &d.outliers {
+    // the touches of a block that moved are one finding, and not so many chips
+    let moved = |o: &&Outlier| d.moved_block.as_ref().is_some_and(|b| *b == o.block);
+    let of_block: Vec<&Outlier> = d.outliers.iter().filter(moved).collect();
+    if let (Some(block), Some(first)) = (&d.moved_block, of_block.first()) {
+        let ids: Vec<String> = of_block.iter().map(|o| o.id.to_string()).collect();
+        out += &match ids.len() {
+            1 => wrapped(&format!("not used: touch {} of run {}, of block {block} that moved", first.id, first.run), 2),
+            n => wrapped(&format!("not used: {n} touches of block {block} that moved: {}", ids.join(", ")), 2),
+        };
+    }
+    for o in d.outliers.iter().filter(|o| !moved(o)) {
         let back = if o.comes_back { "; it belongs to the rest once the first candidate is in the model" } else { "" };
-        out += &wrapped(&format!("not used: touch {} of run {}: {}{back}", o.id, o.run, o.reason), 2);
+        out += &wrapped(
+            &format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason),
+            2,
+        );
     }
     let large: Vec<String> = d
         .power
@@ -141,6 +161,9 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         // an effect of a person's own may say nothing of either
         let says = if first.says.is_empty() { String::new() } else { format!(": {}", first.says) };
         out += &wrapped(&format!("{which}{}{says}", first.name), 2);
+        if let Some(other) = &first.or_else {
+            out += &wrapped(&format!("  or {other}: these touches cannot tell"), 4);
+        }
         if !first.look.is_empty() {
             out += &wrapped(&format!("  look: {}", first.look), 4);
         }
@@ -151,7 +174,10 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
             out += &wrapped(&format!("  {}", wrong_sign(first)), 4);
         }
         if !first.plausible {
-            out += "  its size would be unusual: look at the others of its group first\n";
+            out += match first.same_as.len() {
+                0 => "  its size would be unusual: it may be a name for something else\n",
+                _ => "  its size would be unusual: look at the others of its group first\n",
+            };
         }
         for w in &first.weakens {
             out += &wrapped(
@@ -196,6 +222,7 @@ pub(super) fn probability(p: f64) -> String {
 /// A candidate in a cell: never one name where these touches cannot tell it from others.
 fn one_of(c: &Candidate) -> String {
     match c.same_as.len() {
+        0 if c.or_else.is_some() => format!("{} or another jump", c.effect),
         0 => c.effect.clone(),
         1 => format!("{} or 1 other", c.effect),
         n => format!("{} or {n} others", c.effect),
@@ -256,7 +283,11 @@ fn plot(s: &Shape, paper: Paper) -> String {
     }
     // a group has a number and no unit
     let unit = if s.x_unit == "1" { String::new() } else { format!(" ({})", s.x_unit) };
-    let what = format!("what is left against {}{unit}, {}, about its mean", plain(&s.by), s.direction);
+    let against = match &s.block {
+        Some(block) => format!("the time on block {block}"),
+        None => plain(&s.by),
+    };
+    let what = format!("what is left against {against}{unit}, {}, about its mean", s.direction);
     let mut out = wrapped(&what, 2, paper);
     for (r, line) in grid.iter().enumerate() {
         let label = match r {
@@ -274,5 +305,14 @@ fn plot(s: &Shape, paper: Paper) -> String {
     let (from, to) = (axis_label(from, to - from), axis_label(to, to - from));
     let gap = columns.saturating_sub(from.len() + to.len());
     out += &format!("{} {from}{}{to}\n", " ".repeat(8), " ".repeat(gap));
+    // a number says nothing to a person: those that stand out by name
+    let far = |i: &usize| s.y[*i].abs() > s.band[*i];
+    let mut named: Vec<usize> = (0..s.labels.len().min(s.y.len())).filter(far).collect();
+    named.sort_by(|a, b| s.y[*b].abs().total_cmp(&s.y[*a].abs()));
+    let of = |&i: &usize| format!("{} {} {:+.1}", i + 1, s.labels[i], s.y[i]);
+    let names: Vec<String> = named.iter().take(MOST_NAMED).map(of).collect();
+    if !names.is_empty() {
+        out += &wrapped(&format!("furthest off: {} {}", names.join(", "), s.y_unit), 2, paper);
+    }
     out
 }

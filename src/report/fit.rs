@@ -2,8 +2,12 @@
 
 use super::lay::lay;
 use super::plot::Paper;
-use crate::fit::outcome::{Outcome, Parameter, Status};
+use crate::fit::outcome::{Outcome, Parameter, Rejected, Status};
+use crate::model::data::ELSEWHERE;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+
+/// Up to so many touches that are far from their places have a line each.
+const MOST_FAR: usize = 12;
 
 /// Lines above, below and under the head only: rows are read across, not boxed in.
 const HOUSE: TableStyle = TableStyle::new()
@@ -146,7 +150,18 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     if !o.parted_together.is_empty() {
         out += &format!("what tells all of it together: {}\n", o.parted_together.join("; and "));
     }
-    for r in &o.rejected {
+    // a column of the other sign puts hundreds of them elsewhere: one line says so
+    let far = |r: &&Rejected| r.reason.starts_with(ELSEWHERE);
+    let all_far: Vec<&Rejected> = o.rejected.iter().filter(far).collect();
+    let many = all_far.len() > MOST_FAR;
+    if let Some(first) = all_far.first().filter(|_| many) {
+        let n = all_far.len();
+        out += &format!(
+            "not used: {n} touches far from their places, the first of them touch {} of run {}\n",
+            first.id, first.run
+        );
+    }
+    for r in o.rejected.iter().filter(|r| !(many && far(r))) {
         out += &format!("not used: touch {} of run {}: {}\n", r.id, r.run, r.reason);
     }
     for w in &o.warnings {

@@ -77,6 +77,16 @@ pub fn change(
     }
     lay(&mut t, paper.width.min(100), &[]);
     let mut out = format!("{t}\n");
+    if other_noise((before.noise_um, before.visit_um), (after.noise_um, after.visit_um)) {
+        let line = format!(
+            "chi2/dof is held against the noise as each fit finds it: touch {} and index visits {} um before, {} and {} um after",
+            significant(before.noise_um),
+            significant(before.visit_um),
+            significant(after.noise_um),
+            significant(after.visit_um)
+        );
+        out += &format!("{}\n", sentence(&line, paper.width, 0, 0));
+    }
     if let Some((fall, se)) = doubt.fall {
         let how = if doubt.nested_rms_um.is_some() { "" } else { "; you chose the effect knowing all touches" };
         out += &format!(
@@ -105,6 +115,14 @@ pub fn change(
         out += &format!("note: {r}\n");
     }
     paper.plain(out)
+}
+
+/// Do two fits hold what is left against another noise, so that their chi2/dof cannot be compared? µm.
+fn other_noise(before: (f64, f64), after: (f64, f64)) -> bool {
+    /// A difference that shows in chi2/dof, as a share of the noise of a touch.
+    const SHOWS: f64 = 0.05;
+    let room = SHOWS * before.0.max(after.0);
+    (before.0 - after.0).abs() > room || (before.1 - after.1).abs() > room
 }
 
 /// The ladder as a table and a chart.
@@ -143,10 +161,26 @@ pub fn history(h: &History, paper: Paper) -> String {
         "held out: each index visit is left out of the fit in turn, ± one standard error; the effects were chosen knowing all \
          touches"
     };
+    let noises: Vec<(usize, f64, f64)> =
+        h.steps.iter().filter_map(|s| Some((s.step, s.noise_um?, s.visit_um?))).collect();
+    let changed = noises.windows(2).any(|w| other_noise((w[0].1, w[0].2), (w[1].1, w[1].2)));
+    let noise_note = match changed {
+        true => {
+            let each = noises
+                .iter()
+                .map(|(k, noise, visit)| format!("{k}: {} and {}", significant(*noise), significant(*visit)));
+            let line = format!(
+                "chi2/dof is held against the noise of a touch and of index visits as each fit finds it, um: step {}",
+                each.collect::<Vec<_>>().join("; ")
+            );
+            sentence(&line, paper.width, 0, 0) + "\n"
+        }
+        false => String::new(),
+    };
     let points = |value: &dyn Fn(&crate::study::history::Step) -> Option<f64>| -> Vec<(f64, f64)> {
         h.steps.iter().filter_map(|s| Some((s.step as f64, value(s)?))).collect()
     };
-    let mut out = format!("{t}\n{}\n", sentence(note, paper.width, 0, 0));
+    let mut out = format!("{t}\n{}\n{noise_note}", sentence(note, paper.width, 0, 0));
     for (title, p) in [
         ("error left, um RMS, by step", points(&|s| Some(s.rms_um))),
         ("error on index visits left out, um RMS, by step", points(&|s| s.held_out_rms_um)),
@@ -181,7 +215,11 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
             number(digits(r.after.0, Some(r.after.1))),
             number(digits(r.difference, Some(r.expanded))),
             number(format!("± {}", significant(r.expanded))),
-            Cell::new(if r.changed { "changed" } else { "not changed" }),
+            Cell::new(match (v.models_differ(), r.changed) {
+                (true, _) => "models differ",
+                (_, true) => "changed",
+                _ => "not changed",
+            }),
         ]);
     }
     lay(&mut t, paper.width.min(110), &[]);

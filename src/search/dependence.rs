@@ -7,7 +7,7 @@ use super::groups::Member;
 use super::library::{Library, Origin};
 use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
 use super::score::{Question, Score, Search};
-use super::shapes::Function;
+use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -82,7 +82,10 @@ pub struct Dependence {
     pub terms: Vec<SketchTerm>,
     /// The number that the scan found, where a fit may refine it; the formulas then have it by name.
     pub shape: Option<SketchShape>,
-    /// The curve against the variable; empty for a product.
+    /// Numbers of the groups of touches that it is of: one for each point of a curve over groups, one for a block that
+    /// moves.
+    pub groups: Vec<usize>,
+    /// The curve against the variable; empty for a product of two variables.
     pub curve: Vec<CurvePoint>,
 }
 
@@ -202,6 +205,7 @@ fn dependence(
                 max: if above.is_finite() { above } else { start + start.abs().max(1e-3) },
             }
         }),
+        groups: functions.iter().filter_map(|f| f.group().map(|g| g.1)).collect(),
         curve: curve(search, score, shape, features, &kept),
     }
 }
@@ -249,8 +253,18 @@ fn curve(search: &Search, score: &Score, shape: &Shape, features: &Features, kep
         (None, Some(Function::Along { direction, .. })) => Some(*direction),
         (direction, _) => direction,
     };
-    let weight = |i: usize| direction.map_or(1.0, |d| features.directions[d].weight[i].powi(2));
     let n_touches = features.block.len();
+    // what moves one block is told by its touches alone
+    let moved = match (&shape.variables[..], functions.first().and_then(Function::group)) {
+        ([_], Some((Grouping::Block, number))) => Some(number),
+        _ => None,
+    };
+    let of_it = |i: usize| moved.is_none_or(|number| features.block[i] == number);
+    let weight = |i: usize| match direction {
+        _ if !of_it(i) => 0.0,
+        Some(d) => features.directions[d].weight[i].powi(2),
+        None => 1.0,
+    };
     let total: f64 = (0..n_touches).map(weight).sum();
     let mean = |f: &Function| -> f64 {
         let f = if let Function::Along { of, .. } = f { of.as_ref() } else { f };
@@ -267,10 +281,10 @@ fn curve(search: &Search, score: &Score, shape: &Shape, features: &Features, kep
         [] => (0..functions.len())
             .map(|i| point((i + 1) as f64, DVector::from_fn(functions.len(), |k, _| f64::from(u8::from(i == k)))))
             .collect(),
-        [v] if !shape.depends_on.contains('*') => {
-            let values = &features.variables[v].values;
-            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        [v] => {
+            let values = || (0..n_touches).filter(|&i| of_it(i)).map(|i| features.variables[v].values[i]);
+            let low = values().fold(f64::INFINITY, f64::min);
+            let high = values().fold(f64::NEG_INFINITY, f64::max);
             (0..POINTS)
                 .map(|i| {
                     let x = low + (high - low) * i as f64 / (POINTS - 1) as f64;

@@ -63,7 +63,7 @@ impl Function {
         }
     }
 
-    /// Its value at a value of its variable (1 for a product or a group, whose curve has no such axis).
+    /// Its value at a value of its variable, on the touches of its group where it is of one.
     pub fn at(&self, x: f64) -> f64 {
         match *self {
             Self::Power { centre, scale, k, .. } => ((x - centre) / scale).powi(k),
@@ -73,7 +73,18 @@ impl Function {
             Self::Kink { at, scale, .. } => (x - at).abs() / scale,
             Self::Exponential { from, constant, .. } => 1.0 - (-(x - from) / constant).exp(),
             Self::Along { ref of, .. } => of.at(x),
-            Self::Constant | Self::Product(..) | Self::Member { .. } => 1.0,
+            Self::Product(ref a, ref b) => a.at(x) * b.at(x),
+            Self::Constant | Self::Member { .. } => 1.0,
+        }
+    }
+
+    /// The group of touches that it is of.
+    pub fn group(&self) -> Option<(Grouping, usize)> {
+        match self {
+            Self::Member { of, number } => Some((*of, *number)),
+            Self::Along { of, .. } => of.group(),
+            Self::Product(a, b) => a.group().or_else(|| b.group()),
+            _ => None,
         }
     }
 

@@ -43,6 +43,12 @@ pub struct Step {
     pub later_run_rms_um: Option<f64>,
     /// Reduced chi-square.
     pub chi2_per_dof: f64,
+    /// Standard deviation of a touch that it is held against, µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_um: Option<f64>,
+    /// Scatter of index visits that it is held against, µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visit_um: Option<f64>,
     /// Free parameters.
     #[serde(default)]
     pub unknowns: usize,

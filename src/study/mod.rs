@@ -171,6 +171,12 @@ pub struct DataEntry {
     pub compensation: Option<String>,
 }
 
+/// A word of the whole study that stands in one of its tables: what follows a `[[data]]` belongs to it.
+fn misplaced(error: &toml::de::Error) -> Option<&'static str> {
+    let word = error.message().strip_prefix("unknown field `")?.split('`').next()?;
+    ["effects_file", "machine", "machines"].into_iter().find(|key| *key == word)
+}
+
 impl Study {
     /// Reads a study.
     ///
@@ -178,8 +184,11 @@ impl Study {
     /// When the text is not TOML of this form or contradicts itself; every finding has its place.
     pub fn parse(source: &Source) -> Result<(Self, Findings)> {
         let w: AsWritten = toml::from_str(source.inner()).map_err(|e| {
-            from_toml(&e, source, "study::not_toml")
-                .help("`axiscal new` writes a study; `axiscal schema study` prints the form")
+            let help = match misplaced(&e) {
+                Some(key) => format!("`{key}` is a word of the whole study: put it above the first [[data]]"),
+                None => "`axiscal new` writes a study; `axiscal schema study` prints the form".to_owned(),
+            };
+            from_toml(&e, source, "study::not_toml").help(help)
         })?;
         let mut findings = Findings::default();
         if w.data.is_empty() {

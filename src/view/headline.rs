@@ -196,7 +196,10 @@ fn missing(m: &Material, c: &Candidate) -> String {
         .collect();
     let size = if is_one_size(c) { format!(" ({})", sizes.join(", ")) } else { String::new() };
     let what = match &c.same_as[..] {
-        [] => format!("{}{size}", c.name),
+        [] => match &c.or_else {
+            Some(other) => format!("{}{size}, or {other}: these touches cannot tell which", c.name),
+            None => format!("{}{size}", c.name),
+        },
         [one] => format!("{}, or {}: these touches cannot tell which", c.name, named(m, one)),
         several => format!("{}, or one of {} others that these touches cannot tell from it", c.name, several.len()),
     };
@@ -315,6 +318,7 @@ mod tests {
             parameters: Vec::new(),
             not_told: Vec::new(),
             same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
+            or_else: None,
             tell_apart: String::new(),
             says: String::new(),
             look: String::new(),
@@ -331,6 +335,9 @@ mod tests {
             format: crate::diagnose::answer::FORMAT,
             verdict: Verdict::Unexplained,
             says: String::new(),
+            sketchable: true,
+            moved_block: None,
+            faces: Vec::new(),
             faint: false,
             rms_um: 5.0,
             noise_um: 1.0,

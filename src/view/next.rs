@@ -43,7 +43,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, c, &mut out);
             }
         }
-        Verdict::Unexplained if d.faint => out.push(Next::new(
+        Verdict::Unexplained if d.faint && d.touches_would_tell() => out.push(Next::new(
             "Measure more touches",
             "Repeats and further poses say whether the weak pattern is there at all.",
             plan_next.clone(),
@@ -144,6 +144,16 @@ fn unexplained(m: &Material, out: &mut Vec<Next>) {
         let depends = d.depends.first().map_or("", |w| w.says.as_str());
         let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
         out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
+    }
+    if !d.sketchable || d.moved_block.is_some() {
+        out.push(Next::new(
+            "Put it right at the machine",
+            capital(&crate::diagnose::words::at_the_machine(d)) + ".",
+            "",
+        ));
+    }
+    if !d.sketchable {
+        return;
     }
     out.push(Next::new(
         "Write down its formula",

@@ -1,0 +1,85 @@
+//! What to do after a diagnosis. A command is named only where its verb will do something: the same findings decide here
+//! and there.
+
+use super::load::{Loaded, controller_path};
+use crate::diagnose::answer::Diagnosis;
+use crate::diagnose::{Verdict, words};
+use crate::post::Postprocessor;
+use std::path::{Path, PathBuf};
+
+/// A path as a shell takes it: in quotes where it has signs that a shell reads.
+#[must_use]
+pub fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:@,~\\".contains(c);
+    if !text.is_empty() && text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
+}
+
+/// The control that the study's runs were made on, as a call from here names it: the first of them that programs can be
+/// written for.
+#[must_use]
+pub fn controller(loaded: &Loaded) -> Option<String> {
+    let folder = loaded.path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, &folder));
+    let mut each = each.filter(|c| c != "csv");
+    each.find(|c| Postprocessor::load_built_in_or_file(c).is_ok())
+}
+
+/// The call of `plan-next`, with the study's own control.
+#[must_use]
+pub fn plan_next(loaded: &Loaded) -> String {
+    let call = |name: &str| format!("axiscal plan-next {} --out next --controller {name}", quoted(&loaded.path));
+    match controller(loaded) {
+        Some(name) => call(&quoted(&PathBuf::from(name))),
+        // touches in a file of another origin: nobody knows the control
+        None => call("NAME") + " (for NAME one of those that `axiscal controllers` lists)",
+    }
+}
+
+/// The call of `sketch-effect`.
+#[must_use]
+pub fn sketch_effect(loaded: &Loaded) -> String {
+    format!("axiscal sketch-effect {} --out my-effects.toml", quoted(&loaded.path))
+}
+
+/// What to do next, the first thing first, each line as it is printed.
+#[must_use]
+pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
+    let study = quoted(&loaded.path);
+    if found.mistake().is_some() {
+        return vec!["next: put that right and measure again; smaller errors can be spoken of afterwards".to_owned()];
+    }
+    match found.verdict {
+        Verdict::MissingEffect => {
+            let Some(first) = found.candidates.first().filter(|c| c.proposed) else { return Vec::new() };
+            if first.same_as.is_empty() {
+                return match &first.or_else {
+                    None => vec![format!("next: axiscal add {study} {}", first.effect)],
+                    Some(other) => vec![
+                        format!("next: look at the machine whether it is that, or whether {other}"),
+                        format!(
+                            "  either way this takes it out of the other errors: axiscal add {study} {}",
+                            first.effect
+                        ),
+                    ],
+                };
+            }
+            // which of them it is, is for touches or a person to say
+            let ids: Vec<&str> = std::iter::once(&first.effect).chain(&first.same_as).map(String::as_str).collect();
+            vec![
+                format!("next: {}", plan_next(loaded)),
+                format!("  or, when you know which it is: axiscal add {study} EFFECT, with one of {}", ids.join(", ")),
+            ]
+        }
+        Verdict::Unexplained if found.faint && found.touches_would_tell() => {
+            vec![format!("next: {}", plan_next(loaded)), format!("  or: {}", sketch_effect(loaded))]
+        }
+        Verdict::Unexplained if found.moved_block.is_some() && found.sketchable => vec![
+            format!("next: {}", words::at_the_machine(found)),
+            format!("  or, to take it out of the other errors: {}", sketch_effect(loaded)),
+        ],
+        Verdict::Unexplained if found.sketchable => vec![format!("next: {}", sketch_effect(loaded))],
+        Verdict::Unexplained => vec![format!("next: {}", words::at_the_machine(found))],
+        Verdict::Adequate | Verdict::TooLittleData => Vec::new(),
+    }
+}
