@@ -222,7 +222,10 @@ fn no_message_is_cut() {
                     continue;
                 }
                 let width = post.comment.message_width;
-                let wide = variant(name, "[comment]\nmessage_width = 4000\nunverified = \"as wide as it wants\"\n");
+                let wide = variant(
+                    name,
+                    "[file]\nline_length = 5000\nunverified = \"as long as it wants\"\n[comment]\nmessage_width = 4000\nunverified = \"as wide as it wants\"\n",
+                );
                 assert_ne!(wide.comment.message_width, width);
                 let (cut, whole) = (
                     messages(&written(&post, &machine, &generated).text),

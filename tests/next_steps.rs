@@ -113,6 +113,7 @@ fn a_column_of_the_other_sign_stops_every_verb() {
     assert_eq!(d["candidates"][0]["effect"], "sign-or-axis-swap", "{d}");
     assert!(d["gross"][0]["in_place"].as_f64().is_some_and(|s| s > 0.99), "{}", d["gross"]);
     let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml"]).stdout).unwrap();
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("next: put that right") && said.contains("would be where they belong"), "{said}");
     let (c, _) = json(at, &["compare", "study.toml"]);
     assert!(c["says"].as_str().unwrap().contains(says) && c["explained_by_noise"] == false, "{}", c["says"]);
@@ -182,7 +183,8 @@ fn a_moved_block_is_drawn_and_sketched() {
     let (x, y) = (list("x"), list("y"));
     let jumps: Vec<usize> = (1..y.len()).filter(|&i| (y[i] - y[i - 1]).abs() > 5.0).collect();
     assert_eq!(jumps.len(), 1, "{y:?}");
-    assert!((x[jumps[0]] - 0.83).abs() < 0.1, "{}", x[jumps[0]]);
+    // within one of its visits (0.28 h apart): some of the touches right after the knock are among those that are not used
+    assert!((x[jumps[0]] - 0.83).abs() < 0.3, "{}", x[jumps[0]]);
     let said = diagnosed(at);
     assert!(said.contains("next: clamp block full/b anew") && said.contains("the time on block full/b"), "{said}");
     let listed = said.lines().filter(|l| l.contains("not used:") && l.contains("full/b")).count();

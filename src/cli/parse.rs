@@ -91,25 +91,21 @@ fn run_record(run: &RunFound) -> serde_json::Value {
 }
 
 fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a> {
-    let touches = read.touches.iter().map(|t| {
+    let usable = || read.touches.iter().filter(|t| t.status != Status::Elsewhere);
+    let touches = usable().map(|t| {
         let mut object = serde_json::Map::new();
         object.insert("id".into(), t.id.into());
         for axis in AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()) {
             object.insert(axis.to_string(), (t.position.get(axis) + 0.0).into());
         }
-        let status = match t.status {
-            Status::Hit => "hit",
-            Status::Miss => "miss",
-            Status::Elsewhere => "elsewhere",
-        };
+        let status = if t.status == Status::Hit { "hit" } else { "miss" };
         object.insert("status".into(), status.into());
         t.time_s.into_iter().for_each(|v| drop(object.insert("time_s".into(), v.into())));
         t.temperature_deg_c.into_iter().for_each(|v| drop(object.insert("temperature_degC".into(), v.into())));
         object.insert("line".into(), t.line.into());
         serde_json::Value::Object(object)
     });
-    let usable = read.touches.iter().filter(|t| t.status != Status::Elsewhere);
-    let have: std::collections::BTreeSet<u64> = usable.map(|t| t.id).collect();
+    let have: std::collections::BTreeSet<u64> = usable().map(|t| t.id).collect();
     let count = |status: Status| read.touches.iter().filter(|t| t.status == status).count();
     Parsed {
         format: "axiscal-parse/1",

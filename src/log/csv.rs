@@ -168,7 +168,8 @@ fn touch(line: &[u8], line_number: usize, columns: &[Column], separator: u8, mar
     Ok(out)
 }
 
-/// Writes a touches CSV: numbers in full, so that reading them gives the same doubles.
+/// Writes a touches CSV: numbers in full, so that reading them gives the same doubles. What is far from its place is no touch of
+/// the plan, and is left out.
 #[must_use]
 pub fn write(machine: &Machine, touches: &[Touch]) -> String {
     let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();
@@ -183,7 +184,7 @@ pub fn write(machine: &Machine, touches: &[Touch]) -> String {
     text.push_str(if warmed { ",temperature_degC" } else { "" });
     text.push_str(",status\n");
     let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-    for touch in touches {
+    for touch in touches.iter().filter(|t| t.status != Status::Elsewhere) {
         let _ = write!(text, "{}", touch.id);
         for axis in &axes {
             // adding 0 turns -0 into 0
@@ -195,8 +196,7 @@ pub fn write(machine: &Machine, touches: &[Touch]) -> String {
         if warmed {
             let _ = write!(text, ",{}", optional(touch.temperature_deg_c));
         }
-        // what is far from its place stands there as the control gave it: whoever reads it finds the same
-        text.push_str(if touch.status == Status::Miss { ",miss\n" } else { ",hit\n" });
+        text.push_str(if touch.status == Status::Hit { ",hit\n" } else { ",miss\n" });
     }
     text
 }

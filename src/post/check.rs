@@ -301,7 +301,12 @@ impl Check<'_> {
     }
 
     fn templates(&mut self, file: &w::File, comment: &CommentRule, number: &NumberRule) -> Environment<'static> {
-        let mut env = environment(comment, number, *file.file.line_length.get_ref());
+        // the number of a block stands in its line too
+        const DIGITS: usize = 6;
+        let numbered =
+            file.file.block_numbers.as_ref().map_or(0, |n| n.word.replace("{n}", "").chars().count() + DIGITS);
+        let room = file.file.line_length.get_ref().saturating_sub(numbered);
+        let mut env = environment(comment, number, room);
         // globals reach into messages and macros too
         env.add_global("settings", minijinja::Value::from(file.settings.clone()));
         let write = &file.write;

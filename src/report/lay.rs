@@ -89,14 +89,27 @@ fn needs(t: &Table, column: usize) -> Needs {
         out.all = out.all.max(display_width(&head));
     }
     for content in t.column_cells_iter(column).flatten().map(Cell::content) {
-        let numbers = content.split_whitespace().filter(|w| is_number(w)).map(display_width).max().unwrap_or(0);
-        out.numbers = out.numbers.max(numbers).max(longest(&content).min(LEAST_WORD));
+        out.numbers = out.numbers.max(widest_number(&content)).max(longest(&content).min(LEAST_WORD));
         // a value with its uncertainty is one figure
         let figure = content.split_whitespace().all(|w| is_number(w) || is_sign(w));
         out.words = out.words.max(if figure { display_width(&content) } else { longest(&content) });
         out.all = out.all.max(content.lines().map(display_width).max().unwrap_or(0));
     }
     Needs { words: out.words.max(out.numbers), all: out.all.max(out.words).max(out.numbers), ..out }
+}
+
+/// The widest number of a text; a sign in front of it (`± 0.2`) is a part of it.
+fn widest_number(text: &str) -> usize {
+    let mut before = 0;
+    let mut widest = 0;
+    for word in text.split_whitespace() {
+        let own = display_width(word);
+        if is_number(word) {
+            widest = widest.max(before + own);
+        }
+        before = if is_sign(word) { own + 1 } else { 0 };
+    }
+    widest
 }
 
 /// A word that is (or holds, as `B-30.0` does) a number: one letter at most beside its digits.
@@ -133,7 +146,7 @@ mod tests {
     fn numbers_stay_whole_at_any_width() {
         let whole = |text: &str| ["-0.000052", "± 0.000140", " mm ", "12.3"].iter().all(|w| text.contains(w));
         let mut seen = 0;
-        for width in (46..=140).rev() {
+        for width in (49..=140).rev() {
             let mut t = example();
             let left_out = lay(&mut t, width, &["probe noise"]);
             let text = t.to_string();

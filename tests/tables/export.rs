@@ -304,7 +304,7 @@ terms = [ { parameter = "k", unit = "um/m", dof = "dx", formula = "X" } ]
 [[effect]]
 id = "my-encoder"
 at = "C"
-terms = [ { parameter = "e", unit = "urad", dof = "rz", formula = "sin(C)" } ]
+terms = [ { parameter = "ec", unit = "urad", dof = "rz", formula = "sin(C)" } ]
 [[effect]]
 id = "my-lost-motion"
 at = "reading"
@@ -327,7 +327,7 @@ fn errors_of_an_axis_s_own_position_become_its_table() {
         "swivel-head",
         &[
             ("k", "my-scale", 100.0, "um/m", ID),
-            ("e", "my-encoder", 100.0, "urad", ID),
+            ("ec", "my-encoder", 100.0, "urad", ID),
             ("b", "my-lost-motion", 2.0, "um", ID),
             ("s", "my-sag", 5.0, "um", ID),
         ],
