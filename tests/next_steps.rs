@@ -71,7 +71,8 @@ fn study_of_csv(at: &Path, change: impl Fn(&Value, &mut Vec<(String, String)>)) 
     for line in lines {
         let mut row: Vec<(String, String)> =
             head.iter().zip(line.split(',')).map(|(h, v)| ((*h).to_owned(), v.to_owned())).collect();
-        let touch = plan["touches"].as_array().unwrap().iter().find(|t| t["id"].to_string() == row[0].1).unwrap();
+        let touch =
+            plan["touches"].as_array().unwrap().iter().find(|t| t["id"].as_u64() == row[0].1.parse().ok()).unwrap();
         change(touch, &mut row);
         out.push(row.into_iter().map(|c| c.1).collect::<Vec<_>>().join(","));
     }

@@ -51,7 +51,7 @@ pub fn suppose(machine: &Machine, touches: &[(&PlanTouch, Position, [bool; 6])])
         let mended = fits_as(&mistake.undo);
         let right = mended.iter().filter(|m| **m).count();
         let of_far = mended.iter().zip(&good).filter(|(m, g)| **m && !**g).count();
-        (of_far * 10 >= far * 9 && right * 10 >= touches.len() * 9).then(|| Supposed {
+        (of_far * 10 >= far * 9 && right * 10 >= touches.len() * 9).then_some(Supposed {
             name: mistake.name,
             says: mistake.says,
             help: mistake.help,
