@@ -44,6 +44,11 @@ fn touched(programs: &[&str], scenario: &str, effects: Option<&str>) -> tempfile
     folder
 }
 
+/// Words as they were before they were laid out in lines.
+fn unwrapped(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Their study.
 fn study(at: &Path, programs: &[&str]) {
     let mut new = vec!["new".to_owned()];
@@ -113,8 +118,7 @@ fn a_column_of_the_other_sign_stops_every_verb() {
     assert_eq!(d["candidates"][0]["effect"], "sign-or-axis-swap", "{d}");
     assert!(d["gross"][0]["in_place"].as_f64().is_some_and(|s| s > 0.99), "{}", d["gross"]);
     let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml"]).stdout).unwrap();
-    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.contains("next: put that right") && said.contains("would be where they belong"), "{said}");
+    assert!(said.contains("next: put that right") && unwrapped(&said).contains("would be where they belong"), "{said}");
     let (c, _) = json(at, &["compare", "study.toml"]);
     assert!(c["says"].as_str().unwrap().contains(says) && c["explained_by_noise"] == false, "{}", c["says"]);
     let (i, _) = json(at, &["identify", "study.toml", "--quick"]);
@@ -169,7 +173,7 @@ fn what_is_said_to_be_next_can_be_done() {
 #[test]
 fn a_moved_block_is_drawn_and_sketched() {
     let own = "[[effect]]\nid = \"planted\"\nat = \"block\"\nper = \"block\"\nterms = [\n{ parameter = \"px\", unit = \"um\", dof = \"dx\", formula = \"step(t - 0.83)\" },\n{ parameter = \"py\", unit = \"um\", dof = \"dy\", formula = \"step(t - 0.83)\" } ]\n";
-    let wrong = "effects_file = \"own.toml\"\nseed = 8\n[effects.planted]\n\"px@full/b\" = 8.0\n\"py@full/b\" = -9.0\n[noise]\ntouch_um = 0.9\n";
+    let wrong = "effects_file = \"own.toml\"\nseed = 5\n[effects.planted]\n\"px@full/b\" = 8.0\n\"py@full/b\" = -5.0\n[noise]\ntouch_um = 0.7\n";
     let folder = touched(&["full"], wrong, Some(own));
     let at = folder.path();
     study(at, &["full"]);
@@ -181,12 +185,15 @@ fn a_moved_block_is_drawn_and_sketched() {
     assert_eq!((shape["block"].as_str(), shape["x_unit"].as_str()), (Some("full/b"), Some("h")), "{shape}");
     let list = |key: &str| -> Vec<f64> { shape[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect() };
     let (x, y) = (list("x"), list("y"));
-    let jumps: Vec<usize> = (1..y.len()).filter(|&i| (y[i] - y[i - 1]).abs() > 5.0).collect();
+    let jumps: Vec<usize> = (1..y.len()).filter(|&i| (y[i] - y[i - 1]).abs() > 3.0).collect();
     assert_eq!(jumps.len(), 1, "{y:?}");
     // within one of its visits (0.28 h apart): some of the touches right after the knock are among those that are not used
     assert!((x[jumps[0]] - 0.83).abs() < 0.3, "{}", x[jumps[0]]);
     let said = diagnosed(at);
-    assert!(said.contains("next: clamp block full/b anew") && said.contains("the time on block full/b"), "{said}");
+    assert!(
+        said.contains("next: clamp block full/b anew") && unwrapped(&said).contains("the time on block full/b"),
+        "{said}"
+    );
     let listed = said.lines().filter(|l| l.contains("not used:") && l.contains("full/b")).count();
     assert!(listed <= 1, "{said}");
     let text = std::fs::read_to_string(at.join("study.toml")).unwrap();

@@ -71,8 +71,9 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                 format!("  or, when you know which it is: axiscal add {study} EFFECT, with one of {}", ids.join(", ")),
             ]
         }
-        Verdict::Unexplained if found.faint && found.touches_would_tell() => {
-            vec![format!("next: {}", plan_next(loaded)), format!("  or: {}", sketch_effect(loaded))]
+        Verdict::Unexplained if found.leaves_open() || (found.faint && found.touches_would_tell()) => {
+            let sketch = found.sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
+            std::iter::once(format!("next: {}", plan_next(loaded))).chain(sketch).collect()
         }
         Verdict::Unexplained if found.moved_block.is_some() && found.sketchable => vec![
             format!("next: {}", words::at_the_machine(found)),

@@ -108,9 +108,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let says = format!("a gross mistake must be put right first, and the touches made again: {mistake}");
         return Ok(refuse(&says, &found.says, io));
     }
-    let open = |d: &diagnose::Diagnosis| {
-        matches!(d.verdict, Verdict::MissingEffect | Verdict::Unexplained) && !d.open.suspects.is_empty()
-    };
+    let open = diagnose::Diagnosis::leaves_open;
     if named.is_empty() && !open(&found) {
         // what was added last may stand for others that the same touches could not tell from it: still an open question
         let added = last_added(args, &loaded)?;

@@ -84,6 +84,12 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Are there effects of which these touches cannot say which one acts, or whether it does? A further program tells.
+    #[must_use]
+    pub fn leaves_open(&self) -> bool {
+        matches!(self.verdict, Verdict::MissingEffect | Verdict::Unexplained) && !self.open.suspects.is_empty()
+    }
+
     /// Would further touches tell whether a faint pattern is there? Those of a block that moved are made already.
     #[must_use]
     pub fn touches_would_tell(&self) -> bool {

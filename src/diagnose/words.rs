@@ -202,6 +202,7 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
         Some("face") => "clean the faces of the blocks and touch them again",
         Some("block") => "look whether a block is loose or dirty, clamp and clean it, and measure again",
         Some("visit") => "look for play or dirt in the clamping and indexing of the rotary axes, and measure again",
+        Some(_) if found.faint => "measure again: further touches tell whether the pattern is there at all",
         Some(_) => "look for it at the machine: no formula says it",
         None => "measure again with more touches: what is left depends on nothing that these show",
     }

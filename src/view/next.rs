@@ -43,7 +43,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, c, &mut out);
             }
         }
-        Verdict::Unexplained if d.faint && d.touches_would_tell() => out.push(Next::new(
+        Verdict::Unexplained if d.faint && (d.leaves_open() || d.touches_would_tell()) => out.push(Next::new(
             "Measure more touches",
             "Repeats and further poses say whether the weak pattern is there at all.",
             plan_next.clone(),
