@@ -7,8 +7,16 @@ use super::settings::compare_settings;
 use crate::axes::Position;
 use std::ops::Range;
 
-/// When something went wrong the program must say so and stay where it is.
-pub fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Said) {
+/// The line with which the log of a run ends.
+pub fn last_line(told: &Told) -> Option<&str> {
+    told.trunk.iter().rev().find_map(|h| match &h.event {
+        Event::Log(text) => Some(text.as_str()),
+        _ => None,
+    })
+}
+
+/// When something went wrong the program must say so and stay where it is. `last_line` is that of the run.
+pub fn branch_stops(case: &Case<'_>, told: &Told, last_line: Option<&str>, branch: &Branch, said: &mut Said) {
     if !branch.deviation.must_stop() {
         return;
     }
@@ -52,10 +60,6 @@ pub fn branch_stops(case: &Case<'_>, told: &Told, branch: &Branch, said: &mut Sa
     if !branch.trace.iter().any(shows) {
         complain(&first.at, "no message is shown");
     }
-    let last_line = told.trunk.iter().rev().find_map(|h| match &h.event {
-        Event::Log(text) => Some(text),
-        _ => None,
-    });
     let logs_end = |h: &Happened| matches!((&h.event, last_line), (Event::Log(t), Some(l)) if t == l);
     if told.fault.is_none() && branch.trace.iter().any(logs_end) {
         complain(&first.at, "the log is closed as if the program were complete");

@@ -103,6 +103,8 @@ pub struct Limits {
     /// Probing moves from the beginning at which branches are followed. A run from a later set-up differs from the whole one
     /// at its beginning: after some set-ups what goes wrong there goes wrong in the whole run, or in the run from there, too.
     pub probes: usize,
+    /// A program that makes more probing moves than this runs in a circle.
+    pub most_probes: usize,
 }
 
 impl Limits {
@@ -153,6 +155,11 @@ pub fn explore<'p, D: Dialect>(
             Ok(Pause::Done) => break,
             Ok(Pause::Probe(probe)) => {
                 probes += 1;
+                if limits.is_some_and(|l| probes > l.most_probes) {
+                    let says = format!("the program runs in a circle: it makes more than {} probing moves", probes - 1);
+                    told.fault = Some(Fault { at: run.vm.place.clone(), says });
+                    break;
+                }
                 let outcome = run.vm.world.outcome(&run.vm, &probe);
                 if let Some(limits) = limits.filter(|l| probes <= l.probes) {
                     let leaves = run.vm.trace.len();

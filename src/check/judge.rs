@@ -3,7 +3,7 @@
 //! Shapes and the proof that a move is clear are those of [`crate::program`]; the order of moves, what a touch is and what
 //! must happen when something goes wrong are judged here, from what the program did and not from how it was made.
 
-use super::branches::branch_stops;
+use super::branches::{branch_stops, last_line};
 use super::explore::Told;
 use super::run::{Event, Happened, Probe, Rate};
 use super::settings::settings_return;
@@ -93,8 +93,9 @@ pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told]) -> Vec<Finding> {
         walk.trunk();
         let made = walk.made;
         against_plan(case, told, &made, &mut said);
+        let last_line = last_line(told);
         for branch in &told.branches {
-            branch_stops(case, told, branch, &mut said);
+            branch_stops(case, told, last_line, branch, &mut said);
         }
         settings_return(case, told, &mut said);
     }

@@ -190,11 +190,15 @@ impl<'a, D: Dialect> Runs<'a, D> {
     fn all(&self) -> All {
         let (window, clear_from_anywhere) = self.windows();
         let beginning = self.start(&window, 0.5, 0.3);
+        // a touch takes a dozen, with the guarded moves to it
+        const PER_TOUCH: usize = 50;
+        let touches = self.plan.map_or(self.program.code.statements.len() / PER_TOUCH, |p| p.touches.len());
         let limits = Limits {
             placement_mm: self.machine.probe.placement_tolerance,
             back_off_mm: self.machine.probe.back_off,
             guard_mm: self.post.settings.get("missed_within").and_then(|mm| mm.trim().parse().ok()),
             probes: usize::MAX,
+            most_probes: 10_000 + PER_TOUCH * touches,
         };
         let last = self.codes.len();
         // the whole run, the same from elsewhere, and each set-up but the first
