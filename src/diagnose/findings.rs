@@ -230,7 +230,7 @@ fn jump_of_what(subject: Subject, seen: &Examination, features: &Features, candi
     let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
     let of_blocks = effect.id == first.effect && jumps && effect.terms.iter().all(|t| t.place == Place::Block);
     let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
-    let at_h = seen.named.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
+    let at_h = seen.ordered.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
     let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
     let n = features.block.len();
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
@@ -375,7 +375,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
     if let Some(scanned) = &seen.named.scanned[chosen] {
         parameters.push(Parameter {
             name: scanned.name.clone(),
-            value: seen.named.library.candidates()[chosen].variants[score.variant].shape,
+            value: seen.ordered.library.candidates()[chosen].variants[score.variant].shape,
             unit: scanned.unit.clone(),
             sigma: None,
         });
@@ -425,8 +425,8 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
 /// where its parameters are not told one by one.
 fn moves(seen: &Examination, chosen: usize) -> Option<(f64, f64)> {
     let score = &seen.order.scores[chosen];
-    let span = seen.named.library.candidates()[chosen].variants[score.variant].columns.clone();
-    let columns = seen.named.raw_um.columns(span.start, span.len());
+    let span = seen.ordered.library.candidates()[chosen].variants[score.variant].columns.clone();
+    let columns = seen.ordered.raw_um.columns(span.start, span.len());
     let at = columns * &score.estimate;
     let most = seen.evidence.used.iter().copied().max_by(|&a, &b| at[a].abs().total_cmp(&at[b].abs()))?;
     let row = columns.row(most).transpose();
@@ -456,9 +456,9 @@ fn told(covariance: &DMatrix<f64>) -> Vec<bool> {
 /// weights of the fit, which a refit keeps, and not in those of the tests, which allow for more scatter or for none.
 fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
     let variant = seen.order.scores[chosen].variant;
-    let span = seen.named.library.candidates()[chosen].variants[variant].columns.clone();
+    let span = seen.ordered.library.candidates()[chosen].variants[variant].columns.clone();
     let weights = Evidence::with_visits(fit, fit.noise.tau_mm);
-    let raw_mm = seen.named.raw_um.columns(span.start, span.len()).map(mm_from_um);
+    let raw_mm = seen.ordered.raw_um.columns(span.start, span.len()).map(mm_from_um);
     let columns = weights.whiten(fit, raw_mm);
     let left = weights.base.project_columns(&columns);
     let covariance = crate::fit::uncertainty::free_covariance(fit);

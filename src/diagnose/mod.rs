@@ -82,6 +82,8 @@ pub struct Examination<'a> {
     pub search: Search<'a>,
     /// The same for sizes and order: see [`Ordering`].
     pub order: Search<'a>,
+    /// The effects as in `order`: their scans have values of their own.
+    pub ordered: &'a Named<'a>,
     /// Whitened Jacobian of the base model as in `order`.
     pub jacobian: &'a DMatrix<f64>,
     /// What these touches cannot tell apart, best first.
@@ -152,9 +154,9 @@ pub fn examine<'a>(
     let question = evidence.question();
     let colours_um = evidence.colours_um(fit);
     let search = Search::new(question, &named.library);
-    let (order, jacobian) = ordering
-        .and_then(|o| Some((o.search(&search)?, &o.evidence.jacobian)))
-        .unwrap_or_else(|| (search.clone(), &evidence.jacobian));
+    let (order, ordered, jacobian) = ordering
+        .and_then(|o| Some((o.search(&search)?, &o.named, &o.evidence.jacobian)))
+        .unwrap_or_else(|| (search.clone(), named, &evidence.jacobian));
     let colour = |visit: usize, e: &DVector<f64>| colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e);
     let nested = held_out_in(question, &named.library, &evidence.visits, Choice::Redone, &colour);
     let mut groups = order.groups(at_most);
@@ -163,6 +165,7 @@ pub fn examine<'a>(
     Examination {
         groups,
         order,
+        ordered,
         jacobian,
         dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),

@@ -24,7 +24,7 @@ pub(super) fn open(seen: &Examination) -> Open {
     let tied = |g: &&Group| best.is_finite() && ln_p(g) - best < AS_LIKELY;
     let suspect = |candidate: usize| {
         let score = &seen.order.scores[candidate];
-        let shape = seen.named.library.candidates()[candidate].variants[score.variant].shape;
+        let shape = seen.ordered.library.candidates()[candidate].variants[score.variant].shape;
         Suspect {
             id: seen.named.effects[candidate].id.clone(),
             size: score.estimate.clone(),

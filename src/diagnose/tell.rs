@@ -89,7 +89,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
         .iter()
         .map(|&c| {
             let variant = seen.order.scores[c].variant;
-            let shape = seen.named.library.candidates()[c].variants[variant].shape;
+            let shape = seen.ordered.library.candidates()[c].variants[variant].shape;
             (seen.named.effects[c], seen.named.scanned[c].as_ref().map(|_| shape))
         })
         .collect();
@@ -137,8 +137,8 @@ fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String 
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
     let trace = |c: usize| -> DVector<f64> {
         let score = &seen.order.scores[c];
-        let span = seen.named.library.candidates()[c].variants[score.variant].columns.clone();
-        seen.named.raw_um.columns(span.start, span.len()) * &score.estimate
+        let span = seen.ordered.library.candidates()[c].variants[score.variant].columns.clone();
+        seen.ordered.raw_um.columns(span.start, span.len()) * &score.estimate
     };
     let difference = trace(chosen) - trace(rival);
     let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
