@@ -24,7 +24,10 @@ inline double gap_and_row(const Touch& t, const SetUp& s, const double* g, const
   const double x1[3] = {v[0], v[1], v[2]};
   turn(v[0], v[1], a.sc0, a.cc0);
   const double x2[3] = {v[0], v[1], v[2]};
-  v[0] += t.x, v[1] += t.y, v[2] += t.z;
+  // a late trigger has let the axes go on against the planned normal
+  double r[3] = {t.normal[0], t.normal[1], t.normal[2]};
+  if (s.turns) turn(r[0], r[1], t.sc, t.cc);
+  v[0] += t.x + g[8] * r[0], v[1] += t.y + g[8] * r[1], v[2] += t.z + g[8] * r[2];
   if (n_globals == 12) {
     v[0] -= kMicro * (g[9] * t.x - g[11] * t.y);
     v[1] -= kMicro * g[10] * t.y;
@@ -44,7 +47,7 @@ inline double gap_and_row(const Touch& t, const SetUp& s, const double* g, const
   turn(v[2], v[0], -a.s[1], a.c[1]);
   const double z2[3] = {v[0], v[1], v[2]};
   turn(v[1], v[2], -a.s[0], a.c[0]);
-  double out = g[8] - t.radius;
+  double out = -t.radius;
   for (int k = 0; k < 3; ++k) out += t.normal[k] * (v[k] + s.centre[k] - t.point[k]);
 
   // backward: h = d gap / d point. d(R(-w) p)/dw = -axis x (R(-w) p); the component of a cross product is its slope.
@@ -66,7 +69,7 @@ inline double gap_and_row(const Touch& t, const SetUp& s, const double* g, const
   } else {
     dg[4] = dg[5] = dg[6] = dg[7] = 0.0;
   }
-  dg[8] = 1.0;
+  dg[8] = h[0] * r[0] + h[1] * r[1] + h[2] * r[2];
   if (n_globals == 12) {
     dg[9] = -kMicro * t.x * h[0];
     dg[10] = -kMicro * t.y * h[1];

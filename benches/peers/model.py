@@ -23,6 +23,7 @@ class Touches:
         self.sb, self.cb = np.sin(b_deg * DEG), np.cos(b_deg * DEG)
         self.sc = np.where(self.turns, np.sin(c_deg * DEG), 0.0)
         self.cc = np.where(self.turns, np.cos(c_deg * DEG), 1.0)
+        self.planned = turn(list(normal.T), 0, 1, self.sc, self.cc)  # the normal in R as planned
 
 
 def turn(v, i, j, s, c):
@@ -50,6 +51,8 @@ def evaluate(t, names, theta, jacobian=True):
     x1 = v = turn(v, 1, 2, sa0, ca0)
     x2 = v = turn(v, 0, 1, sc0, cc0)
     v = [v[0] + t.x - MICRO * (g["EXX"] * t.x - g["EC0Y"] * t.y), v[1] + t.y - MICRO * g["EYY"] * t.y, v[2] + t.z]
+    # a late trigger has let the axes go on against the planned normal
+    v = [v[k] + g["pretravel"] * t.planned[k] for k in range(3)]
     v = [v[0] - t.turns * g["EX0C"], v[1] - t.turns * g["EY0C"], v[2]]
     y1 = v = turn(v, 2, 0, -se, ce)
     y2 = v = turn(v, 1, 2, -sa, ca)
@@ -58,7 +61,7 @@ def evaluate(t, names, theta, jacobian=True):
     z1 = v = turn(v, 0, 1, -block[2][0], block[2][1])
     z2 = v = turn(v, 2, 0, -block[1][0], block[1][1])
     v = turn(v, 1, 2, -block[0][0], block[0][1])
-    gap = g["pretravel"] - t.radius
+    gap = -t.radius
     for k in range(3):
         gap = gap + t.normal[:, k] * (v[k] + t.centre[:, k] - t.point[:, k])
     if not jacobian:
@@ -81,7 +84,7 @@ def evaluate(t, names, theta, jacobian=True):
     h = turn(h, 2, 0, se, ce)
     d["EX0C"], d["EY0C"] = -(t.turns * h[0]), -(t.turns * h[1])
     d["EXX"], d["EYY"], d["EC0Y"] = -MICRO * t.x * h[0], -MICRO * t.y * h[1], MICRO * t.y * h[0]
-    d["pretravel"] = 1.0
+    d["pretravel"] = sum(h[k] * t.planned[k] for k in range(3))
     d["EC0B"] = DEG * (h[1] * x2[0] - h[0] * x2[1])
     h = turn(h, 0, 1, -sc0, cc0)
     d["EA0B"] = DEG * (h[2] * x1[1] - h[1] * x1[2])

@@ -115,7 +115,10 @@ inline T gap(const Touch& t, const SetUp& s, const T* g, const T* b) {
   const T a0 = g[2] * kDeg, c0 = g[3] * kDeg;
   turn(v[1], v[2], T(sin(a0)), T(cos(a0)));  // Rx
   turn(v[0], v[1], T(sin(c0)), T(cos(c0)));  // Rz
-  v[0] += t.x, v[1] += t.y, v[2] += t.z;
+  // a late trigger has let the axes go on against the planned normal
+  double r[3] = {t.normal[0], t.normal[1], t.normal[2]};
+  if (s.turns) turn(r[0], r[1], t.sc, t.cc);
+  v[0] += t.x + g[8] * r[0], v[1] += t.y + g[8] * r[1], v[2] += t.z + g[8] * r[2];
   if constexpr (kNumGlobals == 12) {
     v[0] -= kMicro * (g[9] * t.x - g[11] * t.y);
     v[1] -= kMicro * g[10] * t.y;
@@ -132,7 +135,7 @@ inline T gap(const Touch& t, const SetUp& s, const T* g, const T* b) {
   turn(v[0], v[1], T(-sin(sc)), T(cos(sc)));
   turn(v[2], v[0], T(-sin(sb)), T(cos(sb)));
   turn(v[1], v[2], T(-sin(sa)), T(cos(sa)));
-  T out = g[8] - t.radius;
+  T out = T(-t.radius);
   for (int k = 0; k < 3; ++k) out += t.normal[k] * (v[k] + s.centre[k] - t.point[k]);
   return out;
 }
