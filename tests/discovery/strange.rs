@@ -34,7 +34,7 @@ pub struct Seen {
     pub depends: Vec<String>,
     pub rejected: usize,
     pub proposed: Option<String>,
-    /// Said as the one answer: proposed, told from all others, and no shape is better. Of these kinds every name is wrong. A second reading beside it counts as told.
+    /// Said as the one answer: proposed, told from all others, and no shape is better. Of these kinds every name is wrong.
     pub bare: bool,
     /// Reduced RMS with the sketched formula, where the kind has one.
     pub sketched: Option<f64>,
@@ -71,7 +71,7 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
         depends: d.depends.iter().map(|w| w.by.clone()).collect(),
         rejected: d.outliers.len(),
         proposed: d.candidates.first().filter(|c| c.proposed).map(|c| c.effect.clone()),
-        bare: d.candidates.first().is_some_and(|c| c.proposed && c.same_as.is_empty() && c.or_else.is_none())
+        bare: d.candidates.first().is_some_and(|c| c.proposed && c.same_as.is_empty())
             && !d.says.contains("the name may be wrong"),
         sketched: if KINDS[kind].2 { find::sketched(&bench.machine, &catalogue, &fit, &settings) } else { None },
     }
