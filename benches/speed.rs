@@ -7,9 +7,11 @@
 mod problems;
 
 use axiscal::diag::source;
-use axiscal::fit;
+use axiscal::diagnose::evidence::Evidence;
+use axiscal::diagnose::named::Named;
 use axiscal::fit::normal::Touches;
 use axiscal::fit::solve::Problem as _;
+use axiscal::fit::{self, Settings};
 use axiscal::log::{self, Writer};
 use axiscal::post::{LogRecord, Postprocessor};
 use axiscal::program::plan::Plan;
@@ -117,6 +119,23 @@ fn identify(c: &mut Criterion) {
     });
 }
 
+/// Columns of everything that the model leaves out: what `diagnose` tests.
+fn candidates(c: &mut Criterion) {
+    let mut group = c.benchmark_group("candidates");
+    group.sample_size(10).measurement_time(Duration::from_secs(3));
+    each("candidates", |problem, n_touches, n_unknowns| {
+        if n_unknowns != 60 || n_touches > 10_000 {
+            return; // one size of a model, and sizes at which somebody waits for a diagnosis
+        }
+        let settings = Settings { quick: true, ..problem.settings() };
+        let fit = fit::identify_data(&problem.machine, &problem.catalogue, problem.data(), &settings).unwrap();
+        let evidence = Evidence::of(&fit);
+        group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
+            b.iter(|| Named::of(&fit, &evidence, &problem.machine, &problem.catalogue));
+        });
+    });
+}
+
 /// A controller's log to touches that are matched to the plan.
 fn parse(c: &mut Criterion) {
     let mut group = c.benchmark_group("parse");
@@ -153,5 +172,5 @@ fn read_plan(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, prediction, jacobian, whole_fit, covariance, identify, parse, read_plan);
+criterion_group!(benches, prediction, jacobian, whole_fit, covariance, identify, candidates, parse, read_plan);
 criterion_main!(benches);

@@ -56,19 +56,27 @@ impl fmt::Display for AxisName {
 }
 
 /// Positions of some axes, NC coordinates, mm and degrees; in JSON an object such as `{"B": -30.0, "C": 90.0}`.
+///
+/// A plan holds five of these for every touch: they are kept small.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct AxisMap(pub [Option<f64>; 6]);
+pub struct AxisMap {
+    /// Values of the axes that are given, 0 for the others.
+    values: [f64; 6],
+    /// One bit for each axis that is given.
+    given: u8,
+}
 
 impl AxisMap {
     /// Value of an axis, if it is given.
     #[must_use]
     pub fn get(&self, axis: AxisName) -> Option<f64> {
-        self.0[axis.index()]
+        (self.given & (1 << axis.index()) != 0).then_some(self.values[axis.index()])
     }
 
     /// Sets the value of an axis.
     pub fn set(&mut self, axis: AxisName, value: f64) {
-        self.0[axis.index()] = Some(value);
+        self.values[axis.index()] = value;
+        self.given |= 1 << axis.index();
     }
 
     /// The same with one value set.
@@ -81,7 +89,7 @@ impl AxisMap {
     /// X, Y, Z from a vector in mm.
     #[must_use]
     pub fn xyz(x: f64, y: f64, z: f64) -> Self {
-        Self([Some(x), Some(y), Some(z), None, None, None])
+        Self { values: [x, y, z, 0.0, 0.0, 0.0], given: 0b111 }
     }
 
     /// The axes that are given, in storage order.
@@ -92,23 +100,28 @@ impl AxisMap {
     /// True when no axis is given.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.iter().all(Option::is_none)
+        self.given == 0
     }
 
     /// These positions, with `other`'s where they are not given.
     #[must_use]
     pub fn or(&self, other: &Self) -> Self {
-        let mut out = *self;
-        for (mine, theirs) in out.0.iter_mut().zip(other.0) {
-            *mine = mine.or(theirs);
-        }
+        let mut out = *other;
+        self.iter().for_each(|(axis, value)| out.set(axis, value));
         out
     }
 
     /// A full position; axes that are not given stand at 0.
     #[must_use]
     pub fn position(&self) -> Position {
-        Position(self.0.map(|v| v.unwrap_or(0.0)))
+        Position(self.values)
+    }
+}
+
+impl From<Position> for AxisMap {
+    /// All six axes.
+    fn from(position: Position) -> Self {
+        Self { values: position.0, given: 0b11_1111 }
     }
 }
 

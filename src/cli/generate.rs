@@ -252,7 +252,7 @@ fn setups(generated: &Generated) -> Vec<SetupCount> {
     for t in &generated.plan.touches {
         match out.last_mut() {
             Some(last) if last.stage == t.stage && last.pose == t.pose && last.visit == t.visit => last.touches += 1,
-            _ => out.push(SetupCount { stage: t.stage.clone(), pose: t.pose, visit: t.visit, touches: 1 }),
+            _ => out.push(SetupCount { stage: t.stage.to_string(), pose: t.pose, visit: t.visit, touches: 1 }),
         }
     }
     out

@@ -1,5 +1,6 @@
 //! Which share of a misfit some columns would explain, had the model held them.
 
+use crate::fit::whitening::Whitening;
 use crate::fit::{Fit, uncertainty};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -27,6 +28,7 @@ pub(super) struct Misfit<'f> {
     residual: DVector<f64>,
     jacobian: DMatrix<f64>,
     covariance: DMatrix<f64>,
+    whitening: Whitening,
 }
 
 impl<'f> Misfit<'f> {
@@ -38,12 +40,13 @@ impl<'f> Misfit<'f> {
             residual: linear.residual.rows(0, n).into_owned(),
             jacobian: linear.jacobian.rows(0, n).into_owned(),
             covariance: uncertainty::free_covariance(fit),
+            whitening: fit.whitening(fit.noise.tau_mm),
         }
     }
 
     /// Sums of columns (one row per touch) beside the model: AᵀPA and AᵀPr with P = I − JCJᵀ, columns of unit norm.
     pub(super) fn beside(&self, mut columns: DMatrix<f64>) -> Beside {
-        self.fit.with_touches(self.fit.noise.tau_mm, |t| t.whiten(&mut columns));
+        self.whitening.apply(&mut columns);
         for mut column in columns.column_iter_mut() {
             let norm = column.norm();
             if norm > 0.0 {

@@ -166,10 +166,10 @@ fn touch(
         id: 0,
         stage: "next".into(),
         repeat: 1,
-        carrier: block.carrier.to_string(),
+        carrier: block.carrier.to_string().into(),
         mounting: None,
-        block: block.name.clone(),
-        face: face.to_string(),
+        block: block.name.as_str().into(),
+        face: face.to_string().into(),
         point: (*point).into(),
         normal: face.normal().into(),
         pose: manner.pose,
@@ -367,7 +367,7 @@ pub fn without(pool: &[Bundle], skipped: &[plan::Skipped]) -> Vec<Bundle> {
         .filter_map(|b| {
             let mut left = b.clone();
             left.faces.retain(|f| !is_out(b, f));
-            left.touches.retain(|t| left.faces.contains(&t.face));
+            left.touches.retain(|t| left.faces.iter().any(|f| t.face == *f));
             (left.touches.len() >= 3).then_some(left)
         })
         .collect()

@@ -287,7 +287,7 @@ impl Pool<'_> {
                 .filter_map(|t| {
                     let (n, p, c) = (Vector3::from(t.normal), Vector3::from(t.point), Vector3::from(block.centre));
                     let other = p - n * (2.0 * (p - c).dot(&n));
-                    let face = turned_face(&t.face);
+                    let face = turned_face(&t.face).into();
                     let mirrored = PlanTouch { point: other.into(), normal: (-n).into(), face, ..(*t).clone() };
                     again(self.machine, plan, &mirrored, &change)
                 })
@@ -335,7 +335,7 @@ impl Pool<'_> {
             let there: Vec<PlanTouch> = own
                 .light()
                 .into_iter()
-                .map(|t| PlanTouch { block: name.clone(), point: (Vector3::from(t.point) + shift).into(), ..t })
+                .map(|t| PlanTouch { block: name.as_str().into(), point: (Vector3::from(t.point) + shift).into(), ..t })
                 .filter_map(|t| again(self.machine, &plan, &t, &Change::default()))
                 .collect();
             if !there.is_empty() {
@@ -459,7 +459,7 @@ impl Pool<'_> {
 
 /// The machine direction into which a face looks, in words.
 fn in_r(machine: &Machine, t: &PlanTouch) -> String {
-    let Some(carrier) = machine.carrier(&t.carrier) else { return t.face.clone() };
+    let Some(carrier) = machine.carrier(&t.carrier) else { return t.face.to_string() };
     let n = machine.carrier_frame(carrier, &t.pose.position()).rotation * Vector3::from(t.normal);
     debug_assert!(faces_the_spindle(machine, carrier, &t.pose.position(), &t.normal.into()));
     let axis = n.iamax();

@@ -2,6 +2,7 @@
 //! space.
 
 use crate::fit::Fit;
+use crate::fit::whitening::Whitening;
 use crate::search::{Basis, PureError, Question};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -23,6 +24,8 @@ pub struct Evidence {
     pub pure: Option<PureError>,
     /// Scatter of index visits that the tests allow for, mm.
     pub tau_mm: f64,
+    /// What makes rows of columns of gaps.
+    whitening: Whitening,
     /// Rows of priors.
     n_priors: usize,
 }
@@ -48,6 +51,7 @@ impl Evidence {
         Self {
             base: Basis::new(&jacobian),
             visits: used.iter().map(|&i| fit.data.visits[i]).collect(),
+            whitening: fit.whitening(tau_mm),
             n_priors: linear.residual.len() - n,
             residual,
             jacobian,
@@ -90,7 +94,7 @@ impl Evidence {
                 units[(self.used[row], k)] = crate::units::mm_from_um(1.0);
             }
         }
-        let white = self.whiten(fit, units);
+        let white = self.whiten(units);
         let each = rows.into_iter().filter_map(|(visit, of)| {
             let n = of.len();
             let block = DMatrix::from_fn(n, n, |a, b| white[(of[a], b)]);
@@ -101,8 +105,11 @@ impl Evidence {
 
     /// Columns of gaps (all observations × columns, mm) as rows of this regression.
     #[must_use]
-    pub fn whiten(&self, fit: &Fit, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
-        fit.with_touches(self.tau_mm, |t| t.whiten(&mut columns_mm));
+    pub fn whiten(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
+        self.whitening.apply(&mut columns_mm);
+        if self.used.len() == columns_mm.nrows() && self.n_priors == 0 {
+            return columns_mm;
+        }
         let mut out = DMatrix::zeros(self.n_rows(), columns_mm.ncols());
         for (mut to, from) in out.column_iter_mut().zip(columns_mm.column_iter()) {
             for (value, &i) in to.iter_mut().zip(&self.used) {

@@ -125,8 +125,8 @@ fn turns(fit: &Fit, machine: &Machine) -> Vec<Direction> {
 
 /// All generic shapes of a fit, whitened as its touches are.
 #[must_use]
-pub fn shapes(fit: &Fit, evidence: &Evidence, features: &Features) -> Generics {
-    generics(features, |raw_um| evidence.whiten(fit, raw_um.map(mm_from_um)))
+pub fn shapes(evidence: &Evidence, features: &Features) -> Generics {
+    generics(features, |raw_um| evidence.whiten(raw_um.map(mm_from_um)))
 }
 
 /// In which frame a direction's name stands, for people.

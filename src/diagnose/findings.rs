@@ -186,7 +186,7 @@ pub(super) fn put_together(
         && depends.first().is_some_and(|w| !at_the_machine(&w.id))
         && super::sketch::best(&seen.dependences).is_ok();
     let moved_block = drawn.filter(|_| unexplained).and_then(|d| words::moved_block(d, fit)).map(str::to_owned);
-    jump_of_what(subject, seen, features, &mut candidates);
+    jump_of_what(seen, features, &mut candidates);
     Diagnosis {
         format: FORMAT,
         verdict,
@@ -223,7 +223,7 @@ pub(super) fn put_together(
 
 /// Blocks that all stand elsewhere from some moment on are one reading of a jump. Where a jump at the same moment in a frame
 /// that stands still does as well, the machine or the probe may have made it.
-fn jump_of_what(subject: Subject, seen: &Examination, features: &Features, candidates: &mut [Candidate]) {
+fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candidate]) {
     let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
     let chosen = group.first();
     let effect = seen.named.effects[chosen];
@@ -235,7 +235,7 @@ fn jump_of_what(subject: Subject, seen: &Examination, features: &Features, candi
     let n = features.block.len();
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
     let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
-    let columns = seen.evidence.whiten(subject.fit, raw_mm);
+    let columns = seen.evidence.whiten(raw_mm);
     if super::rivals::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
@@ -459,7 +459,7 @@ fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
     let span = seen.ordered.library.candidates()[chosen].variants[variant].columns.clone();
     let weights = Evidence::with_visits(fit, fit.noise.tau_mm);
     let raw_mm = seen.ordered.raw_um.columns(span.start, span.len()).map(mm_from_um);
-    let columns = weights.whiten(fit, raw_mm);
+    let columns = weights.whiten(raw_mm);
     let left = weights.base.project_columns(&columns);
     let covariance = crate::fit::uncertainty::free_covariance(fit);
     let moves = &covariance * weights.jacobian.tr_mul(&columns);

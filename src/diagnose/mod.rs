@@ -221,7 +221,7 @@ fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Features
     let evidence = Evidence::with_visits(fit, declared_mm);
     let mut library = Named::of(fit, &evidence, machine, catalogue).library;
     // groups of visits are the scatter itself
-    library.append(features::shapes(fit, &evidence, features).without("visit"));
+    library.append(features::shapes(&evidence, features).without("visit"));
     let question = evidence.question();
     let (mut basis, mut residual) = (question.base.clone(), question.base.project(question.residual));
     for _ in 0..AT_MOST {
@@ -269,7 +269,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let features = features::features(fit, machine);
     let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
     let named = Named::of(fit, &evidence, machine, catalogue);
-    let generics = features::shapes(fit, &evidence, &features);
+    let generics = features::shapes(&evidence, &features);
     let ordering = Ordering::of(fit, machine, catalogue);
     let seen = examine(fit, &evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
     let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
@@ -332,7 +332,7 @@ fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
         return true;
     }
     let features = features::features(fit, machine);
-    let generics = features::shapes(fit, &evidence, &features);
+    let generics = features::shapes(&evidence, &features);
     dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < verdict::LACK_OF_FIT
 }

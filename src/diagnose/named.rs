@@ -1,16 +1,17 @@
 //! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
 
 use super::evidence::Evidence;
-use crate::fit::candidates::{Columns, Variant, variants, with_values};
+use crate::fit::candidates::{Trials, Variant, with_values};
 use crate::fit::{Fit, around, between, scan};
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect, Parameter};
+use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
 use crate::model::formula::slot;
-use crate::model::predict::Observation;
+use crate::model::predict::{Model, Observation, Unknown};
 use crate::search::{Library, Origin, Search};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 /// A parameter of a candidate: one column.
 #[derive(Debug, Clone)]
@@ -68,52 +69,93 @@ fn scan_of(effect: &Effect, data: &Data) -> Option<(usize, Vec<f64>)> {
     shapes.enumerate().find_map(|(i, p)| Some((i, scan(p, data).filter(|s| s.len() > 1)?)))
 }
 
-/// The values of a scan and a better one beside its best: a jump that was tried between index visits only may come in
-/// mid-visit, and where an effect is large a number between two that were tried leaves so much that another effect seems better.
-fn closer(
-    fit: &Fit,
-    evidence: &Evidence,
-    machine: &Machine,
-    (effect, places): (&Effect, &[Observation]),
-    which: usize,
-    mut values: Vec<f64>,
-) -> Vec<f64> {
-    let shaped: Vec<&Parameter> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
-    let starts: Vec<f64> = shaped.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect();
-    let best_of = |values: &[f64]| -> Option<(f64, f64)> {
-        let of = |value: &f64| {
-            let mut shapes = starts.clone();
-            shapes[which] = *value;
-            Variant { effects: vec![0], shapes }
+/// An effect at one value of its scanned shape.
+struct Tried {
+    /// The value; 0 where nothing is scanned.
+    value: f64,
+    /// Its parameters.
+    columns: Vec<Column>,
+    /// What they would do, mm per typical size, one row per touch.
+    raw_mm: DMatrix<f64>,
+    /// The same as rows of the tests.
+    white: DMatrix<f64>,
+}
+
+/// Makes and compares columns of effects that are not in the model.
+struct Maker<'a> {
+    fit: &'a Fit,
+    evidence: &'a Evidence,
+    trials: Trials<'a>,
+}
+
+impl Maker<'_> {
+    /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at another value.
+    fn make(&self, i: usize, effect: &Effect, scanned: Option<(usize, f64)>) -> Tried {
+        let mut shapes = starts(effect);
+        if let Some((which, value)) = scanned {
+            shapes[which] = value;
+        }
+        let made = self.trials.columns(&Variant { effects: vec![i], shapes });
+        let (own, shaped): (Vec<usize>, Vec<usize>) = (0..made.unknowns.len()).partition(|&c| !made.unknowns[c].shape);
+        let mut raw_mm = made.values.remove_columns_at(&shaped);
+        let column = |u: &Unknown| {
+            let bare = u.name.split('@').next().unwrap_or(&u.name);
+            let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
+            let typical = if u.typical > 0.0 { u.typical } else { 1.0 };
+            Column { name: u.name.clone(), unit: u.unit.clone(), typical, positive }
         };
-        let wanted: Vec<Variant> = values.iter().map(of).collect();
-        let made = variants(machine, &[effect], &fit.data, places, fit.model.reference, &wanted);
-        let sizes = values.iter().zip(made).map(|(value, made)| {
-            let own: Vec<usize> = (0..made.unknowns.len()).filter(|&c| !made.unknowns[c].shape).collect();
-            let mut columns = made.values.select_columns(&own);
-            for (mut column, &c) in columns.column_iter_mut().zip(&own) {
-                column *= made.unknowns[c].typical.max(f64::MIN_POSITIVE);
-            }
-            (*value, evidence.whiten(fit, columns))
-        });
-        let mut library = Library::new(evidence.n_rows());
-        library.push_scan(&effect.id, Origin::Catalogue, sizes, 1);
-        let score = Search::new(evidence.question(), &library).scores.into_iter().next()?;
-        Some((values[score.variant], score.delta_ss))
-    };
-    let Some(coarse) = best_of(&values) else { return values };
-    // the misfit that a pitch leaves goes up and down with it: its best place may be between any two values
-    let finer = if shaped[which].between.is_none() { between(&values) } else { Vec::new() };
-    let better = |one: (f64, f64), other: Option<(f64, f64)>| other.filter(|o| o.1 > one.1).unwrap_or(one);
-    let best = better(coarse, best_of(&finer));
-    let mut tried = [&values[..], &finer].concat();
-    tried.sort_by(f64::total_cmp);
-    let best = better(best, best_of(&around(shaped[which], &fit.data, &tried, best.0)));
-    if best != coarse {
-        values.push(best.0);
-        values.sort_by(f64::total_cmp);
+        let columns: Vec<Column> = own.iter().map(|&c| column(&made.unknowns[c])).collect();
+        for (mut values, column) in raw_mm.column_iter_mut().zip(&columns) {
+            values *= column.typical;
+        }
+        let white = self.evidence.whiten(raw_mm.clone());
+        Tried { value: scanned.map_or(0.0, |(_, value)| value), columns, raw_mm, white }
     }
-    values
+
+    /// Which of them explains most, and how much.
+    fn best_of(&self, tried: &[Tried]) -> Option<(usize, f64)> {
+        let mut library = Library::new(self.evidence.n_rows());
+        library.push_scan("tried", Origin::Catalogue, tried.iter().map(|t| (t.value, &t.white)), 1);
+        let score = Search::new(self.evidence.question(), &library).scores.into_iter().next()?;
+        Some((score.variant, score.delta_ss))
+    }
+
+    /// An effect at all values of its scan, and at a better one beside the best of them: a jump that was tried between index
+    /// visits only may come in mid-visit, and where an effect is large a number between two that were tried leaves so much
+    /// that another effect seems better.
+    fn scan(&self, i: usize, effect: &Effect, (which, values): (usize, Vec<f64>)) -> Vec<Tried> {
+        let make_all = |values: &[f64]| -> Vec<Tried> {
+            values.par_iter().map(|value| self.make(i, effect, Some((which, *value)))).collect()
+        };
+        let mut kept = make_all(&values);
+        let Some(coarse) = self.best_of(&kept) else { return kept };
+        let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
+        let Some(shape) = shape else { return kept };
+        let mut best = (values[coarse.0], coarse.1, None);
+        let try_also = |more: &[f64], best: (f64, f64, Option<Tried>)| {
+            let mut made = make_all(more);
+            match self.best_of(&made) {
+                Some((at, gain)) if gain > best.1 => (more[at], gain, Some(made.swap_remove(at))),
+                _ => best,
+            }
+        };
+        // the misfit that a pitch leaves goes up and down with it: its best place may be between any two values
+        let finer = if shape.between.is_none() { between(&values) } else { Vec::new() };
+        best = try_also(&finer, best);
+        let mut tried = [&values[..], &finer].concat();
+        tried.sort_by(f64::total_cmp);
+        best = try_also(&around(shape, &self.fit.data, &tried, best.0), best);
+        if let (_, _, Some(better)) = best {
+            kept.push(better);
+            kept.sort_by(|a, b| a.value.total_cmp(&b.value));
+        }
+        kept
+    }
+}
+
+/// Where the shape parameters of an effect start.
+fn starts(effect: &Effect) -> Vec<f64> {
+    effect.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect()
 }
 
 /// The touches where the model expects them instead of where they were read: along its normal a reading carries the very
@@ -144,99 +186,41 @@ impl<'c> Named<'c> {
     pub fn with(fit: &Fit, evidence: &Evidence, machine: &Machine, effects: Vec<&'c Effect>) -> Self {
         let places = without_noise(fit);
         let (effects, left_out) = with_values(effects, &places);
-        let scans_of: Vec<Option<(usize, Vec<f64>)>> = effects
-            .iter()
-            .map(|e| {
-                let (which, values) = scan_of(e, &fit.data)?;
-                let values = closer(fit, evidence, machine, (e, &places), which, values);
-                Some((which, values))
+        let model = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
+        let maker = Maker { fit, evidence, trials: Trials::of(&model, &places) };
+        let made: Vec<(Option<Scanned>, Vec<Tried>)> = effects
+            .par_iter()
+            .enumerate()
+            .map(|(i, effect)| match scan_of(effect, &fit.data) {
+                None => (None, vec![maker.make(i, effect, None)]),
+                Some((which, values)) => {
+                    let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
+                    let named = shape.map(|p| Scanned { name: p.name.clone(), unit: p.unit.clone() });
+                    (named, maker.scan(i, effect, (which, values)))
+                }
             })
             .collect();
-        let fixed = (0..effects.len()).filter(|i| scans_of[*i].is_none()).collect();
-        let mut wanted = vec![Variant { effects: fixed, shapes: Vec::new() }];
-        let mut scanned_at = Vec::new();
-        for (i, effect) in effects.iter().enumerate() {
-            let Some((which, values)) = &scans_of[i] else { continue };
-            let starts: Vec<f64> =
-                effect.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect();
-            for &value in values {
-                let mut shapes = starts.clone();
-                shapes[*which] = value;
-                wanted.push(Variant { effects: vec![i], shapes });
-                scanned_at.push((i, value));
-            }
-        }
-        let mut made = variants(machine, &effects, &fit.data, &places, fit.model.reference, &wanted).into_iter();
-        let together = made.next().unwrap_or_else(|| Columns::none(places.len()));
-        let scans: Vec<_> = scanned_at.into_iter().zip(made).map(|((i, value), columns)| (i, value, columns)).collect();
 
-        // one matrix of all variants, whitened at once
-        let mut parts: Vec<(usize, f64, DMatrix<f64>)> = Vec::new();
-        let mut info: Vec<Vec<Column>> = Vec::new();
-        let mut scanned = Vec::new();
-        for (i, effect) in effects.iter().enumerate() {
-            let scan = &scans_of[i];
-            let mut push = |made: &Columns, shape: f64| -> Vec<Column> {
-                let own = |c: &usize| made.unknowns[*c].effect == effect.id && !made.unknowns[*c].shape;
-                let of: Vec<usize> = (0..made.unknowns.len()).filter(own).collect();
-                let mut values = made.values.select_columns(&of);
-                let columns: Vec<Column> = of
-                    .iter()
-                    .map(|&c| {
-                        let u = &made.unknowns[c];
-                        let typical = if u.typical > 0.0 { u.typical } else { 1.0 };
-                        let bare = u.name.split('@').next().unwrap_or(&u.name);
-                        let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
-                        Column { name: u.name.clone(), unit: u.unit.clone(), typical, positive }
-                    })
-                    .collect();
-                for (mut column, c) in values.column_iter_mut().zip(&columns) {
-                    column *= c.typical;
-                }
-                parts.push((i, shape, values));
-                columns
-            };
-            let mut columns = Vec::new();
-            if scan.is_some() {
-                for (_, shape, made) in scans.iter().filter(|s| s.0 == i) {
-                    columns = push(made, *shape);
-                }
-            } else {
-                columns = push(&together, 0.0);
-            }
-            info.push(columns);
-            let shapes: Vec<_> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
-            scanned.push(
-                scan.as_ref().map(|(k, _)| Scanned { name: shapes[*k].name.clone(), unit: shapes[*k].unit.clone() }),
-            );
-        }
         let n = fit.data.observations.len();
-        let n_columns = parts.iter().map(|p| p.2.ncols()).sum();
-        let mut all = DMatrix::zeros(n, n_columns);
-        let mut at = 0;
-        for (_, _, values) in &parts {
-            all.columns_mut(at, values.ncols()).copy_from(values);
-            at += values.ncols();
-        }
-        let mut raw_um = all.map(um_from_mm);
-        for (mut row, w) in raw_um.row_iter_mut().zip(&fit.weight) {
-            row *= *w;
-        }
-        let white = evidence.whiten(fit, all);
+        let mut raw = Vec::with_capacity(n * made.iter().flat_map(|(_, t)| t).map(|t| t.raw_mm.ncols()).sum::<usize>());
         let mut library = Library::new(evidence.n_rows());
-        let (mut at, mut part) = (0, 0);
-        for (i, effect) in effects.iter().enumerate() {
-            let mut variants = Vec::new();
-            while part < parts.len() && parts[part].0 == i {
-                let width = parts[part].2.ncols();
-                variants.push((parts[part].1, white.columns(at, width).into_owned()));
-                at += width;
-                part += 1;
+        let mut columns = Vec::new();
+        let mut scanned = Vec::new();
+        for (effect, (shape, tried)) in effects.iter().zip(made) {
+            for t in &tried {
+                for column in t.raw_mm.column_iter() {
+                    raw.extend(column.iter().zip(&fit.weight).map(|(mm, w)| um_from_mm(*mm) * w));
+                }
             }
+            let own = tried.first().map_or_else(Vec::new, |t| t.columns.clone());
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
-            library.push_scan(&effect.id, origin, variants, usize::from(scanned[i].is_some()));
-            library.positive_of_last((0..info[i].len()).filter(|&k| info[i][k].positive).collect());
+            let variants = tried.into_iter().map(|t| (t.value, t.white));
+            library.push_scan(&effect.id, origin, variants, usize::from(shape.is_some()));
+            library.positive_of_last((0..own.len()).filter(|&k| own[k].positive).collect());
+            columns.push(own);
+            scanned.push(shape);
         }
-        Self { effects, library, raw_um, columns: info, scanned, left_out }
+        let raw_um = DMatrix::from_vec(n, raw.len().checked_div(n).unwrap_or(0), raw);
+        Self { effects, library, raw_um, columns, scanned, left_out }
     }
 }

@@ -149,7 +149,7 @@ fn whitened(
     let linear: Vec<usize> = (0..made.unknowns.len()).filter(|&i| !made.unknowns[i].shape).collect();
     let values = made.values.select_columns(&linear);
     let seen = values.ncols() == formulas.len() && values.iter().all(|v| v.is_finite());
-    (seen && values.norm() > 0.0).then(|| evidence.whiten(fit, values))
+    (seen && values.norm() > 0.0).then(|| evidence.whiten(values))
 }
 
 /// The directions of one place that pay, one after the other.

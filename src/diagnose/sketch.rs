@@ -34,7 +34,7 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
     let features = features(subject.fit, subject.machine);
     let evidence = super::calm(subject.fit, subject.machine, subject.catalogue, &features)
         .unwrap_or_else(|| Evidence::of(subject.fit));
-    let generics = shapes(subject.fit, &evidence, &features);
+    let generics = shapes(&evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let best = best(&all)?;
     let share = super::findings::beyond_the_noise(&evidence, best.share, best.terms.len());

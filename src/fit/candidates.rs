@@ -6,7 +6,6 @@ use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
 use crate::model::traces::Traces;
 use nalgebra::{DMatrix, Vector3};
-use rayon::prelude::*;
 
 /// The columns of some effects: d gap / d parameter at zero effect, mm per unit, one row per touch.
 #[derive(Debug, Clone)]
@@ -15,14 +14,6 @@ pub struct Columns {
     pub unknowns: Vec<Unknown>,
     /// One row per touch, one column per parameter; those of shape parameters are zero.
     pub values: DMatrix<f64>,
-}
-
-impl Columns {
-    /// No columns at so many touches.
-    #[must_use]
-    pub fn none(n_touches: usize) -> Self {
-        Self { unknowns: Vec::new(), values: DMatrix::zeros(n_touches, 0) }
-    }
 }
 
 /// Columns of effects on an otherwise errorless machine: to first order they are those beside any other small errors.
@@ -36,9 +27,9 @@ pub fn columns(
     reference: Vector3<f64>,
     shapes: Option<&[f64]>,
 ) -> Columns {
-    let variant = Variant { effects: (0..effects.len()).collect(), shapes: shapes.unwrap_or_default().to_vec() };
-    let mut all = variants(machine, effects, data, observations, reference, &[variant]);
-    all.pop().unwrap_or_else(|| Columns::none(observations.len()))
+    let model = Model::new(machine, effects, &data.set_ups, reference);
+    let all = Variant { effects: (0..effects.len()).collect(), shapes: shapes.unwrap_or_default().to_vec() };
+    Trials::of(&model, observations).columns(&all)
 }
 
 /// Columns of all unknowns of a model at some touches, in the order of its θ, at the start of its shape parameters.
@@ -48,7 +39,8 @@ pub(super) fn columns_of(model: &Model, observations: &[Observation]) -> DMatrix
     let start = model.start();
     let mut values = DMatrix::zeros(observations.len(), model.n_unknowns());
     for (first, count) in model.all_instances() {
-        values.columns_mut(first, count).copy_from(&traces.columns(first, count, &start[first..first + count]));
+        let columns = first * observations.len()..(first + count) * observations.len();
+        traces.add_columns(first, &start[first..first + count], &mut values.as_mut_slice()[columns]);
     }
     values
 }
@@ -63,42 +55,44 @@ pub struct Variant {
     pub shapes: Vec<f64>,
 }
 
-/// The same for many choices of effects and shapes at once: the machine's chain is gone through once for all of them.
-#[must_use]
-pub fn variants(
-    machine: &Machine,
-    effects: &[&Effect],
-    data: &Data,
-    observations: &[Observation],
-    reference: Vector3<f64>,
-    variants: &[Variant],
-) -> Vec<Columns> {
-    let model = Model::new(machine, effects, &data.set_ups, reference);
-    let traces = Traces::of(&model, observations);
-    let start = model.start();
-    let make = |variant: &Variant| {
+/// A model's effects at some touches, for many choices of effects and shapes: the machine's chain is gone through once for all
+/// of them.
+#[derive(Debug)]
+pub struct Trials<'a> {
+    model: &'a Model,
+    traces: Traces<'a>,
+    start: Vec<f64>,
+}
+
+impl<'a> Trials<'a> {
+    /// Of the effects of a model, at touches.
+    #[must_use]
+    pub fn of(model: &'a Model, observations: &'a [Observation]) -> Self {
+        Self { model, traces: Traces::of(model, observations), start: model.start() }
+    }
+
+    /// The columns of one choice.
+    #[must_use]
+    pub fn columns(&self, variant: &Variant) -> Columns {
         let mut given = variant.shapes.iter();
-        let mut unknowns = Vec::new();
-        let mut parts = Vec::new();
-        for &effect in &variant.effects {
-            for &(first, count) in model.instances(effect) {
-                let own = &model.unknowns[first..first + count];
-                let start = own.iter().zip(&start[first..]);
-                let values: Vec<f64> =
-                    start.map(|(u, s)| if u.shape { *given.next().unwrap_or(s) } else { *s }).collect();
-                unknowns.extend_from_slice(own);
-                parts.push(traces.columns(first, count, &values));
-            }
-        }
-        let mut values = DMatrix::zeros(observations.len(), unknowns.len());
-        let mut at = 0;
-        for part in &parts {
-            values.columns_mut(at, part.ncols()).copy_from(part);
-            at += part.ncols();
+        let instances = || variant.effects.iter().flat_map(|&effect| self.model.instances(effect));
+        let n = self.traces.n_touches();
+        let n_columns = instances().map(|(_, count)| count).sum();
+        let mut unknowns = Vec::with_capacity(n_columns);
+        let mut values = DMatrix::zeros(n, n_columns);
+        for &(first, count) in instances() {
+            let own = &self.model.unknowns[first..first + count];
+            let start = own.iter().zip(&self.start[first..]);
+            let shapes: Vec<f64> = start.map(|(u, s)| if u.shape { *given.next().unwrap_or(s) } else { *s }).collect();
+            self.traces.add_columns(
+                first,
+                &shapes,
+                &mut values.as_mut_slice()[unknowns.len() * n..(unknowns.len() + count) * n],
+            );
+            unknowns.extend_from_slice(own);
         }
         Columns { unknowns, values }
-    };
-    variants.par_iter().map(make).collect()
+    }
 }
 
 /// A formula that gives no number somewhere.

@@ -20,6 +20,7 @@ pub mod snoop;
 pub mod solve;
 pub mod statement;
 pub mod uncertainty;
+pub mod whitening;
 
 pub use knowledge::effects_of;
 pub use rank::{held_first, observe_plan};
@@ -37,6 +38,7 @@ use outcome::Outcome;
 use search::Search;
 use snoop::Snoop;
 use std::collections::BTreeMap;
+use whitening::Whitening;
 
 /// What the user decided about one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,6 +155,12 @@ impl Fit {
         let mut touches = Touches::new(&batch, &self.data.visits, self.theta.clone(), &self.free, &self.priors, noise);
         touches.set_weights(self.weight.clone());
         f(&touches)
+    }
+
+    /// What whitens columns of all touches, with a given scatter of visits, mm.
+    #[must_use]
+    pub fn whitening(&self, tau_mm: f64) -> Whitening {
+        self.with_touches(tau_mm, |t| t.whitening())
     }
 
     /// The fit linearised, with the given τ, mm (tests for missing effects use the noise's upper bound).

@@ -6,6 +6,7 @@
 //! block; the Gram matrix is collected per block and spread out at the end.
 
 use super::solve::{Normal, Problem};
+use super::whitening::{Visit, Whitening};
 use crate::model::batch::{At, Batch, Scratch};
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -153,34 +154,33 @@ impl<'a> Touches<'a> {
 
     /// Whitens columns (one row per touch, mm or mm per unit) in place; rows of unused touches become zero.
     pub fn whiten(&self, columns: &mut DMatrix<f64>) {
-        let all: Vec<usize> = (0..self.batch.len()).collect();
-        self.whiten_of(&all, columns);
+        self.whitening().apply(columns);
     }
 
     /// The same for some touches only, one row each in their order: the used touches of a visit stand together.
     pub(super) fn whiten_of(&self, touches: &[usize], columns: &mut DMatrix<f64>) {
-        for (k, &i) in touches.iter().enumerate() {
-            if self.weight[i] != 1.0 {
-                columns.row_mut(k).scale_mut(self.weight[i].sqrt());
-            }
-        }
+        self.whitening_of(touches).apply(columns);
+    }
+
+    /// What whitens columns of all touches.
+    #[must_use]
+    pub fn whitening(&self) -> Whitening {
+        let all: Vec<usize> = (0..self.batch.len()).collect();
+        self.whitening_of(&all)
+    }
+
+    fn whitening_of(&self, touches: &[usize]) -> Whitening {
+        let root: Vec<f64> = touches.iter().map(|&i| self.weight[i].sqrt()).collect();
+        let mut visits = Vec::new();
         if self.tau_mm > 0.0 {
-            let mut from = 0;
+            let mut normals = touches.iter().zip(&root).map(|(&i, root)| self.normal_in_r(i) * *root);
             for visit in touches.chunk_by(|&a, &b| self.visits[a] == self.visits[b]) {
-                let normals: Vec<Vector3<f64>> =
-                    visit.iter().map(|&i| self.normal_in_r(i) * self.weight[i].sqrt()).collect();
+                let normals: Vec<Vector3<f64>> = normals.by_ref().take(visit.len()).collect();
                 let square = normals.iter().fold(Matrix3::zeros(), |sum, n| sum + n * n.transpose());
-                let k = self.visit_root(&square);
-                for mut column in columns.column_iter_mut() {
-                    let mut part = column.rows_mut(from, visit.len());
-                    let sum = normals.iter().zip(part.iter()).fold(Vector3::zeros(), |s, (n, x)| s + n * *x);
-                    let by = k * sum;
-                    part.iter_mut().zip(&normals).for_each(|(x, n)| *x -= n.dot(&by));
-                }
-                from += visit.len();
+                visits.push(Visit { root: self.visit_root(&square), normals });
             }
         }
-        *columns /= self.sigma_mm;
+        Whitening { root, visits, sigma_mm: self.sigma_mm }
     }
 
     /// All touches in parts of about a thousand, visits whole where their touches share a displacement.

@@ -45,10 +45,11 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
     let (jacobian, residual) = (linear.jacobian.rows(0, n).into_owned(), linear.residual.rows(0, n).into_owned());
     let covariance = uncertainty::free_covariance(fit);
     let sizes: Vec<usize> = (0..effect.parameters.len()).filter(|i| !shaped.contains(i)).collect();
+    let whitening = fit.whitening(fit.noise.tau_mm);
     let judge = |shapes: &[f64]| -> (f64, DVector<f64>) {
         let all = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, Some(shapes));
         let mut a: DMatrix<f64> = all.values.select_columns(&sizes);
-        fit.with_touches(fit.noise.tau_mm, |t| t.whiten(&mut a));
+        whitening.apply(&mut a);
         let seen = jacobian.tr_mul(&a);
         let raw = a.tr_mul(&a);
         let gram = &raw - seen.tr_mul(&(&covariance * &seen));

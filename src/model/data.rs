@@ -145,7 +145,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 // a program with several mountings keeps them apart under the study's name too
                 (Some(label), _) if planned.mounting.is_some() => format!("{label}/{mounting}/{}", planned.block),
                 (Some(label), _) => format!("{label}/{}", planned.block),
-                (None, "") => planned.block.clone(),
+                (None, "") => planned.block.to_string(),
                 (None, mounting) => format!("{mounting}/{}", planned.block),
             };
             let set_up = data.set_ups.iter().position(|s| s.label == set_up_label).unwrap_or_else(|| {
@@ -187,9 +187,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let observation = at(touch.position);
             data.origins.push(Origin {
                 line: touch.line,
-                stage: planned.stage.clone(),
+                stage: planned.stage.to_string(),
                 block: data.set_ups[set_up].label.clone(),
-                face: planned.face.clone(),
+                face: planned.face.to_string(),
             });
             // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
             data.nominal.push(at(ideal));

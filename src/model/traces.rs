@@ -7,7 +7,6 @@
 use super::batch::Batch;
 use super::formula::Formula;
 use super::predict::{Active, Model, Observation};
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -55,18 +54,21 @@ impl<'a> Traces<'a> {
         Self { batch, slope, plain }
     }
 
-    /// The columns of the effect whose parameters are the unknowns `first .. first + count` of the model, mm per unit, one row
-    /// per touch; those of shape parameters are zero. `shapes` are the values of all its parameters, of which only those of
-    /// shape parameters are looked at.
+    /// Number of touches.
     #[must_use]
-    pub fn columns(&self, first: usize, count: usize, shapes: &[f64]) -> DMatrix<f64> {
+    pub fn n_touches(&self) -> usize {
+        self.batch.len()
+    }
+
+    /// Adds the columns of the effect whose parameters are the model's unknowns from `first` on, mm per unit, one row per
+    /// touch, to `columns` (one after the other); nothing is added to those of shape parameters. `shapes` are the values of all
+    /// its parameters, of which only those of shape parameters are looked at.
+    pub fn add_columns(&self, first: usize, shapes: &[f64], columns: &mut [f64]) {
         let n = self.batch.len();
-        let mut values = DMatrix::zeros(n, count);
         let mut shaped: HashMap<&str, Vec<f64>> = HashMap::new();
         for active in self.batch.model().active.iter().filter(|a| a.first == first) {
             let formula = &active.term.formula;
-            let mut column = values.column_mut(active.unknown - first);
-            let column = column.as_mut_slice();
+            let column = &mut columns[(active.unknown - first) * n..][..n];
             let slope = &self.slope[(6 * active.slot + active.component) * n..][..n];
             if let Some(constant) = formula.constant() {
                 self.add(column, active, slope.iter().map(|s| s * constant));
@@ -74,13 +76,15 @@ impl<'a> Traces<'a> {
             }
             let coefficient = match self.plain.get(formula.text()) {
                 Some(values) => values,
+                // all terms of one block's effect belong to that block: the other touches are not looked at
                 None => shaped.entry(formula.text()).or_insert_with(|| {
-                    self.batch.observations().iter().map(|o| formula.eval(&o.state, shapes)).collect()
+                    let here = |o: &Observation| active.set_up.is_none_or(|own| own == o.set_up);
+                    let value = |o: &Observation| if here(o) { formula.eval(&o.state, shapes) } else { 0.0 };
+                    self.batch.observations().iter().map(value).collect()
                 }),
             };
             self.add(column, active, slope.iter().zip(coefficient).map(|(s, c)| s * c));
         }
-        values
     }
 
     fn add(&self, column: &mut [f64], active: &Active, amounts: impl Iterator<Item = f64>) {

@@ -429,7 +429,7 @@ impl<'a> Writer<'a> {
     /// The set-up in which the block of a touch was touched before, where that is another one than the present: a run
     /// that begins behind it has not met the block yet.
     fn met_before(&mut self, touch: &TouchStep) -> Option<u32> {
-        let block = self.plan.touch(touch.id)?.block.clone();
+        let block = self.plan.touch(touch.id)?.block.to_string();
         let before = self.touched.insert(block, self.setup)?;
         (before != self.setup && touch.search_feed > self.machine.probe.slow_feed).then_some(before)
     }

@@ -36,12 +36,12 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
             for repeat in 1..=setup.spec.repeats {
                 touches.push(PlanTouch {
                     id: touches.len() as u64 + 1,
-                    stage: setup.spec.stage.clone(),
+                    stage: setup.spec.stage.as_str().into(),
                     repeat,
-                    carrier: block.carrier.to_string(),
+                    carrier: block.carrier.to_string().into(),
                     mounting: (part.label != one.label).then(|| part.label.clone()),
-                    block: block.name.clone(),
-                    face: target.face.to_string(),
+                    block: block.name.as_str().into(),
+                    face: target.face.to_string().into(),
                     point: target.point.into(),
                     normal: target.normal.into(),
                     pose: setup.pose,

@@ -2,6 +2,7 @@
 
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Finding, Findings, Result, Source, from_json};
+use compact_str::CompactString;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -113,19 +114,19 @@ pub struct PlanTouch {
     /// Its number, unique in the plan.
     pub id: u64,
     /// Stage of the procedure, e.g. `head`.
-    pub stage: String,
+    pub stage: CompactString,
     /// Which repeat of the same point, from 1.
     #[serde(default = "one")]
     pub repeat: u32,
     /// `table` or the letter of a rotary axis.
-    pub carrier: String,
+    pub carrier: CompactString,
     /// The block's mounting, where it differs from the plan's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mounting: Option<String>,
     /// The block's name.
-    pub block: String,
+    pub block: CompactString,
     /// The block's own face at all axes 0.
-    pub face: String,
+    pub face: CompactString,
     /// Nominal contact in the carrier's frame, mm.
     pub point: [f64; 3],
     /// Outward unit normal in the carrier's frame.

@@ -433,12 +433,12 @@ impl Router<'_, '_> {
         self.clock.touch(&step);
         self.out.touches.push(PlanTouch {
             id,
-            stage: setup.spec.stage.clone(),
+            stage: setup.spec.stage.as_str().into(),
             repeat,
-            carrier: planned.carrier.to_string(),
+            carrier: planned.carrier.to_string().into(),
             mounting: (part.label != one.label).then(|| part.label.clone()),
-            block,
-            face: target.face.to_string(),
+            block: block.into(),
+            face: target.face.to_string().into(),
             point: target.point.into(),
             normal: target.normal.into(),
             pose: setup.pose,

@@ -53,7 +53,7 @@ impl Router<'_, '_> {
     pub(super) fn resume(&self) -> Option<Vec<Step>> {
         let ((mut at, senses), to) = (self.opening?, self.at?);
         let mut steps = Vec::new();
-        for (axis, angle, sense) in self.turns(Some((at, senses)), &AxisMap(to.0.map(Some)), &self.senses).ok()? {
+        for (axis, angle, sense) in self.turns(Some((at, senses)), &AxisMap::from(to), &self.senses).ok()? {
             self.scene.clear_turn(&at, axis, angle).ok()?;
             at.set(axis, angle);
             steps.push(turn_step(axis, angle, sense));

@@ -1,6 +1,7 @@
 //! Candidates and their columns, stacked so that one product serves all.
 
-use nalgebra::{DMatrix, DMatrixView};
+use nalgebra::{DMatrix, DMatrixView, DVectorView};
+use std::borrow::Borrow;
 use std::ops::Range;
 
 /// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
@@ -9,8 +10,13 @@ const LEAST_TRACE: f64 = 1e-6;
 /// Whitened columns, per typical size, with those that are only rounding set to nothing: the sine of twice C at C = 0 and 90
 /// leaves 1e-16, which is no direction and explains no other effect.
 pub fn without_rounding(columns: &mut DMatrix<f64>) {
-    for mut column in columns.column_iter_mut() {
-        if column.norm() < LEAST_TRACE {
+    let rows = columns.nrows();
+    clear_rounding(columns.as_mut_slice(), rows);
+}
+
+fn clear_rounding(columns: &mut [f64], rows: usize) {
+    for column in columns.chunks_exact_mut(rows.max(1)) {
+        if DVectorView::from_slice(column, rows).norm() < LEAST_TRACE {
             column.fill(0.0);
         }
     }
@@ -70,7 +76,7 @@ impl Library {
 
     /// Adds a candidate without a scan. `columns`: N × q, whitened, scaled by typical size.
     pub fn push(&mut self, id: impl Into<String>, origin: Origin, columns: &DMatrix<f64>) {
-        self.push_scan(id, origin, [(0.0, columns.clone())], 0);
+        self.push_scan(id, origin, [(0.0, columns)], 0);
     }
 
     /// Adds a candidate with a scanned shape; `variants` gives the shape's value and N × q columns. Matrices with
@@ -79,17 +85,18 @@ impl Library {
         &mut self,
         id: impl Into<String>,
         origin: Origin,
-        variants: impl IntoIterator<Item = (f64, DMatrix<f64>)>,
+        variants: impl IntoIterator<Item = (f64, impl Borrow<DMatrix<f64>>)>,
         n_scanned: usize,
     ) {
         let mut spans = Vec::new();
-        for (shape, mut columns) in variants {
-            without_rounding(&mut columns);
+        for (shape, columns) in variants {
+            let columns = columns.borrow();
             if columns.nrows() != self.n_rows {
                 continue;
             }
-            let first = self.n_columns();
+            let (first, from) = (self.n_columns(), self.data.len());
             self.data.extend_from_slice(columns.as_slice());
+            clear_rounding(&mut self.data[from..], self.n_rows);
             spans.push(Variant { shape, columns: first..first + columns.ncols() });
         }
         if !spans.is_empty() {

@@ -67,12 +67,12 @@ pub fn add_touch(plan: &mut Plan, machine: &Machine, block: &str, point: Vec3, n
     };
     let touch = PlanTouch {
         id: plan.touches.len() as u64 + 1,
-        stage: "test".to_owned(),
+        stage: "test".into(),
         repeat: 1,
-        carrier: found.carrier.clone(),
+        carrier: found.carrier.as_str().into(),
         mounting: None,
-        block: block.to_owned(),
-        face: String::new(),
+        block: block.into(),
+        face: String::new().into(),
         point,
         normal,
         pose,

@@ -1,0 +1,49 @@
+//! V^(−1/2) of the touches, made once and applied to any number of columns.
+
+use nalgebra::{DMatrix, DMatrixViewMut, Matrix3, Vector3};
+
+/// What turns columns of gaps (one row per touch, mm or mm per unit) into rows of unit noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Whitening {
+    /// Square root of each touch's weight: zero where it is not used.
+    pub(super) root: Vec<f64>,
+    /// Index visits whose touches share a displacement, one after the other.
+    pub(super) visits: Vec<Visit>,
+    /// Standard deviation of a touch.
+    pub(super) sigma_mm: f64,
+}
+
+/// The touches of an index visit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Visit {
+    /// Outward normals in R, each times the root of its weight.
+    pub normals: Vec<Vector3<f64>>,
+    /// K of V^(−1/2) = (I − N·K·Nᵀ)/σ.
+    pub root: Matrix3<f64>,
+}
+
+impl Whitening {
+    /// Whitens columns in place; rows of unused touches become zero.
+    pub fn apply(&self, columns: &mut DMatrix<f64>) {
+        let rows = columns.nrows();
+        self.apply_to(columns.view_mut((0, 0), (rows, columns.ncols())));
+    }
+
+    /// The same for a part of a matrix.
+    pub fn apply_to(&self, mut columns: DMatrixViewMut<'_, f64>) {
+        for mut column in columns.column_iter_mut() {
+            for (x, root) in column.iter_mut().zip(&self.root).filter(|(_, root)| **root != 1.0) {
+                *x *= root;
+            }
+            let mut from = 0;
+            for visit in &self.visits {
+                let mut part = column.rows_mut(from, visit.normals.len());
+                let sum = visit.normals.iter().zip(part.iter()).fold(Vector3::zeros(), |s, (n, x)| s + n * *x);
+                let by = visit.root * sum;
+                part.iter_mut().zip(&visit.normals).for_each(|(x, n)| *x -= n.dot(&by));
+                from += visit.normals.len();
+            }
+            column.unscale_mut(self.sigma_mm);
+        }
+    }
+}
