@@ -70,9 +70,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         args.study.display(),
         made.id
     ));
-    let others = made.tried.iter().skip(1).take(5);
-    for t in others {
-        io.say(format!("  at {} ({}) it would leave {:.2} um", t.at, t.dofs().join(", "), t.left_um));
+    for (i, t) in made.tried.iter().take(6).enumerate() {
+        let which = match i {
+            0 => ": this one is written",
+            _ if t.as_good_as(&made.tried[0]) => ": these touches cannot tell it from the first",
+            _ => "",
+        };
+        io.say(format!("  at {} ({}) it would leave {:.2} um{which}", t.at, t.dofs().join(", "), t.left_um));
     }
     io.answer(
         &json!({ "effect": made.id, "places": made.tried, "says": made.says, "formula": made.formula, "file": name, "toml": made.toml }),

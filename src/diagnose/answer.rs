@@ -37,6 +37,9 @@ pub struct Diagnosis {
     /// Faces that lie elsewhere: `full/a +X`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faces: Vec<String>,
+    /// Blocks that stand or measure otherwise than the rest, the most conspicuous first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<String>,
     /// With `unexplained`: the noise explains all that is left but for a pattern too faint to name. No reason to take the
     /// machine apart.
     pub faint: bool,

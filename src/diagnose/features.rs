@@ -21,14 +21,15 @@ pub fn features(fit: &Fit, machine: &Machine) -> Features {
         let kind = if axis.name.is_rotary() { Kind::Rotary } else { Kind::Linear };
         // where the plan has them: a step between two readings of one point would split them by their own noise
         let places = fit.data.nominal.iter().map(|o| o.position.mm_or_rad(axis.name)).collect();
-        variables.push(Variable::new(axis.name.to_string(), kind, places));
+        variables.push(Variable::new(axis.name.to_string(), kind, places).acting(sees(fit, axis.name)));
     }
     variables.push(Variable::new("t", Kind::Time, column(slot::HOURS)));
     if observations.iter().any(|o| o.has_temperature) {
         variables.push(Variable::new("T", Kind::Temperature, column(slot::TEMPERATURE)));
     }
     for axis in &machine.axes {
-        variables.push(Variable::new(format!("s{}", axis.name), Kind::Plain, column(slot::SENSES + axis.name.index())));
+        let sense = Variable::new(format!("s{}", axis.name), Kind::Plain, column(slot::SENSES + axis.name.index()));
+        variables.push(sense.acting(sees(fit, axis.name)));
     }
     for axis in machine.rotary() {
         variables.push(before(fit, axis.name));
@@ -53,11 +54,17 @@ pub fn features(fit: &Fit, machine: &Machine) -> Features {
     }
 }
 
+/// The touches whose block or ball an axis moves.
+fn sees(fit: &Fit, axis: AxisName) -> Vec<bool> {
+    fit.data.observations.iter().map(|o| fit.model.sees(axis, o)).collect()
+}
+
 /// Where a rotary axis stood before it came to its pose: hysteresis.
 fn before(fit: &Fit, axis: AxisName) -> Variable {
     let place = slot::BEFORE + axis.index() - AxisName::A.index();
     let values = fit.data.observations.iter().map(|o| o.state[place]).collect();
-    Variable { word: Some(format!("w{axis}")), ..Variable::new(format!("{axis} before"), Kind::Plain, values) }
+    let name = format!("{axis} before");
+    Variable { word: Some(format!("w{axis}")), ..Variable::new(name, Kind::Plain, values).acting(sees(fit, axis)) }
 }
 
 /// Angle of the approach in the probe's frame.

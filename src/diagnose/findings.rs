@@ -2,6 +2,7 @@
 
 use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Power, Shape, Verdict, Weakened, Where};
 use super::evidence::Evidence;
+use super::first_order::FirstOrder;
 use super::verdict::{Beside, Decision};
 use super::{Examination, Subject, gross, noise_um, tell, words};
 use crate::fit::Fit;
@@ -15,7 +16,7 @@ use crate::search::held_out::{Choice, held_out_in};
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::power;
 use crate::units::{mm_from_um, um_from_mm};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// A parameter is flagged when an added effect makes it this many times less certain.
 const WEAKENED: f64 = 3.0;
@@ -48,10 +49,11 @@ pub(super) fn put_together(
         candidates.push(candidate);
     }
     if verdict != Verdict::TooLittleData {
+        let first_order = FirstOrder::of(fit);
         let tell_apart = tell::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, tell_apart))| Candidate {
             tell_apart,
-            ..candidate(subject, seen, group, i == 0, decision.borne_out)
+            ..candidate(fit, seen, &first_order, group, (i == 0, decision.borne_out))
         }));
     }
     candidates.truncate(options.at_most);
@@ -166,7 +168,7 @@ pub(super) fn put_together(
             labels: d.groups.iter().filter_map(|&g| words::group(&d.on, g, fit, features)).collect(),
             block: moved.map(str::to_owned),
             // where an effect is named, its own words say what does that
-            kind: if candidates.iter().any(|c| c.proposed) { String::new() } else { words::kind(d) },
+            kind: if candidates.iter().any(|c| c.proposed) { String::new() } else { words::kind(d, fit) },
         })
     });
     let outliers = fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).map(|(&i, reason)| {
@@ -176,15 +178,24 @@ pub(super) fn put_together(
     });
     let unexplained = verdict == Verdict::Unexplained;
     let first_by = depends.first().map_or("", |w| w.by.as_str());
-    let faces = if unexplained && first_by == "face" { faces(fit, features, drawn) } else { Vec::new() };
+    let faces = if unexplained && first_by == "face" { faces(fit, seen, features, drawn) } else { Vec::new() };
+    let blocks: Vec<String> = match drawn.filter(|d| unexplained && first_by == "block" && d.on == "block") {
+        Some(d) => {
+            let found = super::standing_out::groups(seen.evidence, features, d, &features.block);
+            found.into_iter().filter_map(|b| words::group("block", b, fit, features)).collect()
+        }
+        None => Vec::new(),
+    };
     if let (Some(first), false) = (depends.first_mut(), faces.is_empty()) {
-        first.says += &format!(": clean {}", faces.join(", "));
+        first.says += &format!(": {}", faces.join(", "));
+    } else if let (Some(first), false) = (depends.first_mut(), blocks.is_empty()) {
+        first.says += &format!(": block {} is not like the rest", blocks.join(", then "));
     }
     // scatter and bad touches that lie together are put right at the machine, not by a formula
     let at_the_machine = |id: &str| id.starts_with("scatter:") || id.starts_with("not-used:");
     let sketchable = unexplained
         && depends.first().is_some_and(|w| !at_the_machine(&w.id))
-        && super::sketch::best(&seen.dependences).is_ok();
+        && super::sketch::best(&seen.dependences, fit).is_ok();
     let moved_block = drawn.filter(|_| unexplained).and_then(|d| words::moved_block(d, fit)).map(str::to_owned);
     jump_of_what(seen, features, &mut candidates);
     Diagnosis {
@@ -194,6 +205,7 @@ pub(super) fn put_together(
         sketchable,
         moved_block,
         faces,
+        blocks,
         faint: false,
         most_missed: false,
         rms_um: fit.outcome.rms_um,
@@ -241,18 +253,25 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     }
 }
 
-/// Faces that lie elsewhere: those on which touches were left out, or else those whose mean stands out from the others.
-fn faces(fit: &Fit, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
-    /// Standard uncertainties beyond which a face stands out from twenty.
-    const FAR: f64 = 3.5;
+/// Faces that lie elsewhere: those on which touches were left out, or else those that stand out from the others, each with the
+/// face opposite to it.
+fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
     let of_touches = super::gathered::faces(fit, features);
-    let named = |i: &usize| words::group("face", features.face[*i], fit, features);
+    let named = |number: usize| words::group("face", number, fit, features);
     if !of_touches.is_empty() {
-        return of_touches.iter().filter_map(named).collect();
+        return of_touches.iter().filter_map(|&i| named(features.face[i])).collect();
     }
     let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
-    let out = d.curve.iter().zip(&d.groups).filter(|(p, _)| p.y.abs() > FAR * p.sigma);
-    out.filter_map(|(_, &g)| words::group("face", g, fit, features)).collect()
+    let mut out: Vec<usize> = Vec::new();
+    for face in super::standing_out::groups(seen.evidence, features, d, &features.face) {
+        let both = [Some(face), super::standing_out::opposite(fit, features, face)];
+        for one in both.into_iter().flatten() {
+            if !out.contains(&one) {
+                out.push(one);
+            }
+        }
+    }
+    out.into_iter().filter_map(named).collect()
 }
 
 /// What is no shape and no effect, but a finding: scatter of visits, and bad touches that lie together.
@@ -331,8 +350,13 @@ fn used_rows(seen: &Examination) -> DMatrix<f64> {
     out
 }
 
-fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, borne_out: bool) -> Candidate {
-    let fit = subject.fit;
+fn candidate(
+    fit: &Fit,
+    seen: &Examination,
+    first_order: &FirstOrder,
+    group: &Group,
+    (first, borne_out): (bool, bool),
+) -> Candidate {
     let chosen = group.first();
     // sizes and what is left come from the order, probabilities from the tests
     let score = &seen.order.scores[chosen];
@@ -383,7 +407,8 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
     let moves = moves(seen, chosen);
     let question = seen.order.question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
-    let left = (1.0 - score.delta_ss / total).max(0.0);
+    let span = seen.ordered.library.candidates()[chosen].variants[score.variant].columns.clone();
+    let raw_mm = seen.ordered.raw_um.columns(span.start, span.len()).map(mm_from_um);
     Candidate {
         effect: effect.id.clone(),
         name: effect.name.clone(),
@@ -391,7 +416,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
         p,
         p_adjusted,
         proposed: first && borne_out && p_adjusted < FAMILY_LEVEL,
-        rms_after_um: fit.outcome.rms_um * left.sqrt(),
+        rms_after_um: first_order.rms_um(&raw_mm),
         held_out_before_um: Some(held.before).filter(|x| x.is_finite()),
         held_out_after_um: Some(held.after).filter(|x| x.is_finite()),
         held_out_se_um: Some(held.fall_error).filter(|x| x.is_finite()),
@@ -416,7 +441,7 @@ fn candidate(subject: Subject, seen: &Examination, group: &Group, first: bool, b
             let names = &seen.named.columns[chosen];
             score.wrong_signs(&seen.named.library).into_iter().map(|k| names[k].name.clone()).collect()
         },
-        weakens: weakened(fit, seen, chosen),
+        weakens: weakened(fit, first_order, &raw_mm),
         remains: None,
     }
 }
@@ -452,30 +477,9 @@ fn told(covariance: &DMatrix<f64>) -> Vec<bool> {
         .collect()
 }
 
-/// Results that an added effect makes less certain, from the one fit: C' = C + G·C_c·Gᵀ with G how they move with it. In the
-/// weights of the fit, which a refit keeps, and not in those of the tests, which allow for more scatter or for none.
-fn weakened(fit: &Fit, seen: &Examination, chosen: usize) -> Vec<Weakened> {
-    let variant = seen.order.scores[chosen].variant;
-    let span = seen.ordered.library.candidates()[chosen].variants[variant].columns.clone();
-    let weights = Evidence::with_visits(fit, fit.noise.tau_mm);
-    let raw_mm = seen.ordered.raw_um.columns(span.start, span.len()).map(mm_from_um);
-    let columns = weights.whiten(raw_mm);
-    let left = weights.base.project_columns(&columns);
-    let covariance = crate::fit::uncertainty::free_covariance(fit);
-    let moves = &covariance * weights.jacobian.tr_mul(&columns);
-    // C_c⁻¹ = JᵀPJ where the plan sees the effect; what it does not see moves nothing
-    let scale = columns.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE));
-    let scale = DVector::from_iterator(columns.ncols(), scale);
-    let gram = left.tr_mul(&left);
-    let scaled = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (scale[i] * scale[j]));
-    let eigen = scaled.symmetric_eigen();
-    let mut added = DVector::zeros(moves.nrows());
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-        if *value > crate::search::KEPT {
-            let along = &moves * vector.component_div(&scale);
-            added += along.component_mul(&along) / *value;
-        }
-    }
+/// Results that an added effect makes less certain, from the one fit.
+fn weakened(fit: &Fit, first_order: &FirstOrder, raw_mm: &DMatrix<f64>) -> Vec<Weakened> {
+    let (covariance, added) = (&first_order.covariance, first_order.added_variance(raw_mm));
     let mut out = Vec::new();
     for (c, &i) in fit.free.iter().enumerate() {
         let u = &fit.model.unknowns[i];

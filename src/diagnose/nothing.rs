@@ -19,6 +19,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         sketchable: false,
         moved_block: None,
         faces: Vec::new(),
+        blocks: Vec::new(),
         faint: false,
         most_missed: false,
         rms_um: fit.outcome.rms_um,

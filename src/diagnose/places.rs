@@ -3,12 +3,12 @@
 
 use super::Subject;
 use super::evidence::Evidence;
+use super::first_order::FirstOrder;
 use crate::diag::source;
 use crate::fit::candidates::columns;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::Dependence;
 use crate::search::{KEPT, Library, Origin, Question, Search};
-use crate::units::um_from_mm;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -37,7 +37,7 @@ pub struct Tried {
     pub at: String,
     /// Direction, number of the formula's term, size and standard uncertainty in the direction's unit.
     pub terms: Vec<(String, usize, f64, f64)>,
-    /// RMS that is left, µm.
+    /// RMS over the touches that is left, µm, as a refit has it to first order.
     pub left_um: f64,
     /// Schwarz's criterion: what is left, and what the terms cost.
     #[serde(skip)]
@@ -50,6 +50,12 @@ impl Tried {
     pub fn of(d: &Dependence) -> Self {
         let terms = d.terms.iter().enumerate().map(|(i, t)| (d.dof.clone(), i, t.size, t.sigma)).collect();
         Self { at: d.at.clone(), terms, left_um: f64::NAN, criterion: 0.0 }
+    }
+
+    /// Do these touches not tell it from a better one?
+    #[must_use]
+    pub fn as_good_as(&self, better: &Self) -> bool {
+        self.criterion - better.criterion < AS_GOOD
     }
 
     /// Its directions.
@@ -94,15 +100,19 @@ pub fn tried(subject: Subject, evidence: &Evidence, d: &Dependence) -> Vec<Tried
     for at in ["tool", "workpiece", "block", "trigger"] {
         add(at);
     }
+    let first_order = FirstOrder::of(subject.fit);
     let mut out: Vec<Tried> = places
         .par_iter()
         .filter_map(|at| {
             let dofs: &[&str] = if at == "trigger" { &["r"] } else { &DOFS };
-            let ways: Vec<(String, DMatrix<f64>)> = dofs
+            let ways: Vec<Way> = dofs
                 .iter()
-                .filter_map(|dof| Some(((*dof).to_owned(), whitened(subject, evidence, at, dof, &formulas, d)?)))
+                .filter_map(|dof| {
+                    let raw_mm = columns_of(subject, at, dof, &formulas, d)?;
+                    Some(Way { dof: (*dof).to_owned(), white: evidence.whiten(raw_mm.clone()), raw_mm })
+                })
                 .collect();
-            forward(subject, evidence, at, &ways)
+            forward(evidence, &first_order, at, &ways)
         })
         .collect();
     let best = out.iter().map(|t| t.criterion).fold(f64::INFINITY, f64::min);
@@ -114,15 +124,17 @@ pub fn tried(subject: Subject, evidence: &Evidence, d: &Dependence) -> Vec<Tried
     out
 }
 
-/// Columns of a formula that acts in one direction of a place, one for each of its terms; `None` where nothing is seen.
-fn whitened(
-    subject: Subject,
-    evidence: &Evidence,
-    at: &str,
-    dof: &str,
-    formulas: &[String],
-    d: &Dependence,
-) -> Option<DMatrix<f64>> {
+/// A direction of a place.
+struct Way {
+    dof: String,
+    /// Its columns, mm per unit, one row per touch.
+    raw_mm: DMatrix<f64>,
+    /// The same as rows of the tests.
+    white: DMatrix<f64>,
+}
+
+/// Columns of a formula that acts in one direction of a place, mm, one for each of its terms; `None` where nothing is seen.
+fn columns_of(subject: Subject, at: &str, dof: &str, formulas: &[String], d: &Dependence) -> Option<DMatrix<f64>> {
     let mut text = format!("[[effect]]\nid = \"place\"\nat = \"{at}\"\nterms = [\n");
     for (i, formula) in formulas.iter().enumerate() {
         let _ = writeln!(
@@ -149,11 +161,11 @@ fn whitened(
     let linear: Vec<usize> = (0..made.unknowns.len()).filter(|&i| !made.unknowns[i].shape).collect();
     let values = made.values.select_columns(&linear);
     let seen = values.ncols() == formulas.len() && values.iter().all(|v| v.is_finite());
-    (seen && values.norm() > 0.0).then(|| evidence.whiten(values))
+    (seen && values.norm() > 0.0).then_some(values)
 }
 
 /// The directions of one place that pay, one after the other.
-fn forward(subject: Subject, evidence: &Evidence, at: &str, ways: &[(String, DMatrix<f64>)]) -> Option<Tried> {
+fn forward(evidence: &Evidence, first_order: &FirstOrder, at: &str, ways: &[Way]) -> Option<Tried> {
     let question = evidence.question();
     let mut base = question.base.clone();
     let mut chosen: Vec<usize> = Vec::new();
@@ -161,7 +173,7 @@ fn forward(subject: Subject, evidence: &Evidence, at: &str, ways: &[(String, DMa
         let mut library = Library::new(evidence.n_rows());
         let open: Vec<usize> = (0..ways.len()).filter(|i| !chosen.contains(i)).collect();
         for &i in &open {
-            library.push(ways[i].0.clone(), Origin::User, &ways[i].1);
+            library.push(ways[i].dof.clone(), Origin::User, &ways[i].white);
         }
         let now = Question { base: &base, ..question };
         let search = Search::new(now, &library);
@@ -169,25 +181,21 @@ fn forward(subject: Subject, evidence: &Evidence, at: &str, ways: &[(String, DMa
         if !chosen.is_empty() && search.scores[first].p > WORTH_A_TERM {
             break;
         }
-        base.extend(&ways[open[first]].1, KEPT);
+        base.extend(&ways[open[first]].white, KEPT);
         chosen.push(open[first]);
     }
     if chosen.is_empty() {
         return None;
     }
     // sizes of all terms together
-    let width: usize = chosen.iter().map(|&i| ways[i].1.ncols()).sum();
-    let mut all = DMatrix::zeros(evidence.n_rows(), width);
-    let mut at_column = 0;
-    let mut terms = Vec::new();
-    for &i in &chosen {
-        let part = &ways[i].1;
-        all.columns_mut(at_column, part.ncols()).copy_from(part);
-        at_column += part.ncols();
-        terms.extend((0..part.ncols()).map(|k| (ways[i].0.clone(), k)));
-    }
+    let together = |of: &dyn Fn(&Way) -> &DMatrix<f64>| {
+        let columns: Vec<_> = chosen.iter().flat_map(|&i| of(&ways[i]).column_iter()).collect();
+        DMatrix::from_columns(&columns)
+    };
+    let terms: Vec<(String, usize)> =
+        chosen.iter().flat_map(|&i| (0..ways[i].white.ncols()).map(move |k| (ways[i].dof.clone(), k))).collect();
     let mut library = Library::new(evidence.n_rows());
-    library.push("all", Origin::User, &all);
+    library.push("all", Origin::User, &together(&|way| &way.white));
     let search = Search::new(question, &library);
     let score = search.scores.first()?;
     let total = question.base.project(question.residual).norm_squared();
@@ -200,7 +208,7 @@ fn forward(subject: Subject, evidence: &Evidence, at: &str, ways: &[(String, DMa
     Some(Tried {
         at: at.to_owned(),
         terms: sized.collect(),
-        left_um: um_from_mm(subject.fit.noise.sigma_mm) * (left / n).sqrt(),
+        left_um: first_order.rms_um(&together(&|way| &way.raw_mm)),
         criterion: n * (left / n).ln() + score.q as f64 * n.ln(),
     })
 }
@@ -217,7 +225,7 @@ pub fn comment(tried: &[Tried]) -> String {
     );
     for t in tried.iter().skip(1).take(MOST_LISTED) {
         let same =
-            if t.criterion - first.criterion < AS_GOOD { ": these touches cannot tell it from the first" } else { "" };
+            if t.as_good_as(first) { ": these touches cannot tell it from the first" } else { "" };
         let _ = writeln!(out, "#   {} ({}) leaves {:.2} um{same}", t.at, t.dofs().join(" "), t.left_um);
     }
     out

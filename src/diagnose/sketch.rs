@@ -6,6 +6,7 @@ use super::features::{features, shapes};
 use super::places;
 use super::words;
 use crate::diag::{Failure, Result};
+use crate::fit::Fit;
 use crate::search::dependence::{Dependence, dependences};
 use std::fmt::Write as _;
 
@@ -36,7 +37,7 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
         .unwrap_or_else(|| Evidence::of(subject.fit));
     let generics = shapes(&evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
-    let best = best(&all)?;
+    let best = best(&all, subject.fit)?;
     let share = super::findings::beyond_the_noise(&evidence, best.share, best.terms.len());
     if best.on == words::MOVED_BLOCK {
         return Ok(write_moved(subject, (best, share), taken));
@@ -50,7 +51,7 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
 ///
 /// # Errors
 /// When nothing is significant, or formulas have no word for the first.
-pub(super) fn best(all: &[Dependence]) -> Result<&Dependence> {
+pub(super) fn best<'d>(all: &'d [Dependence], fit: &Fit) -> Result<&'d Dependence> {
     let level = crate::search::multiplicity::FAMILY_LEVEL;
     let Some(first) = all.iter().find(|d| d.p_adjusted < level) else {
         return Err(Failure::new("sketch::nothing_left", "what is left over depends on nothing that can be seen")
@@ -59,7 +60,8 @@ pub(super) fn best(all: &[Dependence]) -> Result<&Dependence> {
     if first.on == words::MOVED_BLOCK || first.terms.iter().all(|t| t.formula.is_some()) {
         return Ok(first);
     }
-    let says = format!("no formula is written for what goes with {}: {}", words::plain(&first.on), words::kind(first));
+    let says =
+        format!("no formula is written for what goes with {}: {}", words::plain(&first.on), words::kind(first, fit));
     Err(Failure::new("sketch::no_formula", says)
         .help("a dirty face, a block of another size or a pose that does not come back is put right on the machine"))
 }
@@ -81,7 +83,7 @@ fn write_moved(subject: Subject, (d, share): (&Dependence, f64), taken: &dyn Fn(
     let toml = format!(
         "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: block {block} moved\"\nsays = \"{}\"\nlook = \"{}\"\n# every block has sizes of its own: those of the blocks that stood still come to nothing\nper = \"block\"\nat = \"block\"\nterms = [\n{terms}]\n",
         says.replace('"', "'"),
-        words::kind(d).replace('"', "'"),
+        words::kind(d, subject.fit).replace('"', "'"),
     );
     let formula = format!("{formula} [block dx dy dz, each block by itself]");
     Sketch { id, says, formula, toml, sizes: Vec::new(), tried: Vec::new() }
@@ -134,7 +136,7 @@ fn write(
         "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: {}\"\nsays = \"{}\"\nlook = \"{}\"\n{}at = \"{}\"\nterms = [\n{terms}]\n",
         d.on,
         says.replace('"', "'"),
-        words::kind(d).replace('"', "'"),
+        words::kind(d, subject.fit).replace('"', "'"),
         places::comment(tried),
         place.at,
     );

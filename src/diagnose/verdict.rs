@@ -191,6 +191,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
     out.outliers.clear();
     (out.moved_block, out.sketchable) = (None, false);
     out.faces.clear();
+    out.blocks.clear();
     if let Some((s, first)) = fit.data.supposed.as_ref().zip(out.gross.first()) {
         let says = &first.says;
         out.says = format!(

@@ -193,7 +193,13 @@ pub(super) fn speaks_of(subject: super::Subject, effect: &str, variable: &str) -
 #[must_use]
 pub fn at_the_machine(found: &Diagnosis) -> String {
     if !found.faces.is_empty() {
-        return format!("clean {} and touch them again", found.faces.join(", "));
+        return format!(
+            "clean {} and touch them again; where they are clean, measure the block: it may be of another size than the plan says",
+            found.faces.join(", ")
+        );
+    }
+    if let Some(block) = found.blocks.first() {
+        return format!("clean and clamp block {block}, measure its size, and measure again");
     }
     if let Some(block) = &found.moved_block {
         return format!("clamp block {block} anew and measure again");
@@ -201,6 +207,10 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
     match found.depends.first().map(|w| w.by.as_str()) {
         Some("face") => "clean the faces of the blocks and touch them again",
         Some("block") => "look whether a block is loose or dirty, clamp and clean it, and measure again",
+        Some("visit") if comes_back(found) => {
+            "each pose has an error of its own and comes back with it: look for what changes from pose to pose (gear, clamping \
+             ring, cables that drag), and measure at more angles of the rotary axes"
+        }
         Some("visit") => "look for play or dirt in the clamping and indexing of the rotary axes, and measure again",
         Some(_) if found.faint => "measure again: further touches tell whether the pattern is there at all",
         Some(_) => "look for it at the machine: no formula says it",
@@ -209,13 +219,20 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
     .to_owned()
 }
 
+/// Revisits show that poses come back to better than a touch can tell.
+fn comes_back(found: &Diagnosis) -> bool {
+    let scatter = found.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
+    found.visit_source == "revisits" && found.visit_um < found.noise_um && !scatter
+}
+
 fn harmonic(d: &Dependence) -> String {
     if form(d) == "order" { turns(d.scanned) } else { "smoothly over the turn".to_owned() }
 }
 
 /// What kind of thing makes such a misfit.
 #[must_use]
-pub fn kind(d: &Dependence) -> String {
+pub fn kind(d: &Dependence, fit: &Fit) -> String {
+    let comes_back = fit.noise.visit_source == "revisits" && fit.noise.tau_test_mm < fit.noise.sigma_mm;
     let text = match (d.on.as_str(), form(d)) {
         ("t", "step") => {
             "something moved at one moment: a knocked fixture, a clamp or probe that gave way, a collision"
@@ -227,6 +244,9 @@ pub fn kind(d: &Dependence) -> String {
         (CONSTANT, _) => "an offset that the model does not hold: a zero point, a length, a position error of an axis",
         ("block", _) => "a block that stands or measures otherwise than the rest: loose, tilted, another size",
         ("face", _) => "single faces that lie elsewhere: chips, burrs, coolant",
+        ("visit", _) if comes_back => {
+            "poses that each have an error of their own, and come back with it: a pattern that no shape here has"
+        }
         ("visit", _) => "poses that do not come back: clamping or indexing scatter",
         ("T", _) => "temperature",
         ("S" | "approach", _) => "the probe: stylus run-out, or a trigger that depends on the direction",

@@ -260,8 +260,9 @@ fn curve(search: &Search, score: &Score, shape: &Shape, features: &Features, kep
         _ => None,
     };
     let of_it = |i: usize| moved.is_none_or(|number| features.block[i] == number);
+    let acts = |i: usize| shape.variables.iter().all(|&v| features.variables[v].acts_at(i));
     let weight = |i: usize| match direction {
-        _ if !of_it(i) => 0.0,
+        _ if !of_it(i) || !acts(i) => 0.0,
         Some(d) => features.directions[d].weight[i].powi(2),
         None => 1.0,
     };
@@ -282,7 +283,7 @@ fn curve(search: &Search, score: &Score, shape: &Shape, features: &Features, kep
             .map(|i| point((i + 1) as f64, DVector::from_fn(functions.len(), |k, _| f64::from(u8::from(i == k)))))
             .collect(),
         [v] => {
-            let values = || (0..n_touches).filter(|&i| of_it(i)).map(|i| features.variables[v].values[i]);
+            let values = || (0..n_touches).filter(|&i| of_it(i) && acts(i)).map(|i| features.variables[v].values[i]);
             let low = values().fold(f64::INFINITY, f64::min);
             let high = values().fold(f64::NEG_INFINITY, f64::max);
             (0..POINTS)

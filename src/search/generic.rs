@@ -68,6 +68,9 @@ pub struct Variable {
     pub kind: Kind,
     /// Values, in the kind's unit.
     pub values: Vec<f64>,
+    /// At which touches it can act at all; empty: at all of them. What an axis does wrong moves what that axis carries: a
+    /// block beside the turntable sees nothing of it.
+    pub acts: Vec<bool>,
 }
 
 impl Variable {
@@ -75,12 +78,26 @@ impl Variable {
     #[must_use]
     pub fn new(name: impl Into<String>, kind: Kind, values: Vec<f64>) -> Self {
         let name = name.into();
-        Self { word: Some(name.clone()), name, kind, values }
+        Self { word: Some(name.clone()), name, kind, values, acts: Vec::new() }
     }
 
-    /// Distinct values, ascending.
+    /// The same, acting at some of the touches only.
+    #[must_use]
+    pub fn acting(mut self, acts: Vec<bool>) -> Self {
+        self.acts = if acts.iter().all(|a| *a) { Vec::new() } else { acts };
+        self
+    }
+
+    /// Can it act at a touch?
+    #[must_use]
+    pub fn acts_at(&self, touch: usize) -> bool {
+        self.acts.get(touch).is_none_or(|a| *a)
+    }
+
+    /// Distinct values where it acts, ascending.
     fn distinct(&self) -> Vec<f64> {
-        let mut values: Vec<f64> = self.values.iter().copied().filter(|v| v.is_finite()).collect();
+        let here = self.values.iter().enumerate().filter(|(i, v)| v.is_finite() && self.acts_at(*i));
+        let mut values: Vec<f64> = here.map(|(_, v)| *v).collect();
         values.sort_by(f64::total_cmp);
         let span = values.last().zip(values.first()).map_or(0.0, |(b, a)| b - a);
         values.dedup_by(|b, a| (*b - *a).abs() <= 1e-6 * span.max(1e-300));
@@ -215,7 +232,8 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
         for function in shape.functions.iter().flatten() {
             if let Some(mut column) = columns.next() {
                 for (i, value) in column.iter_mut().enumerate() {
-                    let weight = weight.map_or(1.0, |w| w[i]);
+                    let acts = shape.variables.iter().all(|&v| features.variables[v].acts_at(i));
+                    let weight = if acts { weight.map_or(1.0, |w| w[i]) } else { 0.0 };
                     *value = if weight == 0.0 { 0.0 } else { weight * function.at_row(features, i) };
                 }
             }

@@ -338,6 +338,7 @@ mod tests {
             sketchable: true,
             moved_block: None,
             faces: Vec::new(),
+            blocks: Vec::new(),
             faint: false,
             rms_um: 5.0,
             noise_um: 1.0,

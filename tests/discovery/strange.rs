@@ -116,9 +116,12 @@ fn touches(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> (Vec<Vec<Touch>>
     let clean = bench.measure(&base, "", 1.0, seed);
     let wrong = match kind {
         0 => {
-            let (cos, sin) = (25.0 * size, 15.0 * size * sign(rng));
+            // a tooth turns the table, shifts it or tilts it: blocks beside the turntable see none of that
+            let dof = ["rz", "dx", "dy", "dz", "rx", "ry"][rng.random_range(0..6)];
+            let (unit, each) = if dof.starts_with('r') { ("urad", 25.0) } else { ("um", 1.0) };
+            let (cos, sin) = (each * size, 0.6 * each * size * sign(rng));
             let wrong = format!(
-                "{base}[[harmonic]]\naxis = \"C\"\ndof = \"rz\"\nk = 7\ncos_urad = {cos:?}\nsin_urad = {sin:?}\n"
+                "{base}[[harmonic]]\naxis = \"C\"\ndof = \"{dof}\"\nk = 7\ncos_{unit} = {cos:?}\nsin_{unit} = {sin:?}\n"
             );
             bench.measure(&wrong, "", 1.0, seed)
         }
