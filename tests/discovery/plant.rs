@@ -98,7 +98,7 @@ pub fn base(bench: &Bench, rng: &mut ChaCha8Rng) -> String {
     let mut stood: Vec<(String, String)> = Vec::new();
     for (plan, _) in &bench.plans {
         for t in &plan.touches {
-            let at = (t.mounting.clone().unwrap_or_else(|| plan.mounting.clone()), t.block.clone());
+            let at = (t.mounting.clone().unwrap_or_else(|| plan.mounting.clone()), t.block.to_string());
             if !stood.contains(&at) {
                 stood.push(at);
             }
