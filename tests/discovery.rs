@@ -6,7 +6,7 @@ mod common;
 #[path = "discovery/mod.rs"]
 mod discovery;
 
-use axiscal::diagnose::{Diagnosis, Options, Verdict};
+use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, with_effects};
 use axiscal::model::catalogue::Catalogue;
 use discovery::find;
 use discovery::measure::{Outcome, both_named, clean, planted, two};
@@ -185,4 +185,66 @@ fn a_constant_goes_with_no_variable() {
     let shares: Vec<(&str, f64)> = d.depends.iter().map(|w| (w.by.as_str(), w.share)).collect();
     assert!(first.share > 0.8, "{shares:?}");
     assert!(d.depends.iter().skip(1).all(|w| w.share < 0.3 || w.by == "constant"), "{shares:?}");
+}
+
+/// What a candidate would leave is what its refit leaves, for the first and for those behind it; the same of a sketch.
+#[test]
+fn what_would_be_left_is_what_a_refit_leaves() {
+    let catalogue = Catalogue::built_in().unwrap();
+    for (bench, wrong) in [
+        (Bench::full(), "[[harmonic]]\naxis = \"B\"\ndof = \"dx\"\nk = 2\ncos_um = 6.0\nsin_um = 4.0\n"),
+        (Bench::full().with_visits(0.5), "[effects.warm-up]\nwx = 8.0\nwz = 5.0\ntau = 0.4\n"),
+    ] {
+        let (fit, settings, d) = said(&bench, wrong, "", "");
+        let subject = Subject { machine: &bench.machine, catalogue: &catalogue, settings: &settings, fit: &fit };
+        assert!(d.candidates.len() > 1, "{}", d.says);
+        for c in &d.candidates {
+            let after = with_effects(subject, &[c.effect.as_str()]).unwrap();
+            // touches come back with an effect, or are left out with it: then the two are of other touches
+            if after.rejected.len() == fit.rejected.len() {
+                let (said, is) = (c.rms_after_um, after.outcome.rms_um);
+                assert!((said / is - 1.0).abs() < 0.02, "{}: {said} said, {is} found", c.effect);
+            }
+        }
+    }
+    let wrong = "[[harmonic]]\naxis = \"C\"\ndof = \"dx\"\nk = 7\ncos_um = 6.0\nsin_um = 4.0\n";
+    let bench = Bench::full().with_visits(0.5);
+    let (fit, settings, _) = said(&bench, wrong, "", "");
+    let subject = Subject { machine: &bench.machine, catalogue: &catalogue, settings: &settings, fit: &fit };
+    let made = axiscal::diagnose::sketch::sketch(subject, &|_| false).unwrap();
+    let mut own = Catalogue::built_in().unwrap();
+    own.add_file(&axiscal::diag::source("my-effects.toml", made.toml.clone())).unwrap();
+    let more = Subject { catalogue: &own, ..subject };
+    let after = with_effects(more, &[made.id.as_str()]).unwrap().outcome.rms_um;
+    let first = &made.tried[0];
+    assert!((first.left_um / after - 1.0).abs() < 0.02, "{} said, {after} found\n{}", first.left_um, made.toml);
+}
+
+/// One block of another size: that block is named, and no innocent face however large the fault is.
+#[test]
+fn the_faces_of_one_block_of_another_size_are_named_alone() {
+    for size_um in [4.0, 12.0] {
+        let wrong = format!("[[block]]\nmounting = \"full\"\nname = \"c\"\nsize_um = [{size_um:?}, 0.0, 0.0]\n");
+        let d = said_of_a_block(&wrong);
+        assert_eq!(d.verdict, Verdict::Unexplained, "{size_um}: {}", d.says);
+        let mut faces = d.faces.clone();
+        faces.sort();
+        assert_eq!(faces, ["full/c +X", "full/c -X"], "{size_um}: {}", d.says);
+    }
+    let d = said_of_a_block("[[block]]\nmounting = \"full\"\nname = \"c\"\nsize_um = [6.0, 6.0, 6.0]\n");
+    assert!(
+        d.blocks == ["full/c"] || (!d.faces.is_empty() && d.faces.iter().all(|f| f.starts_with("full/c "))),
+        "{}",
+        d.says
+    );
+}
+
+/// Blocks stand where the plan has them: a scenario names each block once.
+fn said_of_a_block(wrong: &str) -> Diagnosis {
+    let bench = Bench::full();
+    let catalogue = Catalogue::built_in().unwrap();
+    let touches = bench.measure(wrong, "", 1.0, 78);
+    let data = find::data(&bench.machine, &bench.plans, &touches);
+    let (fit, settings) = find::fit(&bench.machine, &catalogue, data, &[], None);
+    find::look(&bench.machine, &catalogue, &fit, &settings, &find::LEAN)
 }
