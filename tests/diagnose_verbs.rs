@@ -1,50 +1,10 @@
 //! `diagnose`, `compare` and `sketch-effect` from outside: exit codes, the contract's JSON, rubbish.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-use assert_cmd::Command;
+mod common;
+
+use common::verbs::{axiscal, folder, json, ok};
 use serde_json::Value;
-use std::path::Path;
-
-fn axiscal(folder: &Path, args: &[&str]) -> std::process::Output {
-    Command::cargo_bin("axiscal").unwrap().current_dir(folder).env_remove("COLUMNS").args(args).output().unwrap()
-}
-
-fn ok(folder: &Path, args: &[&str]) {
-    let out = axiscal(folder, args);
-    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
-}
-
-/// One JSON object on stdout and the exit code.
-fn json(folder: &Path, args: &[&str]) -> (Value, i32) {
-    let out = axiscal(folder, &[args, &["--json"]].concat());
-    let read = serde_json::from_slice(&out.stdout);
-    (
-        read.unwrap_or_else(|e| panic!("{args:?}: {e}: {}", String::from_utf8_lossy(&out.stderr))),
-        out.status.code().unwrap(),
-    )
-}
-
-const COMMON: [&str; 5] = ["--machine", "swivel-head", "--controller", "linuxcnc", "--out"];
-
-/// Programs touched under a scenario, and their study.
-fn folder(programs: &[&str], scenario: &str, effects: Option<&str>) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    std::fs::write(at.join("wrong.toml"), scenario).unwrap();
-    if let Some(text) = effects {
-        std::fs::write(at.join("own.toml"), text).unwrap();
-    }
-    let mut new = vec!["new".to_owned()];
-    for p in programs {
-        let (plan, log) = (format!("{p}.plan.json"), format!("{p}.log"));
-        ok(at, &[&["generate", "--program", p][..], &COMMON, &["."]].concat());
-        ok(at, &[&["simulate", "--plan", &plan, "--scenario", "wrong.toml"][..], &COMMON, &[&log]].concat());
-        new.extend(["--plan".to_owned(), plan, "--log".to_owned(), log]);
-    }
-    let words: Vec<&str> = new.iter().map(String::as_str).collect();
-    ok(at, &[&words[..], &COMMON, &["study.toml"]].concat());
-    folder
-}
 
 fn keys(value: &Value, wanted: &[&str]) {
     for key in wanted {

@@ -4,6 +4,7 @@
 
 pub mod more_machines;
 pub mod random;
+pub mod verbs;
 
 use axiscal::diag::source;
 use axiscal::fit::{self, Fit, Settings};
