@@ -297,6 +297,44 @@ fn the_transformation_is_switched_off_again() {
     assert!(of("M129", 1).contains(&"check::not_restored"), "{:?}", of("M129", 1));
 }
 
+/// At its end a program under `--tcp` has the control as it found it: each line that switches something off or gives it back counts.
+/// Where it stops by itself it moves nothing, so the length stays on there, and its alarm says so.
+#[test]
+fn under_a_transformation_the_end_is_as_the_beginning() {
+    for (name, program) in [("trunnion", "basic"), ("swivel-head", "table")] {
+        let machine = machine(name);
+        let generated = generated(&machine, program, true);
+        for (control, alarm) in [("fanuc", "AXISCAL STOPPED TCP IS ON"), ("haas", "STOPPED TCP ON")] {
+            let post = controller(control);
+            let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+            let (touches, end) = text.split_at(text.find("DPRNT[E").unwrap());
+            assert!(!touches.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
+            assert!(end.contains(&format!("\n#3000=1({alarm})\n")), "{control}: {end}");
+            let off = end.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
+            let local = end.lines().find(|l| l.starts_with("G52 ")).unwrap();
+            let with = |line: &str, other: &str| {
+                let found = codes(&post, &machine, &generated, &format!("{touches}{}", end.replacen(line, other, 1)));
+                println!("{control} {name}, {other:?} for {line:?}: {found:?}");
+                found
+            };
+            for line in [off, local, "G#11 G#12 G#13 G#14", "G#15"] {
+                assert!(with(line, "").contains(&"check::not_restored"), "{control} {line}");
+            }
+            // neither where Z goes elsewhere, nor before the rotary axes stand at 0
+            assert!(!with(off, "G0 G49 Z0.").is_empty(), "{control}");
+            assert!(!with(off, "G49").is_empty(), "{control}");
+            let back = touches.rfind("\nG0 ").unwrap() + 1;
+            let turned = format!("{}{}", &touches[..back], touches[back..].split_once('\n').unwrap().1);
+            let found = codes(&post, &machine, &generated, &format!("{turned}{end}"));
+            assert!(found.contains(&"check::not_run"), "{control}: {found:?}");
+            // a stop that takes the length off moves: which axes is not known, the block may be near
+            let stop = format!("N9\nG4 P10\n{off}\n");
+            let found = codes(&post, &machine, &generated, &format!("{touches}{}", end.replacen("N9\n", &stop, 1)));
+            assert!(found.contains(&"check::goes_on"), "{control}: {found:?}");
+        }
+    }
+}
+
 /// With No. 5006#6 (TOS) = 0 a G49 takes Z along by the length that acts: the program begins only where none does, and takes its own
 /// off where Z stands.
 #[test]
@@ -307,7 +345,7 @@ fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
         let post = controller(control);
         let of = |generated: &Generated| post.program(&machine, &generated.plan, &generated.path).unwrap().text;
         let text = of(&plain);
-        assert!(!text.contains("G49"), "{control}");
+        assert!(!text.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
         // it does not look whether a length acts
         let look = text.lines().find(|l| l.starts_with("IF[#4008EQ49]")).unwrap();
         let blind = without(&text, look, "GOTO9");
@@ -327,6 +365,8 @@ fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
     let post = controller("fanuc");
     let text = post.program(&machine, &long.plan, &long.path).unwrap().text;
     let off = text.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
+    // and the local system is off as well before a person is asked to do something
+    assert!(text.contains(&format!("{off}\nG52 X0. Y0. Z0. A0. C0.\n#18=0\n#3006=1(")), "{off}");
     let found = codes(&post, &machine, &long, &text.replace(off, "G49"));
     assert!(
         found.iter().any(|c| [

@@ -3,7 +3,7 @@
 use super::explore::{Branch, Deviation, Told};
 use super::judge::{Case, SIDEWAYS_MM, Said};
 use super::run::{Alarm, Event, Happened};
-use super::settings::compare_settings;
+use super::settings::{compare_settings, stopped_by_itself};
 use crate::axes::Position;
 use std::ops::Range;
 
@@ -78,7 +78,8 @@ pub fn branch_stops(case: &Case<'_>, told: &Told, last_line: Option<&str>, branc
         let calls = case.post.check.as_ref().map(|c| c.calls.as_slice()).unwrap_or_default();
         after.retain(|name, _| !calls.iter().any(|c| c.leaves.contains(name)));
     }
-    compare_settings(case, &told.settings[0], &after, &first.at, what, said);
+    let stopped = stopped_by_itself(&branch.trace);
+    compare_settings(case, [&told.settings[0], &after], stopped, &first.at, what, said);
 }
 
 /// Does a move go back from where the branch began?

@@ -444,7 +444,7 @@ pub struct Check {
     /// Settings of the control that the program leaves off, whatever they were before, by the names that `check` gives them.
     #[serde(default)]
     pub leaves: Vec<String>,
-    /// Settings that a program under the control's own transformation may leave on: M30 or reset takes them off.
+    /// Settings that a program under the control's own transformation may leave on where it stops by itself: reset takes them off.
     #[serde(default)]
     pub stays_on: Vec<String>,
     /// The G number of the further work offsets, which are chosen with P: only of Fanuc (54.1) and Haas (154).

@@ -117,7 +117,7 @@ pub struct CheckRule {
     pub calls: Vec<CallRule>,
     /// Settings that the program leaves off.
     pub leaves: Vec<String>,
-    /// Settings that a program under the control's own transformation may leave on.
+    /// Settings that a program under the control's own transformation may leave on where it stops by itself.
     pub stays_on: Vec<String>,
     /// The G number of the further work offsets.
     pub further_offsets: f64,

@@ -76,7 +76,7 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
     for scene in &scenes {
         scene.blocks_clear_of_each_other()?;
     }
-    let mut routed = route::route(&scenes, &layout, spec)?;
+    let mut routed = route::route(&scenes, &layout, spec, options.tcp)?;
     let groups = skipped_groups(&routed.skipped);
     for group in &groups {
         let message = format!(
@@ -93,6 +93,12 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
         } else {
             Finding::warning("program::unreachable", message).help("these touches are left out")
         });
+    }
+    if let Some(reason) = &routed.stays_turned {
+        let message = format!("at the end the rotary axes are not turned back to 0: {reason}");
+        findings.push(Finding::warning("program::stays_turned", message).help(
+            "a control that can switch its transformation off only there gets no program: a lower artefact, a shorter stylus, or without --tcp",
+        ));
     }
     if routed.touches.is_empty() {
         findings.push(

@@ -36,13 +36,15 @@ pub(super) struct Routed {
     pub(super) touches: Vec<PlanTouch>,
     pub(super) skipped: Vec<Skipped>,
     pub(super) path: Path,
+    /// Why the rotary axes do not stand at 0 at the end, where they should.
+    pub(super) stays_turned: Option<String>,
 }
 
-/// Routes a program.
+/// Routes a program. `tcp`: it runs under the control's own transformation.
 ///
 /// # Errors
 /// When no program can begin on this machine: no axis lifts the probe, or not even near the first pose all is clear.
-pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec) -> Result<Routed> {
+pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec, tcp: bool) -> Result<Routed> {
     let Some(scene) = scenes.first() else { return Ok(Routed::default()) };
     let Some(lift) = scene.lift() else {
         return Err(Failure::new("program::no_lift", format!("{} has no linear axis", scene.machine.name))
@@ -78,7 +80,7 @@ pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec) -> Re
     for (number, setup) in (1..).zip(&layout.setups) {
         router.setup(number, setup)?;
     }
-    router.leave();
+    router.leave(tcp);
     router.out.path.seconds = router.clock.rounded_s();
     router.out.path.waiting = router.clock.waiting;
     if router.part > 0 {
@@ -289,7 +291,7 @@ impl Router<'_, '_> {
     }
 
     /// The linear axes other than the lift.
-    fn across(&self) -> impl Iterator<Item = AxisName> + use<> {
+    pub(super) fn across(&self) -> impl Iterator<Item = AxisName> + use<> {
         let lift = self.lift.axis;
         [AxisName::X, AxisName::Y, AxisName::Z].into_iter().filter(move |a| *a != lift)
     }
@@ -458,14 +460,6 @@ impl Router<'_, '_> {
         self.clock.feed(distance_mm(&step.nominal, &to), probe.position_feed);
         self.push(Step::Touch(step));
         self.push(Step::Retract { to, feed: probe.position_feed });
-    }
-
-    /// Up and away at the end.
-    fn leave(&mut self) {
-        if self.at.is_some() {
-            self.rise(self.heights.over_all);
-            self.rapid(self.lift.axis, self.lift.top);
-        }
     }
 
     pub(super) fn push(&mut self, step: Step) {

@@ -1,11 +1,11 @@
-//! Where a program stops for other blocks or another stylus, and how it is taken up again at a later set-up.
+//! Where a program stops for other blocks or another stylus, how it is taken up again at a later set-up, and how it ends.
 
 use super::parts::Part;
 use super::path::{Step, Stop};
 use super::route::{Router, SAME};
 use super::sweep::Manner;
-use super::turns::turn_step;
-use crate::axes::AxisMap;
+use super::turns::{Turn, turn_step};
+use crate::axes::{AxisMap, Position};
 
 impl Router<'_, '_> {
     /// Stops before a part: up to the top, all rotary axes to 0, where a person has room and a control's own
@@ -24,13 +24,7 @@ impl Router<'_, '_> {
         self.scene
             .clear_straight(&before, &at, Manner::Guarded)
             .map_err(|hit| format!("before the stop, on the way up {hit}"))?;
-        let turns = self.turns(Some((at, self.senses)), &AxisMap::default(), &AxisMap::default())?;
-        for (axis, to, _) in &turns {
-            self.scene
-                .clear_turn(&at, *axis, *to)
-                .map_err(|hit| format!("before the stop, as {axis} turns to {to} {hit}"))?;
-            at.set(*axis, *to);
-        }
+        let turns = self.turns_to_0(&mut at).map_err(|reason| format!("before the stop, {reason}"))?;
         scene.clear_straight(&at, &at, Manner::Rapid).map_err(|hit| format!("after the stop {hit}"))?;
         self.rise(self.lift.top_height());
         for turn in &turns {
@@ -47,6 +41,45 @@ impl Router<'_, '_> {
         self.met.clear();
         (self.heights.over_all, self.heights.over_blocks) = (self.lift.top_height(), self.lift.top_height());
         Ok(())
+    }
+
+    /// All rotary axes to 0, one after the other from where the machine stands, each turn proven clear.
+    fn turns_to_0(&self, at: &mut Position) -> Result<Vec<Turn>, String> {
+        let turns = self.turns(Some((*at, self.senses)), &AxisMap::default(), &AxisMap::default())?;
+        for (axis, to, _) in &turns {
+            self.scene.clear_turn(at, *axis, *to).map_err(|hit| format!("as {axis} turns to {to} {hit}"))?;
+            at.set(*axis, *to);
+        }
+        Ok(turns)
+    }
+
+    /// Up and away at the end; under a control's own transformation (`tcp`) all rotary axes to 0 as well: only there is it known
+    /// what happens as it is switched off, and only there does the next run begin.
+    pub(super) fn leave(&mut self, tcp: bool) {
+        if self.at.is_none() {
+            return;
+        }
+        self.rise(self.heights.over_all);
+        self.rapid(self.lift.axis, self.lift.top);
+        let Some(at) = self.at.filter(|_| tcp) else { return };
+        // where it stands, or else above the place at which it began
+        let mut began = at;
+        if let Some((opening, _)) = self.opening {
+            self.across().for_each(|axis| began.set(axis, opening.get(axis)));
+        }
+        for place in [at, began] {
+            let mut turned = place;
+            let way = self.lateral(&at, &place).and_then(|order| Ok((order, self.turns_to_0(&mut turned)?)));
+            match way {
+                Ok((order, turns)) => {
+                    order.into_iter().for_each(|axis| self.rapid(axis, place.get(axis)));
+                    turns.iter().for_each(|turn| self.turn(turn));
+                    self.out.stays_turned = None;
+                    return;
+                }
+                Err(reason) => self.out.stays_turned = Some(reason),
+            }
+        }
     }
 
     /// The proven way from the end of the opening to here: turns at the top, across, down.

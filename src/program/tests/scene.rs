@@ -157,3 +157,69 @@ fn a_short_lift_asks_for_a_start_near_the_first_pose_or_is_refused() {
     assert!(near.path.head.iter().any(|l| l.contains("turn the rotary axes to A 0, C 0")), "{:?}", near.path.head);
     assert!(with_top("10.0").is_err());
 }
+
+/// Under a control's own transformation a program ends with the rotary axes at 0, each turn proven: where it stands, or above the
+/// place at which it began. Where neither is clear it stays as it stands and says so.
+#[test]
+fn under_a_transformation_the_rotary_axes_end_at_0() {
+    use crate::diag::source;
+    use crate::program::path::Step;
+    use crate::program::{Options, generate, load};
+    // a wide block on a post swings over the turntable as A turns; the lift's top is lower than its circle
+    let blocks = [("side", "[70.0, 0.0, -202.684]", 10, 60.0), ("low", "[-70.0, 60.0, -202.684]", 10, 60.0)];
+    let wide = ("wide", "[-40.0, 120.0, -150.0]", 80, 112.684);
+    let mounting: String = blocks
+        .iter()
+        .chain([&wide])
+        .map(|(name, centre, x, riser)| {
+            format!(
+                "[[machine.mounting.block]]\nname = \"{name}\"\ncentre = {centre}\nsize = [{x}.0, 10.0, 10.0]\n\
+                 riser = {{ height = {riser}, size = [10.0, 10.0] }}\n"
+            )
+        })
+        .collect();
+    let from = BUILT_IN.find("name = \"trunnion\"").unwrap();
+    let first = from + BUILT_IN[from..].find("[[machine.mounting]]").unwrap();
+    let rest = first + BUILT_IN[first..].find("# ----").unwrap();
+    let ends = |top: &str, visits: &[(&str, &str)], tcp: bool| {
+        let text = format!(
+            "{}{}[[machine.mounting]]\nname = \"table\"\nsays = \"posts\"\ncarrier = \"C\"\n{mounting}\n{}",
+            &BUILT_IN[..from],
+            BUILT_IN[from..first].replacen("[-200.0, 350.0]", &format!("[-200.0, {top}]"), 1),
+            &BUILT_IN[rest..]
+        );
+        let machine = machine_of(&text, "trunnion");
+        let setups: String = visits
+            .iter()
+            .map(|(block, a)| {
+                let face = if *a == "0.0" { "+Z" } else { "+Y" };
+                format!(
+                    "[[stage.setup]]\npose = {{ A = {a}, C = 0.0 }}\nblocks = [\"{block}\"]\n\
+                     touch = [{{ faces = [\"{face}\"], grid = \"G\" }}]\n"
+                )
+            })
+            .collect();
+        let program = format!(
+            "format = \"axiscal-programs/1\"\nname = \"p\"\nmounting = \"table\"\nfaces_in = \"block\"\n\
+             [[grid]]\nname = \"G\"\nu = [0.0]\nv = [0.0]\n[[stage]]\nname = \"s\"\n{setups}"
+        );
+        let (spec, _) = load(&source("p.toml", program)).unwrap();
+        let (generated, findings) = generate(&machine, &spec, &Options { strict: true, tcp }).unwrap();
+        let steps = &generated.path.steps;
+        let mut stands = crate::axes::AxisMap::default();
+        for step in steps {
+            if let Step::Rotary { to, .. } = step {
+                stands = to.or(&stands);
+            }
+        }
+        let at_0 = machine.rotary().all(|a| stands.get(a.name).is_none_or(|v| v == 0.0));
+        let left = steps.iter().rev().skip_while(|s| matches!(s, Step::Rotary { .. }));
+        let across = left.take_while(|s| matches!(s, Step::Rapid { to } if to.get(AxisName::Z).is_none())).count();
+        (at_0, across, findings.0.iter().any(|f| f.code == "program::stays_turned"))
+    };
+    let twice = [("side", "0.0"), ("low", "90.0")];
+    assert_eq!(ends("350.0", &twice, false), (false, 0, false));
+    assert_eq!(ends("350.0", &twice, true), (true, 0, false));
+    assert_eq!(ends("100.0", &twice, true), (true, 2, false));
+    assert_eq!(ends("100.0", &[("low", "0.0"), twice[0], twice[1]], true), (false, 0, true));
+}
