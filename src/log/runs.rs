@@ -161,8 +161,8 @@ fn again(touches: &[RawTouch], range: Range<usize>, unread: &[usize], out: &mut 
             }
             continue;
         }
-        let known =
-            seen.get_or_insert_with(|| (from..at).filter_map(|i| Some((touches[i].id?, i))).collect::<BTreeMap<_, _>>());
+        let known = seen
+            .get_or_insert_with(|| (from..at).filter_map(|i| Some((touches[i].id?, i))).collect::<BTreeMap<_, _>>());
         // a line that was copied brings nothing else; numbers before the first one are of an earlier set-up
         let other = |at: usize| {
             touches.get(at).and_then(|t| t.id).is_some_and(|id| match known.get(&id) {
