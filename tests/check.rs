@@ -4,6 +4,8 @@
 #[path = "check/edits.rs"]
 mod edits;
 
+use axiscal::diag::source;
+use axiscal::post::{Postprocessor, parse};
 use edits::{Fate, original};
 
 const CONTROLLERS: [&str; 7] =
@@ -422,5 +424,171 @@ fn a_program_that_does_not_look_at_the_number_of_the_set_up_is_found() {
         };
         let codes = original.codes(&edited);
         assert!(codes.contains(&"check::start"), "{controller}: {codes:?}");
+    }
+}
+
+/// A variant of a built-in controller: its file with these lines.
+fn variant(base: &str, lines: &str) -> Result<Postprocessor, axiscal::diag::Failure> {
+    let text = format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}");
+    parse(&source("mine.toml", text)).map(|(post, _)| post)
+}
+
+/// Values that a builder or a user may give each setting, as the guide and the files name them.
+const SETTINGS: [(&[&str], &str, &[&str]); 24] = [
+    (&["fanuc", "haas"], "program_number", &["1234"]),
+    (&["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"], "triggered_within", &["0.08"]),
+    (&["fanuc", "haas"], "missed_within", &["0.03"]),
+    (&["fanuc", "haas", "sinumerik", "linuxcnc"], "release_feed", &["200"]),
+    (&["fanuc", "haas"], "orient", &["", "M119 R", "M19 S", "M19 P"]),
+    (&["heidenhain", "sinumerik", "linuxcnc"], "orient", &["no"]),
+    (&["fanuc", "haas"], "probe_on", &["M101", "M59 P2", "M59 P1133", "M101\nM59 P1133"]),
+    (&["fanuc", "haas"], "probe_off", &["M102", "M69 P2"]),
+    (&["fanuc", "haas"], "probe_input", &["#1004", "#1032", "#11004"]),
+    (&["fanuc", "haas"], "cancel", &["G69 G40 G80"]),
+    (&["fanuc", "haas"], "wait", &["M53", "G4 P500"]),
+    (&["fanuc", "haas", "heidenhain", "sinumerik"], "modulo", &["C"]),
+    (&["fanuc", "haas"], "time", &["no"]),
+    (&["fanuc", "haas"], "tool_offset", &["5"]),
+    (&["heidenhain", "sinumerik"], "probe_on", &["M27"]),
+    (&["heidenhain", "sinumerik"], "probe_off", &["M28"]),
+    (&["heidenhain"], "folder", &["TNC:\\PROBE\\"]),
+    (&["heidenhain"], "cancel", &["M129\nPLANE RESET STAY\nM127"]),
+    (&["sinumerik"], "probe", &["2"]),
+    (&["sinumerik"], "timer", &["3"]),
+    (&["sinumerik"], "tool_edge", &["D2"]),
+    (&["linuxcnc"], "probe_on", &["M64 P0"]),
+    (&["linuxcnc"], "probe_off", &["M65 P0"]),
+    (&["fanuc-inspection-plus", "haas-inspection-plus"], "probe_input", &["#1004"]),
+];
+
+/// With --tcp only, and of the templates of that.
+const OF_TCP: [&str; 2] = ["tcp", "tool_length"];
+
+#[test]
+fn every_setting_can_be_what_its_file_says() {
+    for base in ["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"] {
+        let (post, _) = Postprocessor::load_built_in_or_file(base).unwrap();
+        for name in post.settings.keys().filter(|n| !OF_TCP.contains(&n.as_str())) {
+            assert!(SETTINGS.iter().any(|(of, n, _)| of.contains(&base) && n == name), "{base}: {name} is not tried");
+        }
+    }
+    for (of, name, values) in SETTINGS {
+        for (base, value) in of.iter().flat_map(|base| values.iter().map(move |v| (base, v))) {
+            let post = variant(base, &format!("[settings]\n{name} = {value:?}\n")).unwrap_or_else(|e| panic!("{e}"));
+            // it is clean, or this says what is wrong
+            let original = edits::of(post, None);
+            if *name == *"probe_input" {
+                assert!(original.text.contains(&format!("{value}EQ0")), "{base}: {value} is not asked");
+            }
+        }
+    }
+}
+
+/// What no setting names is not the builder's, nor is what means the same to every control.
+#[test]
+fn what_no_setting_names_is_refused() {
+    for base in ["fanuc", "haas"] {
+        let with = |lines: &str| edits::of(variant(base, &format!("[settings]\n{lines}\n")).unwrap(), None);
+        let original = with("probe_on = \"M59 P2\"");
+        for other in ["M59 P3", "M59", "M58 P2", "M59 P2 R1"] {
+            let codes = original.codes(&original.text.replacen("M59 P2\n", &format!("{other}\n"), 1));
+            assert!(!codes.is_empty(), "{base}: {other}");
+        }
+        let original = with("orient = \"M119 R\"");
+        assert!(original.codes(&original.text.replacen("M119 R", "M19 R", 1)).contains(&"check::not_run"), "{base}");
+        // a look at the probe that does not lead to the stop
+        let original = with("probe_input = \"#1004\"");
+        assert!(!original.codes(&original.text.replacen("#1004EQ0", "#1004EQ1", 1)).is_empty(), "{base}");
+        assert!(!original.codes(&original.text.replace("#1004", "#1005")).is_empty(), "{base}");
+    }
+    let original = edits::of(variant("heidenhain", "[settings]\nprobe_on = \"M27\"\n").unwrap(), None);
+    assert!(!original.codes(&original.text.replacen("M27", "M26", 1)).is_empty());
+}
+
+/// Whatever number of decimals the log has, its fields hold what is written into them.
+#[test]
+fn the_fields_of_a_log_follow_its_decimals() {
+    for base in ["fanuc", "haas"] {
+        for (decimals, field, modulo) in [(3, "[53]", "100000."), (4, "[44]", "10000."), (5, "[35]", "1000.")] {
+            let lines = format!("[log]\ndecimals = {decimals}\nunverified = \"ours\"\n");
+            let original = edits::of(variant(base, &lines).unwrap(), None);
+            let taken = format!("#9=#9-{modulo}*FIX[#9/{modulo}]");
+            assert!(
+                original.text.contains(&format!("K#9{field}")) && original.text.contains(&taken),
+                "{base} {decimals}"
+            );
+        }
+        // a sum that does not fit: Fanuc loses its first places, and a log with them is not the one that is read
+        let original = edits::of(variant(base, "[log]\ndecimals = 5\nunverified = \"ours\"\n").unwrap(), None);
+        let mut text = original.text.replace("#9=#9-1000.*FIX[#9/1000.]", "#9=#9+4000.");
+        assert_ne!(text, original.text);
+        assert_eq!(original.codes(&text).contains(&"check::log"), base == "fanuc", "{base}");
+        text = original.text.replace("K#9[35]", "K#9[45]");
+        assert_eq!(original.finding(&text).0, "check::not_understood", "{base}");
+        assert!(original.finding(&text).2.contains("9 places"), "{base}");
+        // a file that does not fit together
+        let lines = "[log]\ndecimals = 5\nwhole_places = 3\ncheck_modulo = 10000.0\nunverified = \"ours\"\n";
+        let refused = variant(base, lines).unwrap_err();
+        assert!(refused.0.iter().any(|f| f.code == "post::check_modulo"), "{refused}");
+    }
+}
+
+#[test]
+fn inches_need_four_decimals() {
+    for base in ["fanuc", "haas", "fanuc-inspection-plus", "haas-inspection-plus"] {
+        let refused = variant(base, "[log]\nunit = \"inch\"\nunverified = \"ours\"\n").unwrap_err();
+        let finding = refused.0.iter().find(|f| f.code == "post::inch_decimals").unwrap_or_else(|| panic!("{refused}"));
+        assert!(finding.help.as_ref().is_some_and(|h| h.contains("[number] decimals = 4")), "{finding}");
+    }
+}
+
+/// What an editor or a transfer may put into a remark, and what a control makes a block of.
+#[test]
+fn what_no_control_reads_as_a_remark_is_refused() {
+    for (controller, begins, remark) in [
+        ("linuxcnc", "(", "(UP)"),
+        ("fanuc", "(", "(UP)"),
+        ("haas", "(", "(UP)"),
+        ("sinumerik", ";", "; UP"),
+        ("heidenhain", "", "; UP"),
+    ] {
+        let original = original(controller, None);
+        let line =
+            original.text.lines().find(|l| l.starts_with(begins) && l.contains("axiscal") || l.contains("AXISCAL"));
+        let line = line.unwrap_or_else(|| panic!("{controller}"));
+        let with = |more: &str| {
+            let end = original.text.find(line).unwrap() + line.len();
+            let remark = if line.starts_with('(') || controller != "heidenhain" { remark } else { "" };
+            format!("{} {}{}", &original.text[..end], remark.replace("UP", &format!("UP{more}")), &original.text[end..])
+        };
+        assert!(
+            controller == "heidenhain" || original.codes(&with("")).is_empty(),
+            "{controller}: {:?}",
+            original.codes(&with(""))
+        );
+        for bad in ["\r", "\rG0 Z-100.", "\0", "\u{c}", "\u{1a}", "\u{1b}", "\u{7f}"] {
+            let codes = if controller == "heidenhain" {
+                original.codes(&original.text.replacen("BEGIN PGM", &format!("{bad}BEGIN PGM"), 1))
+            } else {
+                original.codes(&with(bad))
+            };
+            assert_eq!(codes, ["check::not_understood"], "{controller}: {bad:?}");
+        }
+        for bad in ["100%", "; G0 Z-100.", "\u{d6}L", "\u{2028}"] {
+            let refused = original.codes(&with(bad)).contains(&"check::not_understood");
+            assert!(refused || !["fanuc", "haas"].contains(&controller), "{controller}: {bad:?}");
+        }
+    }
+}
+
+/// LinuxCNC does not look at the number of a line.
+#[test]
+fn line_numbers_do_not_matter() {
+    let original = original("linuxcnc", None);
+    let numbered = original.text.replace("\nG0 ", "\nN10 G0 ").replace("\nG1 ", "\nn0020G1 ");
+    assert_ne!(numbered, original.text);
+    assert_eq!(original.fate(&numbered), Fate::Same);
+    for bad in ["N G0 ", "N-1 G0 ", "G0 N10 "] {
+        assert_eq!(original.fate(&original.text.replacen("\nG0 ", &format!("\n{bad}"), 1)), Fate::NotRead, "{bad}");
     }
 }

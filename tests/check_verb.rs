@@ -149,3 +149,25 @@ fn exit_code_2_where_it_cannot_be_said() {
         "swivel-head",
     );
 }
+
+/// A plan that does not hold the program of this controller: that nothing is compared is said, and codes can be looked up.
+#[test]
+fn a_plan_without_the_program_is_said() {
+    let folder = folder("linuxcnc");
+    let path = folder.path().join("small.plan.json");
+    let mut plan: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let programs = plan.as_object_mut().unwrap().remove("programs").unwrap();
+    let mut with = |programs: Option<serde_json::Value>, says: &str| {
+        programs.into_iter().for_each(|p| plan["programs"] = p);
+        std::fs::write(&path, serde_json::to_string_pretty(&plan).unwrap()).unwrap();
+        check(folder.path(), "linuxcnc", "small.ngc")
+            .args(["--plan", "small.plan.json"])
+            .assert()
+            .code(0)
+            .stderr(predicate::str::contains(says))
+            .stdout(predicate::str::contains("check::older_plan (1)"));
+    };
+    with(None, "the plan is of an older version");
+    let of_fanuc = serde_json::json!({ "fanuc": programs["linuxcnc"] });
+    with(Some(of_fanuc), "the plan does not hold the program of linuxcnc, but of fanuc");
+}

@@ -224,16 +224,16 @@ fn what_would_be_left_is_what_a_refit_leaves() {
 #[test]
 fn the_faces_of_one_block_of_another_size_are_named_alone() {
     for size_um in [4.0, 12.0] {
-        let wrong = format!("[[block]]\nmounting = \"full\"\nname = \"c\"\nsize_um = [{size_um:?}, 0.0, 0.0]\n");
+        let wrong = format!("[[block]]\nmounting = \"full\"\nname = \"b\"\nsize_um = [{size_um:?}, 0.0, 0.0]\n");
         let d = said_of_a_block(&wrong);
         assert_eq!(d.verdict, Verdict::Unexplained, "{size_um}: {}", d.says);
         let mut faces = d.faces.clone();
         faces.sort();
-        assert_eq!(faces, ["full/c +X", "full/c -X"], "{size_um}: {}", d.says);
+        assert_eq!(faces, ["full/b +X", "full/b -X"], "{size_um}: {}", d.says);
     }
-    let d = said_of_a_block("[[block]]\nmounting = \"full\"\nname = \"c\"\nsize_um = [6.0, 6.0, 6.0]\n");
+    let d = said_of_a_block("[[block]]\nmounting = \"full\"\nname = \"b\"\nsize_um = [6.0, 6.0, 6.0]\n");
     assert!(
-        d.blocks == ["full/c"] || (!d.faces.is_empty() && d.faces.iter().all(|f| f.starts_with("full/c "))),
+        d.blocks == ["full/b"] || (!d.faces.is_empty() && d.faces.iter().all(|f| f.starts_with("full/b "))),
         "{}",
         d.says
     );

@@ -62,6 +62,17 @@ pub fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
+/// Where the first byte stands that no line of a program holds: a control character, or a CR without its LF.
+pub fn control_byte(text: &str) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let bad = |at: usize| match bytes[at] {
+        b'\t' | b'\n' => false,
+        b'\r' => bytes.get(at + 1) != Some(&b'\n'),
+        byte => byte < b' ' || byte == 0x7f,
+    };
+    (0..bytes.len()).find(|at| bad(*at))
+}
+
 /// Blanks.
 pub fn blanks(input: &str) -> IResult<&str, &str> {
     nom::bytes::complete::take_while(|c| c == ' ' || c == '\t').parse(input)
@@ -100,6 +111,14 @@ pub fn unsigned(input: &str) -> IResult<&str, (f64, bool)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn control_bytes_are_found() {
+        assert_eq!(control_byte("A\tB\r\nC\n"), None);
+        for (text, at) in [("A\rB\n", 1), ("A\r", 1), ("\0", 0), ("AB\u{c}", 2), ("A\u{1a}", 1), ("A\r\r\n", 1)] {
+            assert_eq!(control_byte(text), Some(at), "{text:?}");
+        }
+    }
 
     #[test]
     fn numbers_end_where_they_end() {

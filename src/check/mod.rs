@@ -116,6 +116,14 @@ fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> R
         let says = format!("the line is longer than the {} characters that the control takes", post.line_length);
         return Err(Finding::error("check::line_length", says).at(source, line.all()).into());
     }
+    if let Some(at) = lines::control_byte(text) {
+        let byte = text.as_bytes().get(at).copied().unwrap_or_default();
+        let says = format!("byte 0x{byte:02X} is no text: some controls end a block there, others skip it");
+        return Err(Finding::error("check::not_understood", says)
+            .help("take it out; lines end with LF or CR LF")
+            .at(source, at..at + 1)
+            .into());
+    }
     let masks = heidenhain::Masks::read(text, post, beside)?;
     runs::Program::parse(post, rule, text, &masks).map_err(|fault| {
         Finding::error("check::not_understood", fault.says)

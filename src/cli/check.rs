@@ -9,7 +9,9 @@ use crate::files;
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::program;
+use crate::program::plan::Plan;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `check`.
@@ -45,11 +47,43 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let text = source(args.file.display().to_string(), files::read_text(&args.file)?);
     let beside = beside(&check::wanted_beside(&post, &text), &args.file)?;
     let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from, beside: &beside };
-    let checked = check::check(&machine, &post, &text, &against)?;
+    let mut checked = check::check(&machine, &post, &text, &against)?;
+    checked.findings.extend(plan.as_ref().and_then(|plan| lacks_program(plan, &post)));
     io.report(&checked.findings);
+    say_codes(&checked, io);
     say(&machine, args, &checked, io);
     answer(&machine, &post, args, &checked, io);
     Ok(if good(&checked) { Answer::Done } else { Answer::No })
+}
+
+/// The plan does not say what the program of this controller does: an edit that is safe is not found.
+fn lacks_program(plan: &Plan, post: &Postprocessor) -> Option<Finding> {
+    let (says, help) = match plan.programs.is_empty() {
+        _ if plan.programs.contains_key(&post.name) => return None,
+        true => (
+            "the plan is of an older version and does not hold what its program does: whether this is still the program that was written is not known".to_owned(),
+            "`axiscal generate` writes plan and program anew",
+        ),
+        false => (
+            format!(
+                "the plan does not hold the program of {}, but of {}: whether this is still the program that was written is not known",
+                post.name,
+                plan.programs.keys().cloned().collect::<Vec<_>>().join(", ")
+            ),
+            "is it the plan beside the program, and the controller for which it was written?",
+        ),
+    };
+    Some(Finding::warning("check::older_plan", says).help(help))
+}
+
+/// The findings by their codes, as the guide lists them.
+fn say_codes(checked: &Checked, io: &Io) {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    checked.findings.iter().for_each(|f| *counts.entry(f.code).or_default() += 1);
+    let shown: Vec<String> = counts.iter().map(|(code, n)| format!("{code} ({n})")).collect();
+    if !shown.is_empty() {
+        io.say(format!("what was found, by its code in docs/guide/check.md: {}", shown.join(", ")));
+    }
 }
 
 /// Files that lie in the folder of the program; which of them are lacking the check says.

@@ -199,7 +199,8 @@ fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
     let mut old = match &args.backup {
         Some(path) => {
             let text = source(path.display().to_string(), files::read_text(path)?);
-            backup::read(&text, &tables.backup, &names)?
+            let such_as = control::example(machine, tables).unwrap_or_default();
+            backup::read_such_as(&text, &tables.backup, &names, &such_as)?
         }
         None => Old::default(),
     };
@@ -212,11 +213,13 @@ fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
         let plain = backup::plain_name(name);
         let known =
             names.iter().find(|n| backup::plain_name(n) == plain).ok_or_else(|| bad("no such value is written"))?;
-        let value: f64 =
-            value.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| bad("that is no number"))?;
+        let digits = value.trim().to_owned();
+        let value: f64 = digits.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| bad("that is no number"))?;
         if old.values.insert(known.clone(), (value, Some(args.unit))).is_some() {
             return Err(bad("it is given twice"));
         }
+        old.assumed.remove(known);
+        old.texts.insert(known.clone(), digits);
     }
     Ok(old)
 }
@@ -298,7 +301,7 @@ fn keep_restoring(machine: &Machine, tables: &Tables, files: &[(String, Vec<u8>)
     // the head may be another one: day and study
     let values = |bytes: &[u8]| {
         let text = source("restoring", String::from_utf8_lossy(bytes).into_owned());
-        backup::read(&text, &tables.backup, &names).ok()
+        backup::read(&text, &tables.backup, &names).ok().map(|old| old.values)
     };
     let restoring = tables.file.iter().filter_map(|f| f.restore.as_ref());
     for name in restoring.filter(|_| !args.force) {

@@ -1,7 +1,7 @@
 //! From a study's path to machine, effects and touches: opens what the study names.
 
 use super::common::{Io, load_machine};
-use crate::design::Planned;
+use crate::design::{Planned, keep_measured};
 use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::files;
 use crate::fit::{self, Fit, Settings};
@@ -9,11 +9,10 @@ use crate::log::{self, Touch};
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
-use crate::program::plan::Plan;
+use crate::program::plan::{Plan, PlanBlock};
 use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use sha2::{Digest, Sha256};
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// A study with everything that it names.
@@ -68,22 +67,14 @@ impl Loaded {
     /// The runs as they were planned.
     #[must_use]
     pub fn planned(&self) -> Vec<Planned> {
-        let each = self.runs.iter().map(|r| Planned {
-            plan: r.plan.clone(),
-            mounting: r.mounting.clone(),
-            started_s: r.started_s,
-        });
-        each.collect()
+        self.runs().iter().map(Planned::of).collect()
     }
 
     /// The same with the touches that a fit could use: only what was measured tells anything.
     #[must_use]
     pub fn measured(&self, fit: &Fit) -> Vec<Planned> {
-        let made: HashSet<(usize, u64)> = fit.data.observations.iter().map(|o| (o.run, o.id)).collect();
         let mut out = self.planned();
-        for (run, p) in out.iter_mut().enumerate() {
-            p.plan.touches.retain(|t| made.contains(&(run, t.id)));
-        }
+        keep_measured(&mut out, &fit.data);
         out
     }
 
@@ -129,15 +120,31 @@ impl Loaded {
 #[must_use]
 pub fn beside_the_axis(compensation: &Compensation, machine: &Machine, plan: &Plan) -> Option<Finding> {
     let side = |axis| machine.axis(axis).map(|a| a.side);
-    let carries = |axis| {
-        plan.blocks.iter().all(|b| {
+    let beside = |axis| -> Vec<&str> {
+        let carried = |b: &&PlanBlock| {
             machine.carrier(&b.carrier).is_none_or(|c| machine.carrier_chain(c).iter().any(|a| a.name == axis))
-        })
+        };
+        plan.blocks.iter().filter(|b| !carried(b)).map(|b| b.name.as_str()).collect()
     };
-    let term = compensation
-        .terms
-        .iter()
-        .find(|t| t.value != 0.0 && side(t.axis) == Some(Side::Workpiece) && !carries(t.axis))?;
+    let of_workpiece = compensation.terms.iter().filter(|t| t.value != 0.0 && side(t.axis) == Some(Side::Workpiece));
+    let (term, blocks) = of_workpiece.map(|t| (t, beside(t.axis))).find(|(_, blocks)| !blocks.is_empty())?;
+    if blocks.len() < plan.blocks.len() {
+        let (which, they) = if blocks.len() == 1 { ("block", "it is") } else { ("blocks", "they are") };
+        return Some(
+            Finding::info(
+                "compensation::beside_the_axis",
+                format!(
+                    "the compensation holds errors of {}, which carries {} of the {} blocks of program {}, and not {which} {}",
+                    term.axis,
+                    plan.blocks.len() - blocks.len(),
+                    plan.blocks.len(),
+                    plan.program,
+                    blocks.join(", ")
+                ),
+            )
+            .help(format!("{they} read with the errors of {0} the wrong way round where {0} is turned", term.axis)),
+        );
+    }
     Some(
         Finding::warning(
             "compensation::beside_the_axis",
@@ -178,9 +185,9 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     let machine = located(load_machine(&study.machine, machines.as_deref(), io), &src)?;
     hash.update(machine.sha256.as_bytes());
     let mut catalogue = Catalogue::built_in()?;
-    for file in &study.effects_files {
-        let file = folder.join(file);
-        let text = files::read_text(&file)?;
+    for name in &study.effects_files {
+        let file = folder.join(name);
+        let text = at_the_name(files::read_text(&file), name, &src)?;
         hash.update(text.as_bytes());
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
@@ -225,6 +232,21 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     let hexadecimal = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
     let (sha256, data_sha256) = (hexadecimal(hash), hexadecimal(data));
     Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256, data_sha256 })
+}
+
+/// What is wrong with a file that the study names gets the place of its name, where it has none of its own.
+fn at_the_name<T>(result: Result<T>, name: &str, study: &Source) -> Result<T> {
+    let place = ["\"", "'"].iter().find_map(|quote| {
+        let at = study.inner().find(&format!("{quote}{name}{quote}"))?;
+        Some(at..at + name.len() + 2)
+    });
+    result.map_err(|Failure(findings)| {
+        let placed = |f: Finding| match &place {
+            Some(span) if f.source.is_none() => f.at(study, span.clone()),
+            _ => f,
+        };
+        Failure(findings.into_iter().map(placed).collect())
+    })
 }
 
 /// Findings that name a word of the study get its place.

@@ -64,6 +64,12 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                     ],
                 };
             }
+            if first.tell_apart == crate::diagnose::NEVER_PARTED {
+                return vec![
+                    "next: look at the machine which of them it is: no touches tell".to_owned(),
+                    format!("  either way this takes it out of the other errors: axiscal add {study} {}", first.effect),
+                ];
+            }
             // which of them it is, is for touches or a person to say
             let ids: Vec<&str> = std::iter::once(&first.effect).chain(&first.same_as).map(String::as_str).collect();
             vec![

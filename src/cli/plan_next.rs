@@ -3,10 +3,11 @@
 use super::load::{Loaded, load_study, read_log};
 use super::new::relative;
 use super::{Answer, Io};
+use crate::design;
 use crate::design::bundle::{Bundle, as_plan, bundles, program_text, without};
 use crate::design::next::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions, Suspect};
-use crate::design::{Known, Noise, Planned, Task, View};
+use crate::design::{Known, Noise, Planned, Room, Task, View};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::files;
@@ -34,6 +35,9 @@ const OVER: f64 = 1.02;
 
 /// A pair is promised to be told apart from this probability on.
 const SAFELY: f64 = 0.95;
+
+/// A pair that all touches at once leave no further apart than this is one that they cannot part.
+const NOTHING: f64 = 1e-2;
 
 /// Pairs that the program's own head names.
 const MOST_SAID: usize = 6;
@@ -82,7 +86,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let name = format!("next-{}", loaded.study.data.len() + 1);
     let plan_file = args.out.join(format!("{name}.plan.json"));
     if let Some(log) = &args.join {
-        return join(args, &loaded, &plan_file, log, io);
+        return join(args, &loaded, &plan_of(log, &args.out).unwrap_or(plan_file), log, io);
     }
     if !(args.minutes.is_finite() && args.minutes > 0.0 && args.minutes < 1e5) {
         return Err(Failure::new("next::minutes", "the time is no usable number").help("write --minutes more than 0"));
@@ -107,6 +111,18 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(mistake) = found.mistake() {
         let says = format!("a gross mistake must be put right first, and the touches made again: {mistake}");
         return Ok(refuse(&says, &found.says, io));
+    }
+    if named.is_empty() && found.untold {
+        design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
+        let help = match &fit.outcome.parted_together[..] {
+            [] => "run the program to its end, or touch in more poses, and ask again".to_owned(),
+            remedies => format!("run the program to its end; or what tells them: {}", remedies.join("; and ")),
+        };
+        return Ok(refuse(
+            &format!("nothing to part before the model's own errors are told. {}", found.says),
+            &help,
+            io,
+        ));
     }
     let open = diagnose::Diagnosis::leaves_open;
     if named.is_empty() && !open(&found) {
@@ -189,10 +205,30 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let stands = setting.stands(&loaded.machine, args.moved);
     let mut best: Option<Chosen> = None;
     if let Some((mounting, label)) = &stands {
-        best = setting.choose(mounting, label.as_deref(), &effects, &questions, budget_s, &name).ok();
+        let choose = |s: &Setting| s.choose(mounting, label.as_deref(), &effects, &questions, budget_s, &name).ok();
+        best = choose(&setting);
+        // what goes with the temperature is told from what goes with time where the room turns, and not by touches alone
+        let of_room = |e: &Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
+        let of_room = setting.task.temperature && effects.iter().any(|(e, _)| of_room(e));
+        if of_room && !best.as_ref().is_some_and(|b| b.settles(SEEN)) {
+            setting.room = Room::Swings;
+            let turned = choose(&setting);
+            setting.room = Room::GoesOn;
+            if let Some(mut turned) = turned.filter(|t| best.as_ref().is_none_or(|b| t.told() > b.told())) {
+                turned.if_the_room_turns(setting.told(
+                    &turned.generated.plan,
+                    label.as_deref(),
+                    &effects,
+                    &questions,
+                )?);
+                best = Some(turned);
+            }
+        }
     }
     // other blocks only where those that stand there cannot settle it, and only if they may be put up
     if !best.as_ref().is_some_and(|b| b.settles(SEEN)) {
+        let settled = |p: usize| best.as_ref().is_some_and(|b| b.separations[p].most() >= SEEN);
+        setting.wanted = (0..questions.pairs.len()).filter(|&p| !settled(p)).collect();
         let others = loaded.machine.mountings.iter();
         let others = others.filter_map(|m| setting.choose(m, None, &effects, &questions, budget_s, &name).ok());
         let better = others.filter(|o| best.as_ref().is_none_or(|b| o.worth() > WORTH_MOVING * b.worth()));
@@ -215,12 +251,24 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         }
     }
     warn(setting.holes.borrow().iter(), io);
-    let Some(chosen) = best else {
+    let never = setting.never(&questions);
+    if never.len() == questions.pairs.len() {
+        let says = format!(
+            "no touches that this machine can make, with its blocks and styli, tell these apart: {} do the same wherever it \
+             touches",
+            never.join(", ")
+        );
+        let looks: Vec<String> =
+            effects.iter().filter(|(e, _)| !e.look.is_empty()).map(|(e, _)| format!("{}: {}", e.id, e.look)).collect();
+        return Ok(refuse(&says, &format!("look at the machine which it is. {}", looks.join(". ")), io));
+    }
+    let Some(mut chosen) = best else {
         return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time").help(
             "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
         ));
     };
-    if chosen.separations.iter().all(|s| s.told < SAFELY) {
+    chosen.never = never;
+    if chosen.separations.iter().all(|s| s.told < SAFELY && s.told_if_room_turns.is_none_or(|t| t < SAFELY)) {
         let says = format!(
             "no program of {:.0} minutes that this machine can run would tell any of these effects apart: {}",
             args.minutes,
@@ -280,17 +328,40 @@ struct Chosen {
     separations: Vec<Separation>,
     /// The study's name for the blocks as they stand; `None`: put up anew.
     label: Option<String>,
+    /// Pairs that no touches on these blocks part: they cannot keep a choice from being done.
+    hopeless: Vec<bool>,
+    /// Pairs that no touches of the machine part, in words.
+    never: Vec<String>,
 }
 
 impl Chosen {
     /// Does every pair come that far apart?
     fn settles(&self, lambda: f64) -> bool {
-        self.separations.iter().all(|s| s.after >= lambda)
+        self.separations.iter().all(|s| s.most() >= lambda)
+    }
+
+    /// Does every pair that these blocks can part?
+    fn settles_what_it_can(&self, lambda: f64) -> bool {
+        self.separations.iter().zip(&self.hopeless).all(|(s, hopeless)| *hopeless || s.after >= lambda)
+    }
+
+    /// How many pairs are told apart.
+    fn told(&self) -> usize {
+        self.separations.iter().filter(|s| s.told >= SAFELY).count()
+    }
+
+    /// What was chosen for a room that turns is promised for one only; `goes_on` has what it does where the room goes on.
+    fn if_the_room_turns(&mut self, goes_on: Vec<Separation>) {
+        for (s, on) in self.separations.iter_mut().zip(goes_on) {
+            let turned = std::mem::replace(s, on);
+            s.told_if_room_turns = Some(turned.told);
+            s.after_if_room_turns = Some(turned.after);
+        }
     }
 
     /// Separations as far as they are worth anything: a pair that nothing parts must not hide the others.
     fn worth(&self) -> f64 {
-        self.separations.iter().map(|s| s.after.min(2.0 * SEEN)).sum()
+        self.separations.iter().map(|s| s.most().min(2.0 * SEEN)).sum()
     }
 }
 
@@ -303,6 +374,12 @@ struct Setting<'a> {
     noise: Noise,
     /// What was left out of the choice because an effect has no value there.
     holes: RefCell<BTreeSet<String>>,
+    /// What the room does during the program.
+    room: Room,
+    /// Pairs of questions that a choice is for.
+    wanted: BTreeSet<usize>,
+    /// Pairs that some touches part, on whatever blocks.
+    parted: RefCell<BTreeSet<usize>>,
 }
 
 impl<'a> Setting<'a> {
@@ -326,7 +403,23 @@ impl<'a> Setting<'a> {
             temperature: fit.data.observations.iter().any(|o| o.has_temperature),
         };
         let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: fit.noise.tau_test_mm };
-        Ok(Self { task, runs, known, noise, holes: RefCell::default() })
+        Ok(Self {
+            task,
+            runs,
+            known,
+            noise,
+            holes: RefCell::default(),
+            room: Room::GoesOn,
+            wanted: BTreeSet::new(),
+            parted: RefCell::default(),
+        })
+    }
+
+    /// Pairs that all touches of all blocks together leave as they are, in words.
+    fn never(&self, questions: &Questions) -> Vec<String> {
+        let parted = self.parted.borrow();
+        let never = questions.pairs.iter().enumerate().filter(|(p, _)| !parted.contains(p));
+        never.map(|(_, p)| p.other.as_ref().map_or_else(|| p.one.clone(), |o| format!("{} and {o}", p.one))).collect()
     }
 
     /// The mounting that stands there since the last run, with the study's name for it (`None` where it is put up anew).
@@ -349,7 +442,7 @@ impl<'a> Setting<'a> {
         if label.is_none() && runs.iter().any(|r| r.mounting.is_some() || r.plan.mounting == plan.mounting) {
             plan.mounting = format!("{} anew", plan.mounting);
         }
-        runs.push(Planned { plan, mounting: label.map(str::to_owned), started_s: None });
+        runs.push(Planned { mounting: label.map(str::to_owned), room: self.room, ..Planned::new(plan) });
         runs
     }
 
@@ -393,6 +486,14 @@ impl<'a> Setting<'a> {
                 continue;
             }
             let design = Design::new(&view, self.n_given(), &pool, questions);
+            // what all touches of the pool together leave as it is no choice of them parts
+            let all: Vec<usize> = (0..pool.len()).collect();
+            let hopeless: Vec<bool> = design.separated(&all).iter().map(|s| s.after < NOTHING).collect();
+            self.parted.borrow_mut().extend((0..hopeless.len()).filter(|&p| !hopeless[p]));
+            let wanted = |p: usize| self.wanted.is_empty() || self.wanted.contains(&p);
+            if (0..hopeless.len()).all(|p| hopeless[p] || !wanted(p)) {
+                break;
+            }
             let chosen = design.choose(&pool, budget_s * scale);
             if chosen.is_empty() {
                 break;
@@ -411,12 +512,19 @@ impl<'a> Setting<'a> {
             let lost = !generated.plan.skipped.is_empty();
             if over <= OVER {
                 let separations = self.told(&generated.plan, label, effects, questions)?;
-                let now = Chosen { text, generated: generated.clone(), separations, label: label.map(str::to_owned) };
+                let now = Chosen {
+                    text,
+                    generated: generated.clone(),
+                    separations,
+                    label: label.map(str::to_owned),
+                    hopeless,
+                    never: Vec::new(),
+                };
                 if found.as_ref().is_none_or(|f| now.worth() > f.worth()) {
                     found = Some(now);
                 }
             }
-            let settled = found.as_ref().is_some_and(|f| f.settles(2.0 * SEEN));
+            let settled = found.as_ref().is_some_and(|f| f.settles_what_it_can(2.0 * SEEN));
             if !lost && (settled || (0.85..=OVER).contains(&over)) {
                 break;
             }
@@ -510,6 +618,7 @@ fn write(
             number(significant(s.after)),
             number(match s.told {
                 p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
+                _ if s.told_if_room_turns.is_some_and(|p| p >= SAFELY) => "if the room turns".to_owned(),
                 p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
                 p => format!("no ({:.0} %)", 100.0 * p),
             }),
@@ -524,6 +633,22 @@ fn write(
         told(SAFELY),
         chosen.separations.len()
     ));
+    let turns =
+        chosen.separations.iter().filter(|s| s.told < SAFELY && s.told_if_room_turns.is_some_and(|p| p >= SAFELY));
+    let turns = match turns.count() {
+        0 => None,
+        n => Some(format!(
+            "{n} of them only if the room's temperature does not go on as in the runs so far, but turns or swings while the \
+             program runs (reckoned with {:.0} K up and down in {:.0} min: open a gate, switch the heating, or run it at another \
+             time of day); where the room goes on as before, what goes with it and what goes with time stay one",
+            crate::design::view::SWING_K,
+            crate::design::view::SWING_S / 60.0
+        )),
+    };
+    turns.iter().for_each(|says| io.say(says));
+    for pair in &chosen.never {
+        io.say(format!("no touches of this machine tell {pair} apart: look at the machine which it is"));
+    }
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let log = args.out.join(format!("{}.log", plan.program));
     io.say(format!(
@@ -545,6 +670,8 @@ fn write(
         "format": "axiscal-next/1",
         "says": questions.says,
         "pairs": chosen.separations,
+        "room": turns,
+        "never": chosen.never,
         "touches": plan.touches.len(),
         "time_s": seconds,
         "mounting": chosen.label,
@@ -563,11 +690,27 @@ fn entry(plan: &str, log: &str, controller: &str, label: Option<&str>) -> String
     format!("[[data]]\nplan = \"{plan}\"\nlog = \"{log}\"\ncontroller = \"{controller}\"\n{mounting}")
 }
 
+/// The plan that a log is of, by its name: `next-3.log` is that of `next-3.plan.json`, in the folder that is named or beside
+/// the log. How many runs the study has by now says nothing of it.
+fn plan_of(log: &Path, out: &Path) -> Option<PathBuf> {
+    let name = format!("{}.plan.json", log.file_stem()?.to_str()?);
+    let beside = log.parent().map(|folder| folder.join(&name));
+    std::iter::once(out.join(&name)).chain(beside).find(|p| p.is_file())
+}
+
 /// Puts the log of the program into the study.
 fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, io: &Io) -> Result<Answer> {
+    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
+    let same = |name: &str| {
+        let there = |p: &Path| std::fs::canonicalize(p).ok();
+        there(&folder.join(name)).is_some_and(|p| there(log) == Some(p))
+    };
+    if let Some(run) = loaded.study.data.iter().position(|d| same(&d.log)) {
+        return Err(Failure::new("next::joined", format!("{} is run {} of the study already", log.display(), run + 1))
+            .help("a log counts once: name the log of a further run"));
+    }
     let plan = super::load::load_plan(plan_file, &loaded.machine, io)?;
     let touches = read_log(&files::read_bytes(log)?, log, (&args.controller, None), &loaded.machine, &plan, io)?;
-    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let runs = loaded.planned();
     // whoever made the program for blocks put up anew has put them up anew
     let moved = args.moved || plan.blocks_anew;

@@ -210,7 +210,8 @@ fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
 /// What the model leaves of index visits that were left out of the fit, in words.
 fn left_out(fit: &Fit) -> String {
     let Some(h) = fit::held_out::by_visit(fit) else { return String::new() };
-    let se = h.standard_error_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
+    let se =
+        h.standard_error_um.map_or_else(String::new, |se| format!(" ± {} (one standard error)", digits(se, Some(se))));
     format!(", {}{se} um on index visits left out", digits(h.rms_um, h.standard_error_um))
 }
 
@@ -296,7 +297,7 @@ fn propose(first: &Candidate, io: &Io) {
         },
         others => format!("{}; if it is {}", one_of(&first.effect, others), first.effect),
     };
-    io.say(format!("proposed: {what}: {}", sizes.join(", ")));
+    io.say(format!("proposed: {what}: {} (± one standard uncertainty)", sizes.join(", ")));
     if !first.wrong_sign.is_empty() {
         io.say(format!("  {}", wrong_sign(first)));
     }
@@ -423,6 +424,9 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
         let together = told::together(fit, id).map(|t| t.says());
         words.into_iter().chain(together).collect::<Vec<_>>().join(", ")
     };
+    if !s.steps.is_empty() {
+        io.say("± below: one standard uncertainty");
+    }
     for step in &s.steps {
         io.say(format!(
             "found: {}: {} > {} um RMS: {}",

@@ -208,7 +208,7 @@ pub fn compare(fit: &Fit) -> Comparison {
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
     // where most touches found nothing the rest is no sample of the machine
     let no_sample = fit.data.mostly_missed();
-    let explained_by_noise = !no_sample && (fit.dof == 0 || chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof));
+    let explained_by_noise = !no_sample && (fit.dof == 0 || chi2_per_dof <= fit.noise.limit(fit.dof));
     let mut splits = factors::splits(fit, &points, &Misfit::new(fit));
     let rank = |s: &Split| (s.share >= factors::WORTH_NAMING, s.evidence);
     splits.sort_by(|a, b| rank(b).0.cmp(&rank(a).0).then(rank(b).1.total_cmp(&rank(a).1)));

@@ -241,6 +241,13 @@ pub fn verify(
             remarks.push(format!("{} is larger than before: its sign or its unit may be wrong in the control", r.name));
         }
     }
+    if verdict == Verdict::NotImproved && !differ && !rows.is_empty() && n_changed == 0 {
+        remarks.push(
+            "every error is as it was: it looks as if the compensation did not act during the runs after. Was it loaded and \
+             switched on, and does the study name it for the right runs?"
+                .into(),
+        );
+    }
     let reference = |o: &Outcome| o.reference_mm;
     if reference(before) != reference(after) {
         remarks.push("the location errors are stated at different points".into());

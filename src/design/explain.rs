@@ -1,7 +1,7 @@
 //! Which touches would part what a fit cannot tell apart.
 
 use super::habits::{Habit, habits};
-use super::view::{Known, Noise, Planned, Task, View};
+use super::view::{Known, Noise, Planned, Task, View, keep_measured};
 use crate::diag::Result;
 use crate::fit::outcome::Undetermined;
 use crate::fit::solve::{Observability, observe};
@@ -167,10 +167,9 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
     let priors: Vec<Known> =
         fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
     let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: 0.0 };
-    let planned: Vec<Planned> = runs
-        .iter()
-        .map(|r| Planned { plan: r.plan.clone(), mounting: r.mounting.map(str::to_owned), started_s: r.started_s })
-        .collect();
+    // what was planned and not made tells nothing: a run may have been broken off
+    let mut planned: Vec<Planned> = runs.iter().map(Planned::of).collect();
+    keep_measured(&mut planned, &fit.data);
     let remedies: Vec<Remedy> = habits(machine, &planned, &fit.model)
         .into_iter()
         .map(|habit| {

@@ -18,4 +18,4 @@ pub mod view;
 pub use assess::{Request, assess};
 pub use explain::explain;
 pub use habits::{Habit, habits};
-pub use view::{Known, Noise, Planned, Task, View};
+pub use view::{Known, Made, Noise, Planned, Room, Task, View, keep_measured};

@@ -58,6 +58,20 @@ pub struct Separation {
     pub after: f64,
     /// Probability that `diagnose` tells them apart by all touches.
     pub told: f64,
+    /// The same where the room's temperature turns during the further touches; none where that makes no difference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub told_if_room_turns: Option<f64>,
+    /// Noncentrality with that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after_if_room_turns: Option<f64>,
+}
+
+impl Separation {
+    /// The larger of the noncentralities with the further touches.
+    #[must_use]
+    pub fn most(&self) -> f64 {
+        self.after.max(self.after_if_room_turns.unwrap_or(0.0))
+    }
 }
 
 impl Design {
@@ -217,6 +231,8 @@ impl Design {
                 before: before.lambda,
                 after: after.lambda,
                 told: chance(after.lambda, after.q),
+                told_if_room_turns: None,
+                after_if_room_turns: None,
             }
         });
         each.collect()

@@ -14,6 +14,7 @@ use crate::program::plan::{Plan, PlanTouch};
 use crate::search::{Basis, KEPT, Library, Origin, without_rounding};
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector, Vector3};
+use std::collections::{BTreeMap, HashSet};
 
 /// A touch with its way there, s, where a plan does not predict its times.
 pub const TOUCH_S: f64 = 12.0;
@@ -27,11 +28,11 @@ pub const MOUNTING_S: f64 = 600.0;
 /// Changing the stylus, s.
 pub const STYLUS_S: f64 = 300.0;
 
-/// The room as it is assumed before anything is measured: 20 °C, swinging by this much, K …
-const SWING_K: f64 = 1.0;
+/// The room as it is assumed where nothing is measured: about 20 °C or the last value, swinging by this much, K …
+pub const SWING_K: f64 = 1.0;
 
 /// … once in this time, s: a hall whose heating or cooling comes and goes.
-const SWING_S: f64 = 5400.0;
+pub const SWING_S: f64 = 5400.0;
 
 /// Scanned shapes that are tried at most for an effect that leaves no trace at its usual shape.
 const MOST_SHAPES: usize = 16;
@@ -71,13 +72,100 @@ pub struct Planned {
     pub mounting: Option<String>,
     /// When it begins, s on the study's clock; runs without it follow one another.
     pub started_s: Option<f64>,
+    /// When and at what temperature its touches were made, by their numbers; of a run that is only planned: nothing.
+    pub made: BTreeMap<u64, Made>,
+    /// What the room does during touches that are not made yet.
+    pub room: Room,
+}
+
+/// The circumstances of a touch that was made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Made {
+    /// When, s on the study's clock.
+    pub time_s: Option<f64>,
+    /// The temperature, °C.
+    pub temperature_deg_c: Option<f64>,
 }
 
 impl Planned {
     /// A run of a plan.
     #[must_use]
     pub fn new(plan: Plan) -> Self {
-        Self { plan, mounting: None, started_s: None }
+        Self { plan, mounting: None, started_s: None, made: BTreeMap::new(), room: Room::default() }
+    }
+
+    /// Of a run that was made.
+    #[must_use]
+    pub fn of(run: &Run) -> Self {
+        let of = |t: &Touch| (t.id, Made { time_s: t.time_s, temperature_deg_c: t.temperature_deg_c });
+        Self {
+            plan: run.plan.clone(),
+            mounting: run.mounting.map(str::to_owned),
+            started_s: run.started_s,
+            made: run.touches.iter().map(of).collect(),
+            room: Room::GoesOn,
+        }
+    }
+}
+
+/// Runs without the touches that a fit could not use: only what was measured tells anything.
+pub fn keep_measured(runs: &mut [Planned], data: &Data) {
+    let made: HashSet<(usize, u64)> = data.observations.iter().map(|o| (o.run, o.id)).collect();
+    for (run, p) in runs.iter_mut().enumerate() {
+        p.plan.touches.retain(|t| made.contains(&(run, t.id)));
+        // touches that a variation adds may take their numbers
+        p.made.retain(|id, _| made.contains(&(run, *id)));
+    }
+}
+
+/// What the temperature does where it has not been measured yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Room {
+    /// It swings as in a hall whose heating or cooling comes and goes.
+    #[default]
+    Swings,
+    /// It goes on as it went while the touches so far were made.
+    GoesOn,
+}
+
+/// What is measured of the room: a straight line through the temperatures.
+#[derive(Debug, Clone, Copy, Default)]
+struct Measured {
+    /// Touches that carry time and temperature.
+    n: f64,
+    last_s: f64,
+    last_deg_c: f64,
+    /// Sums of times, temperatures, their squares and products, about the first touch.
+    sums: [f64; 4],
+    first: Option<(f64, f64)>,
+}
+
+impl Measured {
+    fn add(&mut self, time_s: f64, deg_c: f64) {
+        let (s0, t0) = *self.first.get_or_insert((time_s, deg_c));
+        let (s, t) = (time_s - s0, deg_c - t0);
+        self.n += 1.0;
+        (self.last_s, self.last_deg_c) = (time_s, deg_c);
+        for (sum, x) in self.sums.iter_mut().zip([s, t, s * s, s * t]) {
+            *sum += x;
+        }
+    }
+
+    /// K/s.
+    fn slope(&self) -> f64 {
+        let [s, t, ss, st] = self.sums;
+        let spread = self.n * ss - s * s;
+        if spread > 0.0 { (self.n * st - s * t) / spread } else { 0.0 }
+    }
+
+    fn at(&self, time_s: f64, room: Room) -> f64 {
+        let since_s = time_s - self.last_s;
+        let swing = |s: f64| SWING_K * (std::f64::consts::TAU * s / SWING_S).sin();
+        match (self.first, room) {
+            (None, _) => 20.0 + swing(time_s),
+            (Some(_), Room::Swings) => self.last_deg_c + swing(since_s),
+            (Some(_), Room::GoesOn) => self.last_deg_c + self.slope() * since_s,
+        }
     }
 }
 
@@ -301,6 +389,7 @@ fn nominal(task: &Task, runs: &[Planned]) -> (Data, f64) {
     let mut clock_s = 0.0;
     let mut last_mounting: Option<&str> = None;
     let mut touched: Vec<(f64, Vec<Touch>)> = Vec::new();
+    let mut measured = Measured::default();
     for run in runs {
         let mounting = run.mounting.as_deref().unwrap_or(&run.plan.mounting);
         let change_s = if last_mounting.is_some_and(|m| m != mounting) { MOUNTING_S } else { 0.0 };
@@ -313,15 +402,20 @@ fn nominal(task: &Task, runs: &[Planned]) -> (Data, f64) {
             .iter()
             .zip(&times)
             .map(|(t, &after_s)| {
-                let time_s = started_s + after_s;
+                let made = run.made.get(&t.id);
+                let time_s = made.and_then(|m| m.time_s).unwrap_or(started_s + after_s);
                 clock_s = f64::max(clock_s, time_s);
-                let swing = SWING_K * (std::f64::consts::TAU * time_s / SWING_S).sin();
+                let known = made.and_then(|m| m.temperature_deg_c);
+                if let Some(deg_c) = known {
+                    measured.add(time_s, deg_c);
+                }
+                let deg_c = known.unwrap_or_else(|| measured.at(time_s, run.room));
                 Touch {
                     id: t.id,
                     position: t.nominal_position(),
                     status: Status::Hit,
                     time_s: Some(time_s),
-                    temperature_deg_c: task.temperature.then_some(20.0 + swing),
+                    temperature_deg_c: task.temperature.then_some(deg_c),
                     line: 0,
                 }
             })

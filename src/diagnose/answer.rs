@@ -46,6 +46,9 @@ pub struct Diagnosis {
     /// So many touches found nothing that the rest is no sample of the machine: the answer is "no", whatever it is.
     #[serde(skip)]
     pub most_missed: bool,
+    /// None of the errors that the model is there for is told.
+    #[serde(skip)]
+    pub untold: bool,
     /// √(Σr²/n) over the touches used, µm.
     pub rms_um: f64,
     /// Standard deviation of a touch, µm.

@@ -46,8 +46,13 @@ impl Evidence {
         let rows: Vec<usize> = used.iter().copied().chain(n..linear.residual.len()).collect();
         let residual = DVector::from_iterator(rows.len(), rows.iter().map(|&i| linear.residual[i]));
         let jacobian = linear.jacobian.select_rows(&rows);
-        // σ was estimated from repeats that are rows of this regression
-        let pure = fit.noise.dof.map(|dof| PureError { variance: 1.0, dof, within: true, floor: tau_mm > 0.0 });
+        // repeats are rows of this regression; beside a σ that the study states they count as they are
+        let pure = fit.noise.repeats.map(|(found_mm, dof)| PureError {
+            variance: (found_mm / fit.noise.sigma_mm).powi(2),
+            dof,
+            within: true,
+            floor: tau_mm > 0.0,
+        });
         Self {
             base: Basis::new(&jacobian),
             visits: used.iter().map(|&i| fit.data.visits[i]).collect(),

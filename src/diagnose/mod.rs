@@ -21,6 +21,7 @@ mod rivals;
 pub mod sketch;
 mod standing_out;
 mod tell;
+mod untold;
 mod verdict;
 pub mod words;
 
@@ -40,6 +41,7 @@ use evidence::Evidence;
 use nalgebra::{DMatrix, DVector};
 use named::Named;
 use std::collections::HashMap;
+pub use tell::NEVER as NEVER_PARTED;
 
 /// What is diagnosed.
 #[derive(Debug, Clone, Copy)]
@@ -310,6 +312,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     }
     verdict::says(&mut out, subject, verdict, &beside);
     verdict::not_when_touches_are_missing(&mut out, subject);
+    untold::not_when_nothing_is_told(&mut out, subject);
     Ok(out)
 }
 

@@ -1,18 +1,17 @@
 //! Which touches would tell the members of a group apart: variations of these very touches that this machine can make.
 
 use super::{Examination, Options, Subject};
-use crate::design::{Known, Noise, Planned, Task, View, habits};
+use crate::design::{Known, Noise, Planned, Task, View, habits, keep_measured};
 use crate::diag::Result;
 use crate::fit::{Knowledge, effects_of};
 use crate::model::catalogue::Effect;
 use crate::model::formula::slot;
-use crate::search::apart::{Products, chance};
+use crate::search::apart::{Left, Products, chance};
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::units::deg_from_rad;
 use nalgebra::DVector;
 use rayon::prelude::*;
-use std::collections::HashSet;
 
 /// A variation tells two effects apart when the diagnosis of its touches does so with this probability.
 const SAFELY: f64 = 0.95;
@@ -50,10 +49,14 @@ struct Tried {
 impl Tried {
     /// Would the two be told apart, whichever of them acts?
     fn tells(&self, one: usize, other: usize) -> bool {
+        self.left(one, other).is_some_and(|left| chance(left.lambda, left.q) >= SAFELY)
+    }
+
+    /// What is left of one when the other is taken for it, the worse way.
+    fn left(&self, one: usize, other: usize) -> Option<Left> {
         let find = |c: usize| self.effects.iter().find(|e| e.0 == c);
-        let (Some(a), Some(b)) = (find(one), find(other)) else { return false };
-        let left = self.products.apart((&a.1, Some(&a.2)), Some((&b.1, Some(&b.2))));
-        chance(left.lambda, left.q) >= SAFELY
+        let (a, b) = (find(one)?, find(other)?);
+        Some(self.products.apart((&a.1, Some(&a.2)), Some((&b.1, Some(&b.2)))))
     }
 }
 
@@ -75,12 +78,8 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
     let priors: Vec<Known> =
         fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
     let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: seen.evidence.tau_mm };
-    let made: HashSet<(usize, u64)> = fit.data.observations.iter().map(|o| (o.run, o.id)).collect();
     let mut planned = planned.to_vec();
-    for (run, p) in planned.iter_mut().enumerate() {
-        // only what was measured tells anything
-        p.plan.touches.retain(|t| made.contains(&(run, t.id)));
-    }
+    keep_measured(&mut planned, &fit.data);
     let mut candidates: Vec<usize> = Vec::new();
     for group in seen.groups.iter().zip(asked).filter(|g| *g.1).map(|g| g.0) {
         candidates.extend(group.members.iter().map(|m| m.candidate));
@@ -110,6 +109,19 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
         .collect()
 }
 
+/// What is said of effects that do the same wherever the machine touches.
+pub const NEVER: &str = "no touches that this machine can make do: they do the same wherever it touches, so look at the machine \
+                         which it is";
+
+/// Does every variation leave the first of a group and all others exactly as they are to each other?
+fn never_parted(group: &Group, tried: &[Tried]) -> bool {
+    /// Noncentrality of rounding.
+    const NOTHING: f64 = 1e-3;
+    let chosen = group.first();
+    let rivals = || group.members.iter().map(|m| m.candidate).filter(|&c| c != chosen);
+    tried.iter().all(|t| rivals().all(|r| t.left(chosen, r).is_some_and(|l| l.q == 0 || l.lambda < NOTHING)))
+}
+
 /// The cheapest variation that tells the first of a group from most of the others.
 fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> String {
     let chosen = group.first();
@@ -119,7 +131,14 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> String {
     let best = tried.iter().map(|t| (told(t), t)).rev().max_by_key(|t| t.0);
     let id = |c: usize| seen.named.effects[c].id.as_str();
     let Some((count, best)) = best.filter(|b| b.0 > 0) else {
-        return "no single change of these touches does: `axiscal plan-next` looks for a program that does".into();
+        let told_by_room = |c: usize| seen.named.effects[c].terms.iter().any(|t| t.formula.variables().contains(&"T"));
+        return match never_parted(group, tried) {
+            true if group.members.iter().any(|m| told_by_room(m.candidate)) => {
+                "no change of these touches does while the room goes on as it did: measure again while its temperature turns".into()
+            }
+            true => NEVER.into(),
+            false => "no single change of these touches does: `axiscal plan-next` looks for a program that does".into(),
+        };
     };
     let from: Vec<&str> = rivals.iter().filter(|&&r| best.tells(chosen, r)).map(|&r| id(r)).collect();
     let whom = match (count == rivals.len(), count) {

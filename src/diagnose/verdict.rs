@@ -76,13 +76,16 @@ const FAINT: f64 = 1.2;
 /// What chance makes less often than this is no matter of chance, however small it is beside the noise.
 const CHANCE: f64 = 1e-3;
 
+/// Share of what is left that a form must explain beyond a name to speak against it.
+const WORTH_SAYING: f64 = 0.01;
+
 /// Something passed a test and was not borne out, while the noise explains all that is left and chance might have made it.
 fn faint(out: &Diagnosis, fit: &Fit) -> bool {
     let tests = out.candidates.iter().map(|c| c.p_adjusted).chain(out.depends.iter().map(|w| w.p_adjusted));
     if tests.fold(1.0, f64::min) < CHANCE {
         return false;
     }
-    let noise_does = fit.dof > 0 && fit.outcome.chi2_per_dof <= crate::fit::noise::chi2_limit(fit.dof, fit.noise.dof);
+    let noise_does = fit.dof > 0 && fit.outcome.chi2_per_dof <= fit.noise.limit(fit.dof);
     out.verdict == Verdict::Unexplained && noise_does && out.rms_um <= FAINT * out.noise_um
 }
 
@@ -110,14 +113,19 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
         Verdict::MissingEffect => {
             let named = out.candidates.first().map_or_else(String::new, |c| missing(c, &against));
             let better = beside.better.as_ref().and_then(|on| out.depends.iter().find(|w| w.on == *on));
-            let better = better.map_or_else(String::new, |w| {
+            // what rounds to nothing is said of no name
+            let worth = |w: &&super::answer::Where| {
+                let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
+                own.is_none_or(|c| w.share - c.share >= WORTH_SAYING)
+            };
+            let better = better.filter(worth).map_or_else(String::new, |w| {
                 // what depends on the effect's own variable has the same words: what counts is what goes beyond it
                 let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
                 match own {
                     Some(c) => format!(
                         " Another form of the same dependence describes it better: {:.0} % more of what is left goes with {} \
                          than {} takes, so that the name may be wrong or not all.",
-                        (100.0 * (w.share - c.share)).max(0.0),
+                        100.0 * (w.share - c.share),
                         super::words::plain(&w.by),
                         c.effect
                     ),

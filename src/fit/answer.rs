@@ -2,7 +2,7 @@
 
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
-use super::{Fit, Settings, held_out, noise, snoop, statement, uncertainty};
+use super::{Fit, Settings, held_out, snoop, statement, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
@@ -209,16 +209,18 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
             100.0 * snoop::MOST_SHARE
         ));
     }
+    out.extend(fit.noise.contradiction());
     let contradictions = uncertainty::contradictions(fit);
     // what is stated wrongly is no fault of the model
     let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
     let dof = fit.dof.saturating_sub(contradictions.len());
     out.extend(contradictions.into_iter().map(|c| c.says));
-    let limit = noise::chi2_limit(fit.dof, fit.noise.dof);
+    let limit = fit.noise.limit(fit.dof);
     if fit.dof > 0 && chi2_per_dof > limit && (dof == 0 || chi2 > limit * dof as f64) {
         out.push(format!(
-            "the touches miss the model by {}: something is missing in it, and the uncertainties count the noise only (`axiscal diagnose` looks for it)",
-            fit.noise.times(chi2_per_dof.sqrt())
+            "the touches miss the model by {}: something is missing in it, and the uncertainties count {} only (`axiscal diagnose` looks for it)",
+            fit.noise.times(chi2_per_dof.sqrt()),
+            if fit.type_b.is_empty() { "the noise" } else { "the noise and the type B rows" }
         ));
     }
     out

@@ -42,6 +42,10 @@ pub struct Noise {
     /// Standard deviation of touches of one point in visits of one pose, each visit displaced freely, mm, where it is so much above
     /// that of touches right after each other that it counts for nothing: something changes between the visits and is no noise.
     pub later_mm: Option<f64>,
+    /// What repeats say where there are enough of them, whatever σ is taken: standard deviation, mm, and degrees of freedom.
+    pub repeats: Option<(f64, f64)>,
+    /// σ as the user states it, mm, where the repeats contradict it and are taken in its place.
+    pub contradicted_mm: Option<f64>,
     /// There are repeats enough, and they agree to the last digit: they say nothing of the noise.
     pub repeats_agree: bool,
 }
@@ -91,11 +95,15 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
     let repeats_agree = from_repeats.is_some_and(|s| s <= 1e-9);
     let from_repeats = from_repeats.filter(|s| *s > 1e-9);
-    let (sigma_mm, source, sigma_dof) = match (known.stated_sigma_mm, from_repeats) {
-        (Some(stated), _) => (stated, "study", None),
-        (None, Some(found)) => (found, "repeats", Some(dof as f64)),
-        (None, None) => (known.declared_sigma_mm, "declared", None),
-    };
+    // a wrong σ is no fault of the model: where the log itself contradicts it, the log counts
+    let contradicted_mm =
+        known.stated_sigma_mm.filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, *s)));
+    let (sigma_mm, source, sigma_dof) =
+        match (known.stated_sigma_mm.filter(|_| contradicted_mm.is_none()), from_repeats) {
+            (Some(stated), _) => (stated, "study", None),
+            (None, Some(found)) => (found, "repeats", Some(dof as f64)),
+            (None, None) => (known.declared_sigma_mm, "declared", None),
+        };
     let n_poses = samples.iter().map(|s| s.pose).collect::<std::collections::BTreeSet<_>>().len();
     let fixed = |tau_mm, visit_source| (tau_mm, visit_source, None, tau_mm);
     let enough = revisits.contrasts.len() >= LEAST_REVISITS && from_repeats.is_some();
@@ -108,7 +116,31 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
         None if n_poses < 2 => fixed(0.0, "one pose"),
         None => fixed(known.declared_tau_mm, "declared"),
     };
-    Noise { sigma_mm, source, dof: sigma_dof, tau_mm, visit_source, visit_dof, tau_test_mm, later_mm, repeats_agree }
+    let repeats = from_repeats.map(|found| (found, dof as f64));
+    Noise {
+        sigma_mm,
+        source,
+        dof: sigma_dof,
+        tau_mm,
+        visit_source,
+        visit_dof,
+        tau_test_mm,
+        later_mm,
+        repeats,
+        contradicted_mm,
+        repeats_agree,
+    }
+}
+
+/// Do repeats contradict a stated standard deviation? They lie on one side of it further than chance makes once in a
+/// thousand (both sides together), and by more than a tenth: less is no matter to anyone.
+fn contradicts(found_mm: f64, dof: usize, stated_mm: f64) -> bool {
+    const LEVEL: f64 = 1e-3;
+    const TENTH: f64 = 1.1;
+    let ratio = found_mm / stated_mm;
+    let chi2 = ratio * ratio * dof as f64;
+    let below = ChiSquared::new(dof as f64).map_or(0.5, |d| d.cdf(chi2));
+    (below > 1.0 - 0.5 * LEVEL && ratio > TENTH) || (below < 0.5 * LEVEL && ratio < 1.0 / TENTH)
 }
 
 /// The standard deviation of touches that come back later, mm, where it is above that of touches right after each other by more than
@@ -140,6 +172,10 @@ impl Noise {
         let sigma = match (self.source, self.dof) {
             ("repeats", Some(dof)) => {
                 let from = format!("from repeated touches, {dof:.0} degrees of freedom");
+                let from = match self.contradicted_mm {
+                    Some(stated) => format!("{from}; the {:.2} um that the study states are contradicted by them", um_from_mm(stated)),
+                    None => from,
+                };
                 self.later_mm.map_or(from, |later| {
                     format!(
                         "from touches right after each other, {dof:.0} degrees of freedom; the same points later on differ by {:.2} um, \
@@ -153,8 +189,13 @@ impl Noise {
             _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
         };
         let tau = match (self.visit_source, self.visit_dof) {
+            // the revisits scatter by less than the touches' own noise makes: a bound of nothing says nothing
+            ("revisits", Some(_)) if self.tau_test_mm <= 0.0 => {
+                "from revisited poses, which differ by no more than the touches' own noise".to_owned()
+            }
             ("revisits", Some(dof)) => format!(
-                "from revisited poses, {dof:.0} degrees of freedom, at most {:.2} um with 90 % certainty",
+                "from revisited poses, {} of freedom, at most {:.2} um with 90 % certainty",
+                degrees(dof),
                 um_from_mm(self.tau_test_mm)
             ),
             ("study", _) => "as the study states".to_owned(),
@@ -169,6 +210,29 @@ impl Noise {
             um_from_mm(self.sigma_mm),
             um_from_mm(self.tau_mm)
         )
+    }
+
+    /// What the study states of the touches' noise and the log contradicts, in words.
+    #[must_use]
+    pub fn contradiction(&self) -> Option<String> {
+        let (stated, (found, dof)) = (self.contradicted_mm?, self.repeats?);
+        Some(format!(
+            "the study states a noise of {:.2} um ([noise] touch_um), and the repeats of these touches say {:.2} um ({dof:.0} \
+             degrees of freedom): no chance makes that, and the repeats are used; take touch_um out, or find out what has changed",
+            um_from_mm(stated),
+            um_from_mm(found)
+        ))
+    }
+
+    /// χ²/dof above this says that the model fails, whatever σ is taken: with a stated σ that repeats do not bear out quite,
+    /// what the repeats say counts too.
+    #[must_use]
+    pub fn limit(&self, dof: usize) -> f64 {
+        let own = chi2_limit(dof, self.dof);
+        match self.repeats.filter(|_| self.dof.is_none()) {
+            Some((found, of)) => own.max((found / self.sigma_mm).powi(2) * chi2_limit(dof, Some(of))),
+            None => own,
+        }
     }
 
     /// A misfit of so many times what the noise makes (√(χ²/dof)), in words.
@@ -293,6 +357,15 @@ impl Revisits {
             self.contrasts.iter().map(|(lambda, _)| lambda / (sigma_mm * sigma_mm + tau2 * lambda)).sum();
         let dof = (tau2 * information).powi(2) / k;
         (tau2.sqrt(), dof, upper2.sqrt())
+    }
+}
+
+/// Degrees of freedom as a person reads them: effective ones may be far below one, and none at all is something else.
+fn degrees(dof: f64) -> String {
+    match dof {
+        d if d < 0.05 => "less than 0.1 degrees".to_owned(),
+        d if d < 9.5 => format!("{d:.1} degrees"),
+        d => format!("{d:.0} degrees"),
     }
 }
 

@@ -254,7 +254,7 @@ impl Search<'_> {
         out.iter().for_each(|&i| weights[i] = 0.0);
         solution = self.refit(weights, &solution);
         let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
-        let fits = dof > 0 && solution.chi2 / dof as f64 <= noise::chi2_limit(dof, noise.dof);
+        let fits = dof > 0 && solution.chi2 / dof as f64 <= noise.limit(dof);
         let jacobian = solve::Problem::jacobian(&self.touches, &solution.theta);
         let sees_all = solve::observe(&jacobian).rank >= self.observability.rank;
         self.touches.set_noise(sigma_mm, tau_mm);

@@ -105,11 +105,25 @@ pub fn without_trailer(line: &[u8]) -> &[u8] {
     }
 }
 
-/// Without such bytes, and blanks, at its beginning.
+/// Without such bytes, blanks, and the byte order mark of a file that was put behind another one, at its beginning.
 #[must_use]
 pub fn without_leader(line: &[u8]) -> &[u8] {
     let parsed: IResult<&[u8], &[u8]> = take_till(|b| b != b' ' && b != b'\t' && !is_tape(b)).parse(line);
-    parsed.map_or(line, |(rest, _)| rest)
+    let rest = parsed.map_or(line, |(rest, _)| rest);
+    rest.strip_prefix(BYTE_ORDER_MARK).map_or(rest, without_leader)
+}
+
+/// What some editors put before a text.
+pub const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// How a run begins.
+const HEAD: &[u8] = b"H AXISCAL ";
+
+/// Where the head of a run begins in the middle of a line: the line end before it was lost.
+#[must_use]
+pub fn inner_head(line: &[u8]) -> Option<usize> {
+    let leader = line.len() - without_leader(line).len();
+    memchr::memmem::find(&line[(leader + 1).min(line.len())..], HEAD).map(|at| leader + 1 + at)
 }
 
 #[cfg(test)]
@@ -141,5 +155,14 @@ mod tests {
         assert_eq!(without_leader(without_trailer(b"\0\0\x7f P N1 \x14\0")), b"P N1");
         assert_eq!(without_trailer(b"\0\0"), b"");
         assert_eq!(without_trailer(b"P\0N1 "), b"P\0N1 ");
+        assert_eq!(without_leader(b"\0\xef\xbb\xbf H"), b"H");
+    }
+
+    #[test]
+    fn a_head_inside_a_line_is_found() {
+        assert_eq!(inner_head(b"E N202H AXISCAL 1"), Some(6));
+        assert_eq!(inner_head(b" \xef\xbb\xbfH AXISCAL 1"), None);
+        assert_eq!(inner_head(b"H AXISCAL 1 FAH AXISCAL 1"), Some(14));
+        assert_eq!(inner_head(b""), None);
     }
 }

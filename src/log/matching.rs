@@ -72,7 +72,7 @@ pub(super) fn match_at(
                     format!("touch {id} stands twice, in lines {} and {line}: the later one is used", older.line);
                 at(
                     Finding::warning("log::twice", message)
-                        .help("this is as it should be where a set-up was started again"),
+                        .help("this is as it should be where a set-up was started again: a line H with its number U stands between"),
                     line,
                 )
             });

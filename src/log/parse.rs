@@ -4,7 +4,7 @@ use super::lines::{Line, Lines, is_tape};
 use super::place::{Capped, Places};
 use super::record::{LogHeader, begin, named};
 use super::runs::{self, RunFound};
-use super::stretch::{Reader, What, looks_like_columns};
+use super::stretch::{Event, Reader, What, looks_like_columns};
 use super::touch::RawTouch;
 use super::words::Fault;
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -98,7 +98,8 @@ pub fn parse_run(
     }
     let n_faults = faults.len();
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
-    let runs = runs::split(&read.touches, &read.events);
+    glued(bytes, start, &read.events, &places, &mut findings);
+    let runs = runs::split(&read.touches, &read.events, |line| reader.may_be_head(line));
     let heads: Vec<String> = runs.iter().filter_map(|r| r.header.as_ref()).map(|h| h.controller.clone()).collect();
     let chosen = runs::choose(runs, &read.touches, asked, is_columns, &places, &mut findings)
         .map_err(|f| Failure([std::mem::take(&mut findings.0), f.0].concat()))?
@@ -137,6 +138,23 @@ pub fn parse_run(
     let parsed =
         ParsedLog { touches, header: run.header, ending, rejected, columns: is_columns, per_touch, runs: found };
     findings.finish(parsed)
+}
+
+/// Heads in the middle of a line.
+fn glued(bytes: &[u8], start: usize, events: &[Event<'_>], places: &Places<'_>, findings: &mut Findings) {
+    let in_line = |e: &&Event<'_>| {
+        let before = e.line.start.checked_sub(1).filter(|_| e.line.start > start).and_then(|at| bytes.get(at));
+        !matches!(before, None | Some(b'\n' | b'\r'))
+    };
+    let mut found = Capped::few();
+    for event in events.iter().filter(|e| !matches!(e.what, What::End(_))).filter(in_line) {
+        found.push(|| {
+            let finding = Finding::warning("log::line_end_lost", "a run begins in the middle of a line")
+                .help("were two logs put together? the line end between them is lost; they are read as two runs");
+            places.at(finding, event.line.start..event.line.start + event.line.bytes.len())
+        });
+    }
+    findings.0.extend(found.drain("runs that begin in the middle of a line", "log::line_end_lost"));
 }
 
 /// The log was written by another controller than the one that is named.
@@ -189,7 +207,7 @@ pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) 
     let name = places.name();
     if bytes.iter().all(|b| b.is_ascii_whitespace() || is_tape(*b)) {
         return Err(Failure::new("log::empty", format!("{name}:1:1: the log is empty"))
-            .help("did the program run, and is the log closed? LinuxCNC writes it beside its INI file"));
+            .help("did the program run to its end, and is this the file that the control wrote?"));
     }
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
         return Err(Failure::new("log::utf16", format!("{name}:1:1: the log is UTF-16 text, expected plain ASCII"))

@@ -199,6 +199,7 @@ fn axis_of(letter: u8) -> Option<AxisName> {
 /// A finite number, or the fault that says what stands there instead.
 fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Number), Fault> {
     let fault = |code, message: String| Err(Fault::at(line, at, word_length(at), code, message));
+    let shown = || show(&padded(at));
     match number(rule.mark)(at) {
         Ok((rest, n)) if n.value.is_finite() => {
             let other = if rule.mark == b',' { b'.' } else { b',' };
@@ -212,16 +213,24 @@ fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Num
                 };
                 let message = format!(
                     "{} has the decimal mark '{mark}', this controller writes '{}'; {what_to_do}",
-                    show(&at[..word_length(at)]),
+                    shown(),
                     rule.mark as char
                 );
                 return fault("log::decimal_mark", message);
             }
             Ok((rest, n))
         }
-        Ok(_) => fault("log::not_a_number", format!("{} is too large", show(&at[..word_length(at)]))),
-        Err(_) => fault("log::not_a_number", format!("expected a number, found {}", show(&at[..word_length(at)]))),
+        Ok(_) => fault("log::not_a_number", format!("{} is too large", shown())),
+        Err(_) => fault("log::not_a_number", format!("expected a number, found {}", shown())),
     }
+}
+
+/// A number without the blanks that fill its field before and behind its sign.
+fn padded(at: &[u8]) -> Vec<u8> {
+    let at = blanks(at);
+    let (sign, digits) = at.split_at(usize::from(at.first().is_some_and(|b| matches!(b, b'+' | b'-'))));
+    let digits = blanks(digits);
+    [sign, &digits[..word_length(digits)]].concat()
 }
 
 /// Up to the next blank.

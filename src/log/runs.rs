@@ -1,10 +1,12 @@
 //! Where the runs of a log begin and end, and which of them counts.
 
+use super::lines::Line;
 use super::place::Places;
 use super::record::LogHeader;
 use super::stretch::{Event, What};
 use super::touch::RawTouch;
 use crate::diag::{Failure, Finding, Findings};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// One run in a log, as it is offered.
@@ -77,12 +79,22 @@ impl Run {
     }
 }
 
-/// The runs of a log.
-pub fn split(touches: &[RawTouch], events: &[Event<'_>]) -> Vec<Run> {
+/// The runs of a log. `may_be_head`: is this line, which is not understood, the head of a run?
+pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&Line<'_>) -> bool) -> Vec<Run> {
     let mut runs = vec![Run::default()];
     let mut done = 0;
+    let mut beginnings = beginnings(touches, events, may_be_head).into_iter().peekable();
+    let mut add = |range: Range<usize>, runs: &mut Vec<Run>| {
+        let mut from = range.start;
+        while let Some(at) = beginnings.next_if(|at| *at < range.end) {
+            add_touches(from..at, touches, runs);
+            runs.push(Run::default());
+            from = at;
+        }
+        add_touches(from..range.end, touches, runs);
+    };
     for event in events {
-        add_touches(done..event.at, touches, &mut runs);
+        add(done..event.at, &mut runs);
         done = event.at;
         let Some(run) = runs.last_mut() else { continue };
         let number = event.line.number;
@@ -109,9 +121,64 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>]) -> Vec<Run> {
             }
         }
     }
-    add_touches(done..touches.len(), touches, &mut runs);
+    add(done..touches.len(), &mut runs);
     runs.retain(|r| r.header.is_some() || r.count() > 0);
     runs
+}
+
+/// Touches with which a run begins whose head is lost or not understood: their numbers start again, and no head says that
+/// a set-up was started again.
+fn beginnings(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&Line<'_>) -> bool) -> Vec<usize> {
+    let mut out = Vec::new();
+    let (mut from, mut unread) = (0, Vec::new());
+    for event in events {
+        match event.what {
+            What::Fault => unread.extend(may_be_head(&event.line).then_some(event.at)),
+            What::Head(_) | What::End(_) => {
+                again(touches, from..event.at, &unread, &mut out);
+                from = event.at;
+                unread.clear();
+            }
+        }
+    }
+    again(touches, from..touches.len(), &unread, &mut out);
+    out
+}
+
+/// The same between two lines that say where a run begins or ends. `unread`: touches before which a line stands that may be
+/// the head of a run.
+fn again(touches: &[RawTouch], range: Range<usize>, unread: &[usize], out: &mut Vec<usize>) {
+    let mut from = range.start;
+    let mut last = None;
+    // the touches of this run by number: most runs need none of it
+    let mut seen: Option<BTreeMap<u64, usize>> = None;
+    for at in range.clone() {
+        let Some(id) = touches[at].id else { continue };
+        if last.is_none_or(|last| id > last) {
+            last = Some(id);
+            if let Some(seen) = &mut seen {
+                seen.insert(id, at);
+            }
+            continue;
+        }
+        let known = seen
+            .get_or_insert_with(|| (from..at).filter_map(|i| Some((touches[i].id?, i))).collect::<BTreeMap<_, _>>());
+        // a line that was copied brings nothing else; numbers before the first one are of an earlier set-up
+        let other = |at: usize| {
+            touches.get(at).and_then(|t| t.id).is_some_and(|id| match known.get(&id) {
+                Some(before) => touches[*before].differs(&touches[at]),
+                None => known.first_key_value().is_some_and(|(first, _)| id < *first),
+            })
+        };
+        let follows = |next: usize| range.contains(&next) && touches[next].id > Some(id) && other(next);
+        // one touch alone may stand in the wrong place
+        if unread.contains(&at) || (other(at) && follows(at + 1)) {
+            out.push(at);
+            (from, last, seen) = (at, Some(id), None);
+        } else {
+            known.insert(id, at);
+        }
+    }
 }
 
 fn add_touches(range: Range<usize>, touches: &[RawTouch], runs: &mut Vec<Run>) {

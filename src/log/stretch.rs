@@ -4,7 +4,7 @@
 //! A line that is not understood is only noted here: what is wrong with it is found out for the few that are shown.
 
 use super::fast::{self, Table};
-use super::lines::{Line, blanks, first, without_trailer};
+use super::lines::{BYTE_ORDER_MARK, Line, blanks, first, inner_head, without_leader, without_trailer};
 use super::record::{LogHeader, Record, begin, record, row};
 use super::touch::RawTouch;
 use super::words::Fault;
@@ -118,23 +118,47 @@ impl Reader<'_> {
                 continue;
             }
             let (line, end, used) = first(&bytes[at..]);
-            let line = Line { number: out.lines, start: start + at, bytes: line, end };
             end.into_iter().for_each(|e| out.ends[e as usize] = true);
-            let what = match self.line(&line) {
-                Ok(Record::Touch(touch)) => {
-                    out.touches.push(touch);
-                    None
-                }
-                Ok(Record::Head(head)) => Some(What::Head(Box::new(head))),
-                Ok(Record::End(count)) => Some(What::End(count)),
-                Ok(Record::Blank) => None,
-                Err(_) => Some(What::Fault),
-            };
-            let n_touches = out.touches.len();
-            out.events.extend(what.map(|what| Event { at: n_touches, line, what }));
+            let mut line = Line { number: out.lines, start: start + at, bytes: line, end };
+            // two files put together without a line end between them: the head of the second begins a line of its own
+            while self.columns.is_none()
+                && let Some(head) = inner_head(line.bytes)
+            {
+                let before = self.without_prefix(&line.bytes[..head]);
+                self.note(Line { bytes: before, end: None, ..line }, &mut out);
+                line = Line { start: line.start + head, bytes: &line.bytes[head..], ..line };
+            }
+            self.note(line, &mut out);
             at += used;
         }
         out
+    }
+
+    /// Reads a line that is not the usual one of a touch.
+    fn note<'a>(&self, line: Line<'a>, out: &mut Stretch<'a>) {
+        let what = match self.line(&line) {
+            Ok(Record::Touch(touch)) => {
+                out.touches.push(touch);
+                None
+            }
+            Ok(Record::Head(head)) => Some(What::Head(Box::new(head))),
+            Ok(Record::End(count)) => Some(What::End(count)),
+            Ok(Record::Blank) => None,
+            Err(_) => Some(What::Fault),
+        };
+        let n_touches = out.touches.len();
+        out.events.extend(what.map(|what| Event { at: n_touches, line, what }));
+    }
+
+    /// What stands before a head in its line, without what belongs to the head.
+    fn without_prefix<'a>(&self, before: &'a [u8]) -> &'a [u8] {
+        let before = before.strip_suffix(self.rule.prefix.as_bytes()).unwrap_or(before);
+        before.strip_suffix(BYTE_ORDER_MARK).unwrap_or(before)
+    }
+
+    /// Is this line, which is not understood, the head of a run?
+    pub fn may_be_head(&self, line: &Line<'_>) -> bool {
+        self.columns.is_none() && begin(line.bytes, self.rule).first().is_some_and(|b| b.eq_ignore_ascii_case(&b'H'))
     }
 }
 
@@ -155,14 +179,9 @@ pub fn looks_like_columns(bytes: &[u8]) -> bool {
 
 /// The first byte of a line that is no text says more than what the grammar makes of it.
 pub(super) fn no_text(line: &[u8], start: usize) -> Option<Fault> {
-    let at = line.iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?;
     // what a punch writes may stand before the words
-    let at = if line[..at].iter().all(|b| *b == b' ') && super::lines::is_tape(line[at]) {
-        at + super::lines::without_leader(&line[at..]).iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?
-            + (line[at..].len() - super::lines::without_leader(&line[at..]).len())
-    } else {
-        at
-    };
+    let words = without_leader(line);
+    let at = line.len() - words.len() + words.iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?;
     let message = format!("byte 0x{:02X} at offset {} of the file is no text", line[at], start + at);
     Some(Fault::at(line, &line[at..], 1, "log::no_text", message))
 }

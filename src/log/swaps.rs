@@ -140,7 +140,7 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
     all.push(Mistake {
         name: "inch".to_owned(),
         says: "the numbers were inches".into(),
-        help: "the program sets millimetres: was the log written by it?",
+        help: "the head of a log says its unit, MM or INCH, as the program was written (unit in [log]): was the log written by it?",
         undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(mm_from_inch))),
     });
     let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();

@@ -32,6 +32,15 @@ pub struct RawTouch {
     pub line: usize,
 }
 
+impl RawTouch {
+    /// Does it say something else than another line of the same touch?
+    #[must_use]
+    pub fn differs(&self, other: &Self) -> bool {
+        (self.position, self.present, self.status, self.time_s)
+            != (other.position, other.present, other.status, other.time_s)
+    }
+}
+
 /// One touch matched to the plan: never dropped or edited afterwards, only marked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Touch {

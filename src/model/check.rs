@@ -183,6 +183,33 @@ impl<'a> Check<'a> {
         }
     }
 
+    /// A term is its parameter times its formula: what is 0, or holds the parameter once more, is hardly what was meant.
+    fn acts(&mut self, w: &EffectAsWritten, t: &TermAsWritten, formula: &Formula, parameter: usize) {
+        let (name, id) = (t.parameter.get_ref(), w.id.get_ref());
+        let mut warn = |code, message: String, help: String| {
+            self.findings.push(Finding::warning(code, message).help(help).at(self.source, t.formula.span()));
+        };
+        if formula.constant() == Some(0.0) {
+            warn(
+                "effects::nothing",
+                format!("a formula of {id:?} is 0: the term does nothing, whatever {name} is"),
+                "write what it depends on, or take the term out".to_owned(),
+            );
+        }
+        if formula.holds(parameter) {
+            warn(
+                "effects::twice_inside",
+                format!(
+                    "{name} stands in its own formula of {id:?}: the term is {name} times the formula, so that it acts with \
+                     the square of {name}, and a small {name} leaves no trace that a test could find"
+                ),
+                format!(
+                    "leave {name} out of the formula; what bends with a size of its own gets a name of its own under shape"
+                ),
+            );
+        }
+    }
+
     /// The parameter that a term is multiplied by; one parameter may stand before several terms.
     fn factor(&mut self, w: &EffectAsWritten, t: &TermAsWritten, parameters: &mut Vec<Parameter>) {
         let name = t.parameter.get_ref();
@@ -352,6 +379,9 @@ impl<'a> Check<'a> {
             }
             Ok(formula) => {
                 let parameter = names.iter().position(|name| name == t.parameter.get_ref())?;
+                if !self.built_in {
+                    self.acts(w, t, &formula, parameter);
+                }
                 Some(Term { parameter, place, component, formula })
             }
             Err(message) => {

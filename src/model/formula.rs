@@ -168,6 +168,12 @@ impl Formula {
         self.parts().is_some_and(|p| !p.partials.is_empty())
     }
 
+    /// Does this parameter of the effect stand inside?
+    #[must_use]
+    pub fn holds(&self, shape: usize) -> bool {
+        self.parts().is_some_and(|p| p.partials.iter().any(|(s, _)| *s == shape))
+    }
+
     /// The state variables that it uses.
     #[must_use]
     pub fn variables(&self) -> Vec<&'static str> {

@@ -340,6 +340,10 @@ pub struct Log {
     /// What lengths are in, in the program and in its log; the head of the log says it too, and what it says counts.
     #[serde(default)]
     pub unit: LengthUnit,
+    /// Places of a field, before and behind the mark together, where it has a size: those before the mark follow, and what is taken
+    /// off the sum.
+    #[schemars(with = "Option<usize>")]
+    pub field_places: Option<Spanned<usize>>,
     /// Places before the mark that the control fills with blanks; 0: it pads nothing.
     #[schemars(with = "Option<usize>")]
     pub whole_places: Option<Spanned<usize>>,
@@ -447,6 +451,9 @@ pub struct Check {
     /// Settings that a program under the control's own transformation may leave on where it stops by itself: reset takes them off.
     #[serde(default)]
     pub stays_on: Vec<String>,
+    /// What the control does with a number that is too large for its field in the log: `grow` or `cut` (the places in front are lost).
+    #[serde(default)]
+    pub field_overflow: Overflow,
     /// The G number of the further work offsets, which are chosen with P: only of Fanuc (54.1) and Haas (154).
     #[schemars(with = "Option<f64>")]
     pub further_offsets: Option<Spanned<f64>>,
@@ -454,6 +461,17 @@ pub struct Check {
     pub source: Option<String>,
     /// Why it is not verified.
     pub unverified: Option<String>,
+}
+
+/// What becomes of a number that is too large for its field.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Overflow {
+    /// The field becomes larger.
+    #[default]
+    Grow,
+    /// The places in front are not written.
+    Cut,
 }
 
 /// What a macro of a package does, so that a program which calls it can be proven.

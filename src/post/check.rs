@@ -71,6 +71,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
                 *g.get_ref()
             }),
             after_abort: c.after_abort.clone(),
+            field_overflow: c.field_overflow,
             calls: c.call.clone(),
             log_always_open: c.log_always_open,
         }
@@ -108,6 +109,13 @@ pub(super) struct Check<'a> {
     source: &'a Source,
     findings: Findings,
     unverified: Vec<(String, String)>,
+}
+
+/// Digits behind the mark that lengths in inches need at least.
+const INCH_DECIMALS: usize = 4;
+
+fn power_of_ten(places: usize) -> f64 {
+    10f64.powi(i32::try_from(places).unwrap_or(12))
 }
 
 impl Check<'_> {
@@ -165,8 +173,33 @@ impl Check<'_> {
         value.min(9)
     }
 
+    /// The places before the mark of a field of a size, and what is taken off a sum in it, where the file does not say them.
+    fn field(
+        &mut self,
+        log: &w::Log,
+        field: &Spanned<usize>,
+        whole_places: usize,
+        check_modulo: Option<f64>,
+    ) -> (usize, Option<f64>) {
+        let (size, decimals) = (*field.get_ref(), *log.decimals.get_ref());
+        if size > 12 || size <= decimals {
+            let message = format!("field_places is {size}, decimals {decimals}");
+            self.error(&field.span(), "post::field_places", message, "up to 12, and more than decimals");
+        }
+        let left = size.min(12).saturating_sub(decimals).max(1);
+        let whole = if log.whole_places.is_some() { whole_places } else { left };
+        let rest = log.check_word.as_ref().filter(|_| log.check_modulo.is_none());
+        (whole, check_modulo.or(rest.map(|_| power_of_ten(whole))))
+    }
+
     fn number(&mut self, number: &w::Number, unit: w::LengthUnit) -> NumberRule {
         self.origin("number", &number.source, &number.unverified, &number.decimals.span());
+        if unit == w::LengthUnit::Inch && *number.decimals.get_ref() < INCH_DECIMALS {
+            let message =
+                format!("the program is in inches, and its numbers have {} decimals", number.decimals.get_ref());
+            let help = "three would be steps of 0.025 mm: [number] decimals = 4, with a source of its own beside it";
+            self.error(&number.decimals.span(), "post::inch_decimals", message, help);
+        }
         let both = |s: &str| s.contains("{axis}") && s.contains("{value}");
         self.word("word", &number.word, both, "it holds {axis} and {value}");
         NumberRule {
@@ -257,6 +290,20 @@ impl Check<'_> {
             }
             (*places.get_ref()).min(12)
         });
+        let (whole_places, check_modulo) = match &log.field_places {
+            Some(field) => self.field(log, field, whole_places, check_modulo),
+            None => (whole_places, check_modulo),
+        };
+        if let (Some(modulo), Some(places)) = (&log.check_modulo, check_modulo) {
+            let room = power_of_ten(whole_places);
+            if whole_places > 0 && places > room {
+                let message = format!(
+                    "check_modulo is {places}, and the field of the sum has {whole_places} places before its mark"
+                );
+                let help = format!("it holds less than {room}: check_modulo = {room:.1}");
+                self.error(&modulo.span(), "post::check_modulo", message, &help);
+            }
+        }
         let mark = if self.mark(&log.decimal_mark) == ',' { b',' } else { b'.' };
         let other_mark = log.other_decimal_mark.as_ref().map(|other| if self.mark(other) == ',' { b',' } else { b'.' });
         if let Some(word) = log.other_decimal_mark.as_ref().filter(|_| other_mark == Some(mark)) {

@@ -257,6 +257,8 @@ impl<'a> Writer<'a> {
             unit => if self.post.log.unit == LengthUnit::Inch { "inch" } else { "mm" },
             touches => self.plan.touches.len(),
             log_decimals => self.post.log.decimals,
+            log_whole_places => self.post.log.whole_places,
+            log_modulo => self.post.log.check_modulo.map_or_else(String::new, |m| format!("{m:.0}.")),
             seconds => self.path.seconds,
             slow_feed => self.length(self.machine.probe.slow_feed),
             log_name => self.post.log_name(self.plan)?,

@@ -16,7 +16,7 @@ mod render;
 mod spelling;
 pub mod tables;
 
-pub use as_written::{CallRule, DialectName, Does, LengthUnit};
+pub use as_written::{CallRule, DialectName, Does, LengthUnit, Overflow};
 pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
@@ -121,6 +121,8 @@ pub struct CheckRule {
     pub stays_on: Vec<String>,
     /// The G number of the further work offsets.
     pub further_offsets: f64,
+    /// What becomes of a number that is too large for its field in the log.
+    pub field_overflow: Overflow,
 }
 
 /// How a log is called and read.

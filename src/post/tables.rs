@@ -62,6 +62,17 @@ pub enum LengthUnit {
     Inch,
 }
 
+impl LengthUnit {
+    /// `mm` or `inch`.
+    #[must_use]
+    pub fn says(self) -> &'static str {
+        match self {
+            Self::Mm => "mm",
+            Self::Inch => "inch",
+        }
+    }
+}
+
 /// Which tables the control has.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

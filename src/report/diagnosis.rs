@@ -148,7 +148,11 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
             2,
         );
     }
-    for c in d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0 && c.effect != gross::EFFECT) {
+    let sized = || d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0 && c.effect != gross::EFFECT);
+    if sized().any(|c| c.moves_sigma_um.is_some() || c.parameters.iter().any(|p| p.sigma.is_some())) {
+        out += "expected sizes, ± one standard uncertainty:\n";
+    }
+    for c in sized() {
         let which = if c.same_as.is_empty() { c.effect.clone() } else { format!("if it is {}", c.effect) };
         out += &wrapped(&format!("{which}: {}", sizes(c)), 2);
         if !c.same_as.is_empty() {
@@ -202,7 +206,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
 #[must_use]
 pub fn wrong_sign(c: &Candidate) -> String {
     format!(
-        "{} would be negative, and it is positive by nature: only a compensation that is set too far makes that",
+        "{} would be negative, and it is positive by nature: only a compensation that is set too far makes that, or a part that cools down",
         c.wrong_sign.join(", ")
     )
 }

@@ -76,7 +76,8 @@ pub fn change(
         row(&format!("{}, {unit}", p.name), stated(p.before), stated(p.after));
     }
     lay(&mut t, paper.width.min(100), &[]);
-    let mut out = format!("{t}\n");
+    let mut out =
+        format!("{t}\n± in this table: one standard uncertainty, or one standard error of what is left out\n");
     if other_noise((before.noise_um, before.visit_um), (after.noise_um, after.visit_um)) {
         let line = format!(
             "chi2/dof is held against the noise as each fit finds it: touch {} and index visits {} um before, {} and {} um after",
@@ -87,7 +88,11 @@ pub fn change(
         );
         out += &format!("{}\n", sentence(&line, paper.width, 0, 0));
     }
-    if let Some((fall, se)) = doubt.fall {
+    // less than a thousandth of a nanometre is the arithmetic's
+    const NOTHING_UM: f64 = 1e-6;
+    if doubt.fall.is_some_and(|(fall, _)| fall.abs() < NOTHING_UM) {
+        out += "on index visits left out it stays as it is: what was changed leaves no trace in these touches\n";
+    } else if let Some((fall, se)) = doubt.fall {
         let how = if doubt.nested_rms_um.is_some() { "" } else { "; you chose the effect knowing all touches" };
         out += &format!(
             "on index visits left out it {} by {} ± {} um (one standard error, {} visits in turn{how})\n",

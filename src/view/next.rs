@@ -96,7 +96,9 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
     }
     if !first.same_as.is_empty() {
-        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), plan_next));
+        let no_touches = first.tell_apart == crate::diagnose::NEVER_PARTED;
+        let command = if no_touches { "" } else { plan_next };
+        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), command));
     }
     out.push(Next::new(
         "Put it into the model",

@@ -11,8 +11,8 @@ use super::shelf::{self, Shelf};
 use super::{Answered, Host};
 use crate::diag::{Failure, Finding, Severity};
 use crate::diagnose::Diagnosis;
+use crate::fit;
 use crate::fit::outcome::{Combination, Parameter, Undetermined};
-use crate::fit::{self, noise};
 use crate::machine::{Machine, Shape};
 use crate::model::formula::FUNCTIONS;
 use crate::study::history::History;
@@ -164,7 +164,7 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         noise_says: &o.noise_says,
         visit_um: o.visit_um,
         chi2_per_dof: o.chi2_per_dof,
-        explained_by_noise: (fit.dof > 0).then(|| o.chi2_per_dof <= noise::chi2_limit(fit.dof, fit.noise.dof)),
+        explained_by_noise: (fit.dof > 0).then(|| o.chi2_per_dof <= fit.noise.limit(fit.dof)),
         converged: o.converged,
         touches: o.touches,
         used: fit.n_used(),

@@ -58,9 +58,14 @@ touch = [{ faces = ["+Z"], grid = "one" }]
 
 /// The small program for a control, or a built-in one.
 pub fn original(controller: &str, built_in: Option<&str>) -> Original {
+    of(Postprocessor::load_built_in_or_file(controller).unwrap().0, built_in)
+}
+
+/// The same for a control of one's own.
+pub fn of(post: Postprocessor, built_in: Option<&str>) -> Original {
+    let controller = &post.name;
     let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
     let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
-    let (post, _) = Postprocessor::load_built_in_or_file(controller).unwrap();
     let spec = match built_in {
         Some(name) => program::choose(program::built_in().unwrap(), name, &machine).unwrap(),
         None => program::load(&source("small.toml", SMALL)).unwrap().0,

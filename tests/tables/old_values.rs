@@ -45,7 +45,8 @@ $MC_TRAFO5_AXIS2_1[0]=0\n$MC_TRAFO5_AXIS2_1[1]=0\n$MC_TRAFO5_AXIS2_1[2]=-1\n$MC_
     };
     assert!(["0", "1", "2"].iter().all(|k| sum(k).abs() < 1e-9));
     let restore = text(&export, "restore_trafo.ini");
-    assert!(restore.contains("$MC_TRAFO5_BASE_TOOL_1[2]=-250.050000 "), "{restore}");
+    // with the user's own digits
+    assert!(restore.contains("$MC_TRAFO5_BASE_TOOL_1[2]=-250.05EX+00 "), "{restore}");
     assert!(text(&export, "axiscal_trafo.ini").contains("; Study sha256: 0123abcd\n"));
 }
 
@@ -117,11 +118,11 @@ fn what_is_doubtful_is_refused() {
     let names = ["$MC_TRAFO5_AXIS2_1[0]", "$MC_TRAFO5_AXIS2_1[1]", "$MC_TRAFO5_AXIS2_1[2]"];
     let values = names.iter().zip([0.0, 0.0, 1.0]).map(|(n, v)| ((*n).to_owned(), (v, None))).collect();
     assert!(
-        refused(&trunnion, "sinumerik", &small, &Options { old: Old { values }, ..accepting() })
+        refused(&trunnion, "sinumerik", &small, &Options { old: Old { values, ..Old::default() }, ..accepting() })
             .contains(&"tables::other_direction")
     );
     let values = [("$MC_TRAFO5_BASE_TOOL_1[1]".to_owned(), (3.0, None))].into();
-    let old = Old { values };
+    let old = Old { values, ..Old::default() };
     assert!(
         refused(&trunnion, "sinumerik", &small, &Options { old: old.clone(), ..accepting() })
             .contains(&"tables::other_place")
@@ -173,7 +174,7 @@ fn old_settings_of_haas_are_added_to_and_restored() {
     assert!(said(&findings, "tables::old_lacking").unwrap().contains("of SETTING 304, SETTING 305 are"));
     assert!(text(&export, "README.txt").contains("NOT KNOWN"));
     // another machine's
-    let other = Old { values: [("SETTING 255".to_owned(), (4.0, None))].into() };
+    let other = Old { values: [("SETTING 255".to_owned(), (4.0, None))].into(), ..Old::default() };
     let options = Options { old: other, ..accepting() };
     let refused =
         control::export(&machine, "haas", &sheet, &correction(&machine, &planted, None), &options).unwrap_err();
@@ -212,4 +213,121 @@ fn the_readme_names_no_file_that_is_not_written() {
         assert_eq!(export.files.iter().any(|(n, _)| n == "axiscal_cec.ini"), there);
         assert_eq!(text(&export, "README.txt").contains("axiscal_cec.ini"), there);
     }
+}
+
+fn read_old(machine: &Machine, t: &Tables, text_of: &str) -> Old {
+    backup::read(&source("b", text_of), &t.backup, &control::names(machine, t)).unwrap()
+}
+
+/// What axiscal wrote says its unit: millimetres are not read as inches.
+#[test]
+fn a_sheet_of_the_other_unit_is_converted() {
+    let machine = machine("trunnion");
+    let planted: Planted = vec![("location-a", "EY0A", 0.02)];
+    for control in ["haas", "heidenhain", "sinumerik"] {
+        let t = tables(control);
+        let first = crate::controls::export(&machine, control, &planted, &accepting());
+        let restore = t.file[0].restore.clone().unwrap();
+        let old = read_old(&machine, &t, &text(&first, &restore));
+        assert_eq!(old.unit(), Some(LengthUnit::Mm), "{control}");
+        let options = Options { old, unit: LengthUnit::Inch, ..accepting() };
+        let (inches, findings) =
+            control::export(&machine, control, &t, &correction(&machine, &planted, None), &options).unwrap();
+        assert!(findings.0.iter().any(|f| f.code == "tables::old_unit"), "{control}: {findings:?}");
+        for (a, b) in first.values.iter().zip(&inches.values).filter(|(a, _)| a.unit == "mm") {
+            assert!((a.old - b.old * 25.4).abs() < 1e-6, "{control} {}: {} {}", a.id, a.old, b.old);
+        }
+        // and goes back as it came, whatever the unit of the new values
+        let numbers = |e: &Export| {
+            let text = text(e, &restore);
+            text.lines()
+                .filter_map(|l| Some(l.split_once('=')?.1.split(';').next()?.trim().to_owned()))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(numbers(&first), numbers(&inches), "{control}");
+        assert!(text(&inches, &restore).contains("; lengths in mm"), "{control}");
+    }
+}
+
+/// A restoring file of an export without a backup holds what the machine's description said: it is no backup of the control.
+#[test]
+fn what_was_assumed_stays_assumed() {
+    let machine = machine("trunnion");
+    let planted: Planted = vec![("location-a", "EY0A", 0.02)];
+    for control in CONTROLS {
+        let t = tables(control);
+        let first = crate::controls::export(&machine, control, &planted, &accepting());
+        let restore = t.file[0].restore.clone().unwrap();
+        let again = |text_of: &str| {
+            let options = Options { old: read_old(&machine, &t, text_of), ..accepting() };
+            control::export(&machine, control, &t, &correction(&machine, &planted, None), &options).unwrap()
+        };
+        let sheet = text(&first, &restore);
+        let (second, findings) = again(&sheet);
+        assert!(second.values.iter().all(|v| !v.known), "{control}: {sheet}");
+        assert!(findings.0.iter().any(|f| f.code == "tables::old_assumed"), "{control}: {findings:?}");
+        assert!(text(&second, "README.txt").contains("NOT KNOWN"), "{control}");
+        assert_eq!(text(&second, &restore).matches("ASSUMED").count(), sheet.matches("ASSUMED").count(), "{control}");
+        // the control's own numbers are known
+        let own = sheet.replace("ASSUMED", "");
+        assert!(again(&own).0.values.iter().all(|v| v.known), "{control}");
+    }
+}
+
+/// What the control held comes back to the last digit, and in the unit in which it was given.
+#[test]
+fn old_values_go_back_as_they_were_given() {
+    let machine = machine("trunnion");
+    let t = tables("fanuc");
+    let planted: Planted = vec![("location-a", "EY0A", 0.02)];
+    let restored = |text_of: &str, file: &str| {
+        let options = Options { old: read_old(&machine, &t, text_of), ..accepting() };
+        let (export, _) =
+            control::export(&machine, "fanuc", &t, &correction(&machine, &planted, None), &options).unwrap();
+        text(&export, file)
+    };
+    let metric =
+        "%\nN19700Q1M0.1234;\nN19701Q1M0.;\nN19702Q1M-250.0;\nN19703Q1M0.0;\nN19704Q1M0.00;\nN19705Q1M0.;\n%\n";
+    let lines = |text: &str| text.lines().filter(|l| l.starts_with('N')).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(lines(&restored(metric, "restore_parameters.txt")), lines(metric));
+    // inches, in an export of millimetres
+    let inches = metric.replace("M0.1234", "I0.0039").replace("-250.0;", "-9.8425;").replace("Q1M", "Q1I");
+    assert_eq!(lines(&restored(&inches, "restore_parameters.txt")), lines(&inches));
+    let g10 = restored(&inches, "restore_g10.nc");
+    assert!(g10.contains("G20\n") && g10.contains("N19700 R0.0039\n"), "{g10}");
+    assert!(restored(&inches, "axiscal_g10.nc").contains("G21\n"));
+    // one in inches, the others in millimetres: converted without the loss of a digit
+    let mixed = metric.replace("M0.1234", "I0.0039");
+    assert!(restored(&mixed, "restore_parameters.txt").contains("N19700Q1M0.099060;"));
+}
+
+/// Where none of the values is there, the example is one that is always written.
+#[test]
+fn the_example_of_a_backup_is_no_point_of_a_position_table() {
+    let (machine, t) = (machine("trunnion"), tables("sinumerik"));
+    let such_as = control::example(&machine, &t).unwrap();
+    assert!(!such_as.contains("CEC"), "{such_as}");
+    let names = control::names(&machine, &t);
+    let refused = backup::read_such_as(&source("b", "; nothing"), &t.backup, &names, &such_as).unwrap_err();
+    assert!(refused.to_string().contains(&such_as), "{refused}");
+}
+
+/// The same error has the same size whatever the control.
+#[test]
+fn what_is_left_has_one_definition() {
+    let machine = machine("trunnion");
+    let planted: Planted = vec![("location-a", "EB0A", 0.0041)];
+    let of = |control: &str| {
+        let export = crate::controls::export(&machine, control, &planted, &accepting());
+        export.left.iter().find(|l| l.parameter == "EB0A").unwrap().left_um.unwrap()
+    };
+    let by_hand = 0.0041_f64.to_radians() * 100.0 * 1e3;
+    for control in ["fanuc", "haas", "heidenhain"] {
+        assert!((of(control) - by_hand).abs() < 1e-6, "{control}: {}", of(control));
+    }
+    let found = correction(&machine, &planted, None);
+    let (export, _) =
+        axiscal::tables::linuxcnc::export(&machine, &found, &axiscal::tables::linuxcnc::Options::default()).unwrap();
+    let stock = export.stock.left.iter().find(|l| l.parameter == "EB0A").unwrap();
+    assert!((stock.left_um.unwrap() - by_hand).abs() < 1e-6, "{stock:?}");
 }

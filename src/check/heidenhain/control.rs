@@ -12,6 +12,7 @@ use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The state of the control.
 #[derive(Debug, Clone)]
@@ -33,6 +34,8 @@ pub struct Heidenhain {
     angle: Option<f64>,
     own: Values,
     last: Last,
+    /// M functions of the builder that switch the probe.
+    builder: Arc<[f64]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -205,6 +208,7 @@ impl Heidenhain {
             }
             128 => self.tcpm = Tcpm::On,
             129 => self.tcpm = Tcpm::Off,
+            _ if self.builder.contains(&m) => vm.note(Event::Other(format!("M{m}"))),
             _ => return Err(format!("M{m} is not known here")),
         }
         Ok(Next::On)
@@ -228,8 +232,17 @@ impl Heidenhain {
     }
 }
 
+/// The M functions with which a file switches the probe on and off; those that mean something else to every control are not the
+/// builder's.
+fn builder(post: &Postprocessor) -> Arc<[f64]> {
+    const EVERYBODY_S: [f64; 13] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 13.0, 14.0, 91.0, 92.0, 98.0, 99.0, 130.0];
+    let lines = ["probe_on", "probe_off"].into_iter().filter_map(|name| post.settings.get(name));
+    let words = lines.flat_map(|text| text.split_whitespace()).filter_map(|word| word.strip_prefix('M'));
+    words.filter_map(|digits| digits.parse().ok()).filter(|m| !EVERYBODY_S.contains(m)).collect()
+}
+
 impl Dialect for Heidenhain {
-    fn begin(start: Start, _post: &Postprocessor, _machine: &Machine) -> Self {
+    fn begin(start: Start, post: &Postprocessor, _machine: &Machine) -> Self {
         let awkward = start == Start::Awkward;
         let third = start == Start::Third;
         let some = |values: [f64; 6], when: bool| if when { values } else { [0.0; 6] };
@@ -245,6 +258,7 @@ impl Dialect for Heidenhain {
             angle: None,
             own: Values::new(),
             last: Last::default(),
+            builder: builder(post),
         }
     }
 

@@ -4,6 +4,7 @@
 //! without its point counts thousandths, is as the postprocessor files say: unverified on a real control. Macro statements
 //! are read ahead of the blocks before them: what the control shows of its position is refused until a block has made them wait.
 
+use super::builder::Builder;
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
 use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
@@ -55,8 +56,8 @@ pub struct MacroB {
     seconds: f64,
     /// What the macros of a package do.
     calls: Arc<[CallRule]>,
-    /// M functions of the builder that switch the probe.
-    builder: Arc<[f64]>,
+    /// What the builder has made otherwise.
+    builder: Arc<Builder>,
     /// Axes that count from 0 to 360.
     modulo: [bool; 6],
 }
@@ -195,7 +196,15 @@ impl MacroB {
     fn auxiliary(&mut self, m: f64, words: &[Spoken], vm: &mut Vm) -> Result<bool, String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         let whole = m.round() as i64;
-        if self.builder.contains(&m) {
+        if let Some(word) = self.builder.orients(m) {
+            vm.note(Event::Orient(value(word).ok_or_else(|| format!("M{m} needs {word}"))?));
+            return Ok(false);
+        }
+        if self.builder.waits(m) {
+            self.ahead = false;
+            return Ok(false);
+        }
+        if self.builder.switches(m) {
             vm.note(Event::Other(format!("M{m}")));
             return Ok(false);
         }
@@ -207,7 +216,6 @@ impl MacroB {
             0 => vm.note(Event::Wait(String::new())),
             5 => vm.note(Event::Other("spindle off".to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
-            19 => vm.note(Event::Orient(value("R").ok_or("M19 needs R")?)),
             _ => return Err(format!("M{m} is not known here")),
         }
         Ok(false)
@@ -294,13 +302,13 @@ impl MacroB {
         Ok(())
     }
 
-    fn unused(words: &[Spoken], gs: &[i64]) -> Result<(), String> {
-        let m = |n: f64| words.iter().any(|w| w.address == "M" && w.value == n);
+    fn unused(&self, words: &[Spoken], gs: &[i64]) -> Result<(), String> {
         let moves = gs.iter().any(|g| matches!(g, 0 | 10 | 310));
         for word in words {
             let used = match word.address {
+                _ if self.builder.uses(word, words) => true,
                 "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 1540)),
-                "R" => m(19.0),
+                "R" | "S" => false,
                 "H" => gs.iter().any(|g| matches!(g, 434 | 2340)),
                 "F" => moves,
                 "G" | "M" => true,
@@ -367,15 +375,6 @@ fn time_of_day(clock_s: f64) -> f64 {
     const DAY_S: f64 = 86_400.0;
     let s = (clock_s + DAY_S - 120.0).rem_euclid(DAY_S);
     (s / 3600.0).floor() * 10_000.0 + (s / 60.0 % 60.0).floor() * 100.0 + (s % 60.0).floor()
-}
-
-/// The M functions with which a file switches the probe on and off; those that mean something else to every control are not the
-/// builder's.
-fn builder(post: &Postprocessor) -> Arc<[f64]> {
-    const EVERYBODY_S: [f64; 9] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 30.0, 98.0, 99.0];
-    let lines = ["probe_on", "probe_off"].into_iter().filter_map(|name| post.settings.get(name));
-    let words = lines.flat_map(|text| text.split_whitespace()).filter_map(|word| word.strip_prefix('M'));
-    words.filter_map(|digits| digits.parse().ok()).filter(|m| !EVERYBODY_S.contains(m)).collect()
 }
 
 /// The G numbers (in tenths) of one modal group: a block may hold one of each.
@@ -449,7 +448,7 @@ impl Dialect for MacroB {
             skipped: [0.0; 6],
             seconds: 0.0,
             calls: post.check.iter().flat_map(|c| c.calls.iter().cloned()).collect(),
-            builder: builder(post),
+            builder: Arc::new(Builder::of(post)),
             modulo: AxisName::ALL.map(|a| {
                 a.is_rotary() && post.settings.get("modulo").is_some_and(|letters| letters.contains(a.letter()))
             }),
@@ -482,7 +481,7 @@ impl Dialect for MacroB {
         if axes && motion.is_none() && !gs.iter().any(|g| matches!(g, 520 | 434 | 2340)) {
             return Err("axis words stand without a G word that uses them".to_owned());
         }
-        Self::unused(words, &gs)?;
+        self.unused(words, &gs)?;
         let mut over = false;
         for m in numbers("M").collect::<Vec<_>>() {
             over |= self.auxiliary(m, words, vm)?;
@@ -541,9 +540,16 @@ impl Dialect for MacroB {
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
         match var {
             Var::Number(n) if *n < 1000 => own(&self.own, var),
-            Var::Number(5021..=5026 | 5041..=5046) if self.ahead => Err(format!(
-                "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
-            )),
+            Var::Number(n)
+                if self.ahead && (matches!(n, 5021..=5026 | 5041..=5046) || self.builder.is_probe_input(*n)) =>
+            {
+                Err(format!(
+                    "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
+                ))
+            }
+            Var::Number(n) if self.builder.is_probe_input(*n) && self.system_variable(*n, vm).is_none() => {
+                Ok(f64::from(vm.deflected()))
+            }
             Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
             Var::Name(_) => Err(format!("{var} is no variable")),
         }
@@ -551,6 +557,10 @@ impl Dialect for MacroB {
 
     fn exists(&self, var: &Var) -> bool {
         self.own.contains_key(var)
+    }
+
+    fn is_probe_input(&self, var: &Var) -> bool {
+        matches!(var, Var::Number(n) if self.builder.is_probe_input(*n))
     }
 
     fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String> {
@@ -595,9 +605,14 @@ impl Dialect for MacroB {
         ])
     }
 
-    fn spell(&self, value: f64, decimals: usize, _width: usize) -> String {
-        let text = format!("{value:.decimals$}");
-        let zero = text.starts_with('-') && !text.bytes().any(|b| (b'1'..=b'9').contains(&b));
-        if zero { text[1..].to_owned() } else { text }
+    /// A number that is too large for its field: Haas makes the field larger (96-8000 Rev AC, p. 116), Fanuc is taken to write
+    /// the last places only.
+    fn spell(&self, value: f64, decimals: usize, width: usize) -> String {
+        let text = format!("{:.decimals$}", value.abs());
+        let whole = text.find('.').unwrap_or(text.len());
+        let cut = if self.builder.cuts && width > 0 { whole.saturating_sub(width) } else { 0 };
+        let zero = !text.bytes().any(|b| (b'1'..=b'9').contains(&b));
+        let sign = if value.is_sign_negative() && !zero { "-" } else { "" };
+        format!("{sign}{}", &text[cut..])
     }
 }

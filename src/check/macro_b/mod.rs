@@ -1,5 +1,6 @@
 //! Custom macro B of Fanuc, and the macros of Haas, as far as our programs use them.
 
+mod builder;
 mod control;
 mod parse;
 

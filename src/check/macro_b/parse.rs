@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// The letters that a block may hold beside those of the axes.
-const ADDRESSES: [&str; 6] = ["G", "M", "F", "P", "R", "H"];
+const ADDRESSES: [&str; 7] = ["G", "M", "F", "P", "R", "S", "H"];
 
 /// The letters of the axes, in the order of [`AxisName::ALL`].
 const AXES: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
@@ -238,9 +238,13 @@ fn sequence_number(line: &Line<'_>, rest: &str, digits: &str) -> Result<u32, Fau
     digits.parse().map_err(|_| line.fault(rest, format!("{digits} is too large a number")))
 }
 
+/// A remark or a message: no bracket, nothing that ends a program or a block for the control, and what its code has only.
 fn comment_text(input: &str) -> IResult<&str, &str> {
-    take_till(|c| c == '(' || c == ')').parse(input)
+    take_till(|c: char| matches!(c, '(' | ')' | '%' | ';') || !matches!(c, '\t' | ' '..='~')).parse(input)
 }
+
+/// How many places a field has at most, before and behind the point: Haas 96-8000 Rev AC, p. 116.
+const PLACES: usize = 8;
 
 /// What stands in DPRNT: `*` is a blank, `#21[44]` a variable with four whole digits and four after the point.
 fn printed<'a>(line: &Line<'a>, input: &'a str) -> Result<(&'a str, Text), Fault> {
@@ -259,6 +263,13 @@ fn printed<'a>(line: &Line<'a>, input: &'a str) -> Result<(&'a str, Text), Fault
                 .parse(rest)
                 .map_err(|e: Failed<'_>| line.unread(&e, "a variable with its places, #21[44]"))?;
             let digit = |c: char| c.to_digit(10).unwrap_or(0) as usize;
+            if digit(whole) + digit(decimals) > PLACES {
+                let says = format!(
+                    "a field of {} places: DPRNT writes {PLACES} at most (field_places in [log])",
+                    digit(whole) + digit(decimals)
+                );
+                return Err(line.fault(rest, says));
+            }
             let value = Expr::Var(Var::Number(sequence_number(line, rest, n)?));
             text.push(Piece::Fixed { decimals: digit(decimals), width: digit(whole), value });
             rest = after;
@@ -384,6 +395,10 @@ mod tests {
             ("%\nO1\nG4 P-10\n%\n", 8),
             ("%\nO1\nM+5\n%\n", 5),
             ("%\nO1\nN-5\n%\n", 5),
+            ("%\nO1\nDPRNT[P*N#1[45]]\n%\n", 16),
+            ("%\nO1\n(100%)\n%\n", 9),
+            ("%\nO1\nG4 P10 (UP; DOWN)\n%\n", 15),
+            ("%\nO1\n(\u{d6}L)\n%\n", 6),
         ] {
             let fault = read(text).unwrap_err();
             if fault.at.start != place {

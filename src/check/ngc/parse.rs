@@ -42,6 +42,13 @@ struct Reader {
     percents: usize,
 }
 
+/// A line without its number, which the control does not look at: `N10 G0 Z5`.
+fn line_number(rest: &str) -> &str {
+    let Some(digits) = rest.strip_prefix(['n', 'N']).map(str::trim_start) else { return rest };
+    let after = digits.trim_start_matches(|c: char| c.is_ascii_digit());
+    if after.len() == digits.len() { rest } else { after.trim_start_matches([' ', '\t']) }
+}
+
 /// A structure that is not closed yet.
 struct Open {
     label: String,
@@ -81,6 +88,7 @@ impl Reader {
         if rest.starts_with(['o', 'O']) {
             return self.o_word(line, rest);
         }
+        let rest = line_number(rest);
         let rest = if rest.starts_with('#') { self.assignment(line, rest)? } else { self.block(line, rest)? };
         self.comments(line, rest)
     }

@@ -13,6 +13,17 @@ pub const STATE_WORDS: &str = "X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB 
 /// Functions, as messages list them.
 pub const FUNCTION_WORDS: &str = "sin cos tan asin acos atan atan2 exp ln sqrt abs sign floor mod step";
 
+/// Numbers with a name.
+const NUMBERS: [&str; 4] = ["pi", "PI", "e", "E"];
+
+/// Can a parameter have this name? It would hide a word that formulas have already.
+pub fn is_free(name: &str) -> bool {
+    let letter = |c: char| c.is_ascii_alphabetic() || c == '_';
+    let is_word = name.starts_with(letter) && name.chars().all(|c| letter(c) || c.is_ascii_digit());
+    let mut taken = STATE_WORDS.split_whitespace().chain(FUNCTION_WORDS.split_whitespace()).chain(NUMBERS);
+    is_word && !taken.any(|word| word == name)
+}
+
 /// What a word stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Word {

@@ -232,6 +232,12 @@ impl Reader<'_> {
         for (name, unit, default) in factors.chain(row.shape.iter().map(|s| (&s.parameter, &s.unit, s.start))) {
             let unit = self.unit(unit).unwrap_or(Unit::One);
             if !parameters.iter().any(|p| &p.name == name.get_ref()) {
+                if !formula::is_free(name.get_ref()) {
+                    let message = format!("{:?} cannot be the name of a parameter", name.get_ref());
+                    let help =
+                        "letters, digits and _, and none of the variables, functions and constants (pi, e) of formulas";
+                    self.error(name.span(), "effects::parameter", message, help.to_owned());
+                }
                 parameters.push(OwnParameter { name: name.get_ref().clone(), unit, default });
             }
         }

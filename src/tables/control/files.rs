@@ -1,5 +1,6 @@
 //! The files of an export: the control's own through its templates, and what a person reads.
 
+use super::backup::Old;
 use super::fill::Value as Entry;
 use super::{Export, Options};
 use crate::diag::{Failure, Findings, Result};
@@ -8,6 +9,7 @@ use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, compile};
 use crate::tables::compensation::Grid;
 use crate::tables::correction::Correction;
 use crate::tables::linuxcnc::{head, one_line, render};
+use crate::units::{inch_from_mm, mm_from_inch};
 use minijinja::{Value, context};
 
 const README: &str = include_str!("../templates/control/readme.txt.j2");
@@ -23,18 +25,41 @@ fn digits(value: f64, decimals: usize, always_mark: bool) -> String {
     if always_mark && !text.contains('.') { text + "." } else { text }
 }
 
-fn entry(value: &Entry, spelling: Option<&str>, restore: bool, always_mark: bool) -> Option<Value> {
+fn entry(
+    value: &Entry,
+    spelling: Option<&str>,
+    restore: bool,
+    unit: LengthUnit,
+    tables: &Tables,
+    old: &Old,
+) -> Option<Value> {
     let name = match spelling {
         Some(s) => value.names.get(s)?.clone(),
         None => value.names.values().next()?.clone(),
     };
-    let show = |v: f64| digits(v, value.decimals, always_mark);
-    let (now, other) = if restore { (value.old, value.new) } else { (value.new, value.old) };
+    // what is restored is restored in the unit in which it was given
+    let (factor, decimals, shown_unit) = match (value.unit, unit) {
+        ("mm", LengthUnit::Inch) => (inch_from_mm(1.0), super::fill::decimals(*tables.step_inch.get_ref()), "inch"),
+        ("inch", LengthUnit::Mm) => (mm_from_inch(1.0), super::fill::decimals(*tables.step_mm.get_ref()), "mm"),
+        _ => (1.0, value.decimals, value.unit),
+    };
+    let show = |v: f64| digits(v * factor, decimals, tables.always_mark);
+    let given = value.names.values().find(|n| old.values.contains_key(*n));
+    let is_length = matches!(value.unit, "mm" | "inch");
+    let same_unit = |n: &&String| !is_length || old.values.get(*n).is_some_and(|(_, u)| u.is_none_or(|u| u == unit));
+    let old_text = match given.filter(same_unit).and_then(|n| old.texts.get(n)) {
+        Some(text) => text.clone(),
+        // units are mixed: nothing of what was given is lost in a digit that is cut off
+        None if given.is_some() && is_length => digits(value.old * factor, decimals + 3, tables.always_mark),
+        None => show(value.old),
+    };
+    let (now, other) = if restore { (old_text.clone(), show(value.new)) } else { (show(value.new), old_text.clone()) };
     // from what the control then holds to what this file brings
-    let change = digits(if restore { value.old - value.new } else { value.new - value.old }, value.decimals, false);
+    let change = if restore { value.old - value.new } else { value.new - value.old };
+    let change = digits(change * factor, decimals, false);
     Some(context! {
-        id => value.id.clone(), name, value => show(now), other => show(other), old => show(value.old), new => show(value.new),
-        change, says => one_line(&value.says), unit => value.unit, changed => value.new != value.old,
+        id => value.id.clone(), name, value => now, other, old => old_text, new => show(value.new),
+        change, says => one_line(&value.says), unit => shown_unit, changed => value.new != value.old,
         known => value.known, instead => value.instead,
     })
 }
@@ -89,21 +114,19 @@ pub(super) fn write(
         active.iter().find(same).cloned().unwrap_or_else(|| none(g))
     };
     let grids_known = tables.grid.as_ref().is_some_and(|form| super::grids::known(form, &grids, &options.old));
-    let unit = match options.unit {
-        LengthUnit::Mm => context! { name => "mm", letter => "M" },
-        LengthUnit::Inch => context! { name => "inch", letter => "I" },
-    };
     let common = |restore: bool, form: Option<&FileForm>| {
         let spelling = form.or(tables.file.first()).and_then(|f| f.spelling.as_deref());
+        let unit = options.old.unit().filter(|_| restore).unwrap_or(options.unit);
         let entries: Vec<Value> =
-            export.values.iter().filter_map(|v| entry(v, spelling, restore, tables.always_mark)).collect();
+            export.values.iter().filter_map(|v| entry(v, spelling, restore, unit, tables, &options.old)).collect();
+        let letter = if unit == LengthUnit::Mm { "M" } else { "I" };
         let shown: Vec<Value> = grids.iter().map(|g| grid(machine, tables, g, restore.then_some(&before(g)))).collect();
         let of_grids = form.is_some_and(|f| f.grids);
         let known = if of_grids { grids_known } else { known };
         context! {
             head => head.clone(), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
             axes => machine.rotary().map(|a| a.name.to_string()).collect::<Vec<_>>(),
-            unit => unit.clone(), restore, known, doubts => doubts.clone(),
+            unit => context! { name => unit.says(), letter }, restore, known, doubts => doubts.clone(),
         }
     };
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();

@@ -58,12 +58,13 @@ impl Filled {
     /// user's own are spelled.
     #[must_use]
     pub fn lacking(&self, old: &Old) -> Vec<String> {
-        let begun = |instead: bool| self.values.iter().any(|v| v.instead == instead && v.known);
+        let is_given = |v: &Value| v.names.values().any(|name| old.values.contains_key(name));
+        let begun = |instead: bool| self.values.iter().any(|v| v.instead == instead && is_given(v));
         let mut given = self.values.iter().flat_map(|v| &v.names).filter(|(_, name)| old.values.contains_key(*name));
         let spelling = given.next().map(|(spelling, _)| spelling.as_str()).unwrap_or_default();
         let name = |v: &Value| v.names.get(spelling).or(v.names.values().next()).cloned();
         let instead = begun(true) && !begun(false);
-        let lacks = self.values.iter().filter(|v| v.instead == instead && !v.known);
+        let lacks = self.values.iter().filter(|v| v.instead == instead && !is_given(v));
         if self.known() { Vec::new() } else { lacks.filter_map(name).collect() }
     }
 }
@@ -151,6 +152,12 @@ impl Question<'_> {
         let (value, unit) = names.values().find_map(|n| self.old.values.get(&n[k]))?;
         let inch = length && unit.unwrap_or(self.unit) == LengthUnit::Inch;
         Some(if inch { mm_from_inch(*value) } else { *value })
+    }
+
+    /// Is the old value the control's own, and no assumption of an earlier export?
+    fn is_known(&self, names: &BTreeMap<String, [String; 3]>, k: usize) -> bool {
+        let given = names.values().map(|n| &n[k]).find(|n| self.old.values.contains_key(*n));
+        given.is_some_and(|n| !self.old.assumed.contains(n))
     }
 
     /// The old vector: the user's numbers where they are known, else as described.
@@ -289,7 +296,7 @@ impl Question<'_> {
                         (_, LengthUnit::Mm) => "mm",
                         (_, LengthUnit::Inch) => "inch",
                     },
-                    known: self.old_value(&form.names, k, !direction).is_some(),
+                    known: self.is_known(&form.names, k),
                     instead: form.instead,
                     decimals: if direction { self.tables.direction_decimals } else { decimals(self.in_unit(step)) },
                     unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),

@@ -88,22 +88,14 @@ impl Pieces<'_> {
         }
     }
 
-    /// What is known and not held, each alone.
+    /// What is known and not held, each alone and by its size: an offset as it is, a tilt times the distance at which it acts,
+    /// as for every other control.
     pub(super) fn left(&self) -> Vec<Left> {
         let mut out = Vec::new();
-        let length = self.machine.tool.length_mm;
-        let nominal = Seen::of(self.machine, &self.errors(&[]), length);
         for (term, why) in self.carried.not.iter().filter(|(t, _)| t.value != 0.0) {
-            let um = self.worst(&nominal, self.errors(std::slice::from_ref(term)), 0.0, &BTreeMap::new());
-            let um = if um < NOTHING_UM { 0.0 } else { um };
-            out.push(row(
-                &term.parameter,
-                &term.effect,
-                (term.value, &term.unit),
-                self.lever(term.axis),
-                Some(um),
-                why.clone(),
-            ));
+            let lever = self.lever(term.axis);
+            let um = left_um(term.value, &term.unit, lever);
+            out.push(row(&term.parameter, &term.effect, (term.value, &term.unit), lever, um, why.clone()));
         }
         for l in self.correction.left_out.iter().filter(|l| l.known) {
             let mended =

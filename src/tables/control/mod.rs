@@ -76,6 +76,14 @@ pub struct Export {
     pub longer_tool_um: f64,
 }
 
+/// A value that every backup of such a machine holds, for messages; position tables are not always written.
+#[must_use]
+pub fn example(machine: &Machine, tables: &Tables) -> Option<String> {
+    let kind = kind_of(machine, tables).ok()?;
+    let mut vectors = kind.vector.iter().flat_map(|v| v.names.values().flatten());
+    vectors.find(|n| !n.is_empty()).cloned()
+}
+
 /// Names of a control's values for a machine: what a backup is searched for.
 #[must_use]
 pub fn names(machine: &Machine, tables: &Tables) -> BTreeSet<String> {
@@ -226,6 +234,12 @@ pub fn export(
     let zero = add_angles(machine, tables, kind, &carried, options, &mut filled);
     let old_grids = active.and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.grids);
     let unit_step = *tables.step_mm.get_ref();
+    if let Some(unit) = options.old.unit().filter(|u| *u != options.unit) {
+        let [theirs, ours] = [unit, options.unit].map(LengthUnit::says);
+        let says = format!("the old lengths are in {theirs}: they are converted, and restored in {theirs}");
+        findings
+            .push(Finding::info("tables::old_unit", says).help(format!("the new ones are in {ours}, as --unit says")));
+    }
     let mut grid_list = None;
     if let Some(form) = &tables.grid {
         match grids::grids(machine, correction, form, old_grids, [unit_step, *tables.step_deg.get_ref()]) {
@@ -266,6 +280,16 @@ pub fn export(
         findings.push(
             Finding::warning("tables::old_lacking", says)
                 .help("give these too: in the backup, or each as --old \"NAME=VALUE\"; without them the restoring file is not this machine's own"),
+        );
+    } else if !filled.known() && !options.old.assumed.is_empty() {
+        let marked: Vec<&str> = options.old.assumed.iter().map(String::as_str).collect();
+        let says = format!(
+            "the backup marks old values as ASSUMED: {}; an earlier export took them from the machine's description",
+            marked.join(", ")
+        );
+        findings.push(
+            Finding::warning("tables::old_assumed", says)
+                .help("give the control's own backup with --backup FILE; without it neither the new values nor the restoring file are this machine's own"),
         );
     } else if !filled.known() && !filled.values.is_empty() {
         findings.push(
@@ -371,7 +395,8 @@ fn add_angles(
         let Some(axis) = machine.side(side).filter(|a| a.name.is_rotary()).nth(place) else { continue };
         let (now, before) = (now.get(&axis.name).copied(), before.get(&axis.name).copied().unwrap_or(0.0));
         let Some(now) = now else { continue };
-        let given = form.names.values().find_map(|n| options.old.values.get(n)).map(|(v, _)| *v);
+        let given_name = form.names.values().find(|n| options.old.values.contains_key(*n));
+        let given = given_name.and_then(|n| options.old.values.get(n)).map(|(v, _)| *v);
         let old = given.unwrap_or(before);
         let new = rounded(((old + now - before) / step).round() * step);
         out.insert(axis.name, rounded(new - old + before));
@@ -383,7 +408,7 @@ fn add_angles(
             new,
             unit: "deg",
             decimals: fill::decimals(step),
-            known: given.is_some(),
+            known: given_name.is_some_and(|n| !options.old.assumed.contains(n)),
             instead: false,
             unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
         });
