@@ -335,6 +335,27 @@ fn under_a_transformation_the_end_is_as_the_beginning() {
     }
 }
 
+/// Each tool offset holds another length: one whose length is read from another one's variable would move Z where it begins to act.
+#[test]
+fn the_length_that_is_counted_on_is_that_of_the_offset_that_acts() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", true);
+    let of = |control: &str, lines: &str| {
+        let post = variant(control, &format!("[settings]\n{lines}\n"));
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        codes(&post, &machine, &generated, &text)
+    };
+    for (control, own) in [("fanuc", "#11025"), ("haas", "#2025")] {
+        let pair = |length: &str| of(control, &format!("tool_offset = \"25\"\ntool_length = \"{length}\""));
+        assert!(pair(own).is_empty(), "{control}: {:?}", pair(own));
+        assert!(pair("#2024").contains(&"check::not_run"), "{control}: {:?}", pair("#2024"));
+        let offset = of(control, "tool_offset = \"25\"");
+        assert!(offset.contains(&"check::not_run"), "{control}: {offset:?}");
+        let length = of(control, &format!("tool_length = \"{own}\""));
+        assert!(length.contains(&"check::not_run"), "{control}: {length:?}");
+    }
+}
+
 /// With No. 5006#6 (TOS) = 0 a G49 takes Z along by the length that acts: the program begins only where none does, and takes its own
 /// off where Z stands.
 #[test]

@@ -32,8 +32,8 @@ pub struct MacroB {
     tool_on: bool,
     /// mm
     tool_mm: f64,
-    /// Length in the tool offset memory, mm.
-    stored_mm: f64,
+    /// Length of tool offset 0 if it had one, mm: see [`MacroB::stored_mm`].
+    stored_from_mm: f64,
     /// Do work offsets hold anything?
     offsets: bool,
     /// The offset that adds to all of them (EXT), mm and deg.
@@ -68,6 +68,9 @@ const TURN: f64 = 360.0;
 /// Angles that differ by less are the same, deg.
 const SAME_DEG: f64 = 1e-6;
 
+/// Tool offsets that a control has at most.
+const MOST_OFFSETS: u32 = 999;
+
 impl MacroB {
     fn unit(&self, axis: AxisName) -> f64 {
         if self.inch && !axis.is_rotary() { mm_from_inch(1.0) } else { 1.0 }
@@ -91,6 +94,22 @@ impl MacroB {
     /// Sense of the program's coordinate.
     fn sense(&self, axis: AxisName) -> f64 {
         if self.mirrored && axis == AxisName::X { -1.0 } else { 1.0 }
+    }
+
+    /// What the tool offset memory holds under a number, mm: another length under each, so that one that is read for another
+    /// shows. Offset 0 is none.
+    fn stored_mm(&self, number: u32) -> f64 {
+        const APART_MM: f64 = 0.375;
+        if number == 0 { 0.0 } else { self.stored_from_mm + APART_MM * f64::from(number) }
+    }
+
+    /// The length that H chooses, mm.
+    fn chosen_mm(&self, words: &[Spoken]) -> Result<f64, String> {
+        let h = words.iter().find(|w| w.address == "H").ok_or("the number of the tool offset, H, is missing")?.value;
+        if h.fract() != 0.0 || !(0.0..=f64::from(MOST_OFFSETS)).contains(&h) {
+            return Err(format!("H{h} is no tool offset"));
+        }
+        Ok(self.stored_mm(h as u32))
     }
 
     fn axis(&self, number: u32) -> Option<AxisName> {
@@ -304,7 +323,8 @@ impl MacroB {
 
     fn system_variable(&self, n: u32, vm: &Vm) -> Option<f64> {
         Some(match n {
-            2001 | 11001 => self.stored_mm / self.unit(AxisName::Z),
+            2001..=2200 => self.stored_mm(n - 2000) / self.unit(AxisName::Z),
+            11_001..=11_999 => self.stored_mm(n - 11_000) / self.unit(AxisName::Z),
             3001 => ((vm.clock_s(MILLISECOND_S) - self.seconds) * 1000.0).round(),
             3012 => time_of_day(vm.clock_s(1.0)),
             3004 => self.holds,
@@ -411,7 +431,11 @@ impl Dialect for MacroB {
             rotated: awkward,
             tool_on: start == Start::LengthActs,
             tool_mm: if start == Start::LengthActs { 33.5 } else { 0.0 },
-            stored_mm: if awkward || third { 120.25 } else { 0.0 },
+            stored_from_mm: match start {
+                Start::Awkward => 119.875,
+                Start::Third => 84.5,
+                _ => 61.25,
+            },
             offsets: awkward || third,
             external: some([0.625, -1.5, 2.25, 0.125, 0.25, -0.5]),
             local: some([-2.0, 0.75, 1.125, -0.25, 0.5, 0.375]),
@@ -477,11 +501,13 @@ impl Dialect for MacroB {
             }
         }
         if gs.iter().any(|g| matches!(g, 434 | 2340)) {
-            (self.tool_on, self.tool_mm, self.ahead) = (true, self.stored_mm, true);
+            (self.tool_on, self.tool_mm, self.ahead) = (true, self.chosen_mm(words)?, true);
             let to = self.target(words, vm);
             let moves = |axis: &AxisName| to[axis.index()].is_some_and(|to| (to - vm.at.get(*axis)).abs() > SAME_DEG);
-            if AxisName::ALL.iter().any(moves) {
-                return Err("the block that switches the transformation on moves".to_owned());
+            if let Some(axis) = AxisName::ALL.into_iter().find(moves) {
+                return Err(format!(
+                    "the block that switches the transformation on moves {axis}: is the length that the program counts on (tool_length) that of its H (tool_offset)?"
+                ));
             }
         }
         if let Some(f) = words.iter().find(|w| w.address == "F") {
