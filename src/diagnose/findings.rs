@@ -260,14 +260,22 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
 fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
     let of_touches = super::gathered::faces(fit, features);
     let named = |number: usize| words::group("face", number, fit, features);
-    if !of_touches.is_empty() {
-        return of_touches.iter().filter_map(|&i| named(features.face[i])).collect();
-    }
-    let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
+    // where hardly a touch of a face is used the whole face lies elsewhere, and not a chip on it
+    let whole = |face: usize| {
+        let here = || (0..features.face.len()).filter(|&i| features.face[i] == face);
+        10 * here().filter(|i| fit.rejected.contains_key(i)).count() >= 9 * here().count()
+    };
+    let found: Vec<(usize, bool)> = if of_touches.is_empty() {
+        let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
+        let out = super::standing_out::groups(seen.evidence, features, d, &features.face);
+        out.into_iter().map(|face| (face, true)).collect()
+    } else {
+        of_touches.iter().map(|&i| (features.face[i], whole(features.face[i]))).collect()
+    };
     let mut out: Vec<usize> = Vec::new();
-    for face in super::standing_out::groups(seen.evidence, features, d, &features.face) {
-        let both = [Some(face), super::standing_out::opposite(fit, features, face)];
-        for one in both.into_iter().flatten() {
+    for (face, whole) in found {
+        let other = if whole { super::standing_out::opposite(fit, features, face) } else { None };
+        for one in std::iter::once(face).chain(other) {
             if !out.contains(&one) {
                 out.push(one);
             }
