@@ -383,6 +383,20 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
     }
 }
 
+/// Axes that count from 0 to 360 are not turned under a transformation by a controller that cannot write the sense of each step.
+#[test]
+fn a_roll_over_axis_under_the_transformation_is_refused_by_its_name() {
+    let machine = machine("trunnion");
+    let table = generated(&machine, "basic", true);
+    for control in ["fanuc", "haas", "heidenhain"] {
+        let post = variant(control, "[settings]\nmodulo = \"C\"\n");
+        let refused = post.program(&machine, &table.plan, &table.path).unwrap_err();
+        assert_eq!(refused.0[0].code, "post::roll_over", "{control}");
+        assert!(refused.0[0].message.contains("axis C"), "{control}: {refused}");
+    }
+    is_clean(&variant("sinumerik", "[settings]\nmodulo = \"C\"\n"), &machine, &table);
+}
+
 /// Each tool offset holds another length: one whose length is read from another one's variable would move Z where it begins to act.
 #[test]
 fn the_length_that_is_counted_on_is_that_of_the_offset_that_acts() {
