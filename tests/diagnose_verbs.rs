@@ -225,9 +225,9 @@ fn a_mistake_is_named_where_most_touches_miss() {
 /// way each, and none of them is it.
 #[test]
 fn a_step_in_time_gets_no_name_and_solve_leaves_the_study_alone() {
-    let own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"px\", unit = \"um\", dof = \"dx\", formula = \"step(t - 1.02)\" },\n{ parameter = \"pz\", unit = \"um\", dof = \"dz\", formula = \"step(t - 1.02)\" } ]\n";
+    let own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"qx\", unit = \"um\", dof = \"dx\", formula = \"step(t - 1.02)\" },\n{ parameter = \"qz\", unit = \"um\", dof = \"dz\", formula = \"step(t - 1.02)\" } ]\n";
     let wrong =
-        "effects_file = \"own.toml\"\nseed = 8\n[effects.planted]\npx = 7.0\npz = -7.0\n[noise]\ntouch_um = 1.0\n";
+        "effects_file = \"own.toml\"\nseed = 8\n[effects.planted]\nqx = 7.0\nqz = -7.0\n[noise]\ntouch_um = 1.0\n";
     let folder = folder(&["full"], wrong, Some(own));
     let at = folder.path();
     let (d, code) = json(at, &["diagnose", "study.toml"]);

@@ -126,8 +126,8 @@ fn what_is_said_to_be_next_can_be_done() {
 /// One block is knocked in mid-program: its jump is drawn, its touches are one finding, and the formula takes it away.
 #[test]
 fn a_moved_block_is_drawn_and_sketched() {
-    let own = "[[effect]]\nid = \"planted\"\nat = \"block\"\nper = \"block\"\nterms = [\n{ parameter = \"px\", unit = \"um\", dof = \"dx\", formula = \"step(t - 0.83)\" },\n{ parameter = \"py\", unit = \"um\", dof = \"dy\", formula = \"step(t - 0.83)\" } ]\n";
-    let wrong = "effects_file = \"own.toml\"\nseed = 5\n[effects.planted]\n\"px@full/b\" = 8.0\n\"py@full/b\" = -5.0\n[noise]\ntouch_um = 0.7\n";
+    let own = "[[effect]]\nid = \"planted\"\nat = \"block\"\nper = \"block\"\nterms = [\n{ parameter = \"qx\", unit = \"um\", dof = \"dx\", formula = \"step(t - 0.83)\" },\n{ parameter = \"qy\", unit = \"um\", dof = \"dy\", formula = \"step(t - 0.83)\" } ]\n";
+    let wrong = "effects_file = \"own.toml\"\nseed = 5\n[effects.planted]\n\"qx@full/b\" = 8.0\n\"qy@full/b\" = -5.0\n[noise]\ntouch_um = 0.7\n";
     let folder = touched(&["full"], wrong, Some(own));
     let at = folder.path();
     study(at, &["full"]);

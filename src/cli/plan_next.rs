@@ -37,7 +37,7 @@ const OVER: f64 = 1.02;
 const SAFELY: f64 = 0.95;
 
 /// A pair that all touches at once leave no further apart than this is one that they cannot part.
-const NOTHING: f64 = 1e-2;
+const NOTHING: f64 = 0.1;
 
 /// Pairs that the program's own head names.
 const MOST_SAID: usize = 6;
@@ -204,12 +204,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let budget_s = 60.0 * args.minutes;
     let stands = setting.stands(&loaded.machine, args.moved);
     let mut best: Option<Chosen> = None;
+    // what goes with the temperature is told from what goes with time where the room turns, and not by touches alone
+    let of_room = |e: &Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
+    let of_room = setting.task.temperature && effects.iter().any(|(e, _)| of_room(e));
     if let Some((mounting, label)) = &stands {
         let choose = |s: &Setting| s.choose(mounting, label.as_deref(), &effects, &questions, budget_s, &name).ok();
         best = choose(&setting);
-        // what goes with the temperature is told from what goes with time where the room turns, and not by touches alone
-        let of_room = |e: &Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
-        let of_room = setting.task.temperature && effects.iter().any(|(e, _)| of_room(e));
         if of_room && !best.as_ref().is_some_and(|b| b.settles(SEEN)) {
             setting.room = Room::Swings;
             let turned = choose(&setting);
@@ -275,6 +275,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             says(&questions)
         );
         io.say(&says);
+        if of_room {
+            io.say("  what goes with the temperature and what goes with time stay one while the room goes on as it did: measure \
+                    again when its temperature has turned");
+        }
         io.say("  nothing is written: give more time (--minutes), let the blocks be put up anew (--moved), or confirm one of \
                 them at the machine");
         io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": says }));
@@ -638,7 +642,7 @@ fn write(
     let turns = match turns.count() {
         0 => None,
         n => Some(format!(
-            "{n} of them only if the room's temperature does not go on as in the runs so far, but turns or swings while the \
+            "{n} more only if the room's temperature does not go on as in the runs so far, but turns or swings while the \
              program runs (reckoned with {:.0} K up and down in {:.0} min: open a gate, switch the heating, or run it at another \
              time of day); where the room goes on as before, what goes with it and what goes with time stay one",
             crate::design::view::SWING_K,

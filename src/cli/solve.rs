@@ -136,7 +136,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                                 break (loaded, fit, found, refused.unwrap_or_default());
                             }
                             steps.push(Step {
-                                found: found_as(&id, &same_as, first.or_else.as_deref()),
+                                found: found_as(&id, &same_as, first.or_else.as_deref(), found.name_in_doubt),
                                 added: id,
                                 same_as,
                                 p_adjusted: first.p_adjusted,
@@ -397,14 +397,16 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
 }
 
 /// What was found: one name, or those that these touches cannot tell apart, the one that stands in the model first.
-fn found_as(added: &str, same_as: &[String], or_else: Option<&str>) -> String {
-    match same_as {
+fn found_as(added: &str, same_as: &[String], or_else: Option<&str>, in_doubt: bool) -> String {
+    let found = match same_as {
         [] => match or_else {
             Some(other) => format!("{added}, or {other}: these touches cannot tell"),
             None => added.to_owned(),
         },
         others => format!("{} (these touches cannot tell which; {added} stands in the model)", one_of(added, others)),
-    }
+    };
+    let doubt = if in_doubt { " (the name may be wrong: a shape without a name described it better)" } else { "" };
+    found + doubt
 }
 
 fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {

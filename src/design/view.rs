@@ -121,7 +121,7 @@ pub fn keep_measured(runs: &mut [Planned], data: &Data) {
 /// What the temperature does where it has not been measured yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Room {
-    /// It swings as in a hall whose heating or cooling comes and goes.
+    /// It swings as in a hall whose heating or cooling comes and goes; where it was measured before, it turns.
     #[default]
     Swings,
     /// It goes on as it went while the touches so far were made.
@@ -163,7 +163,8 @@ impl Measured {
         let swing = |s: f64| SWING_K * (std::f64::consts::TAU * s / SWING_S).sin();
         match (self.first, room) {
             (None, _) => 20.0 + swing(time_s),
-            (Some(_), Room::Swings) => self.last_deg_c + swing(since_s),
+            // the other way than it went: a room that goes the same way faster or slower has not turned
+            (Some(_), Room::Swings) => self.last_deg_c - self.slope().signum() * swing(since_s),
             (Some(_), Room::GoesOn) => self.last_deg_c + self.slope() * since_s,
         }
     }

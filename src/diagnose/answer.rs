@@ -46,6 +46,8 @@ pub struct Diagnosis {
     /// So many touches found nothing that the rest is no sample of the machine: the answer is "no", whatever it is.
     #[serde(skip)]
     pub most_missed: bool,
+    /// The effect that is named first may be a wrong name: something without a name describes the touches better.
+    pub name_in_doubt: bool,
     /// None of the errors that the model is there for is told.
     #[serde(skip)]
     pub untold: bool,

@@ -208,6 +208,7 @@ pub(super) fn put_together(
         blocks,
         faint: false,
         most_missed: false,
+        name_in_doubt: false,
         untold: false,
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),

@@ -22,6 +22,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         blocks: Vec::new(),
         faint: false,
         most_missed: false,
+        name_in_doubt: false,
         untold: false,
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),

@@ -52,6 +52,12 @@ impl Tried {
         self.left(one, other).is_some_and(|left| chance(left.lambda, left.q) >= SAFELY)
     }
 
+    /// Noncentrality of an effect for itself.
+    fn alone(&self, one: usize) -> Option<f64> {
+        let of = self.effects.iter().find(|e| e.0 == one)?;
+        Some(self.products.left(&of.1, Some(&of.2), None).lambda)
+    }
+
     /// What is left of one when the other is taken for it, the worse way.
     fn left(&self, one: usize, other: usize) -> Option<Left> {
         let find = |c: usize| self.effects.iter().find(|e| e.0 == c);
@@ -115,11 +121,17 @@ pub const NEVER: &str = "no touches that this machine can make do: they do the s
 
 /// Does every variation leave the first of a group and all others exactly as they are to each other?
 fn never_parted(group: &Group, tried: &[Tried]) -> bool {
-    /// Noncentrality of rounding.
-    const NOTHING: f64 = 1e-3;
+    /// Share of an effect's own noncentrality: time constants of two effects are found one by one, and differ a little.
+    const NOTHING: f64 = 1e-4;
+    /// No chance to be told by that.
+    const AT_MOST: f64 = 0.5;
     let chosen = group.first();
     let rivals = || group.members.iter().map(|m| m.candidate).filter(|&c| c != chosen);
-    tried.iter().all(|t| rivals().all(|r| t.left(chosen, r).is_some_and(|l| l.q == 0 || l.lambda < NOTHING)))
+    let the_same = |t: &Tried, rival: usize| {
+        let whole = t.alone(chosen).unwrap_or(0.0);
+        t.left(chosen, rival).is_some_and(|l| l.q == 0 || l.lambda < (NOTHING * whole).min(AT_MOST))
+    };
+    tried.iter().all(|t| rivals().all(|r| the_same(t, r)))
 }
 
 /// The cheapest variation that tells the first of a group from most of the others.

@@ -135,6 +135,7 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
                     ),
                 }
             });
+            out.name_in_doubt = !better.is_empty();
             named + &better
         }
         Verdict::Unexplained if out.faint => {

@@ -17,6 +17,9 @@ pub const PLAUSIBLE: f64 = 5.0;
 /// Logarithms of p-values closer than this make no difference (a factor of 3).
 pub const AS_LIKELY: f64 = 1.0;
 
+/// A size of the wrong sign counts as a thousand times less likely: it takes more than a machine that wears.
+const WRONG_SIGN: f64 = 7.0;
+
 /// A candidate in a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Member {
@@ -39,8 +42,8 @@ pub struct Member {
 pub struct Group {
     /// The most significant candidate.
     pub leader: usize,
-    /// The leader and every candidate after which it adds nothing ([`super::apart`]): as likely as the leader first, then
-    /// the right sign, fewest parameters, plausible size, user's own, p-value.
+    /// The leader and every candidate after which it adds nothing ([`super::apart`]): as likely as the leader first (a wrong
+    /// sign makes a member less so), then the right sign, fewest parameters, plausible size, user's own, p-value.
     pub members: Vec<Member>,
 }
 
@@ -119,6 +122,7 @@ impl Search<'_> {
     fn rank_of(&self, m: &Member, best: f64) -> (f64, bool, usize, bool, bool, f64) {
         let score = &self.scores[m.candidate];
         let behind = if best.is_finite() { ((score.ln_p - best) / AS_LIKELY).floor().max(0.0) } else { 0.0 };
+        let behind = behind + if m.wrong_sign { WRONG_SIGN } else { 0.0 };
         let origin = self.library.candidates()[m.candidate].origin;
         (behind, m.wrong_sign, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
     }

@@ -343,6 +343,7 @@ mod tests {
             rms_um: 5.0,
             noise_um: 1.0,
             most_missed: false,
+            name_in_doubt: false,
             untold: false,
             visit_um: 0.0,
             visit_source: String::new(),

@@ -260,10 +260,10 @@ pub fn bent(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
         }
         ("drift", _) => {
             out.values.clear();
-            out.own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"px\", unit = \"um\", dof = \"dx\", formula = \"t^1.3\" },\n\
-                       { parameter = \"py\", unit = \"um\", dof = \"dy\", formula = \"t^1.3\" },\n{ parameter = \"pz\", unit = \"um\", dof = \"dz\", formula = \"t^1.3\" }]\n"
+            out.own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"qx\", unit = \"um\", dof = \"dx\", formula = \"t^1.3\" },\n\
+                       { parameter = \"qy\", unit = \"um\", dof = \"dy\", formula = \"t^1.3\" },\n{ parameter = \"qz\", unit = \"um\", dof = \"dz\", formula = \"t^1.3\" }]\n"
                 .into();
-            out.own_parameters = ["px", "py", "pz"].map(|p| (p.to_owned(), 5.0 * normal(rng))).to_vec();
+            out.own_parameters = ["qx", "qy", "qz"].map(|p| (p.to_owned(), 5.0 * normal(rng))).to_vec();
         }
         (family, Some(k)) => {
             let other = format!("{family}-{}-{}", words[1], if k == 1 { 2 } else { 1 });

@@ -395,7 +395,7 @@ mod tests {
             ("%\nO1\nG4 P-10\n%\n", 8),
             ("%\nO1\nM+5\n%\n", 5),
             ("%\nO1\nN-5\n%\n", 5),
-            ("%\nO1\nDPRNT[P*N#1[45]]\n%\n", 16),
+            ("%\nO1\nDPRNT[P*N#1[45]]\n%\n", 14),
             ("%\nO1\n(100%)\n%\n", 9),
             ("%\nO1\nG4 P10 (UP; DOWN)\n%\n", 15),
             ("%\nO1\n(\u{d6}L)\n%\n", 6),

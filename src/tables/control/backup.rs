@@ -50,7 +50,7 @@ pub fn read_such_as(source: &Source, form: &BackupForm, wanted: &BTreeSet<String
     let text = source.inner();
     let (mut at, mut last) = (0, "");
     // of a sheet of axiscal's, from the line that says it
-    let (mut unit, mut assumed) = (None, None);
+    let (mut unit, mut restores, mut assumed) = (None, false, None);
     for raw in text.split_inclusive('\n') {
         let line = raw.trim_end_matches(['\n', '\r']);
         let span = at..at + line.len();
@@ -66,14 +66,15 @@ pub fn read_such_as(source: &Source, form: &BackupForm, wanted: &BTreeSet<String
             BackupKind::Words => word(line),
         };
         let Some(found) = found else {
-            if says_assumed(line) {
+            restores |= line.contains(RESTORES);
+            if restores && says_assumed(line) {
                 let named = line.split_whitespace().filter_map(|w| wanted.get(&plain_name(w)));
                 assumed.get_or_insert_with(BTreeSet::new).extend(named.map(|n| (*n).clone()));
             }
             continue;
         };
         let Some(known) = wanted.get(&found.name) else { continue };
-        if says_assumed(line) {
+        if restores && says_assumed(line) {
             old.assumed.insert((*known).clone());
         }
         match found.value.filter(|v| v.is_finite()) {
@@ -119,6 +120,9 @@ struct Found {
     /// The number as it is spelled.
     text: String,
 }
+
+/// The head of a restoring file. What other sheets mark is the value before the one that was entered.
+const RESTORES: &str = "RESTORES";
 
 /// A sheet of axiscal's marks what it took from the machine's description, not from the control.
 fn says_assumed(line: &str) -> bool {
