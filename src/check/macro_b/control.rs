@@ -562,7 +562,11 @@ impl Dialect for MacroB {
                     "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
                 ))
             }
-            Var::Number(n) if self.builder.is_probe_input(*n) && self.system_variable(*n, vm).is_none() => {
+            // what is a tool offset at a Fanuc is an input at a Haas
+            Var::Number(n)
+                if self.builder.is_probe_input(*n)
+                    && (matches!(n, 11_001..=11_999) || self.system_variable(*n, vm).is_none()) =>
+            {
                 Ok(f64::from(vm.deflected()))
             }
             Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
