@@ -454,7 +454,10 @@ impl Dialect for MacroB {
             external: some([0.625, -1.5, 2.25, 0.125, 0.25, -0.5]),
             local: some([-2.0, 0.75, 1.125, -0.25, 0.5, 0.375]),
             mirrored: start == Start::Obstructed,
-            lasting: if let Start::Lasting(what) = start { Some(what) } else { None },
+            lasting: match start {
+                Start::Lasting(what) => Some(what).filter(|what| lasting::may_act(*what, post)),
+                _ => None,
+            },
             ahead: false,
             feed: 0.0,
             holds: 0.0,

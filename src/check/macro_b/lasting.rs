@@ -4,9 +4,15 @@
 //! Groups 11 (G50, G51), 17 (G15, G16) and 23 (G54.2) of #4001 and up: from memory. G255 ends G254: Haas UMC-750 manual, p. 40.
 
 use crate::check::run::Lasting;
+use crate::post::Postprocessor;
 
 /// What a control may be found with.
 pub const ALL: &[Lasting] = &[Lasting::Scaled, Lasting::Polar, Lasting::TurnsAlong];
+
+/// A control whose file says that nothing switches the dynamic offset off lacks it.
+pub fn may_act(what: Lasting, post: &Postprocessor) -> bool {
+    what != Lasting::TurnsAlong || post.settings.get("dynamic_offset").is_none_or(|ends| !ends.is_empty())
+}
 
 /// What a G number (in tenths) ends; G54.2 with P0.
 pub fn ended_by(tenth: i64, p: Option<f64>) -> Result<Option<Lasting>, String> {
