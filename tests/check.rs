@@ -434,7 +434,7 @@ fn variant(base: &str, lines: &str) -> Result<Postprocessor, axiscal::diag::Fail
 }
 
 /// Values that a builder or a user may give each setting, as the guide and the files name them.
-const SETTINGS: [(&[&str], &str, &[&str]); 24] = [
+const SETTINGS: [(&[&str], &str, &[&str]); 25] = [
     (&["fanuc", "haas"], "program_number", &["1234"]),
     (&["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"], "triggered_within", &["0.08"]),
     (&["fanuc", "haas"], "missed_within", &["0.03"]),
@@ -445,6 +445,7 @@ const SETTINGS: [(&[&str], &str, &[&str]); 24] = [
     (&["fanuc", "haas"], "probe_off", &["M102", "M69 P2"]),
     (&["fanuc", "haas"], "probe_input", &["#1004", "#1032", "#11004"]),
     (&["fanuc", "haas"], "cancel", &["G69 G40 G80"]),
+    (&["haas"], "dynamic_offset", &[""]),
     (&["fanuc", "haas"], "wait", &["M53", "G4 P500"]),
     (&["fanuc", "haas", "heidenhain", "sinumerik"], "modulo", &["C"]),
     (&["fanuc", "haas"], "time", &["no"]),

@@ -335,6 +335,68 @@ fn under_a_transformation_the_end_is_as_the_beginning() {
     }
 }
 
+/// A function that a user has left on turns, scales or shifts what a program says: it is taken off or asked for before anything moves.
+#[test]
+fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
+    let machine = machine("trunnion");
+    let plain = generated(&machine, "basic", false);
+    for (control, look, label) in [
+        ("fanuc", "cancel = \"G40 G50 G15 G69 G80\\nG54.2 P0\"", "54.2"),
+        ("haas", "cancel = \"G40 G50 G15 G69 G80\"", "51"),
+    ] {
+        let post = controller(control);
+        let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        // each of them by itself
+        for asked in text.lines().filter(|l| l.starts_with("#4=#4*ABS[#40")) {
+            let found = codes(&post, &machine, &plain, &text.replacen(&format!("{asked}\n"), "", 1));
+            assert!(found.contains(&"check::start"), "{control} {asked}: {found:?}");
+        }
+        assert!(text.contains(&format!("-{label}]\n")), "{control}");
+        // taken off, where the control has them: nothing is asked for
+        let all = variant(control, &format!("[settings]\n{look}\n"));
+        let text = all.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        assert!(!text.contains("#4=#4*ABS[#40"), "{control}");
+        is_clean(&all, &machine, &plain);
+    }
+    let haas = controller("haas");
+    let text = haas.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let found = codes(&haas, &machine, &plain, &text.replacen("G255\n", "", 1));
+    assert!(found.contains(&"check::start"), "{found:?}");
+    let fanuc = controller("fanuc");
+    let text = fanuc.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let found = codes(&fanuc, &machine, &plain, &text.replacen("G40 G69 G80\n", "G40 G69 G80\nG54.2 P1\n", 1));
+    assert!(found.contains(&"check::not_run"), "{found:?}");
+    // under the transformation words are of the workpiece's system
+    let table = generated(&machine, "basic", true);
+    for (control, line, instead) in [
+        ("heidenhain", "FN 18: SYSREAD Q1620 = ID210 NR1 IDX0", "FN 0: Q1620 = +0"),
+        ("sinumerik", "+ABS($P_ACTFRAME[Z,RT])", ""),
+        ("sinumerik", "+ABS($P_ACTFRAME[X,SC]-1)", ""),
+        ("sinumerik", "+$P_ACTFRAME[Y,MI]", ""),
+    ] {
+        let post = controller(control);
+        let text = post.program(&machine, &table.plan, &table.path).unwrap().text;
+        assert!(text.contains(line), "{control} {line}");
+        assert!(codes(&post, &machine, &table, &text).is_empty(), "{control}");
+        let found = codes(&post, &machine, &table, &text.replacen(line, instead, 1));
+        assert!(found.contains(&"check::start"), "{control} {line}: {found:?}");
+    }
+}
+
+/// Axes that count from 0 to 360 are not turned under a transformation by a controller that cannot write the sense of each step.
+#[test]
+fn a_roll_over_axis_under_the_transformation_is_refused_by_its_name() {
+    let machine = machine("trunnion");
+    let table = generated(&machine, "basic", true);
+    for control in ["fanuc", "haas", "heidenhain"] {
+        let post = variant(control, "[settings]\nmodulo = \"C\"\n");
+        let refused = post.program(&machine, &table.plan, &table.path).unwrap_err();
+        assert_eq!(refused.0[0].code, "post::roll_over", "{control}");
+        assert!(refused.0[0].message.contains("axis C"), "{control}: {refused}");
+    }
+    is_clean(&variant("sinumerik", "[settings]\nmodulo = \"C\"\n"), &machine, &table);
+}
+
 /// Each tool offset holds another length: one whose length is read from another one's variable would move Z where it begins to act.
 #[test]
 fn the_length_that_is_counted_on_is_that_of_the_offset_that_acts() {

@@ -46,12 +46,46 @@ pub enum Start {
     Obstructed,
     /// A tool length acts that the program cannot take off without a move: it must see that and not move.
     LengthActs,
+    /// A function that the user has left on acts on the program's coordinates: it must take it off, or see it and not move.
+    Lasting(Lasting),
+}
+
+/// A function that outlasts programs and acts on their coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lasting {
+    /// Lengths are multiplied.
+    Scaled,
+    /// X and Y are a radius and an angle.
+    Polar,
+    /// An offset that turns along with the table.
+    TurnsAlong,
+    /// The workpiece's system is turned against the machine's.
+    Rotated,
+    /// An axis of the workpiece's system runs against the machine's.
+    Mirrored,
+}
+
+impl Lasting {
+    /// What it is to a person.
+    pub fn says(self) -> &'static str {
+        match self {
+            Self::Scaled => "a scaling",
+            Self::Polar => "polar coordinates",
+            Self::TurnsAlong => "an offset that turns along with the table (dynamic fixture offset)",
+            Self::Rotated => "a rotation of the workpiece's system (basic rotation, rotated frame)",
+            Self::Mirrored => "a mirror image",
+        }
+    }
 }
 
 /// The language of a control: what words, variables and G numbers mean.
 pub trait Dialect: Clone + Send + Sync {
     /// States in which a program must see that it cannot begin, because it cannot switch off what acts.
     const OBSTRUCTED: &'static [Start] = &[];
+    /// What a user may have left on that acts on the coordinates of a program. `tcp`: under the control's own transformation.
+    fn lasting(_tcp: bool) -> &'static [Lasting] {
+        &[]
+    }
     /// The control before the program.
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self;
     /// What outlives a program that is broken off by hand; `None`: nothing that a further run of the program could use.

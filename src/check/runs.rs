@@ -201,10 +201,12 @@ impl<'a, D: Dialect> Runs<'a, D> {
             most_probes: 10_000 + PER_TOUCH * touches,
         };
         let last = self.codes.len();
+        let lasting = D::lasting(self.tcp());
         // the whole run, the same from elsewhere, and each set-up but the first
         let numbers: Vec<(usize, Start, bool)> =
             [(1, Start::Awkward, true), (1, Start::Fresh, false), (1, Start::Third, false)]
                 .into_iter()
+                .chain(lasting.iter().map(|what| (1, Start::Lasting(*what), false)))
                 .chain((2..=last).map(|k| (k, Start::Awkward, true)))
                 .collect();
         let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
@@ -216,7 +218,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             })
             .collect();
         let mut findings = Vec::new();
-        let others: Vec<Told> = runs.drain(1..3.min(runs.len())).collect();
+        let others: Vec<Told> = runs.drain(1..(3 + lasting.len()).min(runs.len())).collect();
         let stops = runs.first().map_or(0, |t| stops(&t.trunk));
         if let Some(awkward) = runs.first() {
             for other in &others {
@@ -503,8 +505,15 @@ fn otherwise(one: &Told, other: &Told) -> Option<(Range<usize>, String)> {
     let first = a.iter().zip(&b).find(|(x, y)| differs(x, y)).map(|(x, _)| x.at.clone());
     let shorter = (a.len() != b.len()).then(|| a.get(b.len()).or(a.last()).map_or(0..0, |x| x.at.clone()));
     let place = first.or(shorter)?;
-    let says = "the program does otherwise when it finds the control in another state (units, G91, offsets, feed mode) or the axes elsewhere: something that it needs is not set in its head";
-    Some((place, says.to_owned()))
+    let says = match other.start {
+        Start::Lasting(what) => format!(
+            "with {} left on by the user the program does otherwise: it must take it off, or see it and say so without a move{}",
+            what.says(),
+            other.fault.as_ref().map_or(String::new(), |fault| format!(" ({})", fault.says))
+        ),
+        _ => "the program does otherwise when it finds the control in another state (units, G91, offsets, feed mode) or the axes elsewhere: something that it needs is not set in its head".to_owned(),
+    };
+    Some((place, says))
 }
 
 /// What a program computes from offsets that it reads is rounded otherwise when they are others, mm or deg.

@@ -305,6 +305,9 @@ pub struct Tcp {
     /// A program under the transformation can take up another stylus in the middle.
     #[serde(default = "yes")]
     pub other_stylus: bool,
+    /// A program under the transformation can turn axes that count from 0 to 360 only (`modulo` in `[settings]`).
+    #[serde(default = "yes")]
+    pub roll_over: bool,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.

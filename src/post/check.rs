@@ -42,7 +42,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
                 "more than 0 and at most 30 deg: 2 is a good value",
             );
         }
-        Tcp { rotary_step_deg: step, says: tcp.says.clone(), other_stylus: tcp.other_stylus }
+        Tcp { rotary_step_deg: step, says: tcp.says.clone(), other_stylus: tcp.other_stylus, roll_over: tcp.roll_over }
     });
     if let Some(tables) = &file.tables {
         super::tables::check(&mut check, tables);

@@ -127,6 +127,21 @@ pub(super) struct Writer<'a> {
     of_program: Value,
 }
 
+/// Under a transformation a turn goes in steps that take X, Y and Z along: a controller may have no way to write the sense of such a step.
+fn refuse_roll_over(post: &Postprocessor, machine: &Machine) -> Result<()> {
+    let modulo = post.settings.get("modulo").map_or("", String::as_str);
+    let steps = post.tcp.as_ref().is_some_and(|tcp| tcp.roll_over);
+    let Some(axis) = machine.rotary().find(|a| !steps && modulo.contains(a.name.letter())) else { return Ok(()) };
+    Err(Failure::new(
+        "post::roll_over",
+        format!(
+            "under --tcp controller {} cannot turn axis {}, which counts from 0 to 360 (modulo): a turn goes in steps that take X, Y and Z along, and the sense of such a step is not written",
+            post.name, axis.name
+        ),
+    )
+    .help("generate without --tcp; or leave modulo empty, where the control takes angles below 0 and beyond 360 too"))
+}
+
 impl<'a> Writer<'a> {
     fn new(post: &'a Postprocessor, machine: &'a Machine, plan: &'a Plan, path: &'a Path) -> Result<Self> {
         let frame = Frame::of(machine, plan);
@@ -139,6 +154,7 @@ impl<'a> Writer<'a> {
                 )
                 .help("generate without --tcp, or describe it under [tcp] in the postprocessor file"));
             }
+            refuse_roll_over(post, machine)?;
             // the start of the program checks that the rotary axes stand at 0
             machine.rotary().for_each(|a| at.set(a.name, 0.0));
         }

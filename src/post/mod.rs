@@ -100,6 +100,8 @@ pub struct Tcp {
     pub says: String,
     /// A program under the transformation can take up another stylus in the middle.
     pub other_stylus: bool,
+    /// A program under the transformation can turn axes that count from 0 to 360 only.
+    pub roll_over: bool,
 }
 
 /// How a program is read back.

@@ -7,7 +7,7 @@
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -24,6 +24,8 @@ pub struct Heidenhain {
     tool_mm: f64,
     /// Of TRANS DATUM or cycle 7, mm and deg.
     shift: [f64; 6],
+    /// Basic rotation of the preset, deg.
+    rotation: f64,
     tilted: bool,
     tcpm: Tcpm,
     /// M126: rotary axes take the short way.
@@ -96,6 +98,10 @@ impl Heidenhain {
         match (self.tcpm, vm.world.is_tcp()) {
             (Tcpm::Found, _) => Err("it moves under the M128 of before: M129 is missing".to_owned()),
             (Tcpm::Off, true) => Err("the plan is for the control's transformation: M128 is missing".to_owned()),
+            (Tcpm::On, true) if self.rotation != 0.0 => {
+                Err("it moves under a basic rotation, which turns its way: it has not asked for one (ID210 NR1)"
+                    .to_owned())
+            }
             (Tcpm::On, false) => Err("it moves under M128, and no plan says for which touches".to_owned()),
             _ => Ok(()),
         }
@@ -221,6 +227,9 @@ impl Heidenhain {
         const CLOCK_S: f64 = 1000.0;
         let axis = || AxisName::ALL.get(index.checked_sub(1)?).copied().filter(|a| vm.axes[a.index()]);
         Some(match id {
+            // of the preset, and of cycle 10
+            "210 NR1" => self.rotation,
+            "210 NR2" => 0.0,
             "320" => CLOCK_S + vm.clock_s(1.0),
             "240" => vm.at.get(axis()?),
             "270" => {
@@ -242,6 +251,11 @@ fn builder(post: &Postprocessor) -> Arc<[f64]> {
 }
 
 impl Dialect for Heidenhain {
+    /// With M91 and in the machine's system nothing of it acts.
+    fn lasting(tcp: bool) -> &'static [Lasting] {
+        if tcp { &[Lasting::Rotated] } else { &[] }
+    }
+
     fn begin(start: Start, post: &Postprocessor, _machine: &Machine) -> Self {
         let awkward = start == Start::Awkward;
         let third = start == Start::Third;
@@ -251,6 +265,7 @@ impl Dialect for Heidenhain {
             preset: some([7.5, -3.25, 11.0, 1.5, -2.0, 0.75], awkward || third),
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0], awkward),
+            rotation: if start == Start::Lasting(Lasting::Rotated) { 1.5 } else { 0.0 },
             tilted: awkward,
             tcpm: if awkward || third { Tcpm::Found } else { Tcpm::Off },
             short_way: awkward,

@@ -313,10 +313,11 @@ impl<'a> Reader<'a> {
         let nr = scan.whole(WHAT)?;
         scan.need(" IDX", WHAT)?;
         let index = scan.whole(WHAT)?;
-        if !matches!((id, nr, index), (240 | 270, 1, 1..=6) | (320, 1, 0)) {
+        if !matches!((id, nr, index), (240 | 270, 1, 1..=6) | (320, 1, 0) | (210, 1 | 2, 0)) {
             return Err(Fault { at: place, says: format!("ID{id} NR{nr} IDX{index} is not known here") });
         }
-        let data = Var::Name(Arc::from(format!("ID{id} IDX{index}")));
+        let several = if id == 210 { format!(" NR{nr}") } else { String::new() };
+        let data = Var::Name(Arc::from(format!("ID{id}{several} IDX{index}")));
         self.code.push(at, What::Set(var, Expr::Var(data)));
         Ok(())
     }

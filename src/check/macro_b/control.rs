@@ -5,9 +5,10 @@
 //! are read ahead of the blocks before them: what the control shows of its position is refused until a block has made them wait.
 
 use super::builder::Builder;
+use super::lasting;
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::{CallRule, Does, Postprocessor};
 use crate::units::mm_from_inch;
@@ -42,6 +43,8 @@ pub struct MacroB {
     local: [f64; 6],
     /// X of the program runs against the axis: a mirror image that none of its words takes off.
     mirrored: bool,
+    /// What the user has left on.
+    lasting: Option<Lasting>,
     /// Blocks before this place may not have been done yet.
     ahead: bool,
     /// mm/min
@@ -169,6 +172,10 @@ impl MacroB {
     fn mode(&mut self, tenth: i64, words: &[Spoken]) -> Result<(), String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         self.ahead |= tenth != 40;
+        if let Some(ended) = lasting::ended_by(tenth, value("P"))? {
+            self.lasting = self.lasting.filter(|acts| *acts != ended);
+            return Ok(());
+        }
         match tenth {
             170 | 180 | 190 => self.plane = tenth as f64 / 10.0,
             200 | 210 => self.inch = tenth == 200,
@@ -299,6 +306,9 @@ impl MacroB {
         if self.rotated {
             return Err("it moves in a rotated coordinate system: G69 is missing".to_owned());
         }
+        if let Some(acts) = self.lasting {
+            return Err(format!("it moves under {}: {} is missing", acts.says(), lasting::ends(acts)));
+        }
         Ok(())
     }
 
@@ -307,7 +317,7 @@ impl MacroB {
         for word in words {
             let used = match word.address {
                 _ if self.builder.uses(word, words) => true,
-                "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 1540)),
+                "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 542 | 1540)),
                 "R" | "S" => false,
                 "H" => gs.iter().any(|g| matches!(g, 434 | 2340)),
                 "F" => moves,
@@ -363,7 +373,7 @@ impl MacroB {
                 let axis = self.axis(n - 5060)?;
                 self.shown(axis, self.skipped[axis.index()]) / self.unit(axis)
             }
-            _ => return None,
+            _ => return lasting::modal(n, self.lasting),
         })
     }
 }
@@ -390,6 +400,10 @@ const GROUPS: [&[i64]; 7] = [
 
 impl Dialect for MacroB {
     const OBSTRUCTED: &'static [Start] = &[Start::Obstructed, Start::LengthActs];
+
+    fn lasting(_tcp: bool) -> &'static [Lasting] {
+        lasting::ALL
+    }
 
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
         let mut numbers = [None; 6];
@@ -424,7 +438,7 @@ impl Dialect for MacroB {
             system: match start {
                 Start::Awkward => 56.0,
                 Start::Third => post.check.as_ref().map_or(54.0, |c| c.further_offsets),
-                Start::Fresh | Start::Obstructed | Start::LengthActs => 54.0,
+                _ => 54.0,
             },
             system_p: if third { 7.0 } else { 0.0 },
             cutter: awkward,
@@ -440,6 +454,10 @@ impl Dialect for MacroB {
             external: some([0.625, -1.5, 2.25, 0.125, 0.25, -0.5]),
             local: some([-2.0, 0.75, 1.125, -0.25, 0.5, 0.375]),
             mirrored: start == Start::Obstructed,
+            lasting: match start {
+                Start::Lasting(what) => Some(what).filter(|what| lasting::may_act(*what, post)),
+                _ => None,
+            },
             ahead: false,
             feed: 0.0,
             holds: 0.0,
@@ -547,7 +565,11 @@ impl Dialect for MacroB {
                     "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
                 ))
             }
-            Var::Number(n) if self.builder.is_probe_input(*n) && self.system_variable(*n, vm).is_none() => {
+            // what is a tool offset at a Fanuc is an input at a Haas
+            Var::Number(n)
+                if self.builder.is_probe_input(*n)
+                    && (matches!(n, 11_001..=11_999) || self.system_variable(*n, vm).is_none()) =>
+            {
                 Ok(f64::from(vm.deflected()))
             }
             Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
@@ -590,7 +612,11 @@ impl Dialect for MacroB {
 
     fn settings(&self) -> BTreeMap<String, String> {
         let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
+        let acts = |what: Lasting| if self.lasting == Some(what) { "on" } else { "off" }.to_owned();
         BTreeMap::from([
+            ("scaling".to_owned(), acts(Lasting::Scaled)),
+            ("polar coordinates".to_owned(), acts(Lasting::Polar)),
+            ("dynamic fixture offset".to_owned(), acts(Lasting::TurnsAlong)),
             ("units".to_owned(), if self.inch { "G20" } else { "G21" }.to_owned()),
             ("distance".to_owned(), if self.incremental { "G91" } else { "G90" }.to_owned()),
             ("plane".to_owned(), format!("G{}", self.plane)),

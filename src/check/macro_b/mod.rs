@@ -2,6 +2,7 @@
 
 mod builder;
 mod control;
+mod lasting;
 mod parse;
 
 pub use control::MacroB;

@@ -8,7 +8,7 @@
 use super::words::{Way, axis_word};
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -57,6 +57,8 @@ pub struct Sinumerik {
     base: [f64; 6],
     settable: [f64; 6],
     programmed: [f64; 6],
+    /// What a basic or a system frame holds beside an offset.
+    lasting: Option<Lasting>,
     tool_on: bool,
     /// mm
     tool_mm: f64,
@@ -295,6 +297,14 @@ impl Sinumerik {
         match name {
             "$AC_MEA" => input(truth(self.triggered)),
             "$A_PROBE" => input(truth(vm.deflected())),
+            "$P_ACTFRAME" => {
+                let holds = |axis: &str, what: Lasting| index.starts_with(axis) && self.lasting == Some(what);
+                Ok(match index.split_once(',').map(|(_, component)| component) {
+                    Some("RT") => truth(holds("Z", Lasting::Rotated)) * 1.5,
+                    Some("SC") => 1.0 + truth(holds("X", Lasting::Scaled)) * 0.002,
+                    _ => truth(holds("Y", Lasting::Mirrored)),
+                })
+            }
             "$AA_IM" => Ok(self.of_machine(vm, &vm.at, axis()?)),
             "$AA_IW" => Ok(self.of_workpiece(vm, axis()?)),
             "$AA_MM" => {
@@ -315,6 +325,11 @@ const GROUPS: [&[i64]; 8] =
     [&[0, 1], &[17, 18, 19], &[40], &[54, 55, 56, 57, 500], &[60, 64], &[90, 91], &[93, 94, 95], &[700, 710]];
 
 impl Dialect for Sinumerik {
+    /// SUPA takes the frames away.
+    fn lasting(tcp: bool) -> &'static [Lasting] {
+        if tcp { &[Lasting::Rotated, Lasting::Scaled, Lasting::Mirrored] } else { &[] }
+    }
+
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
         let setting = |name: &str| post.settings.get(name).map_or("", String::as_str);
         let awkward = start == Start::Awkward;
@@ -365,6 +380,7 @@ impl Dialect for Sinumerik {
             base: offsets(0.5, 0.0),
             settable: offsets(1.25, -0.75),
             programmed: offsets(-2.0, 1.5),
+            lasting: if let Start::Lasting(what) = start { Some(what) } else { None },
             tool_on: awkward || third,
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             transformed: awkward,
@@ -434,6 +450,9 @@ impl Dialect for Sinumerik {
         }
         let Some(motion) = motion else { return Ok(if over { Next::End } else { Next::On }) };
         self.may_move(vm)?;
+        if let Some(acts) = self.lasting.filter(|_| value("SUPA").is_none()) {
+            return Err(format!("it moves under {}: it has not asked for one ($P_ACTFRAME)", acts.says()));
+        }
         let to = self.target(words, vm)?;
         self.ahead = true;
         if motion == 1.0 && (self.feed_mode != 94.0 || self.feed <= 0.0) {

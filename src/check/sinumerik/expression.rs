@@ -38,6 +38,8 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 
 /// System variables of an axis, and those with a number.
 const OF_AXIS: [&str; 4] = ["$AA_IM", "$AA_IW", "$AA_MM", "$AA_MW"];
+/// All frames together, whose components can be read: NC Programming 12/2019, 6FC5398-2EP40-0BA0, p. 631.
+const FRAME: &str = "$P_ACTFRAME";
 const NUMBERED: [&str; 3] = ["$AC_MEA", "$A_PROBE", "$AC_TIMER"];
 
 fn refuse<T>(input: &str) -> IResult<&str, T> {
@@ -81,6 +83,9 @@ impl Names {
     /// A system variable: `$AA_MM[X]` by the letter of the axis, `$AC_MEA[1]`.
     pub fn system<'a>(&self, input: &'a str) -> IResult<&'a str, Var> {
         let (after, name) = recognize((char('$'), identifier)).parse(input)?;
+        if name == FRAME {
+            return self.frame(input, after);
+        }
         let (after, index) = delimited(
             char('['),
             take_while1(|c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_'),
@@ -97,6 +102,17 @@ impl Names {
         };
         match index {
             Some(index) => Ok((after, Var::Name(Arc::from(format!("{name}[{index}]"))))),
+            None => refuse(input),
+        }
+    }
+
+    /// A component of the frame that acts: `$P_ACTFRAME[X,RT]`.
+    fn frame<'a>(&self, input: &'a str, after: &'a str) -> IResult<&'a str, Var> {
+        let component = alt((tag("RT"), tag("SC"), tag("MI")));
+        let (after, (axis, _, component)) =
+            delimited(char('['), (identifier, char(','), component), char(']')).parse(after).map_err(to_failure)?;
+        match self.axis(axis).filter(|a| !a.is_rotary()) {
+            Some(axis) => Ok((after, Var::Name(Arc::from(format!("{FRAME}[{},{component}]", axis.letter()))))),
             None => refuse(input),
         }
     }
