@@ -260,10 +260,10 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
 fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
     let of_touches = super::gathered::faces(fit, features);
     let named = |number: usize| words::group("face", number, fit, features);
-    // where hardly a touch of a face is used the whole face lies elsewhere, and not a chip on it
+    // where four of five touches of a face are not used the whole face lies elsewhere, and not a chip on it
     let whole = |face: usize| {
         let here = || (0..features.face.len()).filter(|&i| features.face[i] == face);
-        10 * here().filter(|i| fit.rejected.contains_key(i)).count() >= 9 * here().count()
+        5 * here().filter(|i| fit.rejected.contains_key(i)).count() >= 4 * here().count()
     };
     let found: Vec<(usize, bool)> = if of_touches.is_empty() {
         let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
