@@ -134,9 +134,11 @@ fn worst(machine: &Machine, case: &Case, truth: &BTreeMap<String, f64>, runs: &[
 /// A controller's file with another format of its log.
 fn with_format(base: &str, unit: LengthUnit, decimals: usize) -> Postprocessor {
     let unit = if unit == LengthUnit::Inch { "inch" } else { "mm" };
+    // a program in inches needs the fourth decimal in its numbers, too
+    let number = if unit == "inch" { "[number]\ndecimals = 5\nunverified = \"another format\"\n" } else { "" };
     let text = format!(
         "format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = {base:?}\n\
-         [log]\nunit = {unit:?}\ndecimals = {decimals}\nunverified = \"another format\"\n"
+         [log]\nunit = {unit:?}\ndecimals = {decimals}\nunverified = \"another format\"\n{number}"
     );
     parse(&source(format!("{base} in {unit}, {decimals}"), text)).unwrap_or_else(|e| panic!("{e}")).0
 }
