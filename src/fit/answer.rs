@@ -2,7 +2,8 @@
 
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
-use super::{Fit, Settings, held_out, snoop, statement, uncertainty};
+use super::type_b::TypeB;
+use super::{Fit, Settings, contradictions, held_out, snoop, statement, uncertainty, weak};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
@@ -19,7 +20,7 @@ pub(super) fn outcome(
     effects: &[&Effect],
     settings: &Settings,
     (solution, condition): (&Solution, f64),
-    type_b: &[uncertainty::TypeB],
+    type_b: &[TypeB],
 ) -> Outcome {
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
@@ -111,12 +112,8 @@ pub(super) fn outcome(
         chi2_per_dof,
         undetermined: statement::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
         parted_together: Vec::new(),
-        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {
-            Vec::new()
-        } else {
-            uncertainty::weak(fit, effects)
-        },
-        correlations: uncertainty::correlations(fit, |i| parameters[i].sigma.is_some()),
+        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED { Vec::new() } else { weak::weak(fit, effects) },
+        correlations: weak::correlations(fit, |i| parameters[i].sigma.is_some()),
         parameters,
         priors: uncertainty::priors(fit),
         type_b: type_b
@@ -210,7 +207,7 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
         ));
     }
     out.extend(fit.noise.contradiction());
-    let contradictions = uncertainty::contradictions(fit);
+    let contradictions = contradictions::contradictions(fit);
     // what is stated wrongly is no fault of the model
     let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
     let dof = fit.dof.saturating_sub(contradictions.len());

@@ -7,6 +7,7 @@
 
 mod answer;
 pub mod candidates;
+mod contradictions;
 pub mod held_out;
 mod knowledge;
 pub mod noise;
@@ -19,7 +20,9 @@ pub mod shapes;
 pub mod snoop;
 pub mod solve;
 pub mod statement;
+mod type_b;
 pub mod uncertainty;
+mod weak;
 pub mod whitening;
 
 pub use knowledge::effects_of;
@@ -379,7 +382,7 @@ fn identify_from(
         dof,
         outcome: Outcome::default(),
     };
-    let type_b = uncertainty::type_b(&fit, machine, catalogue, &settings.type_b)?;
+    let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
     fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, (&solution, condition), &type_b);
     fit.outcome.warnings.extend(unknown_masks);

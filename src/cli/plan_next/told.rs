@@ -1,0 +1,134 @@
+//! What was chosen, for the person who waits: the files, and what they will tell.
+
+use super::choose::{Chosen, SAFELY};
+use super::{Answer, Args, Io, Loaded, relative};
+use crate::design::questions::Questions;
+use crate::diag::Result;
+use crate::files;
+use crate::post::Postprocessor;
+use crate::program;
+use crate::report::fit::{number, significant};
+use comfy_table::Cell;
+use serde_json::json;
+use std::path::Path;
+
+/// Pairs that are listed: those that matter most for the person who waits.
+const MOST_LISTED: usize = 20;
+
+/// Writes program, plan and program file, and says what they will tell.
+pub(super) fn write(
+    args: &Args,
+    loaded: &Loaded,
+    post: &Postprocessor,
+    plan_file: &Path,
+    questions: &Questions,
+    chosen: &Chosen,
+    io: &Io,
+) -> Result<Answer> {
+    let plan = &chosen.generated.plan;
+    let nc = post.program(&loaded.machine, plan, &chosen.generated.path)?;
+    io.report(&nc.findings.0);
+    let program_file = args.out.join(format!("{}.{}", plan.program, nc.extension));
+    let form_file = args.out.join(format!("{}.toml", plan.program));
+    let name = format!("{}.{}", plan.program, nc.extension);
+    let proof = crate::cli::generate::prove(&loaded.machine, post, plan, &name, &nc, io)?;
+    let mut proven = plan.clone();
+    proven.blocks_anew = chosen.label.is_none();
+    proven.programs.extend(proof.map(|(p, _)| (post.name.clone(), p)));
+    files::write_whole(plan_file, proven.to_json().as_bytes())?;
+    files::write_whole(&form_file, chosen.text.as_bytes())?;
+    for (name, text) in nc.files(&plan.program) {
+        files::write_whole(&args.out.join(name), text.as_bytes())?;
+    }
+    let seconds = chosen.generated.path.seconds;
+    io.say(&questions.says);
+    io.say(format!(
+        "{} touches on mounting {:?}, about {}",
+        plan.touches.len(),
+        plan.mounting,
+        program::duration(seconds)
+    ));
+    match &chosen.label {
+        Some(_) => io.say("leave the blocks as the last run left them"),
+        None => io.say("put the blocks up first; the time for it is not counted"),
+    }
+    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "told apart"]);
+    for s in chosen.separations.iter().take(MOST_LISTED) {
+        t.add_row(vec![
+            Cell::new(&s.one),
+            Cell::new(s.other.as_deref().unwrap_or("nothing")),
+            number(significant(s.before)),
+            number(significant(s.after)),
+            number(match s.told {
+                p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
+                _ if s.told_if_room_turns.is_some_and(|p| p >= SAFELY) => "if the room turns".to_owned(),
+                p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
+                p => format!("no ({:.0} %)", 100.0 * p),
+            }),
+        ]);
+    }
+    crate::report::lay::lay(&mut t, io.paper(false).width.min(120), &[]);
+    io.say(io.paper(false).plain(t.to_string()));
+    let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
+    io.say(format!(
+        "{} of {} pairs will be told apart by `diagnose` (with 95 % or more, whichever of the two acts); 25 and more of \
+         separation tells a pair apart nearly always",
+        told(SAFELY),
+        chosen.separations.len()
+    ));
+    let turns =
+        chosen.separations.iter().filter(|s| s.told < SAFELY && s.told_if_room_turns.is_some_and(|p| p >= SAFELY));
+    let turns = match turns.count() {
+        0 => None,
+        n => Some(format!(
+            "{n} more only if the room's temperature does not go on as in the runs so far, but turns or swings while the \
+             program runs (reckoned with {:.0} K up and down in {:.0} min: open a gate, switch the heating, or run it at another \
+             time of day); where the room goes on as before, what goes with it and what goes with time stay one",
+            crate::design::view::SWING_K,
+            crate::design::view::SWING_S / 60.0
+        )),
+    };
+    turns.iter().for_each(|says| io.say(says));
+    for pair in &chosen.never {
+        io.say(format!("no touches of this machine tell {pair} apart: look at the machine which it is"));
+    }
+    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
+    let log = args.out.join(format!("{}.log", plan.program));
+    io.say(format!(
+        "written: {}\n         {}\n         {}",
+        program_file.display(),
+        plan_file.display(),
+        form_file.display()
+    ));
+    io.say(format!(
+        "when it has run: axiscal plan-next {} --out {} --controller {} {}--join {}\nor by hand:\n\n{}",
+        args.study.display(),
+        args.out.display(),
+        args.controller,
+        if args.moved { "--moved " } else { "" },
+        log.display(),
+        entry(&relative(plan_file, &folder), &relative(&log, &folder), &args.controller, chosen.label.as_deref())
+    ));
+    io.answer(&json!({
+        "format": "axiscal-next/1",
+        "says": questions.says,
+        "pairs": chosen.separations,
+        "room": turns,
+        "never": chosen.never,
+        "touches": plan.touches.len(),
+        "time_s": seconds,
+        "mounting": chosen.label,
+        "program": program_file.display().to_string(),
+        "plan": plan_file.display().to_string(),
+    }));
+    Ok(Answer::Done)
+}
+
+/// The study's table of the run, as a person would write it.
+fn entry(plan: &str, log: &str, controller: &str, label: Option<&str>) -> String {
+    let mounting = label.map_or_else(String::new, |l| {
+        let before = l.split('/').next().unwrap_or(l);
+        format!("mounting = \"{l}\"        # and in the [[data]] before it: mounting = \"{before}\"\n")
+    });
+    format!("[[data]]\nplan = \"{plan}\"\nlog = \"{log}\"\ncontroller = \"{controller}\"\n{mounting}")
+}
