@@ -4,6 +4,9 @@
 //! without its point counts thousandths, is as the postprocessor files say: unverified on a real control. Macro statements
 //! are read ahead of the blocks before them: what the control shows of its position is refused until a block has made them wait.
 
+mod places;
+mod variables;
+
 use super::builder::Builder;
 use super::lasting;
 use crate::axes::{AxisName, Position};
@@ -12,8 +15,10 @@ use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Ra
 use crate::machine::Machine;
 use crate::post::{CallRule, Does, Postprocessor};
 use crate::units::mm_from_inch;
+use places::SAME_DEG;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use variables::MILLISECOND_S;
 
 /// The state of the control.
 #[derive(Debug, Clone)]
@@ -65,110 +70,7 @@ pub struct MacroB {
     modulo: [bool; 6],
 }
 
-/// Whole turn, deg.
-const TURN: f64 = 360.0;
-
-/// Angles that differ by less are the same, deg.
-const SAME_DEG: f64 = 1e-6;
-
-/// Tool offsets that a control has at most.
-const MOST_OFFSETS: u32 = 999;
-
 impl MacroB {
-    fn unit(&self, axis: AxisName) -> f64 {
-        if self.inch && !axis.is_rotary() { mm_from_inch(1.0) } else { 1.0 }
-    }
-
-    /// Offsets of the chosen work coordinate system, mm and deg: each has its own.
-    fn offset(&self, axis: AxisName) -> f64 {
-        if !self.offsets {
-            return 0.0;
-        }
-        let n = (self.system - 50.0) + self.system_p;
-        [7.5, -3.25, 11.0, 1.5, -2.0, 0.75][axis.index()] * n / 4.0
-    }
-
-    /// Machine coordinate less work coordinate, mm or deg.
-    fn shift(&self, axis: AxisName) -> f64 {
-        let tool = if axis == AxisName::Z && self.tool_on { self.tool_mm } else { 0.0 };
-        self.offset(axis) + self.external[axis.index()] + self.local[axis.index()] + tool
-    }
-
-    /// Sense of the program's coordinate.
-    fn sense(&self, axis: AxisName) -> f64 {
-        if self.mirrored && axis == AxisName::X { -1.0 } else { 1.0 }
-    }
-
-    /// What the tool offset memory holds under a number, mm: another length under each, so that one that is read for another
-    /// shows. Offset 0 is none.
-    fn stored_mm(&self, number: u32) -> f64 {
-        const APART_MM: f64 = 0.375;
-        if number == 0 { 0.0 } else { self.stored_from_mm + APART_MM * f64::from(number) }
-    }
-
-    /// The length that H chooses, mm.
-    fn chosen_mm(&self, words: &[Spoken]) -> Result<f64, String> {
-        let h = words.iter().find(|w| w.address == "H").ok_or("the number of the tool offset, H, is missing")?.value;
-        if h.fract() != 0.0 || !(0.0..=f64::from(MOST_OFFSETS)).contains(&h) {
-            return Err(format!("H{h} is no tool offset"));
-        }
-        Ok(self.stored_mm(h as u32))
-    }
-
-    fn axis(&self, number: u32) -> Option<AxisName> {
-        AxisName::ALL.into_iter().find(|a| self.numbers[a.index()] == Some(number))
-    }
-
-    fn target(&self, words: &[Spoken], vm: &mut Vm) -> [Option<f64>; 6] {
-        AxisName::ALL.map(|axis| {
-            let way =
-                self.sense(axis) * self.length(words.iter().find(|w| w.address.starts_with(axis.letter()))?, axis);
-            Some(match (self.incremental, self.modulo[axis.index()]) {
-                (true, _) => vm.at.get(axis) + way,
-                (false, true) => self.turn(axis, way, vm),
-                (false, false) => way + self.shift(axis),
-            })
-        })
-    }
-
-    /// Where a roll-over axis ends, whole turns counted: its sign is the sense in which it turns (No. 1008, RABx = 1).
-    fn turn(&self, axis: AxisName, value: f64, vm: &mut Vm) -> f64 {
-        let place = value.abs() + self.shift(axis);
-        let at = vm.at.get(axis);
-        let mut by = (place - at).rem_euclid(TURN);
-        if !(SAME_DEG..=TURN - SAME_DEG).contains(&by) {
-            by = 0.0;
-        }
-        if value.is_sign_negative() && by > 0.0 {
-            by -= TURN;
-        }
-        if vm.known[axis.index()] {
-            return at + by;
-        }
-        // nobody knows how often it has turned: counted as the plan does from here on
-        let near = vm.turned_near.get(axis);
-        let end = near + (place - near + TURN / 2.0).rem_euclid(TURN) - TURN / 2.0;
-        vm.at.set(axis, end - by);
-        end
-    }
-
-    /// What the control shows of a position, mm or deg.
-    fn shown(&self, axis: AxisName, place: f64) -> f64 {
-        if !self.modulo[axis.index()] {
-            return place;
-        }
-        let turned = place.rem_euclid(TURN);
-        if turned > TURN - SAME_DEG { 0.0 } else { turned }
-    }
-
-    /// A number without its point counts least increments.
-    fn length(&self, word: &Spoken, axis: AxisName) -> f64 {
-        const LEAST_MM: f64 = 0.001;
-        const LEAST_INCH: f64 = 0.0001;
-        let least = if self.inch && !axis.is_rotary() { LEAST_INCH } else { LEAST_MM };
-        word.value * if word.point { 1.0 } else { least } * self.unit(axis)
-    }
-
     fn mode(&mut self, tenth: i64, words: &[Spoken]) -> Result<(), String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         self.ahead |= tenth != 40;
@@ -330,61 +232,6 @@ impl MacroB {
         }
         Ok(())
     }
-
-    fn system_variable(&self, n: u32, vm: &Vm) -> Option<f64> {
-        Some(match n {
-            2001..=2200 => self.stored_mm(n - 2000) / self.unit(AxisName::Z),
-            11_001..=11_999 => self.stored_mm(n - 11_000) / self.unit(AxisName::Z),
-            3001 => ((vm.clock_s(MILLISECOND_S) - self.seconds) * 1000.0).round(),
-            3012 => time_of_day(vm.clock_s(1.0)),
-            3004 => self.holds,
-            4002 => self.plane,
-            4003 => {
-                if self.incremental {
-                    91.0
-                } else {
-                    90.0
-                }
-            }
-            4005 => self.feed_mode,
-            4006 => {
-                if self.inch {
-                    20.0
-                } else {
-                    21.0
-                }
-            }
-            4008 => match (self.tool_on, vm.world.is_tcp()) {
-                (false, _) => 49.0,
-                (true, false) => 43.0,
-                (true, true) => 43.4,
-            },
-            4012 | 4014 => self.system,
-            4130 => self.system_p,
-            5021..=5026 => {
-                let axis = self.axis(n - 5020)?;
-                self.shown(axis, vm.at.get(axis)) / self.unit(axis)
-            }
-            5041..=5046 => {
-                let axis = self.axis(n - 5040)?;
-                self.shown(axis, self.sense(axis) * (vm.at.get(axis) - self.shift(axis))) / self.unit(axis)
-            }
-            5061..=5066 => {
-                let axis = self.axis(n - 5060)?;
-                self.shown(axis, self.skipped[axis.index()]) / self.unit(axis)
-            }
-            _ => return lasting::modal(n, self.lasting),
-        })
-    }
-}
-
-const MILLISECOND_S: f64 = 0.001;
-
-/// #3012, hours minutes seconds in one number: the program begins two minutes before midnight.
-fn time_of_day(clock_s: f64) -> f64 {
-    const DAY_S: f64 = 86_400.0;
-    let s = (clock_s + DAY_S - 120.0).rem_euclid(DAY_S);
-    (s / 3600.0).floor() * 10_000.0 + (s / 60.0 % 60.0).floor() * 100.0 + (s % 60.0).floor()
 }
 
 /// The G numbers (in tenths) of one modal group: a block may hold one of each.
