@@ -60,12 +60,13 @@ fn report_planted(name: &str, outcomes: &[Outcome]) {
     println!("  verdicts {verdicts:?}");
     for o in outcomes.iter().filter(|o| !o.first_group || !o.by_name) {
         println!(
-            "  - {}{} lambda {:.0}: {}{:?}",
+            "  - {}{} lambda {:.0}: {}{:?} {:.3?}",
             o.truth,
             if o.other_shape { " (bent)" } else { "" },
             o.lambda,
             if o.first_group { "" } else { "MISSED " },
-            o.groups
+            o.groups,
+            o.shares
         );
     }
 }

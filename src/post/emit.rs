@@ -1,59 +1,19 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
+mod touch;
+
 use super::as_written::LengthUnit;
+use super::nc::{NcProgram, SideFile};
 use super::opening::Opening;
 use super::spelling::name_of;
 use super::{Frame, Postprocessor, log_text};
 use crate::axes::{AxisMap, AxisName};
-use crate::diag::{Failure, Finding, Findings, Result, Source, source};
+use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
 use crate::program::path::{Path, Step, TouchStep};
 use crate::program::plan::Plan;
 use minijinja::{Value, context};
 use std::collections::BTreeMap;
-
-/// A program as the control reads it.
-#[derive(Debug, Clone)]
-pub struct NcProgram {
-    /// The text; the same bytes for the same input.
-    pub text: String,
-    /// Of the file, without the dot.
-    pub extension: String,
-    /// Files that the control needs beside it.
-    pub beside: Vec<SideFile>,
-    /// What the person must be told.
-    pub findings: Findings,
-}
-
-/// A file that the control needs beside the program.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SideFile {
-    /// Its name.
-    pub name: String,
-    /// What it is for.
-    pub says: String,
-    /// Its text.
-    pub text: String,
-}
-
-impl NcProgram {
-    /// All files that are written for a program of this name: the program itself, then what stands beside it.
-    pub fn files(&self, stem: &str) -> Vec<(String, &str)> {
-        let program = (format!("{stem}.{}", self.extension), self.text.as_str());
-        std::iter::once(program).chain(self.beside.iter().map(|f| (f.name.clone(), f.text.as_str()))).collect()
-    }
-}
-
-impl NcProgram {
-    /// The files beside the program as `check` takes them.
-    #[must_use]
-    pub fn sources(&self) -> Vec<(String, Source)> {
-        self.beside
-            .iter()
-            .map(|f| (f.name.clone(), source(format!("{} (not written)", f.name), f.text.as_str())))
-            .collect()
-    }
-}
 
 /// Labels that one step may use.
 const LABELS_PER_STEP: usize = 10;
@@ -490,74 +450,6 @@ impl<'a> Writer<'a> {
         }
         self.moved(to);
         self.senses = sense.or(&self.senses);
-        Ok(())
-    }
-
-    fn touch(&mut self, touch: &TouchStep) -> Result<()> {
-        let begins = touch.start.or(&touch.pose);
-        let wrong = begins.iter().find(|(a, v)| self.at.get(*a).is_some_and(|stands| (stands - v).abs() > 1e-6));
-        if let Some((axis, value)) = wrong.filter(|_| !self.loose) {
-            let stands = self.at.get(axis).unwrap_or(value);
-            return Err(
-                self.broken(format!("touch {} begins at {axis} {value}, axis {axis} stands at {stands}", touch.id))
-            );
-        }
-        self.last = Named { id: touch.id, says: touch.says.clone() };
-        let stands = begins.or(&self.at);
-        let place = |map: &AxisMap| self.controller(&map.or(&stands)).xyz_mm();
-        let (start, nominal, end) = (place(&touch.start), place(&touch.nominal), place(&touch.end));
-        let way = end - start;
-        let length = way.norm();
-        if !(length > 1e-3 && length.is_finite() && (nominal - start).norm().is_finite()) {
-            return Err(self.broken(format!("the search of touch {} has the length {length} mm", touch.id)));
-        }
-        let direction = way / length;
-        let target = self.post.number.moved(&xyz(&start), &xyz(&end));
-        let approach: Vec<Value> = target
-            .iter()
-            .map(|(axis, _)| {
-                let i = axis.index();
-                context! {
-                    axis => axis.to_string(),
-                    name => self.post.number.name(axis),
-                    direction => self.number(direction[i]),
-                    vector => self.vector(&direction, axis),
-                    start => self.length(self.shown(axis, start[i])),
-                    nominal => self.length(self.shown(axis, nominal[i])),
-                    end => self.length(self.shown(axis, end[i])),
-                    back_off => self.length(direction[i] * touch.back_off_mm),
-                }
-            })
-            .collect();
-        let context = context! {
-            id => touch.id,
-            says => touch.says.clone(),
-            first => touch.first,
-            before => self.met_before(touch),
-            end => self.words(&target)?,
-            pose => self.words(&touch.pose)?,
-            all => self.words(&xyz(&end))?,
-            length => self.length(length),
-            approach => approach.clone(),
-            way => self.length((nominal - start).norm()),
-            tolerance => self.length(touch.tolerance_mm),
-            search_feed => self.feed(touch.search_feed)?,
-            measure_feed => self.feed(touch.measure_feed)?,
-            back_off => self.length(touch.back_off_mm),
-            half_back_off => self.length(touch.back_off_mm / 2.0),
-        };
-        self.render("touch", context)?;
-        self.approach = approach;
-        let back = |axis: AxisName| {
-            let vector = self.vector(&-direction, axis);
-            let direction = self.number(-direction[axis.index()]);
-            context! { axis => axis.to_string(), name => self.post.number.name(axis), direction, vector }
-        };
-        self.heading_back = target.iter().map(|(axis, _)| back(axis)).collect();
-        self.way = self.length((nominal - start).norm());
-        self.back_off = self.length(touch.back_off_mm);
-        self.at = touch.end.or(&stands);
-        self.loose = true;
         Ok(())
     }
 

@@ -11,17 +11,18 @@ mod frame;
 mod inherit;
 mod log_text;
 mod moves;
+mod nc;
 mod opening;
 mod render;
 mod spelling;
 pub mod tables;
 
 pub use as_written::{CallRule, DialectName, Does, LengthUnit, Overflow};
-pub use emit::{NcProgram, SideFile};
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
 pub use log_text::{LogRecord, digest};
 pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
+pub use nc::{NcProgram, SideFile};
 pub use spelling::{CommentRule, NumberRule};
 
 use crate::axes::AxisName;

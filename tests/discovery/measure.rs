@@ -16,8 +16,9 @@ pub struct Sized {
     pub hidden: Hidden,
     pub size: f64,
     pub lambda: f64,
-    /// Of a mixture: these touches see less than 80 % of it as the effect's own part. The admixture is an effect of the
-    /// catalogue as well, and a large part of what there is to find: then either of the two is right, and the case counts.
+    /// Of a mixture: the effect's own part explains less than 80 % of what these touches see of it. The admixture is an effect
+    /// of the catalogue as well, and a large part of what there is to find: then either of the two is right, and the case
+    /// counts.
     pub two_of_the_catalogue: bool,
     /// The difference in µm, one per touch.
     pub difference_um: DVector<f64>,
@@ -48,7 +49,12 @@ pub fn sized(bench: &Bench, base: &str, hidden: Hidden, peak_um: f64) -> Sized {
     let touches = axiscal::search::Basis::new(&jacobian.rows(0, n).into_owned());
     debug_assert!(evidence.base.rank() <= jacobian.ncols());
     let lambda = touches.project(&difference_um).norm_squared();
-    let two_of_the_catalogue = own.is_some_and(|own| touches.project(&own).norm_squared() < 0.8 * lambda);
+    let seen = touches.project(&difference_um);
+    // what its own part explains of the mixture as it is seen: the two parts may cancel each other where both are large
+    let two_of_the_catalogue = own.is_some_and(|own| {
+        let own = touches.project(&own);
+        own.dot(&seen).powi(2) < 0.8 * own.norm_squared() * seen.norm_squared()
+    });
     Sized { hidden, size, lambda, two_of_the_catalogue, difference_um }
 }
 
@@ -68,6 +74,8 @@ pub struct Outcome {
     pub reduced_after: f64,
     pub held_out_falls: bool,
     pub groups: Vec<Vec<String>>,
+    /// Share of the misfit that the first of each group takes.
+    pub shares: Vec<f64>,
 }
 
 fn draw(bench: &Bench, ids: &[String], bendable: &[String], rng: &mut ChaCha8Rng) -> Hidden {
@@ -128,6 +136,7 @@ pub fn outcome(bench: &Bench, base: &str, case: &Sized, seed: u64) -> Outcome {
         reduced_before: find::reduced_rms(&fit),
         reduced_after: find::reduced_rms(&after),
         held_out_falls: d.candidates.first().is_some_and(|c| c.held_out_after_um < c.held_out_before_um),
+        shares: d.candidates.iter().map(|c| c.share).collect(),
         groups,
     }
 }
