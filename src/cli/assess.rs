@@ -90,7 +90,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             task: task.clone(),
             runs,
             names,
-            probe: Noise { sigma_mm: mm_from_um(noise_um), tau_mm: mm_from_um(args.visit_um.unwrap_or(0.0)) },
+            probe: Noise { sigma_mm: mm_from_um(noise_um), tau_mm: 0.0 },
             acting_tau_mm: args.visit_um.map(mm_from_um),
         })?);
     }

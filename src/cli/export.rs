@@ -174,6 +174,13 @@ fn correction(loaded: &Loaded, fit: &Fit, active: Option<&Compensation>, date: S
         .help("`axiscal identify` shows it; check plan and log"));
     }
     io.report(&fit.outcome.warnings.iter().map(|w| Finding::warning("export::fit", w.clone())).collect::<Vec<_>>());
+    let holds: Vec<String> = crate::report::fit::held(&fit.outcome.parameters).collect();
+    if !holds.is_empty() {
+        let says = format!("{}: {}", crate::report::fit::HOLDS, holds.join("; "));
+        let help = "where such an error is none of the machine (a stylus length that was entered wrongly, say), put it right and measure \
+                    again before this is loaded";
+        io.report(&[Finding::info("export::holds", says).help(help)]);
+    }
     let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let provenance = Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date };
     let (correction, findings) =

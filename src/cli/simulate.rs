@@ -4,7 +4,7 @@ use super::common::MachineArgs;
 use super::generate::keep_inputs;
 use super::load::load_plan;
 use super::{Answer, Io};
-use crate::diag::{Failure, Findings, Result, source};
+use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
 use crate::log::{self, RawTouch, Status, Touch};
 use crate::machine::Machine;
@@ -88,6 +88,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         Some(post) => log_text(post, &machine, &plan, &touches),
     };
     files::write_whole(&args.out, text.as_bytes())?;
+    if post.is_some() && touches.iter().any(|t| t.temperature_deg_c.is_some()) {
+        io.report(&[Finding::info(
+            "simulate::temperature",
+            format!("the log of {} carries no temperature: what goes with the temperature of the scenario looks as if it went with time", args.controller),
+        )
+        .help("--controller csv writes the temperature of each touch beside it")]);
+    }
     let n_hits = touches.iter().filter(|t| t.status == Status::Hit).count();
     let n_misses = touches.len() - n_hits;
     io.say(format!("{}: {n_hits} touches, {n_misses} misses", args.out.display()));

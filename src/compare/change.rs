@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// A standard uncertainty that grows by more than this is worth a warning.
 const MUCH_WORSE: f64 = 3.0;
 
+/// A residual that falls or rises by less than this share of itself has not changed.
+const WORTH_SAYING: f64 = 1e-3;
+
 /// A parameter before and after.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pair {
@@ -33,7 +36,7 @@ pub struct Change {
 }
 
 fn known(p: &Parameter) -> Option<(f64, f64)> {
-    p.sigma.filter(|_| p.status == Status::Identified).map(|s| (p.value, s))
+    p.sigma.filter(|_| matches!(p.status, Status::Identified | Status::PriorDominated)).map(|s| (p.value, s))
 }
 
 /// Compares two fits of the same touches.
@@ -55,7 +58,7 @@ pub fn change(before: &Outcome, after: &Outcome, fall: Option<(f64, f64)>) -> Ch
         .collect();
     let new: Vec<Parameter> = is.iter().filter(|a| !was.iter().any(|b| b.name == a.name)).cloned().collect();
     let mut remarks = Vec::new();
-    let fell = after.rms_um < before.rms_um;
+    let fell = after.rms_um < (1.0 - WORTH_SAYING) * before.rms_um;
     let lead = if fell { "the residual fell, but " } else { "" };
     for p in &kept {
         match (p.times, p.before, p.after) {
@@ -66,7 +69,7 @@ pub fn change(before: &Outcome, after: &Outcome, fall: Option<(f64, f64)>) -> Ch
             _ => {}
         }
     }
-    if let Some((fall, se)) = fall.filter(|f| f.0 < 0.0) {
+    if let Some((fall, se)) = fall.filter(|f| f.0 < -WORTH_SAYING * after.rms_um) {
         let much = if -fall > se { "" } else { ", which may be chance" };
         remarks.push(format!("touches that were left out are predicted worse by {:.3} ± {se:.3} um{much}", -fall));
     }

@@ -237,7 +237,7 @@ pub fn verify(
         remarks.push("no error is identified by both studies".into());
     }
     if question == Question::Compensation && !differ {
-        for r in rows.iter().filter(|r| r.changed && r.after.0.abs() > r.before.0.abs()) {
+        for r in rows.iter().filter(|r| r.changed && r.after.0.abs() > r.before.0.abs() + r.expanded) {
             remarks.push(format!("{} is larger than before: its sign or its unit may be wrong in the control", r.name));
         }
     }
@@ -283,6 +283,7 @@ mod tests {
             value: *value,
             sigma: Some(1.0),
             expanded: Some(Z_95),
+            holds: Vec::new(),
             status: Status::Identified,
             alias: None,
             effect: String::new(),

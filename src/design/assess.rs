@@ -10,6 +10,7 @@ use crate::fit::solve::observe;
 use crate::fit::statement;
 use crate::fit::uncertainty::expected;
 use crate::fit::{declared_tau_mm, held_first};
+use crate::model::catalogue::Effect;
 use crate::search::groups::{ALIGNED, AliasPair, alias_pairs};
 use crate::search::power::{Power, power};
 use crate::units::um_from_mm;
@@ -84,6 +85,8 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let parted_together = part(&results.directions(&observability), &remedies, &mut undetermined);
     let absorbed = Absorbed::new(&view);
     let mut effects: Vec<Seen> = Vec::new();
+    let warm = |e: &Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
+    let blind = |id: &str| !task.temperature && task.catalogue.get(id, task.machine).is_some_and(warm);
     let left_out = |id: &str| view.left_out.iter().any(|(left, _)| left == id);
     for (c, candidate) in view.library.candidates().iter().enumerate().filter(|(_, x)| !left_out(&x.id)) {
         let name = task.catalogue.get(&candidate.id, task.machine).map_or_else(String::new, |e| e.name.clone());
@@ -93,8 +96,11 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         let of = |both: bool| pairs.iter().filter(move |x| x.explained == c && x.both_ways == both).map(|x| id(x.by));
         let (same_as, contained_in): (Vec<String>, Vec<String>) = (of(true).collect(), of(false).collect());
         let absorbed_by = if visible { Vec::new() } else { absorbed.of(&view, c) };
-        let (tell_apart, helps) =
-            if !visible { to_show(c, &tried, &view, &absorbed_by) } else { to_part(c, &pairs, &tried, &view) };
+        let (tell_apart, helps) = if !visible {
+            to_show(c, &tried, &view, &absorbed_by, blind(&candidate.id))
+        } else {
+            to_part(c, &pairs, &tried, &view)
+        };
         effects.push(Seen {
             effect: candidate.id.clone(),
             name,
@@ -250,13 +256,19 @@ fn minutes(seconds: f64) -> String {
 }
 
 /// Touches that make an effect visible.
-fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String]) -> (String, Vec<String>) {
+fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String], blind: bool) -> (String, Vec<String>) {
     let shows = |limit: f64| -> Vec<&Tried> {
         tried.iter().filter(|t| t.power.get(c).is_some_and(|p| p.q > 0 && p.at_typical >= limit)).collect()
     };
     let well = shows(SHOWN);
     let found = if well.is_empty() { shows(0.0) } else { well };
-    let why = if view.library.columns(c, 0).norm() == 0.0 {
+    let why = if blind {
+        return (
+            "it goes with the temperature, and no touch will carry one: it may act, and these touches cannot show it"
+                .into(),
+            Vec::new(),
+        );
+    } else if view.library.columns(c, 0).norm() == 0.0 {
         "nothing that it acts on is touched".to_owned()
     } else if absorbed_by.is_empty() {
         "the model follows it".to_owned()

@@ -51,6 +51,9 @@ pub struct Diagnosis {
     /// None of the errors that the model is there for is told.
     #[serde(skip)]
     pub untold: bool,
+    /// Revisits show that poses come back to better than a touch can tell.
+    #[serde(skip)]
+    pub visits_come_back: bool,
     /// √(Σr²/n) over the touches used, µm.
     pub rms_um: f64,
     /// Standard deviation of a touch, µm.
@@ -81,6 +84,9 @@ pub struct Diagnosis {
     pub tested: usize,
     /// Effects that were tested and not found, and from which size on these touches would have shown them.
     pub power: Vec<Power>,
+    /// Effects that go with the temperature, where no touch carries one: they may act, and nothing here shows it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub needs_temperature: Vec<String>,
     /// Effects that leave no trace in these touches.
     pub not_seen: Vec<String>,
     /// What is left open, for a further program.

@@ -20,7 +20,7 @@ pub struct Evidence {
     pub used: Vec<usize>,
     /// Index visit of each row of a touch: what is held out together.
     pub visits: Vec<usize>,
-    /// From repeats, where there were enough.
+    /// From repeats, where there were enough; else what is declared or stated.
     pub pure: Option<PureError>,
     /// Scatter of index visits that the tests allow for, mm.
     pub tau_mm: f64,
@@ -47,12 +47,12 @@ impl Evidence {
         let residual = DVector::from_iterator(rows.len(), rows.iter().map(|&i| linear.residual[i]));
         let jacobian = linear.jacobian.select_rows(&rows);
         // repeats are rows of this regression; beside a σ that the study states they count as they are
-        let pure = fit.noise.repeats.map(|(found_mm, dof)| PureError {
+        let repeats = |(found_mm, dof): (f64, f64)| PureError {
             variance: (found_mm / fit.noise.sigma_mm).powi(2),
             dof,
             within: true,
             floor: tau_mm > 0.0,
-        });
+        };
         Self {
             base: Basis::new(&jacobian),
             visits: used.iter().map(|&i| fit.data.visits[i]).collect(),
@@ -61,7 +61,7 @@ impl Evidence {
             residual,
             jacobian,
             used,
-            pure,
+            pure: Some(fit.noise.repeats.map_or(PureError::TOLD, repeats)),
             tau_mm,
         }
     }

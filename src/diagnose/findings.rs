@@ -150,6 +150,9 @@ pub(super) fn put_together(
         let kind = features.variables.iter().find(|v| v.name == variable).map(|v| v.kind);
         let moved = words::moved_block(d, fit);
         let to_deg = |x: f64| if kind == Some(Kind::Rotary) { crate::units::deg_from_rad(x) } else { x };
+        // a block or a face stands out or lies deep; only where the probe is the cause a late trigger is what counts
+        let outward = matches!(d.on.as_str(), "block" | "face") && d.direction == "approach";
+        let sign = if outward { -1.0 } else { 1.0 };
         (!d.curve.is_empty()).then(|| Shape {
             by: by(&d.on),
             x_unit: match kind {
@@ -161,9 +164,13 @@ pub(super) fn put_together(
             }
             .to_owned(),
             y_unit: d.unit.clone(),
-            direction: super::features::direction_words(&d.direction, subject.machine),
+            direction: if outward {
+                "outward (+: the faces stand out, the block is larger)".to_owned()
+            } else {
+                super::features::direction_words(&d.direction, subject.machine)
+            },
             x: d.curve.iter().map(|p| to_deg(p.x)).collect(),
-            y: d.curve.iter().map(|p| p.y).collect(),
+            y: d.curve.iter().map(|p| sign * p.y).collect(),
             band: d.curve.iter().map(|p| 1.96 * p.sigma).collect(),
             labels: d.groups.iter().filter_map(|&g| words::group(&d.on, g, fit, features)).collect(),
             block: moved.map(str::to_owned),
@@ -198,6 +205,8 @@ pub(super) fn put_together(
         && super::sketch::best(&seen.dependences, fit).is_ok();
     let moved_block = drawn.filter(|_| unexplained).and_then(|d| words::moved_block(d, fit)).map(str::to_owned);
     jump_of_what(seen, features, &mut candidates);
+    let needs_temperature = without_temperature(fit, seen);
+    room_or_time(fit, seen, &mut candidates);
     Diagnosis {
         format: FORMAT,
         verdict,
@@ -210,6 +219,7 @@ pub(super) fn put_together(
         most_missed: false,
         name_in_doubt: false,
         untold: false,
+        visits_come_back: words::visits_come_back(fit),
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
@@ -223,6 +233,7 @@ pub(super) fn put_together(
         outliers: outliers.collect(),
         tested: seen.search.scores.iter().filter(|s| s.visible()).count(),
         power: powers,
+        needs_temperature,
         not_seen: seen
             .search
             .scores
@@ -232,6 +243,26 @@ pub(super) fn put_together(
             .collect(),
         warnings: seen.named.left_out.clone(),
         open,
+    }
+}
+
+/// Effects that go with the temperature, where no touch carries one: whether they act is not to be seen.
+fn without_temperature(fit: &Fit, seen: &Examination) -> Vec<String> {
+    if fit.data.observations.iter().any(|o| o.has_temperature) {
+        return Vec::new();
+    }
+    let warm = seen.named.effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T")));
+    warm.map(|e| e.id.clone()).collect()
+}
+
+/// What goes with time may go with the temperature of the room, which a log without temperatures does not show.
+fn room_or_time(fit: &Fit, seen: &Examination, candidates: &mut [Candidate]) {
+    let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
+    let effect = seen.named.effects[group.first()];
+    let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
+    let with_time = effect.terms.iter().any(|t| t.formula.variables().contains(&"t"));
+    if effect.id == first.effect && with_time && !jumps && !without_temperature(fit, seen).is_empty() {
+        first.or_else = Some("what goes with the room's temperature (this log carries none)".to_owned());
     }
 }
 
@@ -386,6 +417,12 @@ fn candidate(
         )
     };
     let told = told(&score.covariance);
+    // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
+    let tested = &seen.search.scores[chosen];
+    let sigma = |i: usize| {
+        let both = [Some(score), Some(tested).filter(|t| t.estimate.len() == score.estimate.len())];
+        both.into_iter().flatten().map(|s| s.covariance[(i, i)].max(0.0).sqrt()).fold(0.0, f64::max)
+    };
     let names = seen.named.columns[chosen].iter().zip(&told);
     let not_told: Vec<String> = names.filter(|(_, told)| !**told).map(|(c, _)| c.name.clone()).collect();
     let mut parameters: Vec<Parameter> = seen.named.columns[chosen]
@@ -396,7 +433,7 @@ fn candidate(
             name: c.name.clone(),
             value: score.estimate[i] * c.typical,
             unit: c.unit.clone(),
-            sigma: Some(score.covariance[(i, i)].max(0.0).sqrt() * c.typical),
+            sigma: Some(sigma(i) * c.typical),
         })
         .collect();
     let says = match &not_told[..] {

@@ -24,6 +24,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         most_missed: false,
         name_in_doubt: false,
         untold: false,
+        visits_come_back: false,
         rms_um: fit.outcome.rms_um,
         noise_um: noise_um(fit),
         visit_um: 0.0,
@@ -41,6 +42,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         tested: 0,
         power: Vec::new(),
         not_seen: Vec::new(),
+        needs_temperature: Vec::new(),
         open: Open::default(),
         warnings: Vec::new(),
     };

@@ -246,7 +246,11 @@ fn missing(c: &Candidate, against: &str) -> String {
             None => format!("Missing: {} ({}).", c.name, c.effect),
         }
     } else {
-        format!("Missing: {}; these touches cannot tell them apart.", super::words::one_of(&c.effect, &c.same_as))
+        let other = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
+        format!(
+            "Missing: {}{other}; these touches cannot tell them apart.",
+            super::words::one_of(&c.effect, &c.same_as)
+        )
     };
     format!("{what} It would bring the error from {against} to {:.2} um.{rest}", c.rms_after_um)
 }

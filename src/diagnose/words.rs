@@ -207,7 +207,7 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
     match found.depends.first().map(|w| w.by.as_str()) {
         Some("face") => "clean the faces of the blocks and touch them again",
         Some("block") => "look whether a block is loose or dirty, clamp and clean it, and measure again",
-        Some("visit") if comes_back(found) => {
+        Some("visit") if found.visits_come_back && !found.depends.iter().take(1).any(|w| w.id.starts_with("scatter:")) => {
             "each pose has an error of its own and comes back with it: look for what changes from pose to pose (gear, clamping \
              ring, cables that drag), and measure at more angles of the rotary axes"
         }
@@ -220,9 +220,8 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
 }
 
 /// Revisits show that poses come back to better than a touch can tell.
-fn comes_back(found: &Diagnosis) -> bool {
-    let scatter = found.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
-    found.visit_source == "revisits" && found.visit_um < found.noise_um && !scatter
+pub(super) fn visits_come_back(fit: &Fit) -> bool {
+    fit.noise.visit_source == "revisits" && fit.noise.tau_test_mm < fit.noise.sigma_mm
 }
 
 fn harmonic(d: &Dependence) -> String {
@@ -232,7 +231,7 @@ fn harmonic(d: &Dependence) -> String {
 /// What kind of thing makes such a misfit.
 #[must_use]
 pub fn kind(d: &Dependence, fit: &Fit) -> String {
-    let comes_back = fit.noise.visit_source == "revisits" && fit.noise.tau_test_mm < fit.noise.sigma_mm;
+    let comes_back = visits_come_back(fit);
     let text = match (d.on.as_str(), form(d)) {
         ("t", "step") => {
             "something moved at one moment: a knocked fixture, a clamp or probe that gave way, a collision"

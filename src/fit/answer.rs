@@ -25,9 +25,8 @@ pub(super) fn outcome(
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
-    let (unmodelled, left_out) = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
-        .then(|| uncertainty::with_unmodelled(fit, machine, catalogue))
-        .unzip();
+    let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
+        .then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
     // what the scatter of the priors makes of it
     let prior_variance = |c: usize| {
@@ -69,8 +68,9 @@ pub(super) fn outcome(
                 moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
                 sigma_with_unmodelled: known
                     .zip(unmodelled.as_ref())
-                    .map(|(c, all)| (all[c] * all[c] + b_variance[c]).sqrt())
+                    .map(|(c, all)| (all.sigma[c] * all.sigma[c] + b_variance[c]).sqrt())
                     .filter(|s| s.is_finite()),
+                holds: known.zip(unmodelled.as_ref()).map_or_else(Vec::new, |(c, all)| all.holds[c].clone()),
                 status,
             }
         })
@@ -127,7 +127,7 @@ pub(super) fn outcome(
         warnings: [
             warnings(fit, effects, solution, chi2_per_dof),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
-            left_out.unwrap_or_default(),
+            unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
         .concat(),
     }
@@ -151,6 +151,7 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
             out.push(format!("effect {} goes with the temperature T, and no touch carries one", effect.id));
         }
     }
+    out.extend(fit.data.temperature_says.clone());
     let far = |i: &usize| {
         let u = &fit.model.unknowns[*i];
         !u.shape && !u.nuisance && fit.theta[*i].abs() > NOT_CREDIBLE * u.typical

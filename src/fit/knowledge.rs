@@ -6,7 +6,7 @@ use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
-use crate::model::predict::Unknown;
+use crate::model::predict::{Model, Unknown};
 use std::collections::BTreeMap;
 
 /// The effects of a model, in order.
@@ -92,4 +92,23 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
         }
     }
     if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
+}
+
+/// A held value or a prior of a length among the location errors counts at the machine's pivot: at another point it would be
+/// another line on the machine that is held, and with it another fit.
+pub(super) fn stated_at_the_pivot(model: &Model, knowledge: &[Option<Knowledge>], machine: &Machine) -> Result<()> {
+    if model.reference == machine.reference.pivot {
+        return Ok(());
+    }
+    let moves = |u: &Unknown| u.at_reference && u.unit == "mm";
+    let known = model.unknowns.iter().zip(knowledge).filter(|(u, k)| k.is_some() && moves(u));
+    let names: Vec<&str> = known.map(|(u, _)| u.name.as_str()).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(
+        "model::reference_of_known",
+        format!("what the study says of {} counts at the machine's pivot, and the errors are asked for at another point", names.join(", ")),
+    )
+    .help("ask for them at the pivot (--reference pivot), or take what is said of these parameters out of [model.parameters]"))
 }

@@ -8,6 +8,7 @@
 mod answer;
 pub mod candidates;
 mod contradictions;
+mod digits;
 pub mod held_out;
 mod knowledge;
 pub mod noise;
@@ -257,6 +258,7 @@ fn identify_from(
     let model = Model::new(machine, effects, &data.set_ups, reference);
     let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
     knowledge::every_formula_has_a_value(effects, &data)?;
+    knowledge::stated_at_the_pivot(&model, &knowledge, machine)?;
     let mut theta = model.start();
     for (value, u) in theta.iter_mut().zip(&model.unknowns) {
         *value = starts.get(&u.name).copied().unwrap_or(*value);
@@ -277,6 +279,7 @@ fn identify_from(
         .collect();
     let known = Known {
         declared_sigma_mm: crate::units::mm_from_um(machine.probe.repeatability_um),
+        digit_mm: digits::digit_mm(data.observations.iter().map(|o| o.position)),
         declared_tau_mm: declared_tau_mm(machine, &data.observations),
         stated_sigma_mm: settings.touch_sigma_mm,
         stated_tau_mm: settings.visit_sigma_mm,

@@ -46,7 +46,7 @@ pub struct Noise {
     pub repeats: Option<(f64, f64)>,
     /// σ as the user states it, mm, where the repeats contradict it and are taken in its place.
     pub contradicted_mm: Option<f64>,
-    /// There are repeats enough, and they agree to the last digit: they say nothing of the noise.
+    /// There are repeats enough, and they agree as far as the digits of the log go: they say nothing of the noise.
     pub repeats_agree: bool,
 }
 
@@ -57,6 +57,8 @@ pub struct Known {
     pub declared_sigma_mm: f64,
     /// The indexing repeatability of the axes that are indexed, mm.
     pub declared_tau_mm: f64,
+    /// The last digit of the log, mm, where all its positions are multiples of one.
+    pub digit_mm: Option<f64>,
     /// σ where the user states it, mm.
     pub stated_sigma_mm: Option<f64>,
     /// τ where the user states it, mm.
@@ -92,9 +94,11 @@ pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
         None => (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1),
     };
     let from_repeats = (dof >= LEAST_REPEATS).then(|| (squares / dof as f64).sqrt());
+    // what a log rounds away is the same in all touches of one place, and does not show in them
+    let digits_mm = known.digit_mm.map_or(1e-9, |digit| (digit / 12f64.sqrt()).max(1e-9));
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
-    let repeats_agree = from_repeats.is_some_and(|s| s <= 1e-9);
-    let from_repeats = from_repeats.filter(|s| *s > 1e-9);
+    let repeats_agree = from_repeats.is_some_and(|s| s <= digits_mm);
+    let from_repeats = from_repeats.filter(|s| *s > digits_mm);
     // a wrong σ is no fault of the model: where the log itself contradicts it, the log counts
     let contradicted_mm =
         known.stated_sigma_mm.filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, *s)));
@@ -185,7 +189,7 @@ impl Noise {
                 })
             }
             ("study", _) => "as the study states".to_owned(),
-            _ if self.repeats_agree => "the probe's declared repeatability: the repeats agree exactly (a log that was rounded, or made without noise?)".to_owned(),
+            _ if self.repeats_agree => "the probe's declared repeatability: the repeats agree as far as the digits of the log show (a log that was rounded, or made without noise?)".to_owned(),
             _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
         };
         let tau = match (self.visit_source, self.visit_dof) {

@@ -217,6 +217,9 @@ pub struct Parameter {
     /// Standard uncertainty when everything that the model leaves out acts at its typical size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_with_unmodelled: Option<f64>,
+    /// Effects outside of the model that these touches cannot tell from it: what they do stands in its value.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holds: Vec<String>,
     /// Is the value a result?
     pub status: Status,
 }

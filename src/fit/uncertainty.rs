@@ -127,7 +127,7 @@ pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c
 /// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size (not the
 /// set-up of blocks), and the ball's place scatters from one index to the next as far as that is known; and what is said of
 /// effects that could not be counted.
-pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> (DVector<f64>, Vec<String>) {
+pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> Unmodelled {
     let mut effects = unmodelled_by(&fit.model.unknowns, machine, catalogue);
     effects.retain(|e| !e.per_block);
     let (effects, left_out) = with_values(effects, &fit.data.observations);
@@ -155,7 +155,38 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
             sums.gram[(c, c)] += sigma.powi(-2);
         }
     }
-    (sums.expected(&fit.seen), left_out)
+    let holds = (0..p).map(|_| Vec::new()).collect();
+    let mut out = Unmodelled { sigma: DVector::zeros(p), holds, left_out };
+    for (j, u) in others.unknowns.iter().enumerate().filter(|(_, u)| !u.shape) {
+        if let Some(taken) = sums.taken_by(j, &fit.seen)
+            && let Some(c) = one_result(fit, &taken)
+            && !out.holds[c].contains(&u.effect)
+        {
+            out.holds[c].push(u.effect.clone());
+        }
+    }
+    out.sigma = sums.expected(&fit.seen);
+    out
+}
+
+/// What effects outside of the model may do to a fit.
+pub(super) struct Unmodelled {
+    /// Standard uncertainty of each free unknown while all of them act at their typical size.
+    pub sigma: DVector<f64>,
+    /// For each free unknown: effects of which it takes all that they do.
+    pub holds: Vec<Vec<String>>,
+    /// What is said of effects that could not be counted.
+    pub left_out: Vec<String>,
+}
+
+/// The one result among the unknowns that take an effect, the set-ups of blocks aside. `taken`: what each takes, in noise.
+fn one_result(fit: &Fit, taken: &DVector<f64>) -> Option<usize> {
+    /// Smaller parts are rounding, or the bend of a block that stands askew.
+    const PART: f64 = 0.02;
+    let limit = PART * taken.amax();
+    let result = |c: &usize| !fit.model.unknowns[fit.free[*c]].nuisance && taken[*c] > limit;
+    let mut results = (0..taken.len()).filter(result);
+    results.next().filter(|_| results.next().is_none())
 }
 
 /// Standard uncertainty of each unknown of a whitened regression, in its unit, while effects that are not solved for act
@@ -185,6 +216,29 @@ impl Sums {
         self.gram.gemm(1.0, &turned, jacobian, 1.0);
         self.cross.gemm(1.0, &turned, b, 1.0);
         self.inner.gemm(1.0, &b_turned, b, 1.0);
+    }
+
+    /// Where all that a column of B does goes, by unknown and in units of the noise; none where the touches show a part of it
+    /// that is more than the noise of one touch.
+    fn taken_by(&self, column: usize, seen: &super::solve::Observability) -> Option<DVector<f64>> {
+        /// Blocks that stand askew leave this share of what would be one number on straight ones.
+        const SHARE: f64 = 1e-3;
+        let p = self.gram.nrows();
+        let whole = self.inner[(column, column)];
+        if whole <= 0.0 {
+            return None;
+        }
+        let scaled = DMatrix::from_fn(p, p, |i, j| self.gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
+        let cross = self.cross.column(column).component_div(&seen.scale);
+        let x = if seen.full() {
+            scaled.cholesky()?.solve(&cross)
+        } else {
+            let reduced = (seen.seen.tr_mul(&scaled) * &seen.seen).cholesky()?;
+            &seen.seen * reduced.solve(&seen.seen.tr_mul(&cross))
+        };
+        let left = whole - cross.dot(&x);
+        (left < 1.0 && left < SHARE * whole)
+            .then(|| DVector::from_fn(p, |i, _| x[i].abs() * self.gram[(i, i)].sqrt() / seen.scale[i]))
     }
 
     fn expected(mut self, seen: &super::solve::Observability) -> DVector<f64> {

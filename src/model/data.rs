@@ -71,6 +71,8 @@ pub struct Data {
     /// Where touches of a run are far from their places: the one simple mistake that would explain it. What is left of such
     /// a run is no sample of the machine, however many touches it has.
     pub supposed: Option<Supposed>,
+    /// What is to be said of touches that carry no temperature while others do.
+    pub temperature_says: Option<String>,
 }
 
 /// Why a touch that is far from its place is not used.
@@ -101,6 +103,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut clock_s = 0.0;
     let mut first_touch_s: Option<f64> = None;
     let mut visits = Visits::default();
+    let (temperatures, temperature_says) = super::temperatures::of_runs(runs);
+    data.temperature_says = temperature_says;
     for (index, run) in runs.iter().enumerate() {
         let label = run_label(runs, index);
         let started = run.started_s.unwrap_or(clock_s);
@@ -109,7 +113,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let mut before = Before::default();
         visits.last = None;
         data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run));
-        for touch in run.touches {
+        for (touch, &temperature_deg_c) in run.touches.iter().zip(&temperatures[index]) {
             let Some(planned) = run.plan.touch(touch.id) else {
                 data.unusable.push(Unusable {
                     run: index,
@@ -169,7 +173,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 ball_radius,
                 ball_at_zero: machine.tool.ball_at_zero(length_mm),
                 position,
-                has_temperature: touch.temperature_deg_c.is_some(),
+                has_temperature: temperature_deg_c.is_some(),
                 state: Circumstances {
                     machine,
                     carrier,
@@ -177,7 +181,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     planned,
                     at: &position,
                     hours: t,
-                    temperature_deg_c: touch.temperature_deg_c,
+                    temperature_deg_c,
                     senses: &last_sense,
                     before: &before.earlier,
                     length_mm,

@@ -8,4 +8,5 @@ pub mod data;
 pub mod formula;
 pub mod mistake;
 pub mod predict;
+mod temperatures;
 pub mod traces;

@@ -90,8 +90,14 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
     if !large.is_empty() {
         out += &wrapped(&format!("these touches could not have seen: {}", large.join(", ")), 2);
     }
-    if !d.not_seen.is_empty() {
-        out += &wrapped(&format!("no trace in these touches at any size: {}", d.not_seen.join(", ")), 2);
+    let unseen: Vec<&str> =
+        d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).map(String::as_str).collect();
+    if !unseen.is_empty() {
+        out += &wrapped(&format!("no trace in these touches at any size: {}", unseen.join(", ")), 2);
+    }
+    if !d.needs_temperature.is_empty() {
+        out +=
+            &wrapped(&format!("not to be seen without temperatures in the log: {}", d.needs_temperature.join(", ")), 2);
     }
     for w in &d.warnings {
         out += &wrapped(&format!("warning: {w}"), 2);
@@ -226,7 +232,7 @@ pub(super) fn probability(p: f64) -> String {
 /// A candidate in a cell: never one name where these touches cannot tell it from others.
 fn one_of(c: &Candidate) -> String {
     match c.same_as.len() {
-        0 if c.or_else.is_some() => format!("{} or another jump", c.effect),
+        0 if c.or_else.is_some() => format!("{} or something else", c.effect),
         0 => c.effect.clone(),
         1 => format!("{} or 1 other", c.effect),
         n => format!("{} or {n} others", c.effect),

@@ -114,6 +114,10 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         out += "unmodelled: standard uncertainty if every effect that the model leaves out acts at its typical size\n";
     }
     out += &left_out_says(&left_out);
+    let holds: Vec<String> = held(&o.parameters).collect();
+    if !holds.is_empty() {
+        out += &format!("{HOLDS}: {}\n", holds.join("; "));
+    }
     let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
     if !blocks.is_empty() {
         let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
@@ -168,6 +172,16 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         out += &format!("warning: {w}\n");
     }
     paper.plain(out)
+}
+
+/// What is said of values that hold more than their name says.
+pub const HOLDS: &str =
+    "no touch here tells these from effects that the model leaves out, whose size stands in the value";
+
+/// Results with the effects that stand in their values: `EZ0A holds tool-length`.
+pub fn held(parameters: &[Parameter]) -> impl Iterator<Item = String> {
+    let with = parameters.iter().filter(|p| !p.holds.is_empty() && !p.name.contains('@'));
+    with.map(|p| format!("{} holds {}", p.name, p.holds.join(", ")))
 }
 
 /// What a table does not show for want of room; nothing where it shows all.

@@ -7,7 +7,7 @@ use super::groups::Group;
 use super::held_out::{Choice, HeldOut, held_out};
 use super::library::Library;
 use super::moments::KEPT;
-use super::score::{PureError, Question, Search};
+use super::score::{PureError, Question, Search, held_against};
 use nalgebra::{DMatrix, DVector};
 
 /// An earlier effect goes again when its p-value next to the others is above this.
@@ -158,7 +158,11 @@ pub fn wald(question: Question, effects: &[DMatrix<f64>]) -> Vec<f64> {
             let (more, fewer) = without(Some(i));
             let q = rank - fewer;
             let dof = question.residual.len() as f64 - rank as f64 + pure_dof;
-            if q == 0 || dof < 1.0 { 1.0 } else { ln_p_of_f(more - ss, q as f64, ss + pure_ss, dof).exp() }
+            if q == 0 || dof < 1.0 {
+                1.0
+            } else {
+                ln_p_of_f(more - ss, q as f64, held_against(question.pure, ss + pure_ss, dof), dof).exp()
+            }
         })
         .collect()
 }

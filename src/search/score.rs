@@ -21,6 +21,12 @@ pub struct PureError {
     pub floor: bool,
 }
 
+impl PureError {
+    /// σ as somebody told it, and no repeats that could say otherwise: what is left counts as no less. Touches that scatter less
+    /// than their probe does (a virtual machine's, or those of a log with coarse digits) show what is no error of the machine.
+    pub const TOLD: Self = Self { variance: 1.0, dof: 0.0, within: false, floor: true };
+}
+
 /// What an effect's sum of squares is held against: what is left of `ss` without it, on `dof` degrees of freedom.
 pub(super) fn held_against(pure: Option<PureError>, ss: f64, dof: f64) -> f64 {
     match pure {
@@ -314,12 +320,12 @@ pub fn lack_of_fit(question: &Question) -> LackOfFit {
     let dof = question.residual.len() as f64 - question.base.rank() as f64;
     let p = match question.pure {
         _ if dof < 1.0 => 1.0,
-        None => p_of_chi2(ss, dof),
-        Some(e) => {
+        Some(e) if e.dof > 0.0 => {
             let (own_ss, own_dof) = if e.within { (e.variance * e.dof, e.dof) } else { (0.0, 0.0) };
             let (part, left) = (ss - own_ss, dof - own_dof);
             if left < 1.0 { 1.0 } else { ln_p_of_f(part, left, e.variance * e.dof, e.dof).exp() }
         }
+        _ => p_of_chi2(ss, dof),
     };
     LackOfFit { ss, dof, p }
 }

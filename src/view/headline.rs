@@ -357,6 +357,8 @@ mod tests {
             tested: 50,
             power: Vec::new(),
             not_seen: Vec::new(),
+            needs_temperature: Vec::new(),
+            visits_come_back: false,
             open: Open::default(),
             warnings: Vec::new(),
         }

@@ -18,6 +18,7 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
             sigma_type_b: None,
             moves_with_unseen: None,
             sigma_with_unmodelled: None,
+            holds: Vec::new(),
             status: *status,
         })
         .collect();

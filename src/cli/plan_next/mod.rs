@@ -26,6 +26,9 @@ use told::write;
 /// Other blocks are worth the trouble when they part effects so many times better.
 const WORTH_MOVING: f64 = 1.5;
 
+/// A program must part effects by so much more than the touches that there are.
+const GAIN: f64 = 1.02;
+
 /// Arguments of `plan-next`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -246,6 +249,20 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         ));
     };
     chosen.never = never;
+    // a program that parts nothing further is not worth a person's walk to the machine
+    if chosen.separations.iter().all(|s| s.most() <= GAIN * s.before) {
+        let says = format!(
+            "{}: these touches tell it as well as any program of {:.0} minutes would",
+            says(&questions),
+            args.minutes
+        );
+        let moved = if chosen.label.is_none() { " with the blocks put up anew" } else { "" };
+        return Ok(refuse(
+            &says,
+            &format!("no program{moved} brings more: confirm it at the machine, or give more time (--minutes)"),
+            io,
+        ));
+    }
     if chosen.separations.iter().all(|s| s.told < SAFELY && s.told_if_room_turns.is_none_or(|t| t < SAFELY)) {
         let says = format!(
             "no program of {:.0} minutes that this machine can run would tell any of these effects apart: {}",

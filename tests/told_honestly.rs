@@ -1,0 +1,174 @@
+//! A log that is better than its probe, a log with temperatures here and there, values that hold more than their names say,
+//! and a statement at another point: nothing is invented, and nothing is left out in silence.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
+
+mod common;
+
+use axiscal::design::{Noise, Planned, Request, Task, assess};
+use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose};
+use axiscal::fit::{self, Fit, Knowledge, Settings};
+use axiscal::log::Touch;
+use axiscal::machine::Machine;
+use axiscal::model::catalogue::Catalogue;
+use axiscal::model::data::Run;
+use axiscal::program::plan::Plan;
+use axiscal::simulate::Scenario;
+use common::*;
+
+fn settings(machine: &Machine, more: &[&str]) -> Settings {
+    let location = if machine.name == "trunnion" { ["location-a", "location-c"] } else { ["location-b", "location-c"] };
+    let all = location.iter().chain(&["block-setup", "pretravel"]).chain(more);
+    Settings { effects: all.map(|e| (*e).to_owned()).collect(), ..Settings::default() }
+}
+
+fn fitted(machine: &Machine, plan: &Plan, touches: &[Touch], settings: &Settings) -> Fit {
+    let runs = [Run { plan, touches, mounting: None, started_s: None }];
+    fit::identify(machine, &Catalogue::built_in().unwrap(), &runs, settings).unwrap()
+}
+
+fn diagnosed(machine: &Machine, plan: &Plan, touches: &[Touch]) -> Diagnosis {
+    let settings = settings(machine, &[]);
+    let fit = fitted(machine, plan, touches, &settings);
+    let catalogue = Catalogue::built_in().unwrap();
+    diagnose(Subject { machine, catalogue: &catalogue, settings: &settings, fit: &fit }, &Options::default()).unwrap()
+}
+
+fn scenario(machine: &Machine, text: &str) -> Scenario {
+    axiscal::simulate::scenario::parse_text(text, machine).unwrap()
+}
+
+/// What is left of a log without noise, or of one whose digits are coarser than its probe, is rounding: no error of the machine.
+#[test]
+fn a_log_that_is_better_than_its_probe_shows_no_missing_effect() {
+    for (name, program) in
+        [("trunnion", "full"), ("trunnion", "basic"), ("swivel-head", "full"), ("swivel-head", "head")]
+    {
+        let machine = machine(name);
+        let plan = plan(&machine, program);
+        for (touch_um, rounding_um) in [(0.0, 0.0), (0.0, 1.0), (0.1, 1.0), (0.05, 0.1)] {
+            let text = format!("seed = 4\n[noise]\ntouch_um = {touch_um:?}\nrounding_um = {rounding_um:?}\n");
+            let touches = touch(&machine, &plan, &scenario(&machine, &text), None);
+            let found = diagnosed(&machine, &plan, &touches);
+            assert_eq!(found.verdict, Verdict::Adequate, "{name} {program} {touch_um} {rounding_um}: {}", found.says);
+        }
+    }
+}
+
+/// And an effect that is larger than the digits is found in spite of them.
+#[test]
+fn coarse_digits_do_not_hide_an_effect() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let text = "seed = 4\n[noise]\ntouch_um = 0.1\nrounding_um = 1.0\n[effects.backlash-c]\nbacklash_C = 100.0\n";
+    let found = diagnosed(&machine, &plan, &touch(&machine, &plan, &scenario(&machine, text), None));
+    assert_eq!(found.candidates[0].effect, "backlash-c", "{}", found.says);
+    assert!(found.candidates[0].proposed, "{}", found.says);
+}
+
+#[test]
+fn a_value_that_holds_another_effect_says_so() {
+    let machine = machine("trunnion");
+    let plan = plan(&machine, "full");
+    let text = "seed = 4\n[noise]\ntouch_um = 1.0\n[effects.tool-length]\ndL = 0.3\n";
+    let touches = touch(&machine, &plan, &scenario(&machine, text), None);
+    let fit = fitted(&machine, &plan, &touches, &settings(&machine, &[]));
+    let of = |name: &str| fit.outcome.parameters.iter().find(|p| p.name == name).unwrap();
+    assert!((of("EZ0A").value - 0.3).abs() < 0.001);
+    assert!(of("EZ0A").holds.contains(&"tool-length".to_owned()), "{:?}", of("EZ0A").holds);
+    assert!(of("EA0C").holds.contains(&"zero-a".to_owned()), "{:?}", of("EA0C").holds);
+    assert!(of("EX0C").holds.is_empty(), "{:?}", of("EX0C").holds);
+    let text = axiscal::report::fit::outcome(
+        &fit.outcome,
+        axiscal::report::plot::Paper { width: 120, ascii: true, colour: false },
+    );
+    assert!(text.contains("EZ0A holds"), "{text}");
+    // with the effect in the model it is the model's own matter
+    let with = fitted(&machine, &plan, &touches, &settings(&machine, &["tool-length"]));
+    assert!(with.outcome.parameters.iter().all(|p| !p.holds.contains(&"tool-length".to_owned())));
+    assert!(with.outcome.undetermined.iter().any(|u| u.combination.contains_key("dL")));
+}
+
+/// A room that warms, read from a log that has no temperatures: what goes with time may be the room.
+#[test]
+fn time_is_not_named_alone_where_the_room_was_not_logged() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let text = "seed = 4\n[noise]\ntouch_um = 1.0\n[effects.ambient-bending]\nqx = 3.0\nqz = 2.0\n[temperature]\n\
+                profile = [[0.0, 20.0], [2.0, 23.5]]\n";
+    let mut touches = touch(&machine, &plan, &scenario(&machine, text), None);
+    let logged = diagnosed(&machine, &plan, &touches);
+    assert!(logged.needs_temperature.is_empty());
+    touches.iter_mut().for_each(|t| t.temperature_deg_c = None);
+    let blind = diagnosed(&machine, &plan, &touches);
+    assert!(blind.needs_temperature.contains(&"ambient-bending".to_owned()));
+    assert!(blind.says.contains("the room's temperature"), "{}", blind.says);
+}
+
+/// 20 °C in the middle of a warm hour would be a jump that nothing made.
+#[test]
+fn gaps_in_the_temperatures_are_filled_or_said() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let text = "seed = 4\n[noise]\ntouch_um = 1.0\n[effects.ambient-bending]\nqx = 3.0\nqz = 2.0\n[temperature]\n\
+                profile = [[0.0, 20.0], [0.4, 23.5], [0.9, 21.0], [2.0, 24.0]]\n";
+    let whole = touch(&machine, &plan, &scenario(&machine, text), None);
+    let value = |touches: &[Touch]| {
+        let fit = fitted(&machine, &plan, touches, &settings(&machine, &["ambient-bending"]));
+        let qx = fit.outcome.parameters.iter().find(|p| p.name == "qx").unwrap().clone();
+        (qx, fit.outcome.warnings.join("\n"))
+    };
+    let mut few = whole.clone();
+    few.iter_mut().step_by(3).for_each(|t| t.temperature_deg_c = None);
+    let (qx, said) = value(&few);
+    assert!((qx.value - 3.0).abs() < 3.0 * qx.sigma.unwrap() + 0.05, "{qx:?}");
+    assert!(said.contains("carry no temperature: it is taken from the readings"), "{said}");
+    let mut half = whole;
+    half.iter_mut().skip(400).for_each(|t| t.temperature_deg_c = None);
+    let (qx, said) = value(&half);
+    assert_eq!(qx.sigma, None, "{qx:?}");
+    assert!(said.contains("no temperature is used at all"), "{said}");
+}
+
+/// Held at the pivot is another line than held at the table: the statement must not change the fit.
+#[test]
+fn another_reference_is_refused_where_a_place_is_held() {
+    let machine = machine("trunnion");
+    let plan = plan(&machine, "basic");
+    let touches = touch(&machine, &plan, &Scenario::flawless().with_noise(1e-3, 0.0, 5), None);
+    let mut settings = settings(&machine, &[]);
+    settings.reference = Some(machine.reference.ball);
+    assert_ne!(machine.reference.ball, machine.reference.pivot);
+    fitted(&machine, &plan, &touches, &settings);
+    settings.knowledge.insert("EX0C".into(), Knowledge::Fixed(0.012));
+    let runs = [Run { plan: &plan, touches: &touches, mounting: None, started_s: None }];
+    let said = fit::identify(&machine, &Catalogue::built_in().unwrap(), &runs, &settings).unwrap_err();
+    assert!(format!("{said:?}").contains("EX0C counts at the machine's pivot"), "{said:?}");
+}
+
+/// The figure of the probe's noise alone does not know how visits scatter.
+#[test]
+fn the_scatter_of_visits_is_no_noise_of_the_probe() {
+    let machine = machine("swivel-head");
+    let catalogue = Catalogue::built_in().unwrap();
+    let alone = |visit_mm: f64| {
+        let task = Task {
+            machine: &machine,
+            catalogue: &catalogue,
+            effects: fit::effects_of(&settings(&machine, &[]).effects, &catalogue, &machine).unwrap(),
+            held: Vec::new(),
+            reference: machine.reference.pivot,
+            temperature: false,
+        };
+        let runs = vec![Planned::new(plan(&machine, "head")), Planned::new(plan(&machine, "table"))];
+        let names = vec!["head".to_owned(), "table".to_owned()];
+        let probe = Noise { sigma_mm: 1e-3, tau_mm: 0.0 };
+        assess(&Request { task, runs, names, probe, acting_tau_mm: Some(visit_mm) }).unwrap()
+    };
+    let (none, some) = (alone(0.0), alone(0.7e-3));
+    for (a, b) in none.parameters.iter().zip(&some.parameters) {
+        assert_eq!(a.sigma, b.sigma, "{}", a.name);
+        assert!(b.sigma_with_visits > a.sigma_with_visits, "{}", a.name);
+    }
+    let blind = none.effects.iter().find(|e| e.effect == "ambient-bending").unwrap();
+    assert!(blind.tell_apart.contains("goes with the temperature"), "{}", blind.tell_apart);
+}
