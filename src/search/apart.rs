@@ -146,11 +146,11 @@ mod tests {
 
     #[test]
     fn the_chance_is_that_of_the_test() {
-        // q = 1: |z + 5| > 2.576, and the level itself where nothing is there
-        assert!((chance(25.0, 1) - 0.992_3).abs() < 1e-3);
+        // q = 1: |z + 5| > 2.968, and the level itself where nothing is there
+        assert!((chance(25.0, 1) - 0.979).abs() < 1e-3);
         for q in 1..6 {
             assert!((chance(0.0, q) - LEVEL).abs() < 1e-9);
-            assert!(chance(SEEN, q) > 0.94, "{q}");
+            assert!(chance(SEEN, q) > 0.88, "{q}");
             assert!(chance(9.0, q) < 0.7);
         }
         assert!(chance(1e4, 3) == 1.0 && chance(1e4, 0) == 0.0);
