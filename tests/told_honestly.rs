@@ -172,3 +172,25 @@ fn the_scatter_of_visits_is_no_noise_of_the_probe() {
     let blind = none.effects.iter().find(|e| e.effect == "ambient-bending").unwrap();
     assert!(blind.tell_apart.contains("goes with the temperature"), "{}", blind.tell_apart);
 }
+
+/// The same program twice, and between the two the machine has moved: no clamping is to blame.
+#[test]
+fn runs_that_disagree_are_named_as_runs() {
+    let machine = machine("trunnion");
+    let plan = plan(&machine, "basic");
+    let at = |seed: u64, moved: &str| {
+        let text = format!("seed = {seed}\n[noise]\ntouch_um = 1.0\n{moved}");
+        touch(&machine, &plan, &scenario(&machine, &text), None)
+    };
+    // the axis of A has moved by 8 um against the blocks' places in the second run
+    let (first, second) = (at(4, ""), at(5, "[effects.location-a]\nEZ0A = 0.008\n"));
+    let run = |touches| Run { plan: &plan, touches, mounting: Some("same"), started_s: None };
+    let settings = settings(&machine, &[]);
+    let catalogue = Catalogue::built_in().unwrap();
+    let fit = fit::identify(&machine, &catalogue, &[run(&first), run(&second)], &settings).unwrap();
+    let subject = Subject { machine: &machine, catalogue: &catalogue, settings: &settings, fit: &fit };
+    let found = diagnose(subject, &Options::default()).unwrap();
+    assert_ne!(found.verdict, Verdict::Adequate);
+    assert_eq!(found.depends[0].by, "run", "{}", found.says);
+    assert!(axiscal::diagnose::words::at_the_machine(&found).contains("between the runs"), "{}", found.says);
+}

@@ -51,6 +51,7 @@ pub fn features(fit: &Fit, machine: &Machine) -> Features {
         block: observations.iter().map(|o| o.set_up).collect(),
         face: faces(fit),
         visit: fit.data.visits.clone(),
+        run: observations.iter().map(|o| o.run).collect(),
     }
 }
 

@@ -138,6 +138,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
         "block" => ("the block".to_owned(), "blocks disagree".to_owned()),
         "face" => ("the face".to_owned(), "faces disagree".to_owned()),
         "visit" => ("the index visit".to_owned(), "visits disagree".to_owned()),
+        "run" => ("the run".to_owned(), "runs disagree".to_owned()),
         "S" => ("the orientation of the spindle".to_owned(), harmonic(d)),
         "L" => ("the length of the stylus".to_owned(), "longer against shorter".to_owned()),
         "feed" => ("the feed".to_owned(), "fast against slow".to_owned()),
@@ -178,7 +179,7 @@ pub fn group(on: &str, number: usize, fit: &Fit, features: &Features) -> Option<
             Some(format!("{} {}", origin.block, origin.face))
         }
         "block" => fit.data.set_ups.get(number).map(|s| s.label.clone()),
-        "visit" => Some(format!("visit {}", number + 1)),
+        "visit" | "run" => Some(format!("{on} {}", number + 1)),
         _ => None,
     }
 }
@@ -210,6 +211,10 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
         Some("visit") if found.visits_come_back && !found.depends.iter().take(1).any(|w| w.id.starts_with("scatter:")) => {
             "each pose has an error of its own and comes back with it: look for what changes from pose to pose (gear, clamping \
              ring, cables that drag), and measure at more angles of the rotary axes"
+        }
+        Some("run") => {
+            "something changed between the runs (temperature, a stylus, a block, a knock): say when each began (started, in its \
+             [[data]]), give a run whose blocks were moved a mounting of its own, and ask again"
         }
         Some("visit") => "look for play or dirt in the clamping and indexing of the rotary axes, and measure again",
         Some(_) if found.faint => "measure again: further touches tell whether the pattern is there at all",
@@ -246,6 +251,7 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
         ("visit", _) if comes_back => {
             "poses that each have an error of their own, and come back with it: a pattern that no shape here has"
         }
+        ("run", _) => "something that changed between two runs: the machine's temperature, a stylus, a block, a knock",
         ("visit", _) => "poses that do not come back: clamping or indexing scatter",
         ("T", _) => "temperature",
         ("S" | "approach", _) => "the probe: stylus run-out, or a trigger that depends on the direction",

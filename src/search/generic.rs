@@ -161,6 +161,8 @@ pub struct Features {
     pub face: Vec<usize>,
     /// Number of the index visit.
     pub visit: Vec<usize>,
+    /// Number of the run.
+    pub run: Vec<usize>,
 }
 
 /// A generic candidate with what it is made of.
@@ -386,6 +388,7 @@ impl Plan {
             (Grouping::Block, "block", &features.block),
             (Grouping::Face, "face", &features.face),
             (Grouping::Visit, "visit", &features.visit),
+            (Grouping::Run, "run", &features.run),
         ] {
             let distinct = distinct(numbers);
             if distinct.len() < 2 || distinct.len() > GROUPS {

@@ -34,6 +34,7 @@ pub(super) enum Grouping {
     Block,
     Face,
     Visit,
+    Run,
 }
 
 /// A number for a formula: six digits, in parentheses where it is negative.
@@ -56,6 +57,7 @@ impl Function {
                     Grouping::Block => &features.block,
                     Grouping::Face => &features.face,
                     Grouping::Visit => &features.visit,
+                    Grouping::Run => &features.run,
                 };
                 f64::from(u8::from(groups.get(row) == Some(number)))
             }
