@@ -88,6 +88,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         based_on: file.based_on.clone(),
         name_characters: (file.file.name_characters.clone(), file.file.name_other.clone()),
         last_label: file.file.last_label,
+        last_program: file.file.last_program,
         companions: file.companion.iter().map(|c| c.says.clone()).collect(),
         coordinates: file.number.coordinates,
         number,
