@@ -471,9 +471,12 @@ fn without_comment(text: &str) -> &str {
 
 /// A block behind its number.
 fn without_number(rest: &str) -> &str {
-    let number = (char('N'), digit1::<&str, nom::error::Error<&str>>, nom::character::complete::space1);
-    let mut number = number;
-    number.parse(rest).map_or(rest, |(after, _)| after)
+    let mut number = (char('N'), digit1::<&str, nom::error::Error<&str>>, nom::character::complete::space0);
+    // a number alone is that of a remark
+    let ends = |after: &str| {
+        after.is_empty() || after.len() < rest.trim_start_matches(|c: char| c == 'N' || c.is_ascii_digit()).len()
+    };
+    number.parse(rest).ok().filter(|(after, _)| ends(after)).map_or(rest, |(after, _)| after)
 }
 
 /// `AXC_END:`
