@@ -469,14 +469,12 @@ fn without_comment(text: &str) -> &str {
     text
 }
 
-/// A block behind its number.
+/// A block behind its number; a number alone is that of a remark.
 fn without_number(rest: &str) -> &str {
-    let mut number = (char('N'), digit1::<&str, nom::error::Error<&str>>, nom::character::complete::space0);
-    // a number alone is that of a remark
-    let ends = |after: &str| {
-        after.is_empty() || after.len() < rest.trim_start_matches(|c: char| c == 'N' || c.is_ascii_digit()).len()
-    };
-    number.parse(rest).ok().filter(|(after, _)| ends(after)).map_or(rest, |(after, _)| after)
+    let number = (char('N'), digit1::<&str, nom::error::Error<&str>>).parse(rest);
+    let behind = number.map_or(rest, |(after, _)| after);
+    let block = behind.trim_start_matches([' ', '\t']);
+    if behind.is_empty() || block.len() < behind.len() { block } else { rest }
 }
 
 /// `AXC_END:`
