@@ -190,6 +190,12 @@ fn edits_by_hand_of_a_klartext_program_are_caught() {
         ("M128 of before", with(&t, "M129", 1, &|_| String::new()), "check::not_run"),
         ("machine coordinates lost", with(&t, "L X-", 1, &|l| l.replace(" M91", "")), "check::start"),
         ("a turn below the clearance", turn, "check::turn_not_clear"),
+        (
+            "a remark that takes the next block in",
+            with(&t, ";", 2, &|l| format!("{} ~\r\n", l.trim_end())),
+            "check::not_understood",
+        ),
+        ("a label that the control lacks", all(&t, "LBL 9\r", "LBL 99999\r"), "check::not_understood"),
     ] {
         let codes = original.codes(&original.numbered(&text));
         if !codes.contains(&code) {

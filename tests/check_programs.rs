@@ -69,6 +69,23 @@ fn with_a_probing_package() {
     }
 }
 
+/// Running numbers stand before blocks only: not before % or an O-word.
+#[test]
+fn with_block_numbers() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    let lines = "[file]\nblock_numbers = { first = 10, step = 10, word = \"N{n} \" }\nunverified = \"ours\"\n";
+    for base in ["sinumerik", "linuxcnc"] {
+        is_clean(&variant(base, lines), &machine, &generated);
+    }
+    // where they are labels they are refused
+    for base in ["fanuc", "haas"] {
+        let text = format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}");
+        let failure = parse(&source("mine.toml", text)).unwrap_err();
+        assert!(failure.0.iter().any(|f| f.code == "post::block_numbers"), "{failure}");
+    }
+}
+
 /// The worked example of docs/guide/controllers.md, as it stands there.
 #[test]
 fn the_variant_of_the_guide() {

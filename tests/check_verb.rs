@@ -171,3 +171,38 @@ fn a_plan_without_the_program_is_said() {
     let of_fanuc = serde_json::json!({ "fanuc": programs["linuxcnc"] });
     with(Some(of_fanuc), "the plan does not hold the program of linuxcnc, but of fanuc");
 }
+
+/// The O number is the program's own: another one, or that of a macro that it calls, is refused, by `generate` too.
+#[test]
+fn a_program_has_the_number_that_its_settings_say() {
+    let name = "fanuc-inspection-plus";
+    let folder = folder(name);
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("small.nc")).unwrap();
+    let check = |number: &str| {
+        std::fs::write(at.join("edited.nc"), text.replacen("O9100", number, 1)).unwrap();
+        axiscal(at)
+            .args(["check", "edited.nc", "--machine", "swivel-head", "--controller", name, "--plan", "small.plan.json"])
+            .assert()
+    };
+    check("O9100").success();
+    for number in ["O9810", "O9101", "O0", "O123456789"] {
+        check(number).failure().stderr(predicate::str::contains(number));
+    }
+    let file = |number: &str| {
+        format!(
+            "format = \"axiscal-postprocessor/1\"\nbased_on = {name:?}\nname = \"mine\"\n[settings]\nprogram_number = {number:?}\n"
+        )
+    };
+    for (number, says) in
+        [("9810", "macro that the program calls"), ("0", "1 to 9999"), ("12345", "1 to 9999"), ("X", "1 to 9999")]
+    {
+        std::fs::write(at.join("mine.toml"), file(number)).unwrap();
+        axiscal(at)
+            .args(["generate", "--machine", "swivel-head", "--program", "small.toml", "--out", "mine", "--controller"])
+            .arg("mine.toml")
+            .assert()
+            .code(2)
+            .stderr(predicate::str::contains("program_number").and(predicate::str::contains(says)));
+    }
+}

@@ -266,6 +266,11 @@ fn a_worksheet_serves_as_the_backup_of_the_next_export() {
         let first = json(export(at, control, &one, &["--accept-unverified"]));
         let entered = format!("{one}/axiscal_worksheet.txt");
         let more = ["--accept-unverified", "--backup", entered.as_str()];
+        // of the same study they are the new values: what was identified would be added twice
+        let twice = export(at, control, &two, &more).assert().code(2);
+        twice.stderr(predicates::str::contains("written by an export of this study"));
+        // the study of the next measurement
+        std::fs::write(at.join("study.toml"), text(at, "study.toml") + "# measured again\n").unwrap();
         let second = json(export(at, control, &two, &more));
         assert_eq!(first["values"].as_array().unwrap().len(), second["values"].as_array().unwrap().len());
         let (was, back) = (sheet(&entered), sheet(&format!("{two}/restore_worksheet.txt")));

@@ -40,7 +40,7 @@ impl Program {
     pub fn parse(post: &Postprocessor, rule: &CheckRule, text: &str, masks: &heidenhain::Masks) -> Result<Self, Fault> {
         let code = match rule.dialect {
             DialectName::Ngc => ngc::parse(text)?,
-            DialectName::MacroB => macro_b::parse(text, &post.number)?,
+            DialectName::MacroB => macro_b::parse(text, post)?,
             DialectName::Klartext => heidenhain::parse(text, post, masks)?,
             DialectName::Sinumerik => sinumerik::parse(text, post)?,
         };

@@ -136,8 +136,8 @@ mod tests {
 
     #[test]
     fn a_point_matters_where_the_control_counts_increments_without_it() {
-        let number = Postprocessor::load_built_in_or_file("fanuc").unwrap().0.number;
-        let read = |p: &str| proof(&macro_b::parse(&format!("%\nO1\nG4 P{p}\nM30\n%\n"), &number).unwrap(), true);
+        let post = Postprocessor::load_built_in_or_file("fanuc").unwrap().0;
+        let read = |p: &str| proof(&macro_b::parse(&format!("%\nO9100\nG4 P{p}\nM30\n%\n"), &post).unwrap(), true);
         assert_eq!(first_other(&read("10"), &read("10.")), Some(0));
         assert_eq!(first_other(&read("10."), &read("10.0")), None);
     }

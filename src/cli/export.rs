@@ -2,7 +2,7 @@
 
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
-use crate::diag::{Failure, Finding, Result, source};
+use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::diagnose::{self, Subject, Verdict};
 use crate::files;
 use crate::fit::{self, Fit, Settings};
@@ -201,11 +201,12 @@ fn export(loaded: &Loaded, correction: &Correction, args: &Args, io: &Io) -> Res
 }
 
 /// Old values: the backup, and what was given by hand.
-fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
+fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args: &Args) -> Result<Old> {
     let names = control::names(machine, tables);
     let mut old = match &args.backup {
         Some(path) => {
             let text = source(path.display().to_string(), files::read_text(path)?);
+            not_its_own(&text, correction)?;
             let such_as = control::example(machine, tables).unwrap_or_default();
             backup::read_such_as(&text, &tables.backup, &names, &such_as)?
         }
@@ -231,6 +232,20 @@ fn old_values(machine: &Machine, tables: &Tables, args: &Args) -> Result<Old> {
     Ok(old)
 }
 
+/// The file that this study's own export wrote holds the new values: what was identified would be added twice.
+fn not_its_own(backup: &Source, correction: &Correction) -> Result<()> {
+    let text = backup.inner().to_ascii_lowercase();
+    let own = text.contains(&correction.provenance.study_sha256.to_ascii_lowercase());
+    if !own || text.contains("restores") || correction.provenance.study_sha256.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::new(
+        "export::own_backup",
+        format!("{} was written by an export of this study: its values are the new ones", backup.name()),
+    )
+    .help("give the control's own backup from before, or the restoring file of that export"))
+}
+
 /// Tables of a control that is described by data.
 fn control(
     machine: &Machine,
@@ -245,7 +260,7 @@ fn control(
         force: args.force,
         accept_unverified: args.accept_unverified,
         unit: args.unit,
-        old: old_values(machine, tables, args)?,
+        old: old_values(machine, tables, correction, args)?,
         ..control::Options::default()
     };
     let (export, findings) = control::export(machine, name, tables, correction, &options)?;
@@ -257,7 +272,7 @@ fn control(
     remove_stale(&args.out, &export.files)?;
     let mut t = table(&["value", "old", "new", "change", "unit"]);
     for v in &export.values {
-        let show = |x: f64| number(format!("{x:.*}", v.decimals));
+        let show = |x: f64| number(control::digits(x, v.decimals, false));
         let spelling = tables.file.first().and_then(|f| f.spelling.as_ref());
         let shown = spelling.and_then(|s| v.names.get(s)).or(v.names.values().next()).cloned().unwrap_or_default();
         t.add_row(vec![Cell::new(shown), show(v.old), show(v.new), show(v.new - v.old), Cell::new(v.unit)]);

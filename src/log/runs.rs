@@ -44,6 +44,8 @@ pub struct Run {
     /// Count of touches of the plan, and line.
     pub end: Option<(u64, usize)>,
     last_line: usize,
+    /// The set-ups at which the program was started again, with the lines that say so.
+    resumed: Vec<(u64, usize)>,
 }
 
 impl Run {
@@ -65,6 +67,26 @@ impl Run {
         // an end alone is not enough: lines may have been lost on the way
         let whole = self.end.is_some_and(|(planned, _)| self.count() as u64 >= planned);
         whole && self.count() > 0 && self.header.as_ref().is_none_or(|h| h.setup <= 1)
+    }
+
+    /// Says where the program was started again. Its clock counts from there: how long the pause was is not known, so the
+    /// touches behind it carry no time.
+    pub fn say_resumed(&self, touches: &mut [RawTouch], places: &Places<'_>, findings: &mut Findings) {
+        for (i, (setup, line)) in self.resumed.iter().enumerate() {
+            let until = self.resumed.get(i + 1).map_or(usize::MAX, |(_, next)| *next);
+            let behind = touches.iter_mut().filter(|t| (*line..until).contains(&t.line));
+            let timed = behind.filter_map(|t| t.time_s.take()).count();
+            let says = format!("the log goes on here: the program was started again at set-up {setup}");
+            let finding = if timed == 0 {
+                Finding::info("log::resumed", says)
+            } else {
+                let help = "where time matters, the plan's times stand for them, as where none are logged: the pause is not in them";
+                let says =
+                    format!("{says}, and its clock with it: the times of the {timed} touches behind it are not used");
+                Finding::warning("log::resumed", says).help(help)
+            };
+            findings.push(places.at_line(finding, *line));
+        }
     }
 
     /// The run's touches, out of all of the log.
@@ -107,6 +129,7 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
                         h.digest == header.digest && h.program == header.program && h.unit == header.unit
                     });
                 if goes_on && (run.header.is_some() || run.count() > 0) {
+                    run.resumed.push((header.setup, number));
                     run.header.get_or_insert_with(|| (**header).clone());
                     run.last_line = number;
                 } else {

@@ -90,9 +90,36 @@ fn a_run_that_was_started_again_goes_on() {
     let again = lines[0].strip_suffix("U1").unwrap().to_owned() + "U2";
     let text = [lines[0], lines[1], lines[2], &again, lines[2], lines[3], lines[4], ""].join("\n");
     let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post()), &machine, &plan).unwrap();
-    assert_eq!(codes(&findings.0), ["log::twice"]);
+    assert_eq!(codes(&findings.0), ["log::resumed", "log::twice"]);
+    assert_eq!(findings.0[0].place().unwrap(), "t.log:4:1");
+    assert!(findings.0[0].message.contains("set-up 2"), "{}", findings.0[0].message);
     assert!(read.complete);
     assert_eq!(read.touches.iter().map(|t| t.line).collect::<Vec<_>>(), [2, 5, 6]);
+}
+
+/// The clock of a program counts from its start: behind a second start it says nothing of the first one's.
+#[test]
+fn times_behind_a_second_start_are_not_used() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head", "x+");
+    for name in ["fanuc", "sinumerik", "heidenhain"] {
+        let post = Postprocessor::load_built_in_or_file(name).unwrap().0;
+        let mut all = records(&plan);
+        all.iter_mut().zip([400.0, 45.0, 60.0]).for_each(|(r, t)| r.time_s = Some(t));
+        let text = post.log_text(&machine, &plan, &all);
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let head = lines.iter().position(|l| l.starts_with("H ")).unwrap();
+        let u = lines[head].rfind('U').unwrap();
+        let again = lines[head][..u].to_owned() + &lines[head][u..].replace('1', "2");
+        let with_times = |lines: &[String]| {
+            let text = lines.join("\r\n") + "\r\n";
+            let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post), &machine, &plan).unwrap();
+            (read.touches.iter().map(|t| t.time_s).collect::<Vec<_>>(), codes(&findings.0).contains(&"log::resumed"))
+        };
+        assert_eq!(with_times(&lines), (vec![Some(400.0), Some(45.0), Some(60.0)], false), "{name}");
+        lines.insert(head + 2, again);
+        assert_eq!(with_times(&lines), (vec![Some(400.0), None, None], true), "{name}");
+    }
 }
 
 #[test]

@@ -76,6 +76,8 @@ pub struct ProgramFile {
     pub name_other: String,
     /// The highest number of a label; absent: any.
     pub last_label: Option<usize>,
+    /// The highest number of a program (`program_number` in `[settings]`), Fanuc and Haas; absent: 9999.
+    pub last_program: Option<u32>,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.

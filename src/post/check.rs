@@ -76,6 +76,15 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
             log_always_open: c.log_always_open,
         }
     });
+    if file.check.as_ref().is_some_and(|c| c.dialect == w::DialectName::MacroB) && file.file.block_numbers.is_some() {
+        check.error(
+            &file.file.line_length.span(),
+            "post::block_numbers",
+            "block_numbers of [file]: N numbers are the labels of this control, a running number could be one of them"
+                .to_owned(),
+            "leave block_numbers out",
+        );
+    }
     let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {
         name: file.name.get_ref().clone(),
@@ -88,6 +97,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         based_on: file.based_on.clone(),
         name_characters: (file.file.name_characters.clone(), file.file.name_other.clone()),
         last_label: file.file.last_label,
+        last_program: file.file.last_program,
         companions: file.companion.iter().map(|c| c.says.clone()).collect(),
         coordinates: file.number.coordinates,
         number,

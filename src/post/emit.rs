@@ -154,6 +154,7 @@ impl<'a> Writer<'a> {
     }
 
     fn check_input(&mut self) -> Result<()> {
+        self.post.check_program_number()?;
         if let Some(axis) = self.axes.iter().find(|a| !self.post.result.contains_key(a)) {
             return Err(Failure::new(
                 "post::no_result",

@@ -4,7 +4,8 @@
 //! loses that when one of its lines is changed: what a manual says of the base is no word on the change.
 
 use super::{BUILT_IN, Postprocessor, check};
-use crate::diag::{Failure, Findings, Result, Source, from_toml, source};
+use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml, source};
+use std::collections::BTreeSet;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -33,13 +34,73 @@ pub fn parse_alone(source: &Source) -> Result<(Postprocessor, Findings)> {
 /// # Errors
 /// As [`parse_alone`], and when the base is not found or unusable.
 pub(super) fn parse(source: &Source, read: &dyn Fn(&Path) -> Result<String>) -> Result<(Postprocessor, Findings)> {
-    let Some(whole) = completed(source, read, 0)? else { return check::parse(source) };
+    let Some((whole, of_base)) = completed(source, read, 0)? else {
+        let (post, findings) = check::parse(source)?;
+        // a copy may leave settings of the built-in file without a use
+        let tables = || BUILT_IN.iter().filter_map(|(_, text)| toml::from_str::<Table>(text).ok());
+        uses_its_settings(&post, source, || tables().flat_map(|table| settings(&table)).collect())?;
+        return Ok((post, findings));
+    };
     let (post, findings) = check::parse(&whole)?;
+    uses_its_settings(&post, source, || of_base)?;
     Ok((Postprocessor { text: source.inner().clone(), ..post }, findings))
 }
 
+fn settings(table: &Table) -> BTreeSet<String> {
+    let settings = table.get("settings").and_then(Value::as_table);
+    settings.into_iter().flat_map(Table::keys).cloned().collect()
+}
+
+/// A setting of the file's own that neither its base knows nor a template uses: a misspelled one would be taken without a
+/// word, and the meant one stay as it was.
+fn uses_its_settings(post: &Postprocessor, source: &Source, known: impl FnOnce() -> BTreeSet<String>) -> Result<()> {
+    let unused: Vec<&String> = post.settings.keys().filter(|name| !post.names_setting(name)).collect();
+    if unused.is_empty() {
+        return Ok(());
+    }
+    let (known, mut findings) = (known(), Findings::default());
+    for name in unused.into_iter().filter(|name| !known.contains(*name)) {
+        let near = post.settings.keys().filter(|other| *other != name).min_by_key(|other| distance(name, other));
+        let meant =
+            near.filter(|other| distance(name, other) <= 2).map_or(String::new(), |n| format!("is {n} meant? "));
+        let finding = Finding::error("post::unused_setting", format!("no template uses the setting {name:?}"))
+            .help(format!("{meant}`axiscal controllers show` lists the settings of a controller"));
+        let begins =
+            |line: &str| line.trim_start().strip_prefix(name.as_str()).is_some_and(|r| r.trim_start().starts_with('='));
+        let mut at = 0;
+        let place = source.inner().split_inclusive('\n').find_map(|line| {
+            let here = at..at + line.trim_end().len();
+            at += line.len();
+            begins(line).then_some(here)
+        });
+        findings.push(match place {
+            Some(place) => finding.at(source, place),
+            None => finding,
+        });
+    }
+    findings.finish(()).map(|_| ())
+}
+
+/// How many letters lie between two words: added, left out or changed.
+fn distance(one: &str, other: &str) -> usize {
+    let other: Vec<char> = other.chars().collect();
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (i, a) in one.chars().enumerate() {
+        let mut corner = std::mem::replace(&mut row[0], i + 1);
+        for (j, b) in other.iter().enumerate() {
+            let changed = corner + usize::from(a != *b);
+            corner = row[j + 1];
+            row[j + 1] = changed.min(row[j] + 1).min(corner + 1);
+        }
+    }
+    row.last().copied().unwrap_or(0)
+}
+
+/// The whole file, and the settings of its base.
+type Completed = (Source, BTreeSet<String>);
+
 /// The file with everything that it takes from its base; `None` when it has none.
-fn completed(text: &Source, read: &dyn Fn(&Path) -> Result<String>, depth: usize) -> Result<Option<Source>> {
+fn completed(text: &Source, read: &dyn Fn(&Path) -> Result<String>, depth: usize) -> Result<Option<Completed>> {
     // what is no TOML is reported with its place by the one who reads it
     let Ok(own) = toml::from_str::<Table>(text.inner()) else { return Ok(None) };
     let Some(Value::String(word)) = own.get("based_on").cloned() else { return Ok(None) };
@@ -59,15 +120,16 @@ fn completed(text: &Source, read: &dyn Fn(&Path) -> Result<String>, depth: usize
         })?;
         source(format!("postprocessors/{file} (built in)"), *text)
     };
-    let base = completed(&base, read, depth + 1)?.unwrap_or(base);
+    let base = completed(&base, read, depth + 1)?.map_or(base, |(whole, _)| whole);
     let mut whole: Table = toml::from_str(base.inner())
         .map_err(|e| from_toml(&e, &base, "post::not_toml").help("the base is unusable"))?;
+    let of_base = settings(&whole);
     merge(&mut whole, own);
     let written = toml::to_string_pretty(&whole).map_err(|e| {
         Failure::new("post::base", format!("{} cannot be completed from {word:?}: {e}", text.name()))
             .help("copy the base and change the copy")
     })?;
-    Ok(Some(source(format!("{} completed from {word}", text.name()), written)))
+    Ok(Some((source(format!("{} completed from {word}", text.name()), written), of_base)))
 }
 
 fn merge(base: &mut Table, own: Table) {
@@ -109,6 +171,18 @@ unverified = "the builder's sheet"
         assert_eq!((post.settings["orient"].clone(), &post.log), (base.settings["orient"].clone(), &base.log));
         assert_eq!(post.unverified, [("write.rapid".to_owned(), "the builder's sheet".to_owned())]);
         assert_eq!(post.text, VARIANT);
+    }
+
+    #[test]
+    fn a_setting_that_nothing_uses_is_an_error_with_its_place() {
+        let text = VARIANT.replace("release_feed = ", "release_fed = ");
+        let failure = parse_alone(&source("mine.toml", text)).unwrap_err();
+        assert_eq!(failure.0[0].place().as_deref(), Some("mine.toml:6:1"));
+        assert!(failure.0[0].help.as_deref().unwrap().contains("is release_feed meant?"), "{failure}");
+        // what a template of the file's own uses is known
+        let text = VARIANT.replace("release_feed = ", "my_feed = ").replace("F5000", "F{{ settings.my_feed }}");
+        assert!(parse_alone(&source("mine.toml", text)).is_ok());
+        assert_eq!((distance("probe_onn", "probe_on"), distance("a", "xyz"), distance("", "ab")), (1, 3, 2));
     }
 
     #[test]

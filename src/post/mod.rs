@@ -12,6 +12,7 @@ mod inherit;
 mod log_text;
 mod moves;
 mod nc;
+mod numbers;
 mod opening;
 mod render;
 mod spelling;
@@ -65,6 +66,8 @@ pub struct Postprocessor {
     pub name_characters: (String, String),
     /// The highest number of a label.
     pub last_label: Option<usize>,
+    /// The highest number of a program.
+    pub last_program: Option<u32>,
     /// Files beside the program: what each is for.
     pub companions: Vec<String>,
     /// Which coordinates the words of a program are (not under a transformation).

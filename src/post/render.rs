@@ -5,11 +5,27 @@ use super::as_written::EndOfLine;
 use crate::diag::{Failure, Result};
 use minijinja::Value;
 
+/// Does a line take a block number? Not the head or end of a file (`%`), and not an O-word.
+fn is_block(line: &str) -> bool {
+    !line.starts_with(['%', 'O', 'o'])
+}
+
 impl Postprocessor {
     /// Whether a template names labels; numbers are scarce on some controls, so only those take any.
     pub(super) fn uses_labels(&self, template: &str) -> bool {
         let names = |text: &str| text.contains("label") || text.contains("include");
         self.templates.get_template(template).is_ok_and(|t| names(t.source()))
+    }
+
+    /// Does a template use this setting?
+    pub(super) fn names_setting(&self, name: &str) -> bool {
+        let whole = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+        let uses = |text: &str| {
+            // by a name that is made in the template it may be any
+            text.contains("settings[")
+                || text.split("settings.").skip(1).any(|t| t.strip_prefix(name).is_some_and(whole))
+        };
+        self.templates.templates().any(|(_, template)| uses(template.source()))
     }
 
     /// A name as the control takes it.
@@ -32,9 +48,11 @@ impl Postprocessor {
     pub(super) fn lines(&self, text: &str) -> String {
         let kept = text.lines().filter(|line| self.blank_lines || !line.trim().is_empty());
         let mut out = String::with_capacity(text.len());
-        for (index, line) in kept.enumerate() {
-            if let Some(rule) = &self.block_numbers {
+        let mut index = 0;
+        for line in kept {
+            if let Some(rule) = self.block_numbers.as_ref().filter(|_| is_block(line)) {
                 out.push_str(&rule.word.replace("{n}", &(rule.first + index * rule.step).to_string()));
+                index += 1;
             }
             out.push_str(line);
             out.push('\n');

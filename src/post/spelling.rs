@@ -194,10 +194,12 @@ impl CommentRule {
     /// Would the control act on a remark that begins like this?
     fn is_reserved(&self, line: &str) -> bool {
         let squeezed: String = line.chars().filter(|c| !c.is_whitespace()).collect();
-        self.reserved.iter().any(|word| {
-            squeezed.get(..word.len()).is_some_and(|head| head.eq_ignore_ascii_case(word))
-                && !squeezed[word.len()..].starts_with(|c: char| c.is_ascii_alphanumeric())
-        })
+        let begins = |text: &str, word: &str| {
+            text.get(..word.len()).is_some_and(|head| head.eq_ignore_ascii_case(word))
+                && !text[word.len()..].starts_with(|c: char| c.is_ascii_alphanumeric())
+        };
+        // as one word, or with blanks in it: what nearly acts is no remark
+        self.reserved.iter().any(|word| begins(line.trim_start(), word) || begins(&squeezed, word))
     }
 }
 

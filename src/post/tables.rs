@@ -129,6 +129,10 @@ fn nine() -> usize {
     9
 }
 
+fn one() -> u32 {
+    1
+}
+
 fn large() -> f64 {
     1e6
 }
@@ -144,10 +148,32 @@ pub struct BackupForm {
     pub comment: String,
     /// The control's file ends with this line.
     pub last_line: Option<String>,
+    /// A line that says of which channel the values behind it are, from `{n}`: `CHANDATA({n})`.
+    pub sections: Option<String>,
+    /// The channel that is read, and that the files are written for.
+    #[serde(default = "one")]
+    pub section: u32,
+    /// Beginnings of names that are of no channel.
+    #[serde(default)]
+    pub everywhere: Vec<String>,
     /// Document and page.
     pub source: Option<String>,
     /// Why it is not verified.
     pub unverified: Option<String>,
+}
+
+impl BackupForm {
+    /// Is a value of no channel?
+    #[must_use]
+    pub fn is_everywhere(&self, name: &str) -> bool {
+        self.everywhere.iter().any(|begins| name.starts_with(begins.as_str()))
+    }
+
+    /// How the control calls a channel.
+    #[must_use]
+    pub fn section_name(&self, n: u32) -> String {
+        self.sections.as_ref().map_or_else(|| n.to_string(), |form| form.replace("{n}", &n.to_string()))
+    }
 }
 
 /// The forms of a backup.

@@ -133,6 +133,9 @@ pub struct Tables {
     pub files: Vec<String>,
     /// The vectors.
     pub vectors: Vec<Vector>,
+    /// By the control's name: what the files hold, in their unit. A later backup must hold the same.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub values: BTreeMap<String, f64>,
     /// By rotary axis: the coordinate at which it really stands at zero, deg.
     #[serde(default)]
     pub zero_deg: BTreeMap<AxisName, f64>,
@@ -289,6 +292,9 @@ impl Compensation {
         }
         if !read.reference_mm.iter().all(|v| v.is_finite()) {
             wrong("reference_mm is not a point".to_owned());
+        }
+        if !read.tables.iter().flat_map(|t| t.values.values()).all(|v| v.is_finite()) {
+            wrong("a value of the tables is not a number".to_owned());
         }
         for grid in read.tables.iter().flat_map(|t| &t.grids) {
             let numbers = [grid.min, grid.step].iter().chain(&grid.values).all(|v| v.is_finite());

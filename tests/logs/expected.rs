@@ -5,7 +5,7 @@ const CASES: &[Case] = &[
     case("good/probeopen.log", Some("1 2 3"), &[], ""),
     case("good/run.log", Some("1 2 3"), &[], ""),
     case("good/spreadsheet.csv", Some("1 2 3"), &[], ""),
-    case("good/started-again.log", Some("1 2 3"), &[], ""),
+    case("good/started-again.log", Some("1 2 3"), &["log::resumed 4:1"], "the program was started again at set-up 2"),
     case("good/touches.csv", Some("1 2 3"), &[], ""),
     case("bad/binary.log", None, &["log::binary 1:5"], "byte 5 is no text: this is a binary file"),
     case("bad/blank.log", None, &["log::empty 1:1"], "bad/blank.log:1:1: the log is empty"),

@@ -91,6 +91,11 @@ impl<'a> Reader<'a> {
 
     fn line(&mut self, line: &Line<'_>, at: usize) -> Result<(), Fault> {
         let mut scan = Scan::new(*line, line.text, self.post.number.mark);
+        // at the end of a line, behind a remark too, it takes the next line into this block
+        if let Some(at) = line.text.find('~') {
+            let says = "~ goes on in the next line: axiscal reads blocks of one line";
+            return Err(line.fault(line.text.get(at..).unwrap_or(""), says));
+        }
         if let Some(rule) = &self.post.block_numbers {
             let expected = rule.word.replace("{n}", &(rule.first + at * rule.step).to_string());
             scan.need(&expected, &format!("the block number {}", expected.trim_end()))?;
@@ -146,14 +151,14 @@ impl<'a> Reader<'a> {
             let value = formula(scan, 0)?;
             self.code.push(at, What::Set(var, value));
         } else if scan.take("LBL ") {
-            let label = scan.whole("the number of a label")?;
+            let label = self.label(scan)?;
             if label == 0 {
                 self.code.push(at, What::Return(None));
             } else if self.labels.insert(label, self.code.statements.len()).is_some() {
                 return Err(Fault { at, says: format!("LBL {label} stands twice") });
             }
         } else if scan.take("CALL LBL ") {
-            let label = scan.whole("the number of a label")?;
+            let label = self.label(scan)?;
             let call = self.code.push(at.clone(), What::Call(0));
             self.jumps.push((call, label, at));
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
@@ -196,6 +201,16 @@ impl<'a> Reader<'a> {
             return Err(scan.expected("a block that axiscal knows"));
         }
         Ok(())
+    }
+
+    /// The number of a label that the control has; 0 ends a subprogram.
+    fn label(&self, scan: &mut Scan<'_>) -> Result<u32, Fault> {
+        let at = scan.place();
+        let label = scan.whole("the number of a label")?;
+        match self.post.wrong_label(label).filter(|_| label != 0) {
+            Some(wrong) => Err(Fault { at, says: format!("LBL {label}: {wrong}") }),
+            None => Ok(label),
+        }
     }
 
     /// ` X+10 IC-90`: the axis words that stand here, each behind a blank.
@@ -292,7 +307,7 @@ impl<'a> Reader<'a> {
         scan.need(sign, &format!("{} of FN {n}", sign.trim()))?;
         let right = scan.signed(WHAT)?;
         scan.need(" GOTO LBL ", "GOTO LBL")?;
-        let label = scan.whole("the number of a label")?;
+        let label = self.label(scan)?;
         let over = self.code.push(at.clone(), What::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
         let jump = self.code.push(at.clone(), What::Jump(0));
         self.jumps.push((jump, label, at));

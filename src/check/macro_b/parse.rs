@@ -7,7 +7,7 @@ use crate::axes::AxisName;
 use crate::check::code::{Code, Expr, Function, Op, Piece, Text, Var, What, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
-use crate::post::NumberRule;
+use crate::post::Postprocessor;
 use nom::branch::alt;
 use nom::bytes::complete::{tag, take_till, take_while};
 use nom::character::complete::{char, digit1, one_of};
@@ -30,8 +30,13 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 ///
 /// # Errors
 /// The first place that is not of this grammar.
-pub fn parse(text: &str, number: &NumberRule) -> Result<Code, Fault> {
-    let mut reader = Reader { names: number.spoken(), always_mark: number.always_mark, ..Reader::default() };
+pub fn parse(text: &str, post: &Postprocessor) -> Result<Code, Fault> {
+    let mut reader = Reader {
+        names: post.number.spoken(),
+        always_mark: post.number.always_mark,
+        post: Some(post),
+        ..Reader::default()
+    };
     for line in lines(text) {
         reader.line(&line)?;
     }
@@ -39,7 +44,9 @@ pub fn parse(text: &str, number: &NumberRule) -> Result<Code, Fault> {
 }
 
 #[derive(Default)]
-struct Reader {
+struct Reader<'p> {
+    /// The control, for its ranges.
+    post: Option<&'p Postprocessor>,
     /// What the control calls each axis.
     names: Vec<(String, AxisName)>,
     /// Every number of a place or a feed is written with its decimal point: one without has lost it.
@@ -52,7 +59,7 @@ struct Reader {
     ended: bool,
 }
 
-impl Reader {
+impl Reader<'_> {
     fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
         let rest = line.text;
         if rest.is_empty() {
@@ -75,15 +82,18 @@ impl Reader {
             return Err(line.fault(rest, "the program does not begin with %"));
         }
         if !self.number {
-            let (after, _) = preceded(char('O'), digit1)
+            let (after, digits) = preceded(char('O'), digit1)
                 .parse(rest)
                 .map_err(|e: Failed<'_>| line.unread(&e, "the program's number, O1234"))?;
+            if let Some(wrong) = self.post.and_then(|post| post.wrong_program_number(digits)) {
+                return Err(line.fault(rest, format!("O{digits}: {wrong}")));
+            }
             self.number = true;
             return self.comments(line, after);
         }
         let mut rest = rest;
         if let Ok((after, digits)) = preceded(char('N'), digit1::<_, nom::error::Error<&str>>).parse(rest) {
-            let label = sequence_number(line, rest, digits)?;
+            let label = self.label(line, rest, digits)?;
             if self.labels.insert(label, self.code.statements.len()).is_some() {
                 return Err(line.fault(rest, format!("N{label} stands twice")));
             }
@@ -132,10 +142,19 @@ impl Reader {
         let (after, digits) = preceded(tag("GOTO"), cut(digit1))
             .parse(rest)
             .map_err(|e: Failed<'_>| line.unread(&e, "GOTO and a sequence number"))?;
-        let label = sequence_number(line, rest, digits)?;
+        let label = self.label(line, rest, digits)?;
         let jump = self.code.push(at.clone(), What::Jump(0));
         self.jumps.push((jump, label, at));
         Ok(after)
+    }
+
+    /// A sequence number that the control has.
+    fn label(&self, line: &Line<'_>, rest: &str, digits: &str) -> Result<u32, Fault> {
+        let label = sequence_number(line, rest, digits)?;
+        match self.post.and_then(|post| post.wrong_label(label)) {
+            Some(wrong) => Err(line.fault(rest, format!("N{digits}: {wrong}"))),
+            None => Ok(label),
+        }
     }
 
     fn assignment<'a>(&mut self, line: &Line<'a>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
@@ -372,8 +391,15 @@ mod tests {
     use super::*;
     use crate::post::Postprocessor;
 
+    /// The built-in control, for a program of the number 1.
+    fn fanuc() -> Postprocessor {
+        let mut post = Postprocessor::load_built_in_or_file("fanuc").unwrap().0;
+        post.settings.insert("program_number".into(), "1".into());
+        post
+    }
+
     fn read(text: &str) -> Result<Code, Fault> {
-        parse(text, &Postprocessor::load_built_in_or_file("fanuc").unwrap().0.number)
+        parse(text, &fanuc())
     }
 
     #[test]
@@ -399,6 +425,14 @@ mod tests {
             ("%\nO1\n(100%)\n%\n", 9),
             ("%\nO1\nG4 P10 (UP; DOWN)\n%\n", 15),
             ("%\nO1\n(\u{d6}L)\n%\n", 6),
+            // beyond what the control has
+            ("%\nO1\nGOTO99999999\nM30\n%\n", 5),
+            ("%\nO1\nN0\nM30\n%\n", 5),
+            ("%\nO1\nN100000\nM30\n%\n", 5),
+            // another program
+            ("%\nO2\nM30\n%\n", 2),
+            ("%\nO0\nM30\n%\n", 2),
+            ("%\nO123456789\nM30\n%\n", 2),
         ] {
             let fault = read(text).unwrap_err();
             if fault.at.start != place {
@@ -406,6 +440,19 @@ mod tests {
             }
         }
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+
+    #[test]
+    fn a_program_has_no_number_that_it_calls() {
+        let mut post = Postprocessor::load_built_in_or_file("fanuc-inspection-plus").unwrap().0;
+        for (number, good) in [("9100", true), ("9810", false), ("9833", false), ("9999", true), ("10000", false)] {
+            post.settings.insert("program_number".into(), number.into());
+            assert_eq!(parse(&format!("%\nO{number}\nM30\n%\n"), &post).is_ok(), good, "{number}");
+        }
+        // where the file does not say the number, the range is what is left to look at
+        post.settings.remove("program_number");
+        assert!(parse("%\nO77\nM30\n%\n", &post).is_ok());
+        assert!(parse("%\nO0\nM30\n%\n", &post).is_err());
     }
 
     proptest::proptest! {

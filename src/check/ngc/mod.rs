@@ -1,5 +1,6 @@
 //! LinuxCNC's RS274/NGC, as far as our programs use it.
 
+mod comments;
 mod control;
 mod parse;
 

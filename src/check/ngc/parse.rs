@@ -2,11 +2,12 @@
 //!
 //! Source: LinuxCNC 2.9 manual, chapters 11.3 (lines, words, expressions), 11.4 (comments), 11.7 (O-codes).
 
-use crate::check::code::{Code, Expr, Function, Op, Piece, Text, Var, What, Word};
+use super::comments::comments;
+use crate::check::code::{Code, Expr, Function, Op, Var, What, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
 use nom::branch::alt;
-use nom::bytes::complete::{tag, tag_no_case, take_till, take_while1};
+use nom::bytes::complete::{tag, tag_no_case, take_while1};
 use nom::character::complete::{char, digit1, one_of};
 use nom::combinator::{cut, opt};
 use nom::sequence::{delimited, preceded};
@@ -17,9 +18,6 @@ use std::sync::Arc;
 
 /// The letters that a block may hold.
 const ADDRESSES: [&str; 16] = ["G", "M", "X", "Y", "Z", "A", "B", "C", "F", "S", "P", "L", "R", "E", "D", "Q"];
-
-/// Words that make a comment do something that our programs do not use.
-const OTHER_ACTIVE: [&str; 6] = ["PRINT", "PROBEOPEN", "PROBECLOSE", "PY", "PYRUN", "PYRELOAD"];
 
 /// Reads a program.
 ///
@@ -42,11 +40,14 @@ struct Reader {
     percents: usize,
 }
 
-/// A line without its number, which the control does not look at: `N10 G0 Z5`.
+/// A line without its number, which the control does not look at: `N10 G0 Z5`; at most five digits (manual 11.3.2).
 fn line_number(rest: &str) -> &str {
+    const DIGITS: usize = 5;
     let Some(digits) = rest.strip_prefix(['n', 'N']).map(str::trim_start) else { return rest };
     let after = digits.trim_start_matches(|c: char| c.is_ascii_digit());
-    if after.len() == digits.len() { rest } else { after.trim_start_matches([' ', '\t']) }
+    let count = digits.len() - after.len();
+    // what is no line number is no word either, and is refused where the words are read
+    if (1..=DIGITS).contains(&count) { after.trim_start_matches([' ', '\t']) } else { rest }
 }
 
 /// A structure that is not closed yet.
@@ -95,43 +96,10 @@ impl Reader {
 
     /// The comments that end a line.
     fn comments(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
-        let mut rest = rest;
-        loop {
-            let (after, _) = blanks(rest).map_err(|e| line.unread(&e, "a comment"))?;
-            if after.is_empty() {
-                return Ok(());
-            }
-            let (next, body) =
-                delimited(char('('), take_till(|c| c == '(' || c == ')'), char(')')).parse(after).map_err(
-                    |e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "a word, a comment or the line's end"),
-                )?;
-            self.comment(line, after, body)?;
-            rest = next;
+        let alone = line_number(line.text.trim_start_matches([' ', '\t'])).len() == rest.len();
+        if let Some((at, what)) = comments(line, rest, alone)? {
+            self.code.push(at, what);
         }
-    }
-
-    fn comment(&mut self, line: &Line<'_>, place: &str, body: &str) -> Result<(), Fault> {
-        let (head, tail) = body.split_once(',').map_or((body, None), |(h, t)| (h, Some(t)));
-        let word: String = head.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_ascii_uppercase();
-        let at = line.rest(place);
-        let text = |fixed: bool| -> Result<Text, Fault> {
-            let tail = tail.ok_or_else(|| line.fault(place, format!("({word}) needs a comma and a text")))?;
-            if fixed { Ok(vec![Piece::Text(Arc::from(tail))]) } else { expanded(line, tail) }
-        };
-        let what = match word.as_str() {
-            "MSG" => What::Message(text(true)?),
-            "DEBUG" => What::Message(text(false)?),
-            "ABORT" => What::Abort(text(false)?),
-            "LOG" => What::LogLine(text(false)?),
-            "LOGOPEN" => What::LogOpen { name: text(true)?, append: false },
-            "LOGAPPEND" => What::LogOpen { name: text(true)?, append: true },
-            "LOGCLOSE" => What::LogClose,
-            other if OTHER_ACTIVE.contains(&other) => {
-                return Err(line.fault(place, format!("a comment that begins with {other} acts on the control")));
-            }
-            _ => return Ok(()),
-        };
-        self.code.push(at, what);
         Ok(())
     }
 
@@ -314,41 +282,12 @@ impl Reader {
     }
 }
 
-/// Text with `%f`, `%.3f` and parameters in it.
-fn expanded(line: &Line<'_>, text: &str) -> Result<Text, Fault> {
-    const USUAL_DECIMALS: usize = 4;
-    let mut out = Text::new();
-    let (mut rest, mut decimals) = (text, USUAL_DECIMALS);
-    while !rest.is_empty() {
-        let plain = rest.find(['%', '#']).unwrap_or(rest.len());
-        if plain > 0 {
-            out.push(Piece::Text(Arc::from(&rest[..plain])));
-            rest = &rest[plain..];
-            continue;
-        }
-        if let Some(after) = rest.strip_prefix('%') {
-            let (after, new) = format(after).map_err(|e| line.unread(&e, "%f, %d or %.3f"))?;
-            (rest, decimals) = (after, new.unwrap_or(USUAL_DECIMALS));
-            continue;
-        }
-        let (after, value) = preceded(char('#'), parameter).parse(rest).map_err(|e| line.unread(&e, "a parameter"))?;
-        out.push(Piece::Fixed { decimals, width: 0, value });
-        rest = after;
-    }
-    Ok(out)
-}
-
-fn format(input: &str) -> IResult<&str, Option<usize>> {
-    let digits = (char('.'), one_of("0123456789"), char('f')).map(|(_, d, _)| d.to_digit(10).map(|d| d as usize));
-    alt((digits, char('d').map(|_| Some(0)), char('f').map(|_| None))).parse(input)
-}
-
 fn bracketed_name(input: &str) -> IResult<&str, &str> {
     delimited(char('<'), take_while1(|c: char| c.is_ascii_alphanumeric() || c == '_'), char('>')).parse(input)
 }
 
 /// What follows `#`.
-fn parameter(input: &str) -> IResult<&str, Expr> {
+pub(super) fn parameter(input: &str) -> IResult<&str, Expr> {
     let name = bracketed_name.map(|n: &str| Expr::Var(Var::Name(Arc::from(n.to_ascii_lowercase()))));
     let plain = digit1.map(|d: &str| d.parse().map_or(Expr::Number(f64::NAN), |n| Expr::Var(Var::Number(n))));
     let computed = bracketed.map(|e| Expr::Indirect(Box::new(e)));
@@ -479,6 +418,23 @@ mod tests {
             ("G-0 X1\n", 0),
             ("G4 P-1\n", 3),
             ("M+5\n", 0),
+            // the control acts on the last comment of a line only
+            ("(LOG,one)(A)\n", 0),
+            ("G0 X1\n(ABORT,five) (A)\n", 6),
+            ("(B)(LOG,three)\n", 3),
+            ("(LOG,one)(LOG,two)\n", 0),
+            // and before everything else in it
+            ("G0 X1 (LOG,one)\n", 6),
+            ("o1 if [1 GT 0] (MSG,one)\no1 endif\n", 15),
+            ("N100000 G0 X1\n", 0),
+            // by the first word, whatever follows
+            ("(PROBEOPEN small.log)\n", 0),
+            ("( probeclose now)\n", 0),
+            ("(LOGCLOSE now)\n", 0),
+            ("(LOG ,one)\n", 0),
+            ("(D E B U G,one)\n", 0),
+            ("(MSG)\n", 0),
+            ("(PYRUN x)\n", 0),
         ] {
             let fault = parse(text).unwrap_err();
             if fault.at.start != place {
@@ -488,9 +444,22 @@ mod tests {
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     }
 
+    #[test]
+    fn remarks_are_no_comments_that_act() {
+        for text in [
+            "(A)(B)\n",
+            "G0 X1 (logger)(messages)\n",
+            "o1 if [1 GT 0] (A)\no1 endif\n",
+            "N10 (LOG,one)\n",
+            "(- log, two)\n",
+        ] {
+            parse(text).unwrap_or_else(|e| panic!("{text:?}: {}", e.says));
+        }
+    }
+
     proptest::proptest! {
         #[test]
-        fn rubbish_never_panics(text in "[ -~\n]{0,300}") {
+        fn rubbish_never_panics(text in "[ -~\n\u{e4}]{0,300}") {
             let _ = parse(&text);
         }
 

@@ -5,7 +5,7 @@
 //! postprocessor file says, unverified where it says so.
 
 use super::expression::{Names, Type, identifier, is_truth, quoted};
-use super::words::words;
+use super::words::{means_something, words};
 use crate::axes::AxisName;
 use crate::check::code::{Code, Expr, Function, Piece, Text, Var, What};
 use crate::check::lines::{Line, blanks, lines};
@@ -19,13 +19,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
-
-/// Words that cannot be names of variables or labels.
-const RESERVED: [&str; 28] = [
-    "DEF", "INT", "REAL", "STRING", "IF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "LOOP", "ENDLOOP", "REPEAT", "UNTIL",
-    "GOTO", "GOTOF", "GOTOB", "MSG", "SETAL", "WRITE", "DELETE", "SPRINT", "SUPA", "STOPRE", "TRAFOOF", "TRAORI",
-    "TRANS", "MEAS", "SPOS",
-];
 
 /// Reads a program. The names of the axes are those of the postprocessor file.
 ///
@@ -237,7 +230,7 @@ impl Reader {
     fn free(&self, line: &Line<'_>, rest: &str, name: &str) -> Result<(), Fault> {
         const LENGTH: std::ops::RangeInclusive<usize> = 2..=31;
         let taken = self.names.types.contains_key(name) || self.names.axis(name).is_some();
-        if taken || RESERVED.contains(&name) || self.names.number(name).is_some() {
+        if taken || means_something(name) || self.names.number(name).is_some() {
             return Err(line.fault(rest, format!("{name} already means something else")));
         }
         if !LENGTH.contains(&name.len()) {
@@ -338,8 +331,12 @@ impl Reader {
     fn label(&mut self, line: &Line<'_>, rest: &str, name: &str) -> Result<(), Fault> {
         self.running = true;
         const LENGTH: std::ops::RangeInclusive<usize> = 2..=32;
-        if RESERVED.contains(&name) || !LENGTH.contains(&name.len()) {
-            return Err(line.fault(rest, format!("{name} is no label")));
+        if !LENGTH.contains(&name.len()) {
+            return Err(line.fault(rest, format!("{name} is no label: it has 2 to 32 characters")));
+        }
+        if means_something(name) || self.names.axis(name).is_some() {
+            let says = format!("{name} is no label: the control reads a block number, an address or a word of its own");
+            return Err(line.fault(rest, says));
         }
         let place = (self.code.statements.len(), self.inside());
         match self.labels.insert(name.to_owned(), place) {
@@ -472,11 +469,12 @@ fn without_comment(text: &str) -> &str {
     text
 }
 
-/// A block behind its number.
+/// A block behind its number; a number alone is that of a remark.
 fn without_number(rest: &str) -> &str {
-    let number = (char('N'), digit1::<&str, nom::error::Error<&str>>, nom::character::complete::space1);
-    let mut number = number;
-    number.parse(rest).map_or(rest, |(after, _)| after)
+    let number = (char('N'), digit1::<&str, nom::error::Error<&str>>).parse(rest);
+    let behind = number.map_or(rest, |(after, _)| after);
+    let block = behind.trim_start_matches([' ', '\t']);
+    if behind.is_empty() || block.len() < behind.len() { block } else { rest }
 }
 
 /// `AXC_END:`

@@ -1,4 +1,4 @@
-//! The words of a block.
+//! The words of a block, and what is no name because it is one.
 
 use super::expression::{Names, identifier};
 use crate::axes::AxisName;
@@ -51,6 +51,82 @@ const BARE: [&str; 5] = ["SUPA", "STOPRE", "TRAFOOF", "TRAORI", "TRANS"];
 const NAMED: [&str; 4] = ["F", "MEAS", "SPOS", "D"];
 /// Letters with a number right behind them.
 const LETTERS: [&str; 4] = ["G", "M", "D", "F"];
+
+/// Words that cannot be names of variables or labels.
+const RESERVED: [&str; 28] = [
+    "DEF", "INT", "REAL", "STRING", "IF", "ELSE", "ENDIF", "WHILE", "ENDWHILE", "LOOP", "ENDLOOP", "REPEAT", "UNTIL",
+    "GOTO", "GOTOF", "GOTOB", "MSG", "SETAL", "WRITE", "DELETE", "SPRINT", "SUPA", "STOPRE", "TRAFOOF", "TRAORI",
+    "TRANS", "MEAS", "SPOS",
+];
+
+/// Words of the language that this grammar does not read: no name of a variable or label either.
+const OTHER_WORDS: [&str; 58] = [
+    "RET",
+    "PROC",
+    "EXTERN",
+    "CALL",
+    "ISOCALL",
+    "PCALL",
+    "FOR",
+    "TO",
+    "ENDFOR",
+    "CASE",
+    "OF",
+    "DEFAULT",
+    "GOTOC",
+    "GOTOS",
+    "REPEATB",
+    "ENDLABEL",
+    "ENDPROC",
+    "SBLON",
+    "SBLOF",
+    "SAVE",
+    "DISPLON",
+    "DISPLOF",
+    "VAR",
+    "BOOL",
+    "CHAR",
+    "AXIS",
+    "FRAME",
+    "AND",
+    "OR",
+    "XOR",
+    "NOT",
+    "DIV",
+    "MOD",
+    "TRUE",
+    "FALSE",
+    "AC",
+    "IC",
+    "DC",
+    "ACP",
+    "ACN",
+    "ABS",
+    "SQRT",
+    "ROUND",
+    "TRUNC",
+    "SIN",
+    "COS",
+    "TAN",
+    "MEAW",
+    "MEASA",
+    "MEAC",
+    "ATRANS",
+    "ROT",
+    "AROT",
+    "SCALE",
+    "MIRROR",
+    "STARTFIFO",
+    "STOPFIFO",
+    "REDEF",
+];
+
+/// Can a name not be one because it means something: an address with digits (`N70`, `M30`, `L10`, `R1`) or a word? The first
+/// two characters of a name are letters or `_`.
+pub fn means_something(name: &str) -> bool {
+    let address = name.as_bytes().get(1).is_none_or(u8::is_ascii_digit);
+    address || RESERVED.contains(&name) || OTHER_WORDS.contains(&name)
+}
 
 /// Axis and way of an address; `None` where it is no axis.
 pub fn axis_word(address: &str) -> Option<(AxisName, Way)> {

@@ -1,7 +1,7 @@
 //! The files of an export: the control's own through its templates, and what a person reads.
 
 use super::backup::Old;
-use super::fill::Value as Entry;
+use super::fill::{Filled, Value as Entry};
 use super::{Export, Options};
 use crate::diag::{Failure, Findings, Result};
 use crate::machine::Machine;
@@ -11,11 +11,13 @@ use crate::tables::correction::Correction;
 use crate::tables::linuxcnc::{head, one_line, render};
 use crate::units::{inch_from_mm, mm_from_inch};
 use minijinja::{Value, context};
+use std::collections::BTreeMap;
 
 const README: &str = include_str!("../templates/control/readme.txt.j2");
 
 /// A number with so many digits; a minus before zero is none.
-fn digits(value: f64, decimals: usize, always_mark: bool) -> String {
+#[must_use]
+pub fn digits(value: f64, decimals: usize, always_mark: bool) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
         text.trim_start_matches('-').to_owned()
@@ -33,10 +35,7 @@ fn entry(
     tables: &Tables,
     old: &Old,
 ) -> Option<Value> {
-    let name = match spelling {
-        Some(s) => value.names.get(s)?.clone(),
-        None => value.names.values().next()?.clone(),
-    };
+    let name = value.name(spelling)?.clone();
     // what is restored is restored in the unit in which it was given
     let (factor, decimals, shown_unit) = match (value.unit, unit) {
         ("mm", LengthUnit::Inch) => (inch_from_mm(1.0), super::fill::decimals(*tables.step_inch.get_ref()), "inch"),
@@ -44,7 +43,7 @@ fn entry(
         _ => (1.0, value.decimals, value.unit),
     };
     let show = |v: f64| digits(v * factor, decimals, tables.always_mark);
-    let given = value.names.values().find(|n| old.values.contains_key(*n));
+    let given = value.given.as_ref();
     let is_length = matches!(value.unit, "mm" | "inch");
     let same_unit = |n: &&String| !is_length || old.values.get(*n).is_some_and(|(_, u)| u.is_none_or(|u| u == unit));
     let old_text = match given.filter(same_unit).and_then(|n| old.texts.get(n)) {
@@ -94,7 +93,7 @@ pub(super) fn write(
     kind: &Kind,
     correction: &Correction,
     options: &Options,
-    known: bool,
+    (first, others): (&Filled, &BTreeMap<&str, Filled>),
     export: &mut Export,
     findings: &mut Findings,
 ) -> Result<()> {
@@ -117,12 +116,13 @@ pub(super) fn write(
     let common = |restore: bool, form: Option<&FileForm>| {
         let spelling = form.or(tables.file.first()).and_then(|f| f.spelling.as_deref());
         let unit = options.old.unit().filter(|_| restore).unwrap_or(options.unit);
+        let filled = spelling.and_then(|s| others.get(s)).unwrap_or(first);
         let entries: Vec<Value> =
-            export.values.iter().filter_map(|v| entry(v, spelling, restore, unit, tables, &options.old)).collect();
+            filled.values.iter().filter_map(|v| entry(v, spelling, restore, unit, tables, &options.old)).collect();
         let letter = if unit == LengthUnit::Mm { "M" } else { "I" };
         let shown: Vec<Value> = grids.iter().map(|g| grid(machine, tables, g, restore.then_some(&before(g)))).collect();
         let of_grids = form.is_some_and(|f| f.grids);
-        let known = if of_grids { grids_known } else { known };
+        let known = if of_grids { grids_known } else { filled.known() };
         context! {
             head => head.clone(), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
             axes => machine.rotary().map(|a| a.name.to_string()).collect::<Vec<_>>(),

@@ -33,6 +33,23 @@ pub struct Value {
     pub instead: bool,
     /// Why it is not verified.
     pub unverified: Option<String>,
+    /// By which name the user gave the old value.
+    #[serde(skip)]
+    pub given: Option<String>,
+    /// It was given by the name of another of the control's tables: this one's own is not known.
+    #[serde(skip)]
+    pub elsewhere: bool,
+}
+
+impl Value {
+    /// Its name in one of the control's tables, or the first one.
+    #[must_use]
+    pub fn name(&self, spelling: Option<&str>) -> Option<&String> {
+        match spelling {
+            Some(spelling) => self.names.get(spelling),
+            None => self.names.values().next(),
+        }
+    }
 }
 
 /// A filled table.
@@ -58,7 +75,7 @@ impl Filled {
     /// user's own are spelled.
     #[must_use]
     pub fn lacking(&self, old: &Old) -> Vec<String> {
-        let is_given = |v: &Value| v.names.values().any(|name| old.values.contains_key(name));
+        let is_given = |v: &Value| v.given.is_some();
         let begun = |instead: bool| self.values.iter().any(|v| v.instead == instead && is_given(v));
         let mut given = self.values.iter().flat_map(|v| &v.names).filter(|(_, name)| old.values.contains_key(*name));
         let spelling = given.next().map(|(spelling, _)| spelling.as_str()).unwrap_or_default();
@@ -83,6 +100,8 @@ pub struct Question<'a> {
     pub now: &'a Seen,
     /// The user's old values.
     pub old: &'a Old,
+    /// Whose names are meant first, where the control has several tables of the same values.
+    pub spelling: Option<&'a str>,
     /// Unit of the control.
     pub unit: LengthUnit,
     /// How far old values may lie off the description.
@@ -90,6 +109,9 @@ pub struct Question<'a> {
 }
 
 const OTHER_PLACE: &str = "are `origin`, `point` and `pivot` in machines.toml those of this machine, is it this machine's backup? --force adds the difference all the same";
+
+/// How far the length of a direction may be off 1.
+const UNIT_LENGTH: f64 = 1e-3;
 
 /// Digits behind the point that a step needs.
 #[must_use]
@@ -147,17 +169,19 @@ impl Question<'_> {
         }
     }
 
-    /// An old value by any of its names, in mm for a length.
-    fn old_value(&self, names: &BTreeMap<String, [String; 3]>, k: usize, length: bool) -> Option<f64> {
-        let (value, unit) = names.values().find_map(|n| self.old.values.get(&n[k]))?;
-        let inch = length && unit.unwrap_or(self.unit) == LengthUnit::Inch;
-        Some(if inch { mm_from_inch(*value) } else { *value })
+    /// The name by which the user gave an old value: the table's own, else that of another table.
+    fn given<'n>(&self, names: &'n BTreeMap<String, [String; 3]>, k: usize) -> Option<(&'n String, bool)> {
+        let own = self.spelling.and_then(|spelling| names.get(spelling));
+        let there = |n: &&'n String| self.old.values.contains_key(*n);
+        let mine = own.map(|n| &n[k]).filter(there);
+        mine.map(|n| (n, false)).or_else(|| names.values().map(|n| &n[k]).find(there).map(|n| (n, own.is_some())))
     }
 
-    /// Is the old value the control's own, and no assumption of an earlier export?
-    fn is_known(&self, names: &BTreeMap<String, [String; 3]>, k: usize) -> bool {
-        let given = names.values().map(|n| &n[k]).find(|n| self.old.values.contains_key(*n));
-        given.is_some_and(|n| !self.old.assumed.contains(n))
+    /// An old value, in mm for a length.
+    fn old_value(&self, names: &BTreeMap<String, [String; 3]>, k: usize, length: bool) -> Option<f64> {
+        let (value, unit) = self.given(names, k).and_then(|(n, _)| self.old.values.get(n))?;
+        let inch = length && unit.unwrap_or(self.unit) == LengthUnit::Inch;
+        Some(if inch { mm_from_inch(*value) } else { *value })
     }
 
     /// The old vector: the user's numbers where they are known, else as described.
@@ -203,6 +227,14 @@ impl Question<'_> {
                     off.insert(to, base + old - described);
                 }
                 (_, _, Some(turn)) => {
+                    if (old.norm() - 1.0).abs() > UNIT_LENGTH {
+                        let says = format!("the old direction {} has the length {:.4}, not 1", form.id, old.norm());
+                        findings.push(
+                            Finding::warning("tables::direction_length", says).help(
+                                "the new one has the length 1: is it this machine's backup, complete and unedited?",
+                            ),
+                        );
+                    }
                     turned.insert(turn, (old.try_normalize(1e-9).unwrap_or(described) - described) * sign(form));
                 }
                 _ => {
@@ -285,6 +317,7 @@ impl Question<'_> {
                     );
                 }
                 let shown = |v: f64| if direction { v } else { self.in_unit(v) };
+                let given = self.given(&form.names, k);
                 values.push(Value {
                     id: format!("{}.{}", form.id, ["x", "y", "z"][k]),
                     says: form.says.clone(),
@@ -296,7 +329,10 @@ impl Question<'_> {
                         (_, LengthUnit::Mm) => "mm",
                         (_, LengthUnit::Inch) => "inch",
                     },
-                    known: self.is_known(&form.names, k),
+                    // the table's own, and no assumption of an earlier export
+                    known: given.is_some_and(|(n, elsewhere)| !elsewhere && !self.old.assumed.contains(n)),
+                    given: given.map(|(n, _)| n.clone()),
+                    elsewhere: given.is_some_and(|(_, elsewhere)| elsewhere),
                     instead: form.instead,
                     decimals: if direction { self.tables.direction_decimals } else { decimals(self.in_unit(step)) },
                     unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),

@@ -10,6 +10,7 @@ mod files;
 pub mod fill;
 pub mod grids;
 mod left;
+mod old;
 
 use super::compensation::{Compensation, FORMAT, Mode, Tables as Record, Term, Vector};
 use super::correction::{Correction, Limits, restated, rounded};
@@ -22,6 +23,7 @@ use crate::diag::{Failure, Finding, Findings, Result, Severity};
 use crate::machine::{Machine, Side};
 use crate::post::tables::{Kind, LengthUnit, Tables, doubt};
 use backup::Old;
+pub use files::digits;
 use fill::{Filled, Question, Value};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -219,19 +221,37 @@ pub fn export(
     let length = machine.tool.length_mm;
     let seen = |terms: &[Term]| Seen::of(machine, &Errors::from_terms(terms, carried.reference_mm), length);
     let (before, now) = (seen(&with_active(&carried.terms)), seen(&carried.terms));
-    let question = Question {
+    let spellings = old::spellings(tables);
+    let question = |spelling| Question {
         machine,
         tables,
         kind,
         before: &before,
         now: &now,
         old: &options.old,
+        spelling,
         unit: options.unit,
         limits: options.limits,
     };
-    let (mut filled, more) = question.fill();
+    let (mut filled, more) = question(spellings.first().copied()).fill();
     findings.0.extend(more.0);
     let zero = add_angles(machine, tables, kind, &carried, options, &mut filled);
+    // the same values in another table, on top of that one's own old ones
+    let mut others: BTreeMap<&str, Filled> = BTreeMap::new();
+    for spelling in spellings.iter().skip(1) {
+        let (mut other, more) = question(Some(spelling)).fill();
+        findings.0.extend(
+            more.0.into_iter().filter(|f| !findings.0.iter().any(|g| g.message == f.message)).collect::<Vec<_>>(),
+        );
+        add_angles(machine, tables, kind, &carried, options, &mut other);
+        others.insert(spelling, other);
+    }
+    findings.0.extend(options.old.said.iter().map(|says| Finding::info("tables::old_chosen", says.clone())));
+    findings.0.extend(old::between_tables(tables, &filled, &others, &options.old));
+    let all = || std::iter::once(&filled).chain(others.values());
+    if let Some(active) = active.and_then(|a| a.tables.as_ref()) {
+        findings.0.extend(old::other_than_active(active, all(), options.unit));
+    }
     let old_grids = active.and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.grids);
     let unit_step = *tables.step_mm.get_ref();
     if let Some(unit) = options.old.unit().filter(|u| *u != options.unit) {
@@ -281,6 +301,8 @@ pub fn export(
             Finding::warning("tables::old_lacking", says)
                 .help("give these too: in the backup, or each as --old \"NAME=VALUE\"; without them the restoring file is not this machine's own"),
         );
+    } else if filled.values.iter().any(|v| v.elsewhere) {
+        // said above: they are those of another table
     } else if !filled.known() && !options.old.assumed.is_empty() {
         let marked: Vec<&str> = options.old.assumed.iter().map(String::as_str).collect();
         let says = format!(
@@ -317,7 +339,10 @@ pub fn export(
         radius_mm: options.radius_mm,
     };
     let left = pieces.left();
-    let known = filled.known();
+    let written: BTreeMap<String, f64> = std::iter::once((spellings.first().copied(), &filled))
+        .chain(others.iter().map(|(s, f)| (Some(*s), f)))
+        .flat_map(|(spelling, f)| f.values.iter().filter_map(move |v| Some((v.name(spelling)?.clone(), v.new))))
+        .collect();
     let (rounding_um, rest_um, longer_tool_um) = pieces.figures(&now);
     let mut terms = carried.terms.clone();
     terms.extend(carried.zero.iter().cloned());
@@ -346,6 +371,7 @@ pub fn export(
                 value: value.map(rounded).into(),
             })
             .collect(),
+        values: written,
         zero_deg: zero,
         grids: grid_list,
         workpiece_shift_mm: shift.into(),
@@ -367,14 +393,14 @@ pub fn export(
     let mut export = Export {
         files: Vec::new(),
         compensation,
-        seen: filled.seen,
+        seen: filled.seen.clone(),
         left,
-        values: filled.values,
+        values: filled.values.clone(),
         rounding_um,
         rest_um,
         longer_tool_um,
     };
-    files::write(machine, tables, kind, correction, options, known, &mut export, &mut findings)?;
+    files::write(machine, tables, kind, correction, options, (&filled, &others), &mut export, &mut findings)?;
     Ok((export, findings))
 }
 
@@ -409,6 +435,8 @@ fn add_angles(
             unit: "deg",
             decimals: fill::decimals(step),
             known: given_name.is_some_and(|n| !options.old.assumed.contains(n)),
+            given: given_name.cloned(),
+            elsewhere: false,
             instead: false,
             unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
         });

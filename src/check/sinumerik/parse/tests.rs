@@ -41,6 +41,17 @@ fn what_is_not_known_is_an_error_with_its_place() {
         ("SETAL(1,\"A\")\nM30\n", 5),
         ("G0 X1\n%_N_A_MPF\nM30\n", 6),
         ("G0 X1\n", 6),
+        ("N70:\nM30\n", 0),
+        ("GOTOF N70\nN70: G0 X1\nM30\n", 10),
+        ("M30:\nM30\n", 0),
+        ("G0:\nM30\n", 0),
+        ("F100:\nM30\n", 0),
+        ("RET:\nM30\n", 0),
+        ("L10:\nM30\n", 0),
+        ("R10:\nM30\n", 0),
+        ("D0:\nM30\n", 0),
+        ("DEF INT N1\nM30\n", 7),
+        ("DEF INT FOR\nM30\n", 7),
     ] {
         match read(text) {
             Ok(_) => wrong.push(format!("{text:?} was read")),
