@@ -42,6 +42,9 @@ pub fn sketch_effect(loaded: &Loaded) -> String {
     format!("axiscal sketch-effect {} --out my-effects.toml", quoted(&loaded.path))
 }
 
+/// Effects of a group that are named in a line; the table above has all of them.
+const MOST_IDS: usize = 3;
+
 /// What to do next, the first thing first, each line as it is printed.
 #[must_use]
 pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
@@ -72,9 +75,15 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             }
             // which of them it is, is for touches or a person to say
             let ids: Vec<&str> = std::iter::once(&first.effect).chain(&first.same_as).map(String::as_str).collect();
+            let more = match ids.len().saturating_sub(MOST_IDS) {
+                0 => String::new(),
+                n => format!(" or {n} more"),
+            };
+            let some = ids[..ids.len().min(MOST_IDS)].join(", ");
             vec![
                 format!("next: {}", plan_next(loaded)),
-                format!("  or, when you know which it is: axiscal add {study} EFFECT, with one of {}", ids.join(", ")),
+                format!("  or, when you know which it is: axiscal add {study} EFFECT"),
+                format!("  with one of {some}{more} in place of EFFECT"),
             ]
         }
         Verdict::Unexplained if found.leaves_open() || (found.faint && found.touches_would_tell()) => {
