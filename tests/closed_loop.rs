@@ -12,14 +12,20 @@ use axiscal::paper::tables::GIVEN;
 use axiscal::program::{self, plan::Plan};
 use axiscal::simulate::{Compensation, Scenario};
 use axiscal::tables::compensation::{self, Provenance};
-use axiscal::tables::correction::Correction;
+use axiscal::tables::correction::{Correction, During};
 use axiscal::tables::linuxcnc::{self, Export};
 use common::*;
 
 fn export(machine: &Machine, fit: &Fit, active: Option<&compensation::Compensation>) -> Export {
     let catalogue = Catalogue::built_in().unwrap();
-    let (correction, _) =
-        Correction::collect(machine, &catalogue, &fit.outcome, active, Provenance::default()).unwrap();
+    let (correction, _) = Correction::collect(
+        machine,
+        &catalogue,
+        &fit.outcome,
+        During { loaded: active, transformation: true },
+        Provenance::default(),
+    )
+    .unwrap();
     linuxcnc::export(machine, &correction, &linuxcnc::Options::default()).unwrap().0
 }
 

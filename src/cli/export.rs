@@ -5,6 +5,7 @@ use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::diagnose::{self, Subject, Verdict};
 use crate::files;
+use crate::fit::outcome::Undetermined;
 use crate::fit::{self, Fit, Settings};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
@@ -108,7 +109,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     judged(&loaded, &fit, &settings, args, io)?;
     let correction = correction(&loaded, &fit, active.as_ref(), date, io)?;
     if let Some((name, tables)) = &post {
-        return control(&loaded.machine, name, tables, &correction, args, io);
+        return control(&loaded, name, tables, (&correction, &fit.outcome.undetermined), args, io);
     }
     let export = export(&loaded, &correction, args, io)?;
     for (name, contents) in &export.files {
@@ -116,10 +117,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     remove_stale(&args.out, &export.files)?;
     say(&export, args, io);
-    // what has no value of its own is in no table: "nothing is left" speaks of the rest
-    for u in &fit.outcome.undetermined {
-        io.say(format!("not corrected, because this data cannot tell it: {}", u.says));
-    }
+    say_not_told(&fit.outcome.undetermined, io);
     io.answer(&json!({
         "controller": args.controller,
         "out": args.out.display().to_string(),
@@ -184,7 +182,7 @@ fn correction(loaded: &Loaded, fit: &Fit, active: Option<&Compensation>, date: S
     let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let provenance = Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date };
     let (correction, findings) =
-        Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, active, provenance)?;
+        Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, loaded.during(active), provenance)?;
     io.report(&findings.0);
     Ok(correction)
 }
@@ -201,12 +199,13 @@ fn export(loaded: &Loaded, correction: &Correction, args: &Args, io: &Io) -> Res
 }
 
 /// Old values: the backup, and what was given by hand.
-fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args: &Args) -> Result<Old> {
+fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args: &Args, io: &Io) -> Result<Old> {
     let names = control::names(machine, tables);
     let mut old = match &args.backup {
         Some(path) => {
-            let text = source(path.display().to_string(), files::read_text(path)?);
+            let text = source(path.display().to_string(), read_backup(path)?);
             not_its_own(&text, correction)?;
+            io.report(&written_by_an_export(&text, correction).into_iter().collect::<Vec<_>>());
             let such_as = control::example(machine, tables).unwrap_or_default();
             backup::read_such_as(&text, &tables.backup, &names, &such_as)?
         }
@@ -246,21 +245,50 @@ fn not_its_own(backup: &Source, correction: &Correction) -> Result<()> {
     .help("give the control's own backup from before, or the restoring file of that export"))
 }
 
+/// New values of another export that were loaded before these touches belong into the study as `compensation`; loaded after
+/// them they hold what was identified already.
+fn written_by_an_export(backup: &Source, correction: &Correction) -> Option<Finding> {
+    let text = backup.inner();
+    let new_values = text.contains("Study sha256:") && !text.to_ascii_lowercase().contains("restores");
+    (new_values && correction.active.is_none() && correction.transformation).then(|| {
+        Finding::warning(
+            "export::written_before",
+            format!("{} holds the new values of an export, and the study names no compensation", backup.name()),
+        )
+        .help("if they were loaded when these touches were made, name that export as `compensation` in the study; if not, give what the control held then")
+    })
+}
+
+/// A backup's text: controls write remarks in code pages of their own, and names and numbers in ASCII.
+fn read_backup(path: &Path) -> Result<String> {
+    let bytes = files::read_bytes(path)?;
+    let single = std::str::from_utf8(&bytes).is_err() && !bytes.contains(&0);
+    if single { Ok(bytes.iter().map(|b| char::from(*b)).collect()) } else { files::read_text(path) }
+}
+
 /// Tables of a control that is described by data.
 fn control(
-    machine: &Machine,
+    loaded: &Loaded,
     name: &str,
     tables: &Tables,
-    correction: &Correction,
+    (correction, not_told): (&Correction, &[Undetermined]),
     args: &Args,
     io: &Io,
 ) -> Result<Answer> {
+    let (machine, transformation) = (&loaded.machine, loaded.transformation());
+    if transformation.is_none() && (args.backup.is_some() || !args.old.is_empty()) {
+        return Err(Failure::new(
+            "export::two_frames",
+            "what the control held acted on a part of the runs only: some programs of the study give axis positions, others not",
+        )
+        .help("put the programs of `generate --tcp` into one study and the others into another, or leave the old values away where they are those of the machine's description"));
+    }
     let options = control::Options {
         radius_mm: args.radius,
         force: args.force,
         accept_unverified: args.accept_unverified,
         unit: args.unit,
-        old: old_values(machine, tables, correction, args)?,
+        old: old_values(machine, tables, correction, args, io)?,
         ..control::Options::default()
     };
     let (export, findings) = control::export(machine, name, tables, correction, &options)?;
@@ -294,9 +322,10 @@ fn control(
     }
     say_left("which leaves", &export.left, args, io);
     io.say(format!(
-        "rounding to the control's resolution leaves up to {} um; all constant errors together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
+        "rounding to the control's resolution leaves up to {} um; all constant errors that were identified together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
         significant(export.rounding_um), significant(export.rest_um), significant(export.longer_tool_um)
     ));
+    say_not_told(not_told, io);
     io.say(format!(
         "{}: {} files; README.txt says how to load them and what must be set again",
         args.out.display(),
@@ -309,6 +338,7 @@ fn control(
         "terms": export.compensation.terms,
         "values": export.values,
         "left": export.left,
+        "not_told": not_told,
         "rounding_um": export.rounding_um,
         "rest_um": export.rest_um,
         "longer_tool_um": export.longer_tool_um,
@@ -432,6 +462,13 @@ fn say(export: &Export, args: &Args, io: &Io) {
         args.out.display(),
         export.files.len()
     ));
+}
+
+/// What has no value of its own is in no table: "nothing is left" speaks of the rest.
+fn say_not_told(not_told: &[Undetermined], io: &Io) {
+    for u in not_told {
+        io.say(format!("not corrected, because this data cannot tell it: {}", u.says));
+    }
 }
 
 fn say_left(what: &str, left: &[Left], args: &Args, io: &Io) {

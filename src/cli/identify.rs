@@ -47,10 +47,19 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let mut outcome = fit.outcome;
     if let Some(active) = loaded.active()? {
-        outcome.warnings.push(format!(
-            "a compensation with {} terms was active: the values are what it leaves, not the machine's whole errors",
-            active.terms.len()
-        ));
+        let idle =
+            if loaded.transformation() == Some(true) { 0 } else { active.idle_without_transformation(&loaded.machine) };
+        let acts = active.terms.len().saturating_sub(idle);
+        if acts > 0 || idle == 0 {
+            outcome.warnings.push(format!(
+                "a compensation with {acts} terms was active: the values are what it leaves, not the machine's whole errors"
+            ));
+        }
+        if idle > 0 {
+            outcome.warnings.push(format!(
+                "a compensation with {idle} terms that do not act on axis positions was loaded: the values are the machine's whole errors there"
+            ));
+        }
     }
     if !args.residuals {
         outcome.residuals = None;

@@ -9,9 +9,10 @@ use crate::log::{self, Touch};
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
-use crate::program::plan::{Plan, PlanBlock};
+use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
 use crate::study::Study;
 use crate::tables::compensation::Compensation;
+use crate::tables::correction::During;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -86,7 +87,7 @@ impl Loaded {
 }
 
 impl Loaded {
-    /// What the control applied while the touches were made; `None` where nothing was. All runs must agree: the
+    /// The compensation that was loaded while the touches were made; `None` where nothing was. All runs must agree: the
     /// identified errors add to it.
     ///
     /// # Errors
@@ -111,8 +112,53 @@ impl Loaded {
                 _ => found = Some(here),
             }
         }
-        Ok(found.flatten())
+        let found = found.flatten();
+        if let Some(idle) = found.as_ref().filter(|c| c.idle_without_transformation(&self.machine) > 0)
+            && self.transformation().is_none()
+        {
+            return Err(Failure::new(
+                "study::two_frames",
+                format!(
+                    "the compensation of study {} acted on a part of the runs only: its mode is \"{}\", and some programs give axis positions",
+                    idle.provenance.study, idle.mode
+                ),
+            )
+            .help("put the programs of `generate --tcp` into one study and the others into another"));
+        }
+        Ok(found)
     }
+
+    /// Was the control's own transformation on, so that what it held acted on the touches? `None`: in a part of the runs.
+    #[must_use]
+    pub fn transformation(&self) -> Option<bool> {
+        let mut on = self.runs.iter().map(|r| r.plan.controller_frame == ControllerFrame::Tcp);
+        let first = on.next().unwrap_or(false);
+        on.all(|other| other == first).then_some(first)
+    }
+
+    /// What the control did while the touches were made.
+    #[must_use]
+    pub fn during<'a>(&self, loaded: Option<&'a Compensation>) -> During<'a> {
+        During { loaded, transformation: self.transformation() == Some(true) }
+    }
+}
+
+/// A compensation that does not act on a program of axis positions.
+#[must_use]
+pub fn does_not_act(compensation: &Compensation, machine: &Machine, plan: &Plan) -> Option<Finding> {
+    let idle = compensation.idle_without_transformation(machine);
+    if idle == 0 || plan.controller_frame == ControllerFrame::Tcp {
+        return None;
+    }
+    let of = compensation.terms.iter().filter(|t| t.value != 0.0).count();
+    let which = if idle == of { "it does".to_owned() } else { format!("{idle} of its {of} errors do") };
+    Some(
+        Finding::info(
+            "compensation::does_not_act",
+            format!("program {} gives axis positions: the compensation acts under the control's own transformation, and {which} not act on it", plan.program),
+        )
+        .help("what these touches show is the machine without it, and an export takes its place; a program of `generate --tcp` shows what it leaves"),
+    )
 }
 
 /// A compensation with errors of an axis that does not carry the blocks: the control then corrects what the blocks do not
@@ -210,7 +256,9 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
         seen.push((log_path.clone(), digest.clone()));
         if let Some(path) = &entry.compensation {
             let active = load_compensation(&folder.join(path), &machine)?;
-            io.report(&beside_the_axis(&active, &machine, &plan).into_iter().collect::<Vec<_>>());
+            let idle = does_not_act(&active, &machine, &plan);
+            let beside = if idle.is_some() { None } else { beside_the_axis(&active, &machine, &plan) };
+            io.report(&idle.into_iter().chain(beside).collect::<Vec<_>>());
         }
         for part in [&plan_digest[..], &digest, format!("{:?}", entry.run).as_bytes()] {
             hash.update(part);

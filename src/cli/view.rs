@@ -76,7 +76,7 @@ fn correction(loaded: &Loaded, fit: &Fit, date: &str) -> std::result::Result<Cor
         return Err(format!("the fit did not converge: {}", fit.outcome.stopped));
     }
     let active: Option<Compensation> = loaded.active().map_err(|f| f.to_string())?;
-    Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, active.as_ref(), provenance)
+    Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, loaded.during(active.as_ref()), provenance)
         .map(|(correction, _)| correction)
         .map_err(|f| f.to_string())
 }

@@ -3,7 +3,7 @@
 //! It is written beside the controller's own files, read back as "what was active during the measurement", and read by the
 //! virtual machine. It holds no sign or unit that the controller's own files do not hold.
 
-use super::place::{Dof, Place, Spot};
+use super::place::{Dof, Place, Spot, along};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result, Source, from_json};
 use crate::machine::Machine;
@@ -361,6 +361,27 @@ impl Compensation {
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| Failure::new("compensation::unwritable", format!("cannot write compensation.json: {e}")))?;
         Ok(text + "\n")
+    }
+
+    /// Does the control apply this term to a program that gives axis positions? The vectors and pins of its own
+    /// transformation act under that only; zero positions of axes act always, and so does the kinematics component.
+    #[must_use]
+    pub fn acts_without_transformation(&self, machine: &Machine, term: &Term) -> bool {
+        let own_turn = term.place == Place::Zero
+            || (term.place == Place::Before
+                && term.dof.is_angle()
+                && machine.axis(term.axis).is_some_and(|a| along(a, term.dof).is_some()));
+        match self.mode {
+            Mode::Component => true,
+            Mode::Stock => own_turn,
+            Mode::Table => own_turn && self.tables.as_ref().is_some_and(|t| t.zero_deg.contains_key(&term.axis)),
+        }
+    }
+
+    /// Its terms that do not act on a program of axis positions.
+    #[must_use]
+    pub fn idle_without_transformation(&self, machine: &Machine) -> usize {
+        self.terms.iter().filter(|t| t.value != 0.0 && !self.acts_without_transformation(machine, t)).count()
     }
 
     /// The value of a spot: 0 where nothing stands, mm or deg.

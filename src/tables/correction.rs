@@ -2,17 +2,16 @@
 //! what is left out, each with its reason.
 
 use super::compensation::{Compensation, Provenance, Term};
-use super::place::{Dof, Meaning, Place, Spot, across, coordinate_off, meaning};
+use super::place::{Meaning, Spot, across, coordinate_off, meaning};
+use super::restate::restated;
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result};
 use crate::fit::outcome::{Outcome, Parameter, Status};
-use crate::geometry::Displacement;
-use crate::machine::{Axis, Machine, Side};
+use crate::machine::{Axis, Machine};
 use crate::model::catalogue::{Catalogue, Effect, Place as At};
 use crate::model::formula::VARIABLES;
 use crate::units::{deg_from_rad, rad_from_deg, rad_from_mrad, ratio_from_ppm, um_from_mm};
-use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How much further an axis stands than it shows: coordinate relative to R's origin (mm or deg) and sense (+1 or -1) →
 /// mm or deg.
@@ -26,6 +25,10 @@ pub struct AxisShape {
     pub effect: String,
     /// The axis.
     pub axis: AxisName,
+    /// Its value.
+    pub value: f64,
+    /// Unit of the value.
+    pub unit: String,
     /// The axis by whose position: the same one, or another.
     pub input: AxisName,
     /// With the identified value; of the input's coordinate and sense.
@@ -72,10 +75,24 @@ pub struct Correction {
     pub of_measurement: BTreeMap<String, usize>,
     /// Where `before` terms of workpiece-side axes are stated, mm in R.
     pub reference_mm: [f64; 3],
-    /// What was active during the measurement.
+    /// Where the study found something.
+    pub found: BTreeSet<Spot>,
+    /// What was loaded during the measurement.
     pub active: Option<Compensation>,
+    /// The control's own transformation was on while the touches were made: what it held acted on them.
+    pub transformation: bool,
     /// Where it comes from.
     pub provenance: Provenance,
+}
+
+/// What the control did while the touches were made.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct During<'a> {
+    /// The compensation that was loaded.
+    pub loaded: Option<&'a Compensation>,
+    /// The control's own transformation was on (programs of `generate --tcp`). Without it a touch shows the bare machine,
+    /// whatever vectors and pins the control holds.
+    pub transformation: bool,
 }
 
 /// Above these an export is refused unless it is forced: such values are set-up faults, not location errors.
@@ -125,9 +142,10 @@ struct Collector<'a> {
 }
 
 impl Correction {
-    /// Collects what a fit found on top of what was active while its data were measured.
+    /// Collects what a fit found on top of what acted while its data were measured.
     ///
-    /// Only parameters of status `identified` become corrections; the catalogue says what each of them means.
+    /// Only parameters of status `identified` become corrections; the catalogue says what each of them means. What was loaded
+    /// and did not act is replaced where something was found, and kept elsewhere.
     ///
     /// # Errors
     /// When the outcome belongs to another machine, the catalogue lacks one of its effects, or a value is not a number.
@@ -135,7 +153,7 @@ impl Correction {
         machine: &Machine,
         catalogue: &Catalogue,
         outcome: &Outcome,
-        active: Option<&Compensation>,
+        during: During,
         provenance: Provenance,
     ) -> Result<(Self, Findings)> {
         let mut collector = Collector {
@@ -151,7 +169,9 @@ impl Correction {
                 left_out: Vec::new(),
                 of_measurement: BTreeMap::new(),
                 reference_mm: outcome.reference_mm,
-                active: active.cloned(),
+                found: BTreeSet::new(),
+                active: during.loaded.cloned(),
+                transformation: during.transformation,
                 provenance,
             },
         };
@@ -340,6 +360,8 @@ impl Collector<'_> {
         Ok(AxisShape {
             parameter: p.name.clone(),
             effect: p.effect.clone(),
+            value: p.value,
+            unit: p.unit.clone(),
             axis: output,
             input,
             error: Box::new(error),
@@ -348,15 +370,22 @@ impl Collector<'_> {
 
     /// Adds what was active, restated at the new reference point.
     fn finish(mut self) -> Result<(Correction, Findings)> {
-        let active: Vec<Term> = match &self.correction.active {
-            Some(active) => restated(&active.terms, self.machine, active.reference_mm, self.correction.reference_mm),
-            None => Vec::new(),
-        };
+        let loaded = self.correction.active.clone();
         let mut terms = self.identified;
-        for old in active {
-            let term =
-                terms.entry(old.spot()).or_insert_with(|| blank(old.spot(), &old.parameter, &old.effect, 0.0, None));
-            term.active_before = rounded(old.value);
+        self.correction.found = terms.keys().copied().collect();
+        if let Some(loaded) = loaded {
+            let to = self.correction.reference_mm;
+            for old in restated(&loaded.terms, self.machine, loaded.reference_mm, to) {
+                let acted = self.correction.transformation || loaded.acts_without_transformation(self.machine, &old);
+                if !acted && terms.contains_key(&old.spot()) {
+                    // the touches show the whole error
+                    continue;
+                }
+                let term = terms
+                    .entry(old.spot())
+                    .or_insert_with(|| blank(old.spot(), &old.parameter, &old.effect, 0.0, None));
+                term.active_before = rounded(old.value);
+            }
         }
         self.correction.terms = terms
             .into_values()
@@ -370,7 +399,7 @@ impl Collector<'_> {
     }
 }
 
-fn blank(spot: Spot, parameter: &str, effect: &str, identified: f64, sigma: Option<f64>) -> Term {
+pub(super) fn blank(spot: Spot, parameter: &str, effect: &str, identified: f64, sigma: Option<f64>) -> Term {
     Term {
         axis: spot.axis,
         place: spot.place,
@@ -383,44 +412,4 @@ fn blank(spot: Spot, parameter: &str, effect: &str, identified: f64, sigma: Opti
         identified,
         sigma,
     }
-}
-
-/// The terms with the displacements of workpiece-side axes stated at another point: the same transforms, exactly.
-///
-/// E about c1 by d1 is E about c2 by d1 + (R - 1)(c2 - c1), with R its rotation. Only `value` is restated; a displacement
-/// that becomes another number loses its uncertainty, which would need that of the tilts and their covariance.
-#[must_use]
-pub fn restated(terms: &[Term], machine: &Machine, from_mm: [f64; 3], to_mm: [f64; 3]) -> Vec<Term> {
-    let mut out = terms.to_vec();
-    let shift = Vector3::from(to_mm) - Vector3::from(from_mm);
-    let value = |spot: Spot| terms.iter().find(|t| t.spot() == spot).map_or(0.0, |t| t.value);
-    for axis in machine.rotary().filter(|a| a.side == Side::Workpiece) {
-        let at = |dof: Dof| Spot { axis: axis.name, place: Place::Before, dof };
-        let mut e = Displacement::default();
-        for dof in Dof::ALL.into_iter().filter(|d| d.is_angle()) {
-            e.add(dof.index(), rad_from_deg(value(at(dof))));
-        }
-        let moved = e.rotation() * shift - shift;
-        for dof in [Dof::Dx, Dof::Dy, Dof::Dz] {
-            let by = moved[dof.index()];
-            // below the twelve decimals that are written
-            if by.abs() < 5e-13 {
-                continue;
-            }
-            match out.iter_mut().find(|t| t.spot() == at(dof)) {
-                Some(term) => {
-                    term.value += by;
-                    term.sigma = None;
-                }
-                None => {
-                    let parameter = format!("E{}0{}", dof.iso_letter(), axis.name);
-                    let mut term = blank(at(dof), &parameter, "tilt at another point", 0.0, None);
-                    term.value = by;
-                    out.push(term);
-                }
-            }
-        }
-    }
-    out.sort_by_key(Term::spot);
-    out
 }

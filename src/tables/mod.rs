@@ -13,6 +13,7 @@ pub mod kins;
 pub mod lines;
 pub mod linuxcnc;
 pub mod place;
+pub mod restate;
 
 pub use compensation::Compensation;
 pub use correction::Correction;

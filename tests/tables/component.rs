@@ -5,7 +5,7 @@ use axiscal::axes::Position;
 use axiscal::fit::outcome::Outcome;
 use axiscal::machine::Machine;
 use axiscal::tables::compensation::{Provenance, Term};
-use axiscal::tables::correction::Correction;
+use axiscal::tables::correction::{Correction, During};
 use axiscal::tables::kins::{Errors, Kins};
 use axiscal::tables::linuxcnc::component;
 use std::path::{Path, PathBuf};
@@ -13,8 +13,14 @@ use std::process::Command;
 
 fn source(machine: &Machine) -> String {
     let outcome: Outcome = crate::export::outcome(&machine.name, &[]);
-    let (correction, _) =
-        Correction::collect(machine, &crate::support::catalogue(), &outcome, None, Provenance::default()).unwrap();
+    let (correction, _) = Correction::collect(
+        machine,
+        &crate::support::catalogue(),
+        &outcome,
+        During { loaded: None, transformation: true },
+        Provenance::default(),
+    )
+    .unwrap();
     component::source(machine, &correction).unwrap()
 }
 

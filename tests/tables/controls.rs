@@ -13,7 +13,7 @@ use axiscal::program::plan::{ControllerFrame, Plan};
 use axiscal::simulate::{self, Compensation, Scenario};
 use axiscal::tables::compensation::{self, Provenance};
 use axiscal::tables::control::{self, Export, Options};
-use axiscal::tables::correction::Correction;
+use axiscal::tables::correction::{Correction, During};
 use axiscal::tables::kins::{Errors, Kins};
 use axiscal::tables::lines::Seen;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -42,6 +42,11 @@ pub fn scenario(machine: &Machine, planted: &Planted) -> Scenario {
 }
 
 pub fn correction(machine: &Machine, planted: &Planted, active: Option<&compensation::Compensation>) -> Correction {
+    found_during(machine, planted, During { loaded: active, transformation: true })
+}
+
+/// What a study finds whose touches were made so.
+pub fn found_during(machine: &Machine, planted: &Planted, during: During) -> Correction {
     let catalogue = catalogue();
     let unit = |effect: &str, name: &str| {
         let row = catalogue.get(effect, machine).unwrap();
@@ -55,7 +60,7 @@ pub fn correction(machine: &Machine, planted: &Planted, active: Option<&compensa
     let mut outcome = crate::export::outcome(&machine.name, &rows);
     // where the virtual machine states its errors
     outcome.reference_mm = machine.reference.pivot.into();
-    Correction::collect(machine, &catalogue, &outcome, active, provenance).unwrap().0
+    Correction::collect(machine, &catalogue, &outcome, during, provenance).unwrap().0
 }
 
 pub fn accepting() -> Options {
@@ -105,7 +110,7 @@ pub fn readings(machine: &Machine, plan: &Plan, scenario: &Scenario, c: Option<&
 
 /// Largest reading that is left when the workpiece has been touched off again: one small displacement of all blocks,
 /// fitted by least squares here. mm.
-fn left(plan: &Plan, readings: &[f64]) -> f64 {
+pub fn left(plan: &Plan, readings: &[f64]) -> f64 {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     let rows: Vec<(Vector6<f64>, f64)> = plan
         .touches
@@ -196,7 +201,14 @@ fn every_parameter_of(machine: &Machine, controls: [&str; 2], at_least: usize) {
         for (effect, parameter, length) in parameters(&catalogue, machine) {
             for sign in [1.0, -1.0] {
                 let value = sign * if length { 0.05 } else { 0.02 };
-                let (before, after, export) = way(machine, control, &vec![(effect, &parameter, value)], &plan);
+                // the others are known, and 0
+                let others = parameters(&catalogue, machine)
+                    .into_iter()
+                    .filter(|(e, n, _)| e.starts_with("location") && (*e, n) != (effect, &parameter));
+                let others: Vec<(&str, String, bool)> = others.collect();
+                let mut planted = vec![(effect, parameter.as_str(), value)];
+                planted.extend(others.iter().map(|(e, n, _)| (*e, n.as_str(), 0.0)));
+                let (before, after, export) = way(machine, control, &planted, &plan);
                 let of = format!("{control} {name} {parameter} ({effect}) {value}");
                 if export.left.is_empty() {
                     // half a step in each of several components, and angles of 0.0005 deg at some 100 mm

@@ -46,7 +46,7 @@ use crate::support::{Spread, catalogue, have, machine, pose, run};
 use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::tables::compensation::{Compensation, Mode, Provenance};
-use axiscal::tables::correction::Correction;
+use axiscal::tables::correction::{Correction, During};
 use axiscal::tables::kins::{Errors, Kins};
 use axiscal::tables::linuxcnc::ini::UserIni;
 use axiscal::tables::linuxcnc::work_offset;
@@ -60,7 +60,15 @@ fn provenance() -> Provenance {
 }
 
 fn collect(name: &str, parameters: Parameters, active: Option<&Compensation>) -> Correction {
-    Correction::collect(&machine(name), &catalogue(), &outcome(name, parameters), active, provenance()).unwrap().0
+    Correction::collect(
+        &machine(name),
+        &catalogue(),
+        &outcome(name, parameters),
+        During { loaded: active, transformation: true },
+        provenance(),
+    )
+    .unwrap()
+    .0
 }
 
 fn export(name: &str, parameters: Parameters, active: Option<&Compensation>, options: &Options) -> Export {
@@ -147,7 +155,14 @@ fn what_was_active_is_restated_at_the_new_reference() {
     let first = export("trunnion", &found, None, &Options::default()).component.compensation;
     let mut later = outcome("trunnion", &[]);
     later.reference_mm = [5.0, -7.0, -267.684];
-    let (correction, _) = Correction::collect(&machine, &catalogue(), &later, Some(&first), provenance()).unwrap();
+    let (correction, _) = Correction::collect(
+        &machine,
+        &catalogue(),
+        &later,
+        During { loaded: Some(&first), transformation: true },
+        provenance(),
+    )
+    .unwrap();
     let old = Kins::new(&machine, Errors::from_terms(&first.terms, first.reference_mm), 202.684);
     let new = Kins::new(&machine, Errors::from_terms(&correction.terms, correction.reference_mm), 202.684);
     let mut spread = Spread::new(3);
@@ -184,14 +199,31 @@ fn what_belongs_to_another_machine_is_refused() {
     let correction = collect("trunnion", &[("EX0C", "location-c", 0.01, "mm", ID)], Some(&of_head));
     let failure = linuxcnc::export(&machine("trunnion"), &correction, &Options::default()).unwrap_err();
     assert_eq!(failure.0[0].code, "compensation::other");
-    let wrong =
-        Correction::collect(&machine("trunnion"), &catalogue(), &outcome("swivel-head", &[]), None, provenance());
+    let wrong = Correction::collect(
+        &machine("trunnion"),
+        &catalogue(),
+        &outcome("swivel-head", &[]),
+        During { loaded: None, transformation: true },
+        provenance(),
+    );
     assert_eq!(wrong.unwrap_err().0[0].code, "tables::other_machine");
     let unknown = outcome("trunnion", &[("k", "no-such-effect", 1.0, "um", ID)]);
-    let wrong = Correction::collect(&machine("trunnion"), &catalogue(), &unknown, None, provenance());
+    let wrong = Correction::collect(
+        &machine("trunnion"),
+        &catalogue(),
+        &unknown,
+        During { loaded: None, transformation: true },
+        provenance(),
+    );
     assert_eq!(wrong.unwrap_err().0[0].code, "tables::unknown_effect");
     let nan = outcome("trunnion", &[("EX0C", "location-c", f64::NAN, "mm", ID)]);
-    let wrong = Correction::collect(&machine("trunnion"), &catalogue(), &nan, None, provenance());
+    let wrong = Correction::collect(
+        &machine("trunnion"),
+        &catalogue(),
+        &nan,
+        During { loaded: None, transformation: true },
+        provenance(),
+    );
     assert_eq!(wrong.unwrap_err().0[0].code, "tables::not_a_number");
 }
 
@@ -333,7 +365,9 @@ fn errors_of_an_axis_s_own_position_become_its_table() {
             ("s", "my-sag", 5.0, "um", ID),
         ],
     );
-    let (correction, _) = Correction::collect(&machine, &catalogue, &fit, None, provenance()).unwrap();
+    let (correction, _) =
+        Correction::collect(&machine, &catalogue, &fit, During { loaded: None, transformation: true }, provenance())
+            .unwrap();
     let (export, _) = linuxcnc::export(&machine, &correction, &Options::default()).unwrap();
     let tables = &export.stock.compensation.stock.as_ref().unwrap().axis_tables;
     let (x, y, c) = (&tables[&AxisName::X], &tables[&AxisName::Y], &tables[&AxisName::C]);
@@ -354,7 +388,14 @@ fn errors_of_an_axis_s_own_position_become_its_table() {
     // measured again under these tables: the new ones add up
     let active = export.component.compensation;
     let again = outcome("swivel-head", &[("k", "my-scale", -20.0, "um/m", ID)]);
-    let (correction, _) = Correction::collect(&machine, &catalogue, &again, Some(&active), provenance()).unwrap();
+    let (correction, _) = Correction::collect(
+        &machine,
+        &catalogue,
+        &again,
+        During { loaded: Some(&active), transformation: true },
+        provenance(),
+    )
+    .unwrap();
     let (export, _) = linuxcnc::export(&machine, &correction, &Options::default()).unwrap();
     let tables = &export.component.compensation.stock.as_ref().unwrap().axis_tables;
     assert_eq!(tables[&AxisName::X].rows.last().unwrap()[1], 0.036);
@@ -367,7 +408,9 @@ fn a_table_of_the_user_s_own_is_not_silently_replaced() {
     let mut catalogue = catalogue();
     catalogue.add_file(&source("my-effects.toml", MY_EFFECTS)).unwrap();
     let fit = outcome("swivel-head", &[("k", "my-scale", 100.0, "um/m", ID)]);
-    let (correction, _) = Correction::collect(&machine, &catalogue, &fit, None, provenance()).unwrap();
+    let (correction, _) =
+        Correction::collect(&machine, &catalogue, &fit, During { loaded: None, transformation: true }, provenance())
+            .unwrap();
     let text = "[TRAJ]\nCOORDINATES = XYZBC\n[JOINT_0]\nCOMP_FILE = mine.comp\nCOMP_FILE_TYPE = 0\n";
     let ini = UserIni::read(&source("m.ini", text)).unwrap();
     let options = Options { ini: Some(ini), ..Options::default() };
@@ -414,7 +457,9 @@ fn names_stay_inside_their_comments() {
     let nasty = "*/ x (y)\nsetp evil.pin 1\r\nG0 X0".to_owned();
     let provenance = Provenance { study: nasty.clone(), study_sha256: nasty.clone(), data_date: nasty };
     let fit = outcome(&machine.name, &HEAD);
-    let (correction, _) = Correction::collect(&machine, &catalogue(), &fit, None, provenance).unwrap();
+    let (correction, _) =
+        Correction::collect(&machine, &catalogue(), &fit, During { loaded: None, transformation: true }, provenance)
+            .unwrap();
     let (export, _) = linuxcnc::export(&machine, &correction, &Options::default()).unwrap();
     let files = files(&export);
     let hal = files["axiscal.hal"];

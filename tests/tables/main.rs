@@ -6,6 +6,7 @@
 #[path = "../common/random.rs"]
 mod random;
 
+mod again;
 mod backups;
 mod by_hand;
 mod component;

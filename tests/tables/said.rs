@@ -9,7 +9,7 @@ use axiscal::model::catalogue::Effect;
 use axiscal::post::tables::LengthUnit;
 use axiscal::tables::compensation::{Compensation, Provenance, Term};
 use axiscal::tables::control::{self, Options};
-use axiscal::tables::correction::Correction;
+use axiscal::tables::correction::{Correction, During};
 use axiscal::tables::linuxcnc::{self, Left};
 use std::collections::BTreeMap;
 
@@ -26,7 +26,15 @@ fn correction(machine: &Machine, effects: &[&Effect]) -> Correction {
         .collect();
     let mut outcome = crate::export::outcome(&machine.name, &rows);
     outcome.reference_mm = machine.reference.pivot.into();
-    Correction::collect(machine, &catalogue(), &outcome, None, Provenance::default()).unwrap().0
+    Correction::collect(
+        machine,
+        &catalogue(),
+        &outcome,
+        During { loaded: None, transformation: true },
+        Provenance::default(),
+    )
+    .unwrap()
+    .0
 }
 
 /// Where an export says what became of a parameter.

@@ -91,8 +91,9 @@ impl Texts<'_> {
     }
 }
 
-/// Reads SINUMERIK data: machine data or swivel data of the transformation, and position tables.
-pub fn sinumerik(files: &[Source], machine: &Machine, findings: &mut Findings) -> Loaded {
+/// Reads SINUMERIK data: machine data or swivel data of the transformation, and position tables. The files do not say their
+/// unit: lengths are in that of the control's basic system.
+pub fn sinumerik(files: &[Source], machine: &Machine, mm_per_unit: f64, findings: &mut Findings) -> Loaded {
     let mut texts = Texts { machine, findings };
     let mut data: BTreeMap<String, String> = BTreeMap::new();
     for source in files {
@@ -117,7 +118,7 @@ pub fn sinumerik(files: &[Source], machine: &Machine, findings: &mut Findings) -
         }
     }
     let Some(first) = files.first() else { return Loaded::default() };
-    let vectors = texts.transformation(first, &data);
+    let vectors = texts.transformation(first, &data, mm_per_unit);
     let cross = texts.cross(first, &data);
     Loaded { vectors, cross }
 }
@@ -133,7 +134,12 @@ impl Texts<'_> {
         }
     }
 
-    fn transformation(&mut self, source: &Source, data: &BTreeMap<String, String>) -> Option<Vectors> {
+    fn transformation(
+        &mut self,
+        source: &Source,
+        data: &BTreeMap<String, String>,
+        mm_per_unit: f64,
+    ) -> Option<Vectors> {
         let carrier = data.keys().any(|k| k.starts_with("$TC_CARR"));
         let (tool, table) = (rotary(self.machine, machine::Side::Tool), rotary(self.machine, machine::Side::Workpiece));
         let by_axes = match (tool.len(), table.len()) {
@@ -172,6 +178,7 @@ impl Texts<'_> {
         let mut out = blank(self.machine);
         let mut get = |which: usize| [0, 1, 2].map(|k| self.number(source, data, &spelled(which, k)));
         let (v1, v2) = (get(4), get(5));
+        let mut get = |which: usize| get(which).map(|length| length * mm_per_unit);
         // a table's direction counts against its motion
         let against = |v: Vec3| v.map(|x| -x);
         match kind.as_str() {

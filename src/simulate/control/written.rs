@@ -11,7 +11,7 @@ use crate::machine::{self, Machine};
 use crate::simulate::chain::Chain;
 use crate::simulate::rigid::{Vec3, plus};
 use crate::simulate::terms::Shifts;
-use crate::units::rad_from_deg;
+use crate::units::{mm_from_inch, rad_from_deg};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -39,6 +39,9 @@ struct WrittenTables {
     /// Who knows the files.
     #[serde(default)]
     reads: Option<String>,
+    /// Of the lengths in the files.
+    #[serde(default)]
+    unit: Option<String>,
     files: Vec<String>,
     vectors: Vec<WrittenVector>,
     #[serde(default)]
@@ -243,7 +246,10 @@ impl Reader<'_> {
         }
         let files = || written.files.iter().map(|name| open(name)).collect::<Result<Vec<_>>>();
         Ok(match written.reads.as_deref() {
-            Some("sinumerik-data") => loaded::sinumerik(&files()?, self.machine, &mut self.findings),
+            Some("sinumerik-data") => {
+                let mm_per_unit = if written.unit.as_deref() == Some("inch") { mm_from_inch(1.0) } else { 1.0 };
+                loaded::sinumerik(&files()?, self.machine, mm_per_unit, &mut self.findings)
+            }
             Some("fanuc-parameters") => loaded::fanuc(&files()?, self.machine, &mut self.findings),
             Some(other) => {
                 let message = format!("files of the kind {other:?} are not known");

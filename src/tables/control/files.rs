@@ -49,7 +49,9 @@ fn entry(
     let old_text = match given.filter(same_unit).and_then(|n| old.texts.get(n)) {
         Some(text) => text.clone(),
         // units are mixed: nothing of what was given is lost in a digit that is cut off
-        None if given.is_some() && is_length => digits(value.old * factor, decimals + 3, tables.always_mark),
+        None if is_length && given.is_some_and(|n| old.texts.contains_key(n)) => {
+            digits(value.old * factor, decimals + 3, tables.always_mark)
+        }
         None => show(value.old),
     };
     let (now, other) = if restore { (old_text.clone(), show(value.new)) } else { (show(value.new), old_text.clone()) };

@@ -1,6 +1,7 @@
 //! Lines → the vectors of a control's table, on top of its old values, rounded to what it stores.
 
 use super::backup::Old;
+use super::replace::{Replaced, hold_along_the_lines};
 use crate::diag::{Finding, Findings};
 use crate::machine::{Machine, Side};
 use crate::post::tables::{Kind, LengthUnit, Point, Tables, Turn, VectorForm, doubt};
@@ -74,11 +75,11 @@ impl Filled {
     /// Names of the values that a person would have to give so that all of a set are known: of the set of which some are, as the
     /// user's own are spelled.
     #[must_use]
-    pub fn lacking(&self, old: &Old) -> Vec<String> {
+    pub fn lacking(&self, old: &Old, first: Option<&str>) -> Vec<String> {
         let is_given = |v: &Value| v.given.is_some();
         let begun = |instead: bool| self.values.iter().any(|v| v.instead == instead && is_given(v));
         let mut given = self.values.iter().flat_map(|v| &v.names).filter(|(_, name)| old.values.contains_key(*name));
-        let spelling = given.next().map(|(spelling, _)| spelling.as_str()).unwrap_or_default();
+        let spelling = given.next().map(|(spelling, _)| spelling.as_str()).or(first).unwrap_or_default();
         let name = |v: &Value| v.names.get(spelling).or(v.names.values().next()).cloned();
         let instead = begun(true) && !begun(false);
         let lacks = self.values.iter().filter(|v| v.instead == instead && !is_given(v));
@@ -98,6 +99,8 @@ pub struct Question<'a> {
     pub before: &'a Seen,
     /// With what is to be.
     pub now: &'a Seen,
+    /// Where the old values did not act on the touches: what was found takes their place.
+    pub replaced: Option<&'a Replaced>,
     /// The user's old values.
     pub old: &'a Old,
     /// Whose names are meant first, where the control has several tables of the same values.
@@ -255,6 +258,8 @@ impl Question<'_> {
             }
         }
         self.compare(&off, &turned, &mut findings);
+        let given = off.clone();
+        self.keep_what_stays(&mut off, &mut turned, &mut findings);
         let (mut seen, mut target) = (self.now.clone(), self.now.clone());
         for (point, by) in &off {
             let Some((side, place)) = point.turn().map(Turn::place) else { continue };
@@ -272,6 +277,7 @@ impl Question<'_> {
                 line.direction = Unit::new_normalize(line.direction.into_inner() + by);
             }
         }
+        hold_along_the_lines(self.before, &given, &mut target);
         let mut values = Vec::new();
         let mut vectors: Vec<(VectorForm, Vector3<f64>)> = Vec::new();
         let step = self.step_mm();
@@ -287,7 +293,7 @@ impl Question<'_> {
                     -vectors.iter().filter(|(f, _)| ids.contains(&f.id)).map(|(_, v)| *v).sum::<Vector3<f64>>()
                 }
                 // the user's own numbers of the other set say nothing of this one
-                None if form.instead => old + self.described(form, self.now) - described,
+                None if form.instead => self.described(form, self.now) + self.kept_instead(form, old - described),
                 None => self.described(form, &target),
             };
             let new = exact.map(|v| (v / step).round() * step);
@@ -349,6 +355,29 @@ impl Question<'_> {
         }
         self.as_written(&vectors, &off, &turned, &mut seen);
         (Filled { values, vectors, seen }, findings)
+    }
+
+    /// What the other set is off the description, and stays so.
+    fn kept_instead(&self, form: &VectorForm, off: Vector3<f64>) -> Vector3<f64> {
+        self.replaced.map_or(off, |r| r.place(off, |seen| self.described(form, seen)))
+    }
+
+    /// Where the old values did not act on the touches, what of them stays; a difference that is replaced is said.
+    fn keep_what_stays(
+        &self,
+        off: &mut BTreeMap<Point, Vector3<f64>>,
+        turned: &mut BTreeMap<Turn, Vector3<f64>>,
+        findings: &mut Findings,
+    ) {
+        let Some(replaced) = self.replaced else { return };
+        let worst = replaced.keep(self.before, off, turned);
+        if let Some((mm, axis)) = worst.filter(|(mm, _)| *mm > self.step_mm().max(1e-3)) {
+            let says = format!(
+                "the old values place axis {axis} {mm:.4} mm from where the machine's description has it; the program gave axis \
+                 positions, on which they did not act, so that the description with what was found takes their place"
+            );
+            findings.push(Finding::info("tables::old_did_not_act", says));
+        }
     }
 
     /// The machine that the written vectors describe, without what the user's numbers are off the description.

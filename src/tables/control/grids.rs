@@ -84,10 +84,10 @@ pub fn beyond(grids: &[Grid], limits: &Limits) -> Vec<Finding> {
     findings
 }
 
-/// What the user's backup says of a table: nothing, or its points.
-fn in_backup(form: &GridForm, number: usize, old: &Old) -> Option<Vec<(String, f64)>> {
-    let names = (0..form.most_points).filter_map(|p| form.point_name(number, p));
-    let found: Vec<(String, f64)> = names.filter_map(|n| old.values.get(&n).map(|(v, _)| (n.clone(), *v))).collect();
+/// What the user's backup says of a table: nothing, or its points with their numbers.
+fn in_backup(form: &GridForm, number: usize, old: &Old) -> Option<Vec<(usize, String, f64)>> {
+    let names = (0..form.most_points).filter_map(|p| Some((p, form.point_name(number, p)?)));
+    let found: Vec<_> = names.filter_map(|(p, n)| old.values.get(&n).map(|(v, _)| (p, n.clone(), *v))).collect();
     (!found.is_empty()).then_some(found)
 }
 
@@ -107,8 +107,18 @@ pub fn occupied(form: &GridForm, grids: &[Grid], active: &[Grid], old: &Old) -> 
         let as_written = |i: usize, value: f64| {
             (own.and_then(|a| a.values.get(i)).copied().unwrap_or(0.0) - value).abs() <= SAME_POINT
         };
-        let other = points.iter().enumerate().find(|(i, (_, value))| !as_written(*i, *value));
-        if let Some((_, (name, value))) = other {
+        let other = points.iter().find(|(point, _, value)| !as_written(*point, *value));
+        let empty = points.iter().all(|(_, _, value)| *value == 0.0);
+        if let (Some((point, name, _)), true) = (other, empty) {
+            let wrote = own.and_then(|a| a.values.get(*point)).copied().unwrap_or_default();
+            let says = format!(
+                "the compensation that was active during the measurement wrote {name} = {wrote}, the backup has 0: what was identified adds to the first"
+            );
+            findings.push(
+                Finding::error("tables::old_not_active", says)
+                    .help("give a backup of the control from after that compensation was loaded, or none"),
+            );
+        } else if let Some((_, name, value)) = other {
             let says = format!(
                 "position table {} of the control is in use: {name} = {value} is not axiscal's, and would be written over",
                 grid.number

@@ -100,24 +100,21 @@ impl Pieces<'_> {
         for l in self.correction.left_out.iter().filter(|l| l.known) {
             let mended =
                 |s: &&crate::tables::correction::AxisShape| (&s.parameter, &s.effect) == (&l.parameter, &l.effect);
-            let shape = self.correction.across.iter().find(mended);
-            if shape.is_some() && self.has_grids {
+            if self.has_grids && self.correction.across.iter().any(|s| mended(&s)) {
                 continue;
             }
-            let um = match shape {
-                Some(shape) => Some(grids::largest_um(self.machine, shape, self.radius_mm)),
-                None => left_um(l.value, &l.unit, self.radius_mm),
-            };
+            let um = left_um(l.value, &l.unit, self.radius_mm);
             out.push(row(&l.parameter, &l.effect, (l.value, &l.unit), self.radius_mm, um, l.why.clone()));
         }
         if !self.has_grids {
             for shape in &self.correction.shapes {
                 let um = grids::largest_um(self.machine, shape, self.radius_mm);
                 let why = format!(
-                    "it depends on the position of {}: this program knows no table of this control for that",
+                    "over the whole travel of {}, by whose position it goes: this program knows no table of this control for that",
                     shape.input
                 );
-                out.push(row(&shape.parameter, &shape.effect, (um, "um"), self.radius_mm, Some(um), why));
+                let value = (shape.value, shape.unit.as_str());
+                out.push(row(&shape.parameter, &shape.effect, value, self.radius_mm, Some(um), why));
             }
         }
         out

@@ -11,13 +11,15 @@ pub mod fill;
 pub mod grids;
 mod left;
 mod old;
+mod replace;
 
 use super::compensation::{Compensation, FORMAT, Mode, Tables as Record, Term, Vector};
-use super::correction::{Correction, Limits, restated, rounded};
+use super::correction::{Correction, Limits, rounded};
 use super::kins::Errors;
 use super::lines::{self, Seen};
 use super::linuxcnc::{Left, program};
-use super::place::{Place, along};
+use super::place::{Place, Spot, along};
+use super::restate::{kept_in_words, stated_at};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result, Severity};
 use crate::machine::{Machine, Side};
@@ -25,6 +27,7 @@ use crate::post::tables::{Kind, LengthUnit, Tables, doubt};
 use backup::Old;
 pub use files::digits;
 use fill::{Filled, Question, Value};
+use replace::Replaced;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How to export.
@@ -125,6 +128,8 @@ struct Carried {
     reference_mm: [f64; 3],
     /// Not held.
     not: Vec<(Term, String)>,
+    /// Places that a tilt would move, from where the study does not know.
+    kept: Vec<Spot>,
 }
 
 /// Is it a turn of an axis about itself?
@@ -142,17 +147,9 @@ fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
     let angles: BTreeSet<AxisName> = kind.angle.iter().filter_map(|a| axis_of(a.axis)).collect();
     let reference_mm = if tilts { correction.reference_mm } else { machine.reference.ball.into() };
     // without directions an offset is right at one height only: that of the workpiece
-    let before: Vec<Term> = correction.terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect();
-    let before = restated(&before, machine, correction.reference_mm, reference_mm);
-    let mut terms = restated(&correction.terms, machine, correction.reference_mm, reference_mm);
-    for term in &mut terms {
-        let old = before.iter().find(|b| b.spot() == term.spot()).map_or(0.0, |b| b.value);
-        term.value = rounded(term.value);
-        term.active_before = rounded(old);
-        term.identified = rounded(term.value - term.active_before);
-    }
+    let (terms, kept) = stated_at(machine, correction, reference_mm);
     let last_work = machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
-    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new() };
+    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept };
     for term in terms {
         let own = own_turn(machine, &term) && term.place != Place::After;
         if own && angles.contains(&term.axis) {
@@ -217,17 +214,25 @@ pub fn export(
             Err(failure) => findings.0.extend(failure.0),
         }
     }
+    // what it wrote is what the control holds, where no backup says so
+    let held = old::with_what_was_loaded(&options.old, active.and_then(|a| a.tables.as_ref()));
+    let options = &Options { old: held, ..options.clone() };
     let carried = carried(machine, correction, kind);
     let length = machine.tool.length_mm;
     let seen = |terms: &[Term]| Seen::of(machine, &Errors::from_terms(terms, carried.reference_mm), length);
     let (before, now) = (seen(&with_active(&carried.terms)), seen(&carried.terms));
     let spellings = old::spellings(tables);
+    if !carried.kept.is_empty() {
+        findings.push(Finding::info("tables::kept", kept_in_words(&carried.kept)));
+    }
+    let replaced = (!correction.transformation).then(|| Replaced::of(machine, correction, &carried, length));
     let question = |spelling| Question {
         machine,
         tables,
         kind,
         before: &before,
         now: &now,
+        replaced: replaced.as_ref(),
         old: &options.old,
         spelling,
         unit: options.unit,
@@ -235,7 +240,7 @@ pub fn export(
     };
     let (mut filled, more) = question(spellings.first().copied()).fill();
     findings.0.extend(more.0);
-    let zero = add_angles(machine, tables, kind, &carried, options, &mut filled);
+    let zero = add_angles(machine, tables, kind, &carried, &options.old, &mut filled);
     // the same values in another table, on top of that one's own old ones
     let mut others: BTreeMap<&str, Filled> = BTreeMap::new();
     for spelling in spellings.iter().skip(1) {
@@ -243,7 +248,7 @@ pub fn export(
         findings.0.extend(
             more.0.into_iter().filter(|f| !findings.0.iter().any(|g| g.message == f.message)).collect::<Vec<_>>(),
         );
-        add_angles(machine, tables, kind, &carried, options, &mut other);
+        add_angles(machine, tables, kind, &carried, &options.old, &mut other);
         others.insert(spelling, other);
     }
     findings.0.extend(options.old.said.iter().map(|says| Finding::info("tables::old_chosen", says.clone())));
@@ -291,7 +296,7 @@ pub fn export(
         }
     }
     say_unverified(tables, kind, &filled, !grid_list.is_empty(), options, &mut findings);
-    let lacking = filled.lacking(&options.old);
+    let lacking = filled.lacking(&options.old, spellings.first().copied());
     if !options.old.values.is_empty() && !lacking.is_empty() {
         let says = format!(
             "the control's old values of {} are not known: they are taken from the machine's description and what was active",
@@ -410,7 +415,7 @@ fn add_angles(
     tables: &Tables,
     kind: &Kind,
     carried: &Carried,
-    options: &Options,
+    old: &Old,
     filled: &mut Filled,
 ) -> BTreeMap<AxisName, f64> {
     let (now, before) = (zero_deg(machine, &carried.zero), zero_deg(machine, &with_active(&carried.zero)));
@@ -421,20 +426,20 @@ fn add_angles(
         let Some(axis) = machine.side(side).filter(|a| a.name.is_rotary()).nth(place) else { continue };
         let (now, before) = (now.get(&axis.name).copied(), before.get(&axis.name).copied().unwrap_or(0.0));
         let Some(now) = now else { continue };
-        let given_name = form.names.values().find(|n| options.old.values.contains_key(*n));
-        let given = given_name.and_then(|n| options.old.values.get(n)).map(|(v, _)| *v);
-        let old = given.unwrap_or(before);
-        let new = rounded(((old + now - before) / step).round() * step);
-        out.insert(axis.name, rounded(new - old + before));
+        let given_name = form.names.values().find(|n| old.values.contains_key(*n));
+        let given = given_name.and_then(|n| old.values.get(n)).map(|(v, _)| *v);
+        let was = given.unwrap_or(before);
+        let new = rounded(((was + now - before) / step).round() * step);
+        out.insert(axis.name, rounded(new - was + before));
         filled.values.push(Value {
             id: form.id.clone(),
             says: form.says.clone(),
             names: form.names.clone(),
-            old: rounded(old),
+            old: rounded(was),
             new,
             unit: "deg",
             decimals: fill::decimals(step),
-            known: given_name.is_some_and(|n| !options.old.assumed.contains(n)),
+            known: given_name.is_some_and(|n| !old.assumed.contains(n)),
             given: given_name.cloned(),
             elsewhere: false,
             instead: false,

@@ -24,6 +24,16 @@ pub fn spellings(tables: &Tables) -> Vec<&str> {
     out
 }
 
+/// The old values with those that a loaded compensation wrote, where nothing else is said of them.
+pub fn with_what_was_loaded(old: &Old, loaded: Option<&Record>) -> Old {
+    let mut held = old.clone();
+    let Some(loaded) = loaded else { return held };
+    for (name, value) in &loaded.values {
+        held.values.entry(name.clone()).or_insert((*value, Some(loaded.unit)));
+    }
+    held
+}
+
 /// In mm, for a length.
 fn plain(value: f64, unit: &str) -> f64 {
     if unit == "inch" { mm_from_inch(value) } else { value }

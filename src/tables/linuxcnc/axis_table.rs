@@ -93,7 +93,15 @@ mod tests {
     }
 
     fn shape(axis: AxisName, error: fn(f64, f64) -> f64) -> AxisShape {
-        AxisShape { parameter: "k".to_owned(), effect: "test".to_owned(), axis, input: axis, error: Box::new(error) }
+        AxisShape {
+            parameter: "k".to_owned(),
+            effect: "test".to_owned(),
+            value: 1.0,
+            unit: "mm".to_owned(),
+            axis,
+            input: axis,
+            error: Box::new(error),
+        }
     }
 
     fn one(machine: &Machine, shape: AxisShape) -> AxisTable {

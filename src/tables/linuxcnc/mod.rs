@@ -127,7 +127,7 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
             Ok(more) => findings.0.extend(more.0),
             Err(failure) => findings.0.extend(failure.0),
         }
-        findings.push(mode_note(active.mode));
+        findings.push(mode_note(active, correction.transformation || active.idle_without_transformation(machine) == 0));
     }
     let joints = match ini::Joints::of(machine, options.ini.as_ref()) {
         Ok(joints) => Some(joints),
@@ -152,14 +152,19 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
     Ok((export, findings))
 }
 
-fn mode_note(active: Mode) -> Finding {
-    let other = match active {
+fn mode_note(active: &Compensation, acted: bool) -> Finding {
+    let mode = active.mode;
+    let other = match mode {
         Mode::Component => "stock/",
         Mode::Stock | Mode::Table => "the component",
     };
     Finding::info(
         "tables::one_way",
-        format!("during the measurement the control applied a compensation of mode \"{active}\"; its values are in the totals"),
+        if acted {
+            format!("during the measurement the control applied a compensation of mode \"{mode}\"; its values are in the totals")
+        } else {
+            format!("during the measurement a compensation of mode \"{mode}\" was loaded, whose pins do not act on axis positions: what was found takes their place")
+        },
     )
     .help(format!("before changing to {other}, load the restoring files of the old one: the two ways must never act together"))
 }

@@ -10,6 +10,7 @@ use crate::diag::{Finding, Findings, Result};
 use crate::machine::{Machine, Side};
 use crate::tables::compensation::{AxisTable, Compensation, FORMAT, Mode, Stock, Term};
 use crate::tables::correction::{Correction, left_um, rounded};
+use crate::tables::restate::kept_in_words;
 use minijinja::{Value, context};
 use std::collections::BTreeMap;
 
@@ -327,7 +328,10 @@ impl Packing<'_> {
 
     fn stock(&mut self) -> Result<Way> {
         let (machine, module) = (self.machine, self.module.clone());
-        let (terms, reference_mm) = stock::terms_at_the_workpiece(machine, self.correction);
+        let (terms, reference_mm, kept) = stock::terms_at_the_workpiece(machine, self.correction);
+        if module.is_ok() && !kept.is_empty() {
+            self.findings.push(Finding::info("tables::kept", format!("stock/: {}", kept_in_words(&kept))));
+        }
         let (carried, not): (Vec<Term>, Vec<Term>) =
             terms.into_iter().partition(|t| stock::why_not(machine, &module, t).is_none());
         let home = stock::home_offsets(machine, &carried);

@@ -17,8 +17,9 @@
 use crate::axes::AxisName;
 use crate::machine::{Axis, Machine, Side};
 use crate::tables::compensation::Term;
-use crate::tables::correction::{Correction, restated, rounded};
-use crate::tables::place::{Place, along};
+use crate::tables::correction::{Correction, rounded};
+use crate::tables::place::{Place, Spot, along};
+use crate::tables::restate::stated_at;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -101,20 +102,12 @@ fn unit(component: usize) -> Vector3<f64> {
 }
 
 /// The terms of a correction stated where the workpiece is: without tilts an offset is right at one height only, so it
-/// is taken at the block's (`ball` of the machine's reference points).
+/// is taken at the block's (`ball` of the machine's reference points); with the places that stay as they were.
 #[must_use]
-pub fn terms_at_the_workpiece(machine: &Machine, correction: &Correction) -> (Vec<Term>, [f64; 3]) {
+pub fn terms_at_the_workpiece(machine: &Machine, correction: &Correction) -> (Vec<Term>, [f64; 3], Vec<Spot>) {
     let point: [f64; 3] = machine.reference.ball.into();
-    let before: Vec<Term> = correction.terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect();
-    let before = restated(&before, machine, correction.reference_mm, point);
-    let mut terms = restated(&correction.terms, machine, correction.reference_mm, point);
-    for term in &mut terms {
-        let old = before.iter().find(|b| b.spot() == term.spot()).map_or(0.0, |b| b.value);
-        term.value = rounded(term.value);
-        term.active_before = rounded(old);
-        term.identified = rounded(term.value - term.active_before);
-    }
-    (terms, point)
+    let (terms, kept) = stated_at(machine, correction, point);
+    (terms, point, kept)
 }
 
 /// Offset of an axis before its rotation, mm.
