@@ -190,6 +190,24 @@ fn stops_for_another_stylus() {
     all_clean("trunnion", "full", false, &["heidenhain"]);
 }
 
+/// ISO 841 turns a table's axis the other way: some faces, and all of a set-up, are then out of reach. What is left is a program
+/// that can begin at each set-up that it has.
+#[test]
+fn a_swivelling_table_that_turns_the_other_way() {
+    for name in ["trunnion", "swivel-table-b"] {
+        let mut machine = machine(name);
+        machine.axes.iter_mut().find(|a| a.name.is_rotary()).unwrap().sense = -1.0;
+        let spec = program::choose(program::built_in().unwrap(), "full", &machine).unwrap();
+        let generated = program::generate(&machine, &spec, &Options::default()).unwrap().0;
+        for control in ["linuxcnc", "sinumerik"] {
+            let post = controller(control);
+            is_clean(&post, &machine, &generated);
+            let setups = checked(&post, &machine, &generated).setups as usize;
+            assert!(setups < spec.setups.len(), "{control} {name}: all {setups} set-ups are within reach");
+        }
+    }
+}
+
 /// Text between two lines, taken out.
 fn without(text: &str, first: &str, last: &str) -> String {
     let lines: Vec<&str> = text.split_inclusive('\n').collect();

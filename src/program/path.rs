@@ -15,7 +15,7 @@ pub enum Step {
     /// The moves before the first one are the opening of the program: after them the machine stands at a known place at
     /// the top of the lifting axis.
     Setup {
-        /// Running number from 1.
+        /// Running number from 1, without a gap.
         number: u32,
         /// What is touched in it.
         says: String,

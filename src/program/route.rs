@@ -72,13 +72,14 @@ pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec, tcp: 
         at: None,
         senses: AxisMap::default(),
         opening: None,
+        entered: 0,
         visit: 0,
         stopped: false,
         met: BTreeSet::new(),
         heights: Heights { over_all: lift.top_height(), over_blocks: lift.top_height() },
     };
-    for (number, setup) in (1..).zip(&layout.setups) {
-        router.setup(number, setup)?;
+    for setup in &layout.setups {
+        router.setup(setup)?;
     }
     router.leave(tcp);
     router.out.path.seconds = router.clock.rounded_s();
@@ -106,6 +107,8 @@ pub(super) struct Router<'a, 'm> {
     pub(super) senses: AxisMap,
     /// Where the opening ended, and the senses in which the rotary axes came there.
     pub(super) opening: Option<(Position, AxisMap)>,
+    /// Set-ups that the program has so far: one of which nothing can be reached is none of them.
+    entered: u32,
     pub(super) visit: u32,
     /// The program has stopped since the last touch: what comes is another visit, turned or not.
     pub(super) stopped: bool,
@@ -116,7 +119,7 @@ pub(super) struct Router<'a, 'm> {
 }
 
 impl Router<'_, '_> {
-    fn setup(&mut self, number: u32, setup: &Setup) -> Result<()> {
+    fn setup(&mut self, setup: &Setup) -> Result<()> {
         let Some(scene) = self.scenes.get(setup.part) else { return Ok(()) };
         let probe = &scene.machine.probe;
         let room = probe.clearance + probe.placement_tolerance + probe.approach;
@@ -136,7 +139,7 @@ impl Router<'_, '_> {
             return Ok(());
         };
         let there = match self.change_part(setup.part) {
-            Ok(()) => self.index(number, setup, heights, first)?,
+            Ok(()) => self.index(setup, heights, first)?,
             Err(reason) => Err(reason),
         };
         if let Err(reason) = there {
@@ -170,14 +173,14 @@ impl Router<'_, '_> {
     }
 
     /// Brings the rotary axes to a pose. The inner error is the reason why this set-up cannot be reached.
-    fn index(&mut self, number: u32, setup: &Setup, heights: Heights, first: &Reached) -> Result<Result<(), String>> {
+    fn index(&mut self, setup: &Setup, heights: Heights, first: &Reached) -> Result<Result<(), String>> {
         let turns = match self.turns(self.at.map(|at| (at, self.senses)), &setup.pose, &setup.spec.from.value) {
             Ok(turns) => turns,
             Err(reason) => return Ok(Err(reason)),
         };
         let Some(at) = self.at else {
             self.begin(setup, &turns, first)?;
-            self.enter(number, setup);
+            self.enter(setup);
             self.heights = heights;
             return Ok(Ok(()));
         };
@@ -189,7 +192,7 @@ impl Router<'_, '_> {
             match self.clear_turns(&at, height_here, &turns, first) {
                 Ok(()) => {
                     self.rise(height_here);
-                    self.enter(number, setup);
+                    self.enter(setup);
                     for turn in &turns {
                         self.turn(turn);
                     }
@@ -260,11 +263,13 @@ impl Router<'_, '_> {
     }
 
     /// The set-up begins here: how to come here from the end of the opening, and the spindle in its place.
-    fn enter(&mut self, number: u32, setup: &Setup) {
+    fn enter(&mut self, setup: &Setup) {
+        // without a gap: begun at a number that is left out, a program would enter the next set-up without a way there
+        self.entered += 1;
         let pose: Vec<String> = setup.pose.iter().map(|(a, v)| format!("{a} {v}")).collect();
         let says = format!("{}, {}", setup.spec.stage, pose.join(" "));
         let resume = self.resume();
-        self.push(Step::Setup { number, says, resume });
+        self.push(Step::Setup { number: self.entered, says, resume });
         // in every set-up, that it also holds where the program is taken up again
         let deg = setup.spec.spindle_deg.unwrap_or(0.0);
         self.push(Step::OrientSpindle { deg });

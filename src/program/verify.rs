@@ -65,6 +65,7 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
         in_contact: None,
         at_start_of: None,
         next_touch: 0,
+        setups: 0,
         moves: Vec::new(),
         violations: Vec::new(),
         start_near: path.start_near.as_ref(),
@@ -141,6 +142,8 @@ struct Walk<'a, 'm> {
     /// Start of the touch at which the ball stands and from which it may search.
     at_start_of: Option<AxisMap>,
     next_touch: usize,
+    /// That have begun.
+    setups: u32,
     moves: Vec<Move>,
     violations: Vec<Violation>,
     start_near: Option<&'a super::path::StartNear>,
@@ -186,7 +189,7 @@ impl<'a> Walk<'a, '_> {
             Step::Note(_) => {}
             Step::Stop(stop) => self.stop(i, stop),
             Step::OrientSpindle { .. } => self.at_start_of = None,
-            Step::Setup { resume, .. } => self.setup(i, resume.as_deref()),
+            Step::Setup { number, resume, .. } => self.setup(i, *number, resume.as_deref()),
             Step::Rapid { to } => self.linear(i, to, None),
             Step::Protected { to, feed } => self.linear(i, to, Some(*feed)),
             Step::Rotary { to, sense } => self.rotary(i, to, sense),
@@ -196,7 +199,11 @@ impl<'a> Walk<'a, '_> {
     }
 
     /// Proves the way from the end of the opening to a set-up.
-    fn setup(&mut self, i: usize, resume: Option<&'a [Step]>) {
+    fn setup(&mut self, i: usize, number: u32, resume: Option<&'a [Step]>) {
+        self.setups += 1;
+        if number != self.setups {
+            self.violation(i, format!("set-up {} of the program has the number {number}", self.setups));
+        }
         if self.in_contact.is_some() {
             self.violation(i, "a set-up begins while the ball may press against a block".to_owned());
         }

@@ -325,6 +325,16 @@ fn every_set_up_of_the_built_in_programs_can_be_taken_up_again() {
         }),
         "does not end where the set-up begins",
     );
+    // and so is a gap: begun at that number, the program would enter the next set-up without a way there
+    says(
+        &after(|s| {
+            let i = place(s, 2, |s| matches!(s, Step::Setup { .. }));
+            if let Step::Setup { number, .. } = &mut s[i] {
+                *number += 1;
+            }
+        }),
+        "set-up 3 of the program has the number 4",
+    );
 }
 
 /// A program of one set-up on the swivel head's bridge.
