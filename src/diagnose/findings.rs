@@ -89,6 +89,7 @@ pub(super) fn put_together(
     };
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
+    let mut own_curve = None;
     let mut depends: Vec<Where> = if verdict == Verdict::Adequate {
         Vec::new()
     } else {
@@ -117,6 +118,7 @@ pub(super) fn put_together(
     {
         let share = beyond_the_noise(seen.evidence, first.share, first.parameters.len() + first.not_told.len());
         depends.retain(|w| w.by != by(on));
+        own_curve = super::own_curve::curve(seen, features, on, &by(on));
         depends.insert(
             0,
             Where {
@@ -145,7 +147,8 @@ pub(super) fn put_together(
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
-    let shape = drawn.and_then(|d| {
+    let shape = own_curve.filter(|c| depends.first().is_some_and(|w| w.by == c.by)).or_else(|| {
+        let d = drawn?;
         let variable = d.on.strip_suffix("*block").unwrap_or(&d.on);
         let kind = features.variables.iter().find(|v| v.name == variable).map(|v| v.kind);
         let moved = words::moved_block(d, fit);
@@ -155,14 +158,7 @@ pub(super) fn put_together(
         let sign = if outward { -1.0 } else { 1.0 };
         (!d.curve.is_empty()).then(|| Shape {
             by: by(&d.on),
-            x_unit: match kind {
-                Some(Kind::Rotary) => "deg",
-                Some(Kind::Linear) => "mm",
-                Some(Kind::Time) => "h",
-                Some(Kind::Temperature) => "degC",
-                _ => "1",
-            }
-            .to_owned(),
+            x_unit: x_unit(kind).to_owned(),
             y_unit: d.unit.clone(),
             direction: if outward {
                 "outward (+: the faces stand out, the block is larger)".to_owned()
@@ -243,6 +239,17 @@ pub(super) fn put_together(
             .collect(),
         warnings: seen.named.left_out.clone(),
         open,
+    }
+}
+
+/// Unit of what a misfit is drawn against.
+pub(super) fn x_unit(kind: Option<Kind>) -> &'static str {
+    match kind {
+        Some(Kind::Rotary) => "deg",
+        Some(Kind::Linear) => "mm",
+        Some(Kind::Time) => "h",
+        Some(Kind::Temperature) => "degC",
+        _ => "1",
     }
 }
 

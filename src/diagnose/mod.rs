@@ -16,6 +16,7 @@ mod missed;
 pub mod named;
 mod nothing;
 pub mod open;
+mod own_curve;
 pub mod places;
 mod rivals;
 pub mod sketch;
