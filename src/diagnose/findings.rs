@@ -51,8 +51,9 @@ pub(super) fn put_together(
     if verdict != Verdict::TooLittleData {
         let first_order = FirstOrder::of(fit);
         let tell_apart = tell::words(subject, seen, options);
-        candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, tell_apart))| Candidate {
-            tell_apart,
+        candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
+            tell_apart: told.says,
+            never_parted: told.never,
             ..candidate(fit, seen, &first_order, group, (i == 0, decision.borne_out))
         }));
     }
@@ -487,6 +488,7 @@ fn candidate(
             .collect(),
         or_else: None,
         tell_apart: String::new(),
+        never_parted: false,
         says,
         look: effect.look.clone(),
         share: score.delta_ss / total,
