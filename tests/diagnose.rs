@@ -14,6 +14,10 @@ use axiscal::simulate::{self, Scenario};
 use common::*;
 
 fn diagnosis(machine: &Machine, plans: &[Plan], scenario: &Scenario) -> Diagnosis {
+    diagnosis_with(machine, plans, scenario, false)
+}
+
+fn diagnosis_with(machine: &Machine, plans: &[Plan], scenario: &Scenario, refit: bool) -> Diagnosis {
     let catalogue = Catalogue::built_in().unwrap();
     let touches: Vec<Vec<Touch>> = plans
         .iter()
@@ -39,7 +43,7 @@ fn diagnosis(machine: &Machine, plans: &[Plan], scenario: &Scenario) -> Diagnosi
     let settings = Settings { effects, quick: true, ..Settings::default() };
     let fit = fit::identify(machine, &catalogue, &runs, &settings).unwrap();
     let subject = Subject { machine, catalogue: &catalogue, settings: &settings, fit: &fit };
-    diagnose(subject, &Options { refit: false, power: false, ..Options::default() }).unwrap()
+    diagnose(subject, &Options { refit, power: false, ..Options::default() }).unwrap()
 }
 
 /// The plan's coordinates keep the pitch of the screws when the blocks stand exactly where they should: a formula of the
@@ -90,4 +94,23 @@ fn scatter_of_visits_far_above_the_declared_one_is_a_finding() {
     // what the machine file declares is no finding
     let usual = diagnosis(&machine, &plans, &Scenario::flawless().with_noise(5e-4, 5e-4, 410));
     assert!(usual.depends.iter().all(|w| w.id != "scatter:visit"), "{}", usual.says);
+}
+
+/// Two effects at once, of which the second makes one pose come back elsewhere: beside the first it is still there, and no
+/// scatter of the visits.
+#[test]
+fn what_remains_beside_the_first_is_judged_as_the_model_with_it_would_be() {
+    let machine = machine("swivel-table-b");
+    let text = "seed = 11\n[effects.ambient-bending]\nqx = 2.0\nqz = -3.0\n[effects.tip-eccentricity]\nex = 6\ney = -2\n\
+                [effects.location-b]\nEX0B = 0.018\nEZ0B = -0.011\nEA0B = 0.0041\nEC0B = -0.0033\n\
+                [effects.location-c]\nEX0C = -0.009\nEY0C = 0.014\nEA0C = 0.0025\nEB0C = -0.0039\n\
+                [noise]\ntouch_um = 1.0\nvisit_um = 0.3\n\
+                [temperature]\nprofile = [[0.0, 20.5], [0.5, 21.8], [0.9, 21.0], [1.6, 23.0]]\n";
+    let scenario = simulate::scenario::parse(&axiscal::diag::source("two", text.to_owned()), &machine).unwrap().0;
+    let found = diagnosis_with(&machine, &[plan(&machine, "full")], &scenario, true);
+    assert_eq!(found.verdict, Verdict::MissingEffect, "{}", found.says);
+    let first = &found.candidates[0];
+    assert!(first.rms_after_um > 1.2 * found.noise_um, "{} {}", first.rms_after_um, found.noise_um);
+    assert_eq!((first.effect.as_str(), first.remains), ("tip-eccentricity", Some(true)), "{}", found.says);
+    assert!(found.says.contains("Something else is missing besides."), "{}", found.says);
 }

@@ -261,6 +261,9 @@ fn solve_names_a_group_and_not_its_first_member() {
     std::fs::write(at.join("study.toml"), study.replace(", \"backlash-y\"", "")).unwrap();
     let said = String::from_utf8(axiscal(at, &["solve", "study.toml", "--yes"]).stdout).unwrap();
     assert!(said.contains("found: one of backlash-y, ") && !said.contains("found: backlash-y:"), "{said}");
+    // a further program is asked for these names: the study holds one of them by now, and its touches leave nothing open
+    let next = said.lines().find(|l| l.starts_with("next: axiscal plan-next")).unwrap();
+    assert!(next.contains(" --effects backlash-y,") && next.contains("backlash-x"), "{next}");
 }
 
 /// Half of a run-out of C is an offset of the block: no amplitude has a value of its own, and the whole has.
@@ -305,9 +308,59 @@ fn the_curve_can_be_read() {
     assert!(high - low > 2.0 * median, "{low} to {high} with a band of {median}");
 }
 
+/// What is named is drawn: of a steady drift a line, though a step in its middle passes the test, too. The report says of it what
+/// `compare` says, and has another program asked for what these touches leave open.
+#[test]
+fn a_drift_is_drawn_as_a_drift_and_said_alike_everywhere() {
+    let wrong = "seed = 5\n[effects.drift-linear]\nvx = 6\nvz = -5\n[noise]\ntouch_um = 1.0\nvisit_um = 0.3\n";
+    let folder = folder(&["full"], wrong, None);
+    let at = folder.path();
+    let (d, _) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!(d["candidates"][0]["effect"], "drift-linear", "{}", d["says"]);
+    assert_eq!((&d["where"][0]["by"], &d["shape"]["by"]), (&"time".into(), &"time".into()), "{d}");
+    let list =
+        |key: &str| -> Vec<f64> { d["shape"][key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect() };
+    let (x, y) = (list("x"), list("y"));
+    let slope = |i: usize| (y[i] - y[i - 1]) / (x[i] - x[i - 1]);
+    // um per hour, everywhere
+    assert!(
+        (1..x.len()).all(|i| (slope(i).abs() - 5.5).abs() < 2.0 && (slope(i) - slope(1)).abs() < 1e-6),
+        "{x:?} {y:?}"
+    );
+    let (c, _) = json(at, &["compare", "study.toml"]);
+    ok(at, &["report", "study.toml", "--out", "r.html", "--view", "v.json"]);
+    let view: serde_json::Value = serde_json::from_slice(&std::fs::read(at.join("v.json")).unwrap()).unwrap();
+    assert_eq!(view["comparison_says"], c["says"]);
+    assert!(!c["says"].as_str().unwrap().contains("does not fail"), "{c}");
+    let told = |d: &serde_json::Value| d["candidates"][0]["tell_apart"].clone();
+    assert_eq!(told(&view["diagnosis"]), told(&d));
+    let headline = view["headline"]["sentence"].as_str().unwrap();
+    assert!(headline.contains("or what goes with the room's temperature"), "{headline}");
+}
+
+/// A spindle that stood at a few angles tells so many waves: no more terms are written, and the study can hold them all.
+#[test]
+fn a_sketch_has_the_terms_that_these_touches_tell() {
+    let wrong = "seed = 11\n[effects.tip-eccentricity]\nex = 6\ney = -2\n[noise]\ntouch_um = 1.0\nvisit_um = 0.3\n";
+    let folder = folder(&["full"], wrong, None);
+    let at = folder.path();
+    ok(at, &["sketch-effect", "study.toml", "--out", "my.toml"]);
+    let text = std::fs::read_to_string(at.join("my.toml")).unwrap();
+    let id = text.lines().find_map(|l| l.strip_prefix("id = \"")?.split('"').next()).unwrap();
+    assert!(text.contains("cos(S)") || text.contains("sin(S)"), "{text}");
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    let study = study.replacen("[[data]]", "effects_file = [\"my.toml\"]\n\n[[data]]", 1);
+    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", &format!("\"pretravel\", \"{id}\""))).unwrap();
+    let (i, _) = json(at, &["identify", "study.toml"]);
+    assert_eq!(i["rank"], i["unknowns"], "{text}\n{}", i["undetermined"]);
+}
+
 #[test]
 fn words_are_words() {
-    use axiscal::diagnose::words::{one_of, plain};
+    use axiscal::diagnose::words::{by, one_of, plain};
+    let rotary = |name: &str| name == "C";
+    assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C stood before");
+    assert_eq!(plain(&by("C before", &rotary)), "where C stood before");
     let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
     assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
     assert_eq!(one_of("backlash-x", &[]), "backlash-x");

@@ -337,3 +337,56 @@ fn a_prior_settles_what_touches_cannot() {
     assert_eq!((find("EY0B").status, find("EY0B").value), (Status::Fixed, 0.02));
     assert!(fit.outcome.undetermined.is_empty());
 }
+
+/// A warm-up that anybody would see makes one pose come back elsewhere: that is no scatter of the visits that hides it, and its
+/// time constant takes no location error with it.
+#[test]
+fn a_warm_up_of_the_usual_size_is_told_with_its_time_constant() {
+    let mut rng = ChaCha8Rng::seed_from_u64(29);
+    for machine in machines().iter().filter(|m| ["swivel-head", "swivel-table-b"].contains(&m.name.as_str())) {
+        let full = plan(machine, "full");
+        let [(first, one), (second, other)] = location(&machine.name);
+        for seed in 1..=4 {
+            let scenario = wrong(machine, &mut rng).0;
+            let scenario = scenario.with(machine, "warm-up", &[("wx", 3.0), ("wz", 8.0)]).unwrap();
+            let touches = touch(machine, &full, &scenario.with_noise(1e-3, 0.3e-3, seed), None);
+            let model = [first, second, "block-setup", "pretravel", "warm-up"];
+            let fit = identify(machine, &[(&full, &touches)], &model);
+            let o = &fit.outcome;
+            for p in o.parameters.iter().filter(|p| one.contains(&p.name.as_str()) || other.contains(&p.name.as_str()))
+            {
+                assert_eq!(p.status, Status::Identified, "{} seed {seed}: {}", machine.name, p.name);
+            }
+            for (name, truth) in [("wx", 3.0), ("wy", 0.0), ("wz", 8.0), ("tau", 0.5)] {
+                let p = o.parameters.iter().find(|p| p.name == name).unwrap();
+                let sigma = p.sigma.unwrap_or_else(|| panic!("{} seed {seed}: {name} is not told", machine.name));
+                // half of it for a time constant: the fit is far from linear in it
+                let most = if name == "tau" { 0.25 } else { 5.0 * sigma };
+                assert!((p.value - truth).abs() < most, "{name}: {} ± {sigma}", p.value);
+            }
+        }
+    }
+}
+
+/// Where nothing warms up the model holds a time constant that no touch tells, whatever the visits scatter.
+#[test]
+fn scatter_of_visits_is_no_warm_up() {
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    let machine = machine("swivel-head");
+    let full = plan(&machine, "full");
+    let [(first, _), (second, _)] = location(&machine.name);
+    let model = [first, second, "block-setup", "pretravel", "warm-up"];
+    let told = |visit_mm: f64, rng: &mut ChaCha8Rng| -> usize {
+        let seen = |seed: u64, rng: &mut ChaCha8Rng| {
+            let scenario = wrong(&machine, rng).0.with_noise(1e-3, visit_mm, seed);
+            let touches = touch(&machine, &full, &scenario, None);
+            let fit = identify(&machine, &[(&full, &touches)], &model);
+            fit.outcome.parameters.iter().any(|p| p.name == "tau" && p.status == Status::Identified)
+        };
+        (1..=6).filter(|&seed| seen(seed, rng)).count()
+    };
+    for visit_mm in [0.3e-3, 3e-3] {
+        let n = told(visit_mm, &mut rng);
+        assert!(n == 0, "with {visit_mm} mm a warm-up is seen in {n} of 6 runs in which there is none");
+    }
+}

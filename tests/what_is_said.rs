@@ -196,6 +196,7 @@ fn what_no_touches_part_is_said() {
     let first = &found.candidates[0];
     assert_eq!((first.effect.as_str(), &first.same_as[..]), ("warm-up", &["spindle-growth".to_owned()][..]));
     assert_eq!(first.tell_apart, axiscal::diagnose::NEVER_PARTED);
+    assert!(first.never_parted);
 }
 
 /// A term is its parameter times its formula: with the parameter inside once more it acts in second order.

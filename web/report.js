@@ -16,7 +16,7 @@
       else if (value !== null && value !== undefined && value !== false) el.setAttribute(name, value === true ? '' : value);
     }
     // the rooms write um in plain letters
-    const micro = (c) => (typeof c === 'string' && tag !== 'code' ? c.replace(/(\d )um\b/g, '$1µm') : c);
+    const micro = (c) => (typeof c === 'string' && tag !== 'code' ? c.replace(/(^|\d )um\b/g, '$1µm') : c);
     el.append(...children.filter((c) => c !== null && c !== undefined).map(micro));
     return el;
   }
@@ -142,6 +142,7 @@
       const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: takes away no more than chance may. Diamond: the same on index visits left out.');
       plot(div, () => P.candidates(div, view));
       const cards = make('div.grid');
+      const alike = (c) => [...c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)), ...(c.or_else ? [c.or_else] : [])];
       d.candidates.forEach((c, k) => {
         const stands = P.standing(d, c);
         const least = c.p_adjusted < 1e-300 ? 'p below 10⁻³⁰⁰' : `p = ${digits(c.p_adjusted, 2)}`;
@@ -150,10 +151,10 @@
         const mends = d.effects[c.effect]?.mends;
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('on index visits left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the fall is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
+            ...fact('on index visits left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
             ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
-            ...(c.same_as.length ? fact('cannot be told from', c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)).join('; ')) : []),
+            ...(alike(c).length ? fact('cannot be told from', alike(c).join('; ')) : []),
             ...(c.tell_apart ? fact('what tells them apart', c.tell_apart) : []),
             ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
           make('p', {}, c.says), c.look ? make('p', {}, make('strong', {}, 'Look: '), c.look) : null, mends ? make('p', {}, make('strong', {}, 'Mends it: '), mends) : null));

@@ -4,7 +4,7 @@ use super::load::load_study;
 use super::{Answer, Io};
 use crate::compare::Lead;
 use crate::diag::Result;
-use crate::diagnose::{Options, Subject, diagnose};
+use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
 use crate::{compare, files, fit, report};
 use std::path::PathBuf;
 
@@ -24,6 +24,11 @@ pub struct Args {
     pub ascii: bool,
 }
 
+/// What a diagnosis found, as a comparison names it: best first.
+pub(super) fn leads(found: &Diagnosis) -> Vec<Lead> {
+    found.depends.iter().map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() }).collect()
+}
+
 /// Runs `compare`.
 ///
 /// # Errors
@@ -40,8 +45,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         subject,
         &Options { at_most: 1, refit: false, power: false, planned: missed.then_some(&planned[..]) },
     )?;
-    let leads: Vec<Lead> =
-        found.depends.iter().map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() }).collect();
+    let leads = leads(&found);
     let mut comparison = compare::compare(&fit).led_by(&leads);
     if found.most_missed {
         comparison.says.clone_from(&found.says);

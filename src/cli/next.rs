@@ -28,7 +28,15 @@ pub fn controller(loaded: &Loaded) -> Option<String> {
 /// The call of `plan-next`, with the study's own control.
 #[must_use]
 pub fn plan_next(loaded: &Loaded) -> String {
-    let call = |name: &str| format!("axiscal plan-next {} --out next --controller {name}", quoted(&loaded.path));
+    plan_next_for(loaded, &[])
+}
+
+/// The same for effects that are to be told apart.
+#[must_use]
+pub fn plan_next_for(loaded: &Loaded, effects: &[&str]) -> String {
+    let which = if effects.is_empty() { String::new() } else { format!(" --effects {}", effects.join(",")) };
+    let study = quoted(&loaded.path);
+    let call = |name: &str| format!("axiscal plan-next {study} --out next --controller {name}{which}");
     match controller(loaded) {
         Some(name) => call(&quoted(&PathBuf::from(name))),
         // touches in a file of another origin: nobody knows the control
@@ -67,9 +75,13 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                     ],
                 };
             }
-            if first.tell_apart == crate::diagnose::NEVER_PARTED {
+            if first.never_parted {
+                let how = match first.tell_apart.as_str() {
+                    crate::diagnose::NEVER_PARTED => "look at the machine which of them it is: no touches tell",
+                    other => other,
+                };
                 return vec![
-                    "next: look at the machine which of them it is: no touches tell".to_owned(),
+                    format!("next: {how}"),
                     format!("  either way this takes it out of the other errors: axiscal add {study} {}", first.effect),
                 ];
             }

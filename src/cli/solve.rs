@@ -63,6 +63,9 @@ struct Step {
     found: String,
     /// Effects that these touches cannot tell from it.
     same_as: Vec<String>,
+    /// No touches do.
+    #[serde(skip)]
+    never_parted: bool,
     p_adjusted: f64,
     rms_before_um: f64,
     rms_after_um: f64,
@@ -139,6 +142,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                                 found: found_as(&id, &same_as, first.or_else.as_deref(), found.name_in_doubt),
                                 added: id,
                                 same_as,
+                                never_parted: first.never_parted,
                                 p_adjusted: first.p_adjusted,
                                 rms_before_um: o.rms_um,
                                 rms_after_um: after.rms_um,
@@ -155,13 +159,27 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             (Verdict::Unexplained, _) if found.faint => {
                 Some("what is left is as small as the noise, but for a pattern too faint to name".to_owned())
             }
-            (Verdict::Unexplained, _) if found.sketchable => Some(format!(
-                "no known effect explains what is left: `{}` writes its curve as a formula",
-                super::next::sketch_effect(&loaded)
-            )),
-            (Verdict::Unexplained, _) => {
-                Some(format!("no known effect explains what is left: {}", words::at_the_machine(&found)))
+            (Verdict::Unexplained, Some(first)) if found.in_question().is_some() => {
+                let (beside, add) = beside(&steps, &loaded);
+                Some(format!(
+                    "{} passes the test{beside}, but touches that had no part in choosing it are not predicted better with it: \
+                     {add}`{}` looks for touches that tell",
+                    one_of(&first.effect, &first.same_as),
+                    super::next::plan_next(&loaded)
+                ))
             }
+            (Verdict::Unexplained, _) if found.sketchable => {
+                let (beside, add) = beside(&steps, &loaded);
+                Some(format!(
+                    "no known effect explains what is left{beside}: {add}`{}` writes its curve as a formula",
+                    super::next::sketch_effect(&loaded)
+                ))
+            }
+            (Verdict::Unexplained, _) => Some(format!(
+                "no known effect explains what is left{}: {}",
+                beside(&steps, &loaded).0,
+                words::at_the_machine(&found)
+            )),
             (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
             (Verdict::MissingEffect, _) => Some("what is missing is not borne out".to_owned()),
             _ => Some("nothing is left that these touches can show".to_owned()),
@@ -173,8 +191,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     // names that end in something unexplained were names for a part of it, and may all be wrong
     let unexplained = found.verdict == Verdict::Unexplained && !found.faint;
     if unexplained && !steps.is_empty() {
+        let each = |s: &Step| {
+            format!("{}: {} > {} um RMS", s.added, significant(s.rms_before_um), significant(s.rms_after_um))
+        };
+        let found: Vec<String> = steps.iter().map(each).collect();
         let added: Vec<String> = steps.drain(..).map(|s| s.added).collect();
-        io.say(format!("what was added ({}) does not explain it: it is taken out again", added.join(", ")));
+        io.say(format!("what was added ({}) is not all that is there: it is taken out again", found.join("; ")));
         let change = add::Args { study: args.study.clone(), effects: added.clone(), dry_run: false };
         add::remove(&change, &io.inner())?;
         taken_back.extend(added);
@@ -356,6 +378,17 @@ fn ask(first: &Candidate, yes: bool) -> Result<Reply> {
     }
 }
 
+/// What was added before something is left that nothing explains, in words: it is taken out again, and what is said of the rest
+/// holds beside it only.
+fn beside(steps: &[Step], loaded: &Loaded) -> (String, String) {
+    if steps.is_empty() {
+        return (String::new(), String::new());
+    }
+    let added: Vec<&str> = steps.iter().map(|s| s.added.as_str()).collect();
+    let study = super::next::quoted(&loaded.path);
+    (format!(" beside {}", added.join(", ")), format!("`axiscal add {study} {}` and then ", added.join(" ")))
+}
+
 /// Effects that the loop added and that say nothing any more beside the later ones (Wald), taken out again.
 fn drop_idle(args: &Args, steps: &[Step], fit: &Fit, io: &Io) -> Result<Vec<String>> {
     let mut dropped = Vec::new();
@@ -454,8 +487,10 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
     for line in &s.open {
         io.say(format!("open: {line}"));
     }
-    if s.steps.iter().any(|step| !step.same_as.is_empty()) {
-        io.say_as_it_is(format!("next: {}", super::next::plan_next(loaded)));
+    // a further program is asked for the names themselves: the study holds one of them by now
+    for step in s.steps.iter().filter(|step| !step.same_as.is_empty() && !step.never_parted) {
+        let asked: Vec<&str> = std::iter::once(&step.added).chain(&step.same_as).map(String::as_str).collect();
+        io.say_as_it_is(format!("next: {}", super::next::plan_next_for(loaded, &asked)));
     }
     io.say_as_it_is(format!("next: axiscal history {}", super::next::quoted(&loaded.path)));
 }

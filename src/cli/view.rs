@@ -1,6 +1,7 @@
 //! From a study to what is looked at: the report and the workbench begin here.
 
 use super::add::{history_path, read_history};
+use super::compare::leads;
 use super::export::newest_log;
 use super::load::Loaded;
 use crate::compare::rungs::{Kind, Ladder, Rung, climb};
@@ -42,9 +43,8 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
     let diagnosis = {
         let quick = Settings { quick: true, ..settings.clone() };
         let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &quick, fit: &fit };
-        let missed = fit.data.mostly_missed();
-        let planned = if missed { loaded.planned() } else { Vec::new() };
-        diagnose(subject, &Options { planned: missed.then_some(&planned[..]), ..Options::default() })?
+        let planned = loaded.planned();
+        diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?
     };
     let tried: Vec<Vec<String>> =
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();
@@ -66,7 +66,8 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
     }
     let date = newest_log(loaded);
     let correction = correction(loaded, &fit, &date);
-    Ok(Worked { comparison: compare(&fit), proposed, diagnosis, ladder, correction, date, fit })
+    let comparison = compare(&fit).led_by(&leads(&diagnosis));
+    Ok(Worked { comparison, proposed, diagnosis, ladder, correction, date, fit })
 }
 
 fn correction(loaded: &Loaded, fit: &Fit, date: &str) -> std::result::Result<Correction, String> {

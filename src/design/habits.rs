@@ -51,6 +51,20 @@ pub struct Habit {
     pub seconds: f64,
 }
 
+impl Habit {
+    /// Touches that a further program could make: of the blocks as they stand, with a stylus that the machine's file knows. A
+    /// gauge is no touch, and a riser or a star is nothing that a program has.
+    #[must_use]
+    pub fn is_a_program(&self, machine: &Machine) -> bool {
+        let bought = match self.id.as_str() {
+            "riser" | "second-block" | "downward-face" => true,
+            "other-stylus" => machine.styli.is_empty(),
+            _ => false,
+        };
+        self.touches > 0 && !bought
+    }
+}
+
 /// All habits that this machine and these runs allow, cheapest first. `model` names the blocks' unknowns.
 #[must_use]
 pub fn habits(machine: &Machine, runs: &[Planned], model: &Model) -> Vec<Habit> {

@@ -104,6 +104,16 @@ impl Diagnosis {
         matches!(self.verdict, Verdict::MissingEffect | Verdict::Unexplained) && !self.open.suspects.is_empty()
     }
 
+    /// The effect that passes the test with all candidates counted in and that touches left out do not bear out: neither a name
+    /// nor nothing that is known.
+    #[must_use]
+    pub fn in_question(&self) -> Option<&Candidate> {
+        let asked =
+            self.verdict == Verdict::Unexplained && !self.faint && self.leaves_open() && self.mistake().is_none();
+        let passes = |c: &&Candidate| !c.proposed && c.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL;
+        self.candidates.first().filter(|_| asked).filter(passes)
+    }
+
     /// Would further touches tell whether a faint pattern is there? Those of a block that moved are made already.
     #[must_use]
     pub fn touches_would_tell(&self) -> bool {
@@ -213,6 +223,9 @@ pub struct Candidate {
     pub or_else: Option<String>,
     /// Which touches would tell them apart.
     pub tell_apart: String,
+    /// No touches that this machine can make tell the first two apart, whatever else may.
+    #[serde(skip)]
+    pub never_parted: bool,
     /// What it is.
     pub says: String,
     /// Where to look on the machine and how to confirm it.

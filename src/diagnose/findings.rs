@@ -51,8 +51,9 @@ pub(super) fn put_together(
     if verdict != Verdict::TooLittleData {
         let first_order = FirstOrder::of(fit);
         let tell_apart = tell::words(subject, seen, options);
-        candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, tell_apart))| Candidate {
-            tell_apart,
+        candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
+            tell_apart: told.says,
+            never_parted: told.never,
             ..candidate(fit, seen, &first_order, group, (i == 0, decision.borne_out))
         }));
     }
@@ -89,6 +90,7 @@ pub(super) fn put_together(
     };
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
+    let mut own_curve = None;
     let mut depends: Vec<Where> = if verdict == Verdict::Adequate {
         Vec::new()
     } else {
@@ -117,6 +119,7 @@ pub(super) fn put_together(
     {
         let share = beyond_the_noise(seen.evidence, first.share, first.parameters.len() + first.not_told.len());
         depends.retain(|w| w.by != by(on));
+        own_curve = super::own_curve::curve(seen, features, on, &by(on));
         depends.insert(
             0,
             Where {
@@ -145,7 +148,8 @@ pub(super) fn put_together(
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
-    let shape = drawn.and_then(|d| {
+    let shape = own_curve.filter(|c| depends.first().is_some_and(|w| w.by == c.by)).or_else(|| {
+        let d = drawn?;
         let variable = d.on.strip_suffix("*block").unwrap_or(&d.on);
         let kind = features.variables.iter().find(|v| v.name == variable).map(|v| v.kind);
         let moved = words::moved_block(d, fit);
@@ -155,14 +159,7 @@ pub(super) fn put_together(
         let sign = if outward { -1.0 } else { 1.0 };
         (!d.curve.is_empty()).then(|| Shape {
             by: by(&d.on),
-            x_unit: match kind {
-                Some(Kind::Rotary) => "deg",
-                Some(Kind::Linear) => "mm",
-                Some(Kind::Time) => "h",
-                Some(Kind::Temperature) => "degC",
-                _ => "1",
-            }
-            .to_owned(),
+            x_unit: x_unit(kind).to_owned(),
             y_unit: d.unit.clone(),
             direction: if outward {
                 "outward (+: the faces stand out, the block is larger)".to_owned()
@@ -243,6 +240,17 @@ pub(super) fn put_together(
             .collect(),
         warnings: seen.named.left_out.clone(),
         open,
+    }
+}
+
+/// Unit of what a misfit is drawn against.
+pub(super) fn x_unit(kind: Option<Kind>) -> &'static str {
+    match kind {
+        Some(Kind::Rotary) => "deg",
+        Some(Kind::Linear) => "mm",
+        Some(Kind::Time) => "h",
+        Some(Kind::Temperature) => "degC",
+        _ => "1",
     }
 }
 
@@ -480,6 +488,7 @@ fn candidate(
             .collect(),
         or_else: None,
         tell_apart: String::new(),
+        never_parted: false,
         says,
         look: effect.look.clone(),
         share: score.delta_ss / total,

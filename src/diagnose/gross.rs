@@ -188,6 +188,7 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
         same_as: Vec::new(),
         or_else: None,
         tell_apart: String::new(),
+        never_parted: false,
         says: effect.says.clone(),
         look: effect.look.clone(),
         share: 1.0 - (gross.rms_um / subject.fit.outcome.rms_um).powi(2),

@@ -16,6 +16,7 @@ mod missed;
 pub mod named;
 mod nothing;
 pub mod open;
+mod own_curve;
 pub mod places;
 mod rivals;
 pub mod sketch;
@@ -330,13 +331,14 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
 
 /// Does a fit still miss something, by the tests of the first step?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
-    let evidence = Evidence::of(fit);
+    let features = features::features(fit, machine);
+    // as the diagnosis of that model would see it: what else acts may look like scatter of the visits
+    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
     let named = Named::of(fit, &evidence, machine, catalogue);
     let question = evidence.question();
     if Search::new(question, &named.library).leader().is_some() {
         return true;
     }
-    let features = features::features(fit, machine);
     let generics = features::shapes(&evidence, &features);
     dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < verdict::LACK_OF_FIT

@@ -19,8 +19,17 @@ const SAFELY: f64 = 0.95;
 /// Rivals that are named at most.
 const MOST_NAMED: usize = 4;
 
-/// In words, one for each group; empty where a group has one member.
-pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<String> {
+/// What tells the members of a group apart.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Told {
+    /// In words; empty where a group has one member.
+    pub says: String,
+    /// No touches do.
+    pub never: bool,
+}
+
+/// One for each group.
+pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<Told> {
     let found = |g: &Group| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL);
     let asked: Vec<bool> = seen.groups.iter().map(|g| g.members.len() > 1 && found(g)).collect();
     let tried = match options.planned {
@@ -31,7 +40,7 @@ pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> 
         if *asked && !tried.is_empty() {
             by_variation(seen, group, &tried)
         } else {
-            by_difference(subject, seen, group)
+            Told { says: by_difference(subject, seen, group), never: false }
         }
     });
     each.collect()
@@ -41,6 +50,8 @@ pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> 
 struct Tried {
     says: String,
     seconds: f64,
+    /// Could a further program make it?
+    program: bool,
     /// Candidate, columns, expected size.
     effects: Vec<(usize, std::ops::Range<usize>, DVector<f64>)>,
     products: Products,
@@ -110,7 +121,13 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
                 .map(|(&c, span)| (c, span, seen.order.scores[c].estimate.clone()))
                 .collect();
             let products = Products::new(&view.base, &view.library.matrix().into_owned());
-            Ok(Tried { says: habit.says, seconds: habit.seconds, effects, products })
+            Ok(Tried {
+                program: habit.is_a_program(machine),
+                says: habit.says,
+                seconds: habit.seconds,
+                effects,
+                products,
+            })
         })
         .collect()
 }
@@ -119,7 +136,10 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
 pub const NEVER: &str = "no touches that this machine can make do: they do the same wherever it touches, so look at the machine \
                          which it is";
 
-/// Does every variation leave the first of a group and all others exactly as they are to each other?
+/// What is said where the variations that were tried do not help, and a program of its own may.
+const LOOKED_FOR: &str = "no single change of these touches does: `axiscal plan-next` looks for a program that does";
+
+/// Does every variation that a program could make leave the first of a group and all others exactly as they are to each other?
 fn never_parted(group: &Group, tried: &[Tried]) -> bool {
     /// Share of an effect's own noncentrality: time constants of two effects are found one by one, and differ a little.
     const NOTHING: f64 = 1e-4;
@@ -131,26 +151,30 @@ fn never_parted(group: &Group, tried: &[Tried]) -> bool {
         let whole = t.alone(chosen).unwrap_or(0.0);
         t.left(chosen, rival).is_some_and(|l| l.q == 0 || l.lambda < (NOTHING * whole).min(AT_MOST))
     };
-    tried.iter().all(|t| rivals().all(|r| the_same(t, r)))
+    tried.iter().filter(|t| t.program).all(|t| rivals().all(|r| the_same(t, r)))
 }
 
 /// The cheapest variation that tells the first of a group from most of the others.
-fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> String {
+fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Told {
     let chosen = group.first();
     let rivals: Vec<usize> = group.members.iter().map(|m| m.candidate).filter(|&c| c != chosen).collect();
     let told = |t: &Tried| rivals.iter().filter(|&&r| t.tells(chosen, r)).count();
     // ties go to the earlier, which is the cheaper
     let best = tried.iter().map(|t| (told(t), t)).rev().max_by_key(|t| t.0);
     let id = |c: usize| seen.named.effects[c].id.as_str();
+    let never = never_parted(group, tried);
     let Some((count, best)) = best.filter(|b| b.0 > 0) else {
         let told_by_room = |c: usize| seen.named.effects[c].terms.iter().any(|t| t.formula.variables().contains(&"T"));
-        return match never_parted(group, tried) {
-            true if group.members.iter().any(|m| told_by_room(m.candidate)) => {
-                "no change of these touches does while the room goes on as it did: measure again while its temperature turns".into()
+        let of_room = group.members.iter().any(|m| told_by_room(m.candidate));
+        let says = match never {
+            true if of_room => {
+                "no change of these touches does while the room goes on as it did: measure again while its temperature turns"
             }
-            true => NEVER.into(),
-            false => "no single change of these touches does: `axiscal plan-next` looks for a program that does".into(),
+            true => NEVER,
+            false => LOOKED_FOR,
         };
+        // a room that turns is something that touches wait for
+        return Told { says: says.into(), never: never && !of_room };
     };
     let from: Vec<&str> = rivals.iter().filter(|&&r| best.tells(chosen, r)).map(|&r| id(r)).collect();
     let whom = match (count == rivals.len(), count) {
@@ -159,8 +183,12 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> String {
         (false, n) if n <= MOST_NAMED => format!("from {}, and leaves the others", from.join(", ")),
         (false, n) => format!("from {n} of the {}", rivals.len()),
     };
-    format!("{} (+{:.0} min): that tells {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen))
+    let says = format!("{} (+{:.0} min): that tells {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen));
+    Told { says, never }
 }
+
+/// Two effects that differ by less at every touch, um, are told apart at none of them.
+const LEAST_DIFFERENCE_UM: f64 = 0.05;
 
 /// Where the two that lead a group differ most: for who has no plan at hand.
 fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String {
@@ -174,6 +202,9 @@ fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String 
     let difference = trace(chosen) - trace(rival);
     let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
     let Some(most) = seen.evidence.used.iter().copied().max_by(further) else { return String::new() };
+    if difference[most].abs() < LEAST_DIFFERENCE_UM {
+        return LOOKED_FOR.into();
+    }
     let o = &subject.fit.data.observations[most];
     let pose: Vec<String> = subject
         .machine

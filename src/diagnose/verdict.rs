@@ -166,8 +166,13 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
                 (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
                 (_, true, true) => format!(
-                    "Something is missing ({against}), and no known effect explains it: {one} would take {part} of it, but a \
-                     shape without a name describes it clearly better.{}",
+                    "Something is missing ({against}), and no known effect explains it: {one} would take {part} of it, but {}.{}",
+                    // the first shape may take less than the effect: what was weighed is what either side comes to in the end
+                    if out.depends.first().is_some_and(|w| w.share > share) {
+                        "a shape without a name describes it clearly better"
+                    } else {
+                        "what is left beside it has no name, and shapes without one describe the whole clearly better"
+                    },
                     gross.unwrap_or(first)
                 ),
                 (_, true, false) if gross.is_none() => format!(

@@ -40,6 +40,8 @@ pub fn by(on: &str, is_rotary: &dyn Fn(&str) -> bool) -> String {
         "L" => "length".into(),
         "t*block" => "time*block".into(),
         "X" | "Y" | "Z" => format!("axis.{on}"),
+        // the last factor of a product may be a pose before
+        _ if on.contains('*') => on.to_owned(),
         _ if is_rotary(on) => format!("pose.{on}"),
         _ => match on.strip_suffix(" before") {
             Some(axis) => format!("before.{axis}"),

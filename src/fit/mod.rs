@@ -196,7 +196,63 @@ pub fn identify(machine: &Machine, catalogue: &Catalogue, runs: &[Run], settings
 /// As [`identify`].
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
-    let starts = starts(machine, catalogue, &effects, &data, settings)?;
+    let mut starts = BTreeMap::new();
+    let shaped = effects.iter().copied().filter(|e| !e.per_block && e.parameters.iter().any(|p| p.shape.is_some()));
+    let unseen = look_for((machine, catalogue), shaped.collect(), &data, settings, &mut starts)?;
+    let fit = identify_started(machine, catalogue, &effects, data, settings, &starts)?;
+    // what an effect changes from one visit to the next is scatter of the visits to a fit without it, which then hardly sees it:
+    // where less scatter is left beside it, that is what it is judged by
+    let Some(unseen) = unseen.filter(|u| fit.noise.tau_mm < u.tau_mm) else { return Ok(fit) };
+    let calm = Settings { visit_sigma_mm: Some(fit.noise.tau_mm), ..settings.clone() };
+    let n_unseen = unseen.effects.len();
+    let still = look_for((machine, catalogue), unseen.effects, &fit.data, &calm, &mut starts)?;
+    if still.is_some_and(|s| s.effects.len() == n_unseen) {
+        return Ok(fit);
+    }
+    identify_started(machine, catalogue, &effects, fit.data, settings, &starts)
+}
+
+/// Effects with shape parameters that the data does not show, and with which scatter of index visits, mm.
+struct Unseen<'e> {
+    effects: Vec<&'e Effect>,
+    tau_mm: f64,
+}
+
+/// Where the search begins for effects with shape parameters, by name of the unknown, beside the fit of everything else; what
+/// the data does not show is handed back.
+fn look_for<'e>(
+    (machine, catalogue): (&Machine, &Catalogue),
+    shaped: Vec<&'e Effect>,
+    data: &Data,
+    settings: &Settings,
+    starts: &mut BTreeMap<String, f64>,
+) -> Result<Option<Unseen<'e>>> {
+    if shaped.is_empty() || data.observations.is_empty() {
+        return Ok(None);
+    }
+    let base = shapes::without(settings, &shaped);
+    let others = effects_of(&base.effects, catalogue, machine)?;
+    let fit = identify_started(machine, catalogue, &others, data.clone(), &base, starts)?;
+    let mut unseen = Unseen { effects: Vec::new(), tau_mm: fit.noise.tau_mm };
+    for effect in shaped {
+        let Some(start) = shapes::start_shapes(&fit, machine, effect) else { continue };
+        starts.extend(effect.parameters.iter().zip(start.values).map(|(p, v)| (p.name.clone(), v)));
+        if !start.shown {
+            unseen.effects.push(effect);
+        }
+    }
+    Ok(Some(unseen).filter(|u| !u.effects.is_empty()))
+}
+
+/// Fits a model from given starts: where something jumps, and what runs out of its range, is held.
+fn identify_started(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    data: Data,
+    settings: &Settings,
+    starts: &BTreeMap<String, f64>,
+) -> Result<Fit> {
     let mut held_settings = settings.clone();
     for effect in effects.iter().filter(|e| starts.contains_key(&e.parameters[0].name)) {
         let values: Vec<f64> = effect.parameters.iter().map(|p| starts.get(&p.name).copied().unwrap_or(0.0)).collect();
@@ -208,37 +264,12 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
             held_settings.knowledge.entry(name.to_owned()).or_insert(Knowledge::Fixed(value));
         }
     }
-    let fit = identify_from(machine, catalogue, &effects, data, &held_settings, &starts)?;
+    let fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;
     let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
     held_settings.knowledge.insert(name.clone(), held);
-    let mut fit = identify_from(machine, catalogue, &effects, fit.data, &held_settings, &starts)?;
+    let mut fit = identify_from(machine, catalogue, effects, fit.data, &held_settings, starts)?;
     fit.outcome.warnings.push(format!("{name} ran out of its range in the search and is held at the end of it"));
     Ok(fit)
-}
-
-/// Where the search begins for effects with shape parameters, by name of the unknown.
-fn starts(
-    machine: &Machine,
-    catalogue: &Catalogue,
-    effects: &[&Effect],
-    data: &Data,
-    settings: &Settings,
-) -> Result<BTreeMap<String, f64>> {
-    let mut out = BTreeMap::new();
-    let shaped: Vec<&Effect> =
-        effects.iter().copied().filter(|e| !e.per_block && e.parameters.iter().any(|p| p.shape.is_some())).collect();
-    if shaped.is_empty() || data.observations.is_empty() {
-        return Ok(out);
-    }
-    let base = shapes::without(settings, &shaped);
-    let others = effects_of(&base.effects, catalogue, machine)?;
-    let fit = identify_from(machine, catalogue, &others, data.clone(), &base, &out)?;
-    for effect in shaped {
-        if let Some(start) = shapes::start_shapes(&fit, machine, effect) {
-            out.extend(effect.parameters.iter().zip(start.values).map(|(p, v)| (p.name.clone(), v)));
-        }
-    }
-    Ok(out)
 }
 
 /// Fits a model from given starts.

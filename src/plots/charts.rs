@@ -2,7 +2,7 @@
 
 use super::chart::{Axis, Chart, Colour, Look, Mark, Point, Shape};
 use super::machine;
-use crate::compare::rungs::Kind;
+use crate::compare::rungs::{Curve, Kind};
 use crate::diagnose::Verdict;
 use crate::fit::outcome::Status;
 use crate::report::fit::significant;
@@ -287,7 +287,12 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
     let room = 0.04 * (high - low);
     let miss = |rung: usize, i: usize| if along { 1.0 } else { f64::from(t.sign[i]) } * t.residual_um[rung][i];
     let noise = 2.0 * view.errors.noise_um;
-    let reach = 1.08 * highest(used.iter().flat_map(|i| [miss(from, *i).abs(), miss(to, *i).abs()]).chain([noise]));
+    let added: Vec<&Curve> =
+        view.curves.iter().filter(|q| q.variable == variable.id && (q.from, q.to) == (from, to)).collect();
+    let missed = used.iter().flat_map(|i| [miss(from, *i).abs(), miss(to, *i).abs()]);
+    // a line between the touches may go further than any of them
+    let drawn = added.iter().flat_map(|q| q.y_um.iter().map(|y| y.abs()));
+    let reach = 1.08 * highest(missed.chain(drawn).chain([noise]));
     let title = if along { "miss along the face, µm" } else { "miss, µm" };
     let name = format!("residual-{}", variable.id.to_lowercase());
     let x = Axis::new(variable.title.clone(), (low - room, high + room));
@@ -324,11 +329,7 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
             add(from, "before", false, 0.45);
         }
         add(to, "after", true, 0.85);
-        let own = view
-            .curves
-            .iter()
-            .filter(|q| q.variable == variable.id && q.direction == *direction && (q.from, q.to) == (from, to));
-        for curve in own {
+        for curve in added.iter().filter(|q| q.direction == *direction) {
             let points = curve.x.iter().zip(&curve.y_um).map(|(x, y)| point(*x, *y)).collect();
             let series = format!("{direction} added");
             c.marks.push(Mark::Line { series, colour: *colour, width: 3, dash: *dash, points });

@@ -18,6 +18,9 @@ const MOST_NAMED: usize = 6;
 /// Effects named with their smallest detectable size.
 const MOST_POWER: usize = 4;
 
+/// More touches than this that come back with the first candidate are said in one line.
+const MOST_ALONE: usize = 4;
+
 /// Columns of the small plot at least and at most.
 const COLUMNS: (usize, usize) = (30, 100);
 
@@ -74,7 +77,16 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
             n => wrapped(&format!("not used: {n} touches of block {block} that moved: {}", ids.join(", ")), 2),
         };
     }
-    for o in d.outliers.iter().filter(|o| !moved(o)) {
+    let (back, stay): (Vec<&Outlier>, Vec<&Outlier>) =
+        d.outliers.iter().filter(|o| !moved(o)).partition(|o| o.comes_back);
+    let together = back.len() > MOST_ALONE;
+    if together {
+        let ids: Vec<String> = back.iter().map(|o| format!("{}/{}", o.run, o.id)).collect();
+        let n = ids.len();
+        let says = "that belong to the rest once the first candidate is in the model";
+        out += &wrapped(&format!("not used: {n} touches {says} (run/touch): {}", ids.join(", ")), 2);
+    }
+    for o in stay.into_iter().chain(back.into_iter().filter(|_| !together)) {
         let back = if o.comes_back { "; it belongs to the rest once the first candidate is in the model" } else { "" };
         out += &wrapped(
             &format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason),

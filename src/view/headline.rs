@@ -46,6 +46,11 @@ pub(super) fn um(x: f64) -> String {
     format!("{x:.digits$} µm")
 }
 
+/// The same with its sign.
+fn signed_um(x: f64) -> String {
+    format!("{}{}", if x < 0.0 { "-" } else { "" }, um(x))
+}
+
 /// "3 of 8 errors", "1 of 8 errors", "the one error".
 fn of(n: usize, total: usize) -> String {
     if total == 1 { "the one error".to_owned() } else { format!("{n} of {total} errors") }
@@ -65,7 +70,7 @@ fn largest(parameters: &[ParameterRecord], judgement: Judgement) -> Option<&Para
 pub(super) fn size(p: &ParameterRecord, m: &Material) -> String {
     let own = || format!("{} {}", crate::report::fit::digits(p.value, p.sigma), p.unit);
     match (p.at_radius_um, p.unit.as_str()) {
-        (Some(size), "mm" | "um") => um(size),
+        (Some(size), "mm" | "um") => signed_um(size),
         (Some(size), _) => format!("{}, that is {} at {} mm", own(), um(size), m.tolerance.radius_mm),
         (None, _) => own(),
     }
@@ -83,6 +88,13 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
         Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
         Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
         Verdict::Unexplained if !open.is_empty() => (Level::Act, one_of(m, &open)),
+        Verdict::Unexplained if d.in_question().is_some() => (
+            Level::Act,
+            format!(
+                "Something is missing in the model: {} may be it, but touches that had no part in choosing it are not predicted better with it.",
+                d.in_question().map_or_else(String::new, |c| in_question(m, c))
+            ),
+        ),
         Verdict::Unexplained => (
             Level::Act,
             format!(
@@ -163,6 +175,15 @@ fn one_of(m: &Material, open: &[&str]) -> String {
     }
 }
 
+/// An effect that passes its test and is not borne out, with those that these touches cannot tell from it.
+pub(super) fn in_question(m: &Material, c: &Candidate) -> String {
+    match &c.same_as[..] {
+        [] => c.name.clone(),
+        [one] => format!("{} or {}", c.name, named(m, one)),
+        several => format!("{} or one of {} others", c.name, several.len()),
+    }
+}
+
 /// What the missing effect does to the touches, in figures.
 fn falls(m: &Material, c: &Candidate) -> String {
     let d = m.diagnosis;
@@ -195,14 +216,14 @@ fn missing(m: &Material, c: &Candidate) -> String {
         })
         .collect();
     let size = if is_one_size(c) { format!(" ({})", sizes.join(", ")) } else { String::new() };
-    let what = match &c.same_as[..] {
-        [] => match &c.or_else {
-            Some(other) => format!("{}{size}, or {other}: these touches cannot tell which", c.name),
-            None => format!("{}{size}", c.name),
-        },
-        [one] => format!("{}, or {}: these touches cannot tell which", c.name, named(m, one)),
-        several => format!("{}, or one of {} others that these touches cannot tell from it", c.name, several.len()),
+    let others = match &c.same_as[..] {
+        [] => None,
+        [one] => Some(named(m, one)),
+        several => Some(format!("one of {} others", several.len())),
     };
+    let or: String = others.iter().chain(&c.or_else).map(|other| format!(", or {other}")).collect();
+    let which = if or.is_empty() { "" } else { ": these touches cannot tell which" };
+    let what = format!("{}{size}{or}{which}", c.name);
     let (whose, has) = whose(m, &c.effect);
     format!("{whose} {has} an error that is not in the model yet: {what}.")
 }
@@ -320,6 +341,7 @@ mod tests {
             same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
             or_else: None,
             tell_apart: String::new(),
+            never_parted: false,
             says: String::new(),
             look: String::new(),
             share: 0.9,
@@ -362,6 +384,25 @@ mod tests {
             open: Open::default(),
             warnings: Vec::new(),
         }
+    }
+
+    #[test]
+    fn a_size_keeps_its_sign() {
+        assert_eq!((signed_um(-2.95).as_str(), signed_um(2.95).as_str()), ("-2.95 µm", "2.95 µm"));
+    }
+
+    #[test]
+    fn what_passes_and_is_not_borne_out_is_in_question() {
+        let mut d = diagnosis(vec![candidate("a", 1e-9, Some(2.0), &[])]);
+        assert!(d.in_question().is_none(), "nothing is open: shapes say it better");
+        d.open.suspects.push(crate::design::questions::Suspect {
+            id: "a".into(),
+            size: nalgebra::DVector::from_element(1, 1.0),
+            shape: None,
+        });
+        assert!(d.in_question().is_some_and(|c| c.effect == "a"));
+        d.faint = true;
+        assert!(d.in_question().is_none());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What to do next, the first thing first.
 
 use super::Material;
-use super::headline::{Headline, Level, capital, named, size, um, untried};
+use super::headline::{Headline, Level, capital, in_question, named, size, um, untried};
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
@@ -51,6 +51,11 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
         Verdict::Unexplained if !untried(d).is_empty() => {
             which(m, &untried(d), &plan_next, controller, &mut out);
         }
+        Verdict::Unexplained if d.in_question().is_some() => {
+            let what = d.in_question().map_or_else(String::new, |c| in_question(m, c));
+            let how = format!("Whether it is {what}, touches at further poses tell.");
+            out.push(Next::new("Measure more index visits", how, plan_next.clone()));
+        }
         Verdict::Unexplained => unexplained(m, &mut out),
         Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
     }
@@ -96,8 +101,7 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
     }
     if !first.same_as.is_empty() {
-        let no_touches = first.tell_apart == crate::diagnose::NEVER_PARTED;
-        let command = if no_touches { "" } else { plan_next };
+        let command = if first.never_parted { "" } else { plan_next };
         out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), command));
     }
     out.push(Next::new(

@@ -57,7 +57,8 @@ function row(effect, score) {
     const words = score.visible
       ? `${standing(effect.id, score)}; chance ${chance(score.p_adjusted, score.ln_p)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
       : "leaves no trace in these touches";
-    const same = candidate(effect.id)?.same_as ?? [];
+    const found = candidate(effect.id);
+    const same = [...(found?.same_as ?? []), ...(found?.or_else ? [found.or_else] : [])];
     what.append(element("div", { class: "bar", "aria-hidden": "true" }, bar), element("small", {}, words));
     if (same.length) what.append(element("small", {}, `these touches cannot tell it from ${same.join(", ")}`));
   }

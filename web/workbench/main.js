@@ -57,7 +57,7 @@ function verdict() {
   const says = open.size ? `Something is missing in the model (${found.rms_um.toFixed(2)} µm RMS against ${found.noise_um.toFixed(2)} µm noise): ${which}` : found?.says;
   show("verdict", says?.replace(/(\d )um\b/g, "$1µm") ?? soFar);
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
-    ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${first.same_as.join(", ")}: a further program would.` : ""}`
+    ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${[...first.same_as, ...(first.or_else ? [first.or_else] : [])].join(", ")}: a further program would.` : ""}`
     : found.faint ? "What is left is as small as the noise, but for a faint pattern: write the program that tells more."
     : open.size ? "Measure further poses: write the program that tells more, or run the full program."
     : found.verdict === "unexplained" ? "No known effect explains what is left: try a formula of your own, or look at the touches that stand out."

@@ -217,13 +217,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         if let Some(other) = most {
             if args.moved || stands.is_none() {
                 best = Some(other);
-            } else {
+            } else if other.told() > best.as_ref().map_or(0, Chosen::told) {
                 io.report(&[Finding::info(
                     "next::other_blocks",
                     format!(
                         "with mounting {:?} put up anew {} of {} pairs would be told apart",
                         other.generated.plan.mounting,
-                        other.separations.iter().filter(|s| s.told >= SAFELY).count(),
+                        other.told(),
                         other.separations.len()
                     ),
                 )
