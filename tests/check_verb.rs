@@ -206,3 +206,56 @@ fn a_program_has_the_number_that_its_settings_say() {
             .stderr(predicate::str::contains("program_number").and(predicate::str::contains(says)));
     }
 }
+/// LinuxCNC: a name in brackets is as it stands, and nothing but blank lines stands before the first %.
+#[test]
+fn what_linuxcnc_itself_refuses_is_refused() {
+    let folder = folder("linuxcnc");
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("small.ngc")).unwrap();
+    let check = |edited: String| {
+        assert_ne!(edited, text);
+        std::fs::write(at.join("edited.ngc"), edited).unwrap();
+        check(at, "linuxcnc", "edited.ngc").assert()
+    };
+    for (from, to, place) in [
+        ("\no40 endif", "\no<040> endif", ""),
+        ("\no<axiscal> call", "\no<0axiscal> call", ""),
+        ("\no2 if", "\no<02> if", ""),
+        ("\no2 endif", "\no<0002> endif", ""),
+        ("%\n", "(a remark)\n%\n", ":2:1"),
+        ("%\n", "N10\n%\n", ":2:1"),
+        ("%\n", "\u{feff}%\n", ":1:1"),
+    ] {
+        check(text.replacen(from, to, 1)).code(2).stderr(predicate::str::contains(format!("edited.ngc{place}")));
+    }
+    for (from, to) in [
+        ("\no40 endif", "\nO<40> ENDIF"),
+        ("\no40 endif", "\no040 endif"),
+        ("\no<axiscal> call", "\no<AXISCAL> call"),
+        ("%\n", "\n \t\n%\n"),
+    ] {
+        check(text.replacen(from, to, 1)).code(0);
+    }
+}
+
+/// A byte order mark is no part of a program, on any control, nor of a mask beside it.
+#[test]
+fn a_byte_order_mark_is_refused() {
+    for (controller, file) in [
+        ("linuxcnc", "small.ngc"),
+        ("fanuc", "small.nc"),
+        ("haas", "small.nc"),
+        ("sinumerik", "small.mpf"),
+        ("heidenhain", "small.h"),
+        ("heidenhain", "SMALL_P.A"),
+    ] {
+        let folder = folder(controller);
+        let marked = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        std::fs::write(folder.path().join(file), format!("\u{feff}{marked}")).unwrap();
+        let program = if controller == "heidenhain" { "small.h" } else { file };
+        check(folder.path(), controller, program).assert().code(2).stderr(
+            predicate::str::contains(format!("{file}:1:1: error"))
+                .and(predicate::str::contains("byte order mark").and(predicate::str::contains("save it"))),
+        );
+    }
+}

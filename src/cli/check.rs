@@ -44,7 +44,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
     io.report(&findings);
     let plan = args.plan.as_ref().map(|file| load_plan(file, &machine, io)).transpose()?;
-    let text = source(args.file.display().to_string(), files::read_text(&args.file)?);
+    let text = source(args.file.display().to_string(), files::read_text_as_it_is(&args.file)?);
     let beside = beside(&check::wanted_beside(&post, &text), &args.file)?;
     let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from, beside: &beside };
     let mut checked = check::check(&machine, &post, &text, &against)?;
@@ -90,7 +90,9 @@ fn say_codes(checked: &Checked, io: &Io) {
 fn beside(names: &[String], program: &Path) -> Result<Vec<(String, Source)>> {
     let folder = program.parent().unwrap_or_else(|| Path::new(""));
     let there = names.iter().map(|name| (name, folder.join(name))).filter(|(_, path)| path.is_file());
-    there.map(|(name, path)| Ok((name.clone(), source(path.display().to_string(), files::read_text(&path)?)))).collect()
+    there
+        .map(|(name, path)| Ok((name.clone(), source(path.display().to_string(), files::read_text_as_it_is(&path)?))))
+        .collect()
 }
 
 fn good(checked: &Checked) -> bool {
