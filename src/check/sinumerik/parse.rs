@@ -469,11 +469,12 @@ fn without_comment(text: &str) -> &str {
     text
 }
 
-/// A block behind its number; a number alone is that of a remark.
+/// A block behind its number, of eight digits at most; a number alone is that of a remark.
 fn without_number(rest: &str) -> &str {
     let number = (char('N'), digit1::<&str, nom::error::Error<&str>>).parse(rest);
-    let behind = number.map_or(rest, |(after, _)| after);
+    let behind = number.map_or(rest, |(after, (_, digits))| if digits.len() > DIGITS { rest } else { after });
     let block = behind.trim_start_matches([' ', '\t']);
+    const DIGITS: usize = 8;
     if behind.is_empty() || block.len() < behind.len() { block } else { rest }
 }
 
