@@ -128,7 +128,7 @@ pub fn parse_run(
     let unnamed = lost.iter().any(Option::is_none);
     let rejected = Rejected { ids: lost.into_iter().flatten().collect(), unnamed };
     let mut touches = run.take(read.touches);
-    run.say_resumed(&mut touches, &places, &mut findings);
+    run.say_resumed(&mut touches, &rule, &places, &mut findings);
     if let Some(header) = &run.header {
         other_controller(header, post, &places, &mut findings);
         if header.unit == LengthUnit::Inch {
