@@ -259,3 +259,46 @@ fn a_byte_order_mark_is_refused() {
         );
     }
 }
+
+/// A program that moves before it has stopped the spindle, without a plan that would say so.
+#[test]
+fn the_spindle_is_stopped_before_anything_moves() {
+    for (controller, file) in [
+        ("linuxcnc", "small.ngc"),
+        ("fanuc", "small.nc"),
+        ("haas", "small.nc"),
+        ("sinumerik", "small.mpf"),
+        ("heidenhain", "small.h"),
+    ] {
+        let folder = folder(controller);
+        let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let stops = |line: &str| {
+            let words = line.trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
+            words.split_whitespace().next().is_some_and(|w| w == "M5" || w == "M19" || w.starts_with("SPOS"))
+        };
+        let without = |only_the_first: bool| {
+            let mut seen = 0;
+            let line = |line: &str| {
+                seen += usize::from(stops(line));
+                match line.trim_end() {
+                    kept if !stops(line) || (only_the_first && seen > 1) => kept.to_owned(),
+                    "M5 M9" => "M9".to_owned(),
+                    // block numbers run on: a remark keeps its own
+                    gone => gone
+                        .split_once(' ')
+                        .filter(|_| controller == "heidenhain")
+                        .map_or(String::new(), |(n, words)| format!("{n} ;{words}")),
+                }
+            };
+            let edited: String = text.lines().map(line).map(|line| line + "\n").collect();
+            std::fs::write(folder.path().join(file), edited).unwrap();
+            check(folder.path(), controller, file)
+                .assert()
+                .code(1)
+                .stderr(predicate::str::contains("before it has stopped the spindle"))
+                .stdout(predicate::str::contains("check::start"));
+        };
+        without(false);
+        without(true);
+    }
+}
