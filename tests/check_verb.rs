@@ -302,3 +302,18 @@ fn the_spindle_is_stopped_before_anything_moves() {
         without(true);
     }
 }
+
+/// The cause stands first: what the control stops at, not what follows from it.
+#[test]
+fn the_cause_stands_before_what_follows_from_it() {
+    let folder = folder("fanuc");
+    edited(folder.path(), "small.nc", "\nM9\n", "\nM98 P1000\n");
+    for plan in [&[][..], &["--plan", "small.plan.json"]] {
+        let output = check(folder.path(), "fanuc", "small.nc").args(plan).arg("--json").assert().code(1);
+        let answer: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+        let codes: Vec<&str> =
+            answer["findings"].as_array().unwrap().iter().map(|f| f["code"].as_str().unwrap()).collect();
+        assert_eq!(codes[0], "check::not_run", "{codes:?}");
+        assert!(!codes.contains(&"check::log"), "{codes:?}");
+    }
+}
