@@ -206,6 +206,7 @@ fn a_program_has_the_number_that_its_settings_say() {
             .stderr(predicate::str::contains("program_number").and(predicate::str::contains(says)));
     }
 }
+
 /// LinuxCNC: a name in brackets is as it stands, and nothing but blank lines stands before the first %.
 #[test]
 fn what_linuxcnc_itself_refuses_is_refused() {
@@ -316,4 +317,31 @@ fn the_cause_stands_before_what_follows_from_it() {
         assert_eq!(codes[0], "check::not_run", "{codes:?}");
         assert!(!codes.contains(&"check::log"), "{codes:?}");
     }
+}
+
+/// There is no set-up 0, and the name that a program gives itself is that of its file.
+#[test]
+fn set_up_0_and_other_names_are_said() {
+    let folder = folder("heidenhain");
+    let at = folder.path();
+    check(at, "heidenhain", "small.h")
+        .args(["--from", "0"])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("--from"));
+    let named = || predicate::str::contains("BEGIN PGM");
+    check(at, "heidenhain", "small.h").assert().code(0).stderr(named().not());
+    let text = std::fs::read_to_string(at.join("small.h")).unwrap();
+    std::fs::write(at.join("small.h"), text.replace(" PGM SMALL ", " PGM OTHER ")).unwrap();
+    check(at, "heidenhain", "small.h").assert().code(0).stderr(named().and(predicate::str::contains("small.h:1:")));
+}
+
+/// One letter for the controller, wherever a verb takes one.
+#[test]
+fn the_controller_has_one_letter_everywhere() {
+    let folder = folder("fanuc");
+    let run = |args: &[&str]| axiscal(folder.path()).args(args).args(["-c", "fanuc"]).assert().code(0);
+    run(&["check", "small.nc", "-m", "swivel-head"]);
+    run(&["simulate", "-m", "swivel-head", "--plan", "small.plan.json", "--out", "small.log"]);
+    run(&["parse", "small.log", "--plan", "small.plan.json"]);
 }
