@@ -15,16 +15,24 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     })
 }
 
-/// The text of a file (UTF-8).
+/// The text of a file (UTF-8), without a byte order mark.
 ///
 /// # Errors
 /// When it cannot be read or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
-    let mut bytes = read_bytes(path)?;
-    if bytes.starts_with(b"\xef\xbb\xbf") {
-        bytes.drain(..3);
+    let mut text = read_text_as_it_is(path)?;
+    if text.starts_with('\u{feff}') {
+        text.remove(0);
     }
-    String::from_utf8(bytes).map_err(|e| {
+    Ok(text)
+}
+
+/// The text of a file (UTF-8), with a byte order mark where it has one.
+///
+/// # Errors
+/// When it cannot be read or is not UTF-8.
+pub fn read_text_as_it_is(path: &Path) -> Result<String> {
+    String::from_utf8(read_bytes(path)?).map_err(|e| {
         Failure::new(
             "file::not_text",
             format!("{} is not text: byte {} is not UTF-8", path.display(), e.utf8_error().valid_up_to() + 1),

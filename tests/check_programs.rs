@@ -86,6 +86,47 @@ fn with_block_numbers() {
     }
 }
 
+/// Block numbers that the control does not take are refused by their name, not as a word that nobody understands.
+#[test]
+fn block_numbers_end_somewhere() {
+    let file = |base: &str, numbers: &str| {
+        let lines = format!("[file]\nblock_numbers = {{ {numbers} }}\nunverified = \"ours\"\n");
+        parse(&source(
+            "mine.toml",
+            format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}"),
+        ))
+    };
+    for (base, numbers) in [
+        ("sinumerik", "first = 10, step = 0, word = \"N{n} \""),
+        ("sinumerik", "first = 10, step = 10, word = \"N{n}\""),
+        ("sinumerik", "first = 10, step = 10, word = \"N \""),
+        ("linuxcnc", "first = 10, step = 0, word = \"N{n} \""),
+        ("linuxcnc", "first = 100000, step = 1, word = \"N{n} \""),
+        ("linuxcnc", "first = 0, step = 9223372036854775807, word = \"N{n} \""),
+        ("heidenhain", "first = 0, step = 1, word = \"{n}\""),
+    ] {
+        let failure = file(base, numbers).err().unwrap_or_else(|| panic!("{base} {numbers}"));
+        let finding = failure.0.iter().find(|f| f.code == "post::block_numbers");
+        assert!(finding.is_some_and(|f| f.place().is_some() && f.help.is_some()), "{base} {numbers}: {failure}");
+    }
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for (base, numbers, says, help) in [
+        ("linuxcnc", "first = 90000, step = 10, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("linuxcnc", "first = 10, step = 50, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("sinumerik", "first = 99999990, step = 10, word = \"N{n} \"", "is beyond N99999999", "a smaller first number"),
+    ] {
+        let post = file(base, numbers).unwrap().0;
+        let failure = post.program(&machine, &generated.plan, &generated.path).unwrap_err();
+        let finding = &failure.0[0];
+        assert_eq!(finding.code, "post::block_numbers", "{failure}");
+        assert!(finding.message.contains("block_numbers") && finding.message.contains(says), "{failure}");
+        assert!(finding.help.as_ref().is_some_and(|h| h.contains(help)), "{base} {numbers}: {:?}", finding.help);
+    }
+    // LinuxCNC needs no blank behind a number
+    is_clean(&file("linuxcnc", "first = 1, step = 1, word = \"N{n}\"").unwrap().0, &machine, &generated);
+}
+
 /// The worked example of docs/guide/controllers.md, as it stands there.
 #[test]
 fn the_variant_of_the_guide() {

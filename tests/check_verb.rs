@@ -206,3 +206,142 @@ fn a_program_has_the_number_that_its_settings_say() {
             .stderr(predicate::str::contains("program_number").and(predicate::str::contains(says)));
     }
 }
+
+/// LinuxCNC: a name in brackets is as it stands, and nothing but blank lines stands before the first %.
+#[test]
+fn what_linuxcnc_itself_refuses_is_refused() {
+    let folder = folder("linuxcnc");
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("small.ngc")).unwrap();
+    let check = |edited: String| {
+        assert_ne!(edited, text);
+        std::fs::write(at.join("edited.ngc"), edited).unwrap();
+        check(at, "linuxcnc", "edited.ngc").assert()
+    };
+    for (from, to, place) in [
+        ("\no40 endif", "\no<040> endif", ""),
+        ("\no<axiscal> call", "\no<0axiscal> call", ""),
+        ("\no2 if", "\no<02> if", ""),
+        ("\no2 endif", "\no<0002> endif", ""),
+        ("%\n", "(a remark)\n%\n", ":2:1"),
+        ("%\n", "N10\n%\n", ":2:1"),
+        ("%\n", "\u{feff}%\n", ":1:1"),
+    ] {
+        check(text.replacen(from, to, 1)).code(2).stderr(predicate::str::contains(format!("edited.ngc{place}")));
+    }
+    for (from, to) in [
+        ("\no40 endif", "\nO<40> ENDIF"),
+        ("\no40 endif", "\no040 endif"),
+        ("\no<axiscal> call", "\no<AXISCAL> call"),
+        ("%\n", "\n \t\n%\n"),
+    ] {
+        check(text.replacen(from, to, 1)).code(0);
+    }
+}
+
+/// A byte order mark is no part of a program, on any control, nor of a mask beside it.
+#[test]
+fn a_byte_order_mark_is_refused() {
+    for (controller, file) in [
+        ("linuxcnc", "small.ngc"),
+        ("fanuc", "small.nc"),
+        ("haas", "small.nc"),
+        ("sinumerik", "small.mpf"),
+        ("heidenhain", "small.h"),
+        ("heidenhain", "SMALL_P.A"),
+    ] {
+        let folder = folder(controller);
+        let marked = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        std::fs::write(folder.path().join(file), format!("\u{feff}{marked}")).unwrap();
+        let program = if controller == "heidenhain" { "small.h" } else { file };
+        check(folder.path(), controller, program).assert().code(2).stderr(
+            predicate::str::contains(format!("{file}:1:1: error"))
+                .and(predicate::str::contains("byte order mark").and(predicate::str::contains("save it"))),
+        );
+    }
+}
+
+/// A program that moves before it has stopped the spindle, without a plan that would say so.
+#[test]
+fn the_spindle_is_stopped_before_anything_moves() {
+    for (controller, file) in [
+        ("linuxcnc", "small.ngc"),
+        ("fanuc", "small.nc"),
+        ("haas", "small.nc"),
+        ("sinumerik", "small.mpf"),
+        ("heidenhain", "small.h"),
+    ] {
+        let folder = folder(controller);
+        let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let stops = |line: &str| {
+            let words = line.trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
+            words.split_whitespace().next().is_some_and(|w| w == "M5" || w == "M19" || w.starts_with("SPOS"))
+        };
+        let without = |only_the_first: bool| {
+            let mut seen = 0;
+            let line = |line: &str| {
+                seen += usize::from(stops(line));
+                match line.trim_end() {
+                    kept if !stops(line) || (only_the_first && seen > 1) => kept.to_owned(),
+                    "M5 M9" => "M9".to_owned(),
+                    // block numbers run on: a remark keeps its own
+                    gone => gone
+                        .split_once(' ')
+                        .filter(|_| controller == "heidenhain")
+                        .map_or(String::new(), |(n, words)| format!("{n} ;{words}")),
+                }
+            };
+            let edited: String = text.lines().map(line).map(|line| line + "\n").collect();
+            std::fs::write(folder.path().join(file), edited).unwrap();
+            check(folder.path(), controller, file)
+                .assert()
+                .code(1)
+                .stderr(predicate::str::contains("before it has stopped the spindle"))
+                .stdout(predicate::str::contains("check::start"));
+        };
+        without(false);
+        without(true);
+    }
+}
+
+/// The cause stands first: what the control stops at, not what follows from it.
+#[test]
+fn the_cause_stands_before_what_follows_from_it() {
+    let folder = folder("fanuc");
+    edited(folder.path(), "small.nc", "\nM9\n", "\nM98 P1000\n");
+    for plan in [&[][..], &["--plan", "small.plan.json"]] {
+        let output = check(folder.path(), "fanuc", "small.nc").args(plan).arg("--json").assert().code(1);
+        let answer: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+        let codes: Vec<&str> =
+            answer["findings"].as_array().unwrap().iter().map(|f| f["code"].as_str().unwrap()).collect();
+        assert_eq!(codes[0], "check::not_run", "{codes:?}");
+        assert!(!codes.contains(&"check::log"), "{codes:?}");
+    }
+}
+
+/// There is no set-up 0, and the name that a program gives itself is that of its file.
+#[test]
+fn set_up_0_and_other_names_are_said() {
+    let folder = folder("heidenhain");
+    let at = folder.path();
+    check(at, "heidenhain", "small.h")
+        .args(["--from", "0"])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("--from"));
+    let named = || predicate::str::contains("BEGIN PGM");
+    check(at, "heidenhain", "small.h").assert().code(0).stderr(named().not());
+    let text = std::fs::read_to_string(at.join("small.h")).unwrap();
+    std::fs::write(at.join("small.h"), text.replace(" PGM SMALL ", " PGM OTHER ")).unwrap();
+    check(at, "heidenhain", "small.h").assert().code(0).stderr(named().and(predicate::str::contains("small.h:1:")));
+}
+
+/// One letter for the controller, wherever a verb takes one.
+#[test]
+fn the_controller_has_one_letter_everywhere() {
+    let folder = folder("fanuc");
+    let run = |args: &[&str]| axiscal(folder.path()).args(args).args(["-c", "fanuc"]).assert().code(0);
+    run(&["check", "small.nc", "-m", "swivel-head"]);
+    run(&["simulate", "-m", "swivel-head", "--plan", "small.plan.json", "--out", "small.log"]);
+    run(&["parse", "small.log", "--plan", "small.plan.json"]);
+}

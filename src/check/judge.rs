@@ -78,9 +78,9 @@ impl Said {
         }
     }
 
-    /// All findings in the order of the program.
+    /// All findings in the order of the program; first where the control stops, for others may follow from that.
     pub fn finish(mut self) -> Vec<Finding> {
-        self.findings.sort_by_key(|f| f.span.as_ref().map_or(usize::MAX, |s| s.start));
+        self.findings.sort_by_key(|f| (f.code != "check::not_run", f.span.as_ref().map_or(usize::MAX, |s| s.start)));
         for (code, count) in self.count.iter().filter(|(_, n)| **n > SHOWN) {
             self.findings.push(Finding::error(code, format!("{} more of the kind {code}", count - SHOWN)));
         }

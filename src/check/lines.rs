@@ -4,6 +4,9 @@ use super::run::Fault;
 use nom::{IResult, Parser};
 use std::ops::Range;
 
+/// What some editors put before a text.
+pub const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// A line without its end, and where it begins in the text.
 #[derive(Debug, Clone, Copy)]
 pub struct Line<'a> {

@@ -112,6 +112,14 @@ fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> R
         .help("write [check] dialect = \"ngc\" (macro-b, sinumerik, klartext) in the postprocessor file")
     })?;
     let text = source.inner();
+    let masks = beside.iter().map(|(_, mask)| mask);
+    if let Some(marked) = std::iter::once(source).chain(masks).find(|s| s.inner().starts_with(lines::BYTE_ORDER_MARK)) {
+        let says = "it begins with a byte order mark, which an editor has put there: LinuxCNC refuses it, what other controls do is not known";
+        return Err(Finding::error("check::not_understood", says)
+            .help("save it as plain ASCII, or as UTF-8 without that mark")
+            .at(marked, 0..lines::BYTE_ORDER_MARK.len_utf8())
+            .into());
+    }
     if let Some(line) = lines::lines(text).find(|l| l.text.chars().count() > post.line_length) {
         let says = format!("the line is longer than the {} characters that the control takes", post.line_length);
         return Err(Finding::error("check::line_length", says).at(source, line.all()).into());

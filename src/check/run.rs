@@ -11,7 +11,7 @@ use crate::post::Postprocessor;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-pub use vm::{Alarm, Event, Happened, Outcome, Probe, Rate, Vm};
+pub use vm::{Alarm, Event, Happened, Outcome, Probe, Rate, SPINDLE_OFF, Vm};
 
 /// Where a run rests.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,6 +2,7 @@
 //! happen, once more from elsewhere with the control fresh, and from each set-up.
 
 mod otherwise;
+mod spindle;
 
 use super::code::{Code, Expr, Var, What};
 use super::explore::{Limits, Told, explore};
@@ -226,9 +227,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
             for other in &others {
                 findings.extend(otherwise(awkward, other).filter(|_| !stays(other)));
             }
-            // the same finding in two states is one
-            findings.dedup();
         }
+        findings.extend(runs.iter().filter_map(spindle::turns));
+        findings.dedup();
         let refused = self.refused(beginning);
         findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));
         let neutral = D::begin(Start::Fresh, self.post, self.machine).settings();

@@ -89,14 +89,15 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
     let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
     let mut parsed = match log::parse(text.as_bytes(), "the log that the program writes", case.post) {
         Ok((parsed, findings)) => {
-            for finding in &findings.0 {
+            // what a run leaves that the control has stopped follows from that
+            for finding in findings.0.iter().filter(|_| told.fault.is_none()) {
                 said.say(case, "check::log", &end, format!("the log that it writes: {}", finding.message), "");
             }
             parsed
         }
         Err(failure) => {
             // a run that only gives the settings back writes no touches
-            if !made.is_empty() || told.from == 1 {
+            if told.fault.is_none() && (!made.is_empty() || told.from == 1) {
                 for finding in &failure.0 {
                     said.say(case, "check::log", &end, format!("the log that it writes: {}", finding.message), "");
                 }

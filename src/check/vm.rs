@@ -133,6 +133,9 @@ pub enum Event {
     End,
 }
 
+/// The word of [`Event::Other`] for a spindle that is switched off.
+pub const SPINDLE_OFF: &str = "spindle off";
+
 /// An event with its place in the program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Happened {

@@ -7,7 +7,7 @@ use crate::check::{self, Against, Checked};
 use crate::diag::{Finding, Result, Severity, Source, source};
 use crate::files;
 use crate::machine::Machine;
-use crate::post::Postprocessor;
+use crate::post::{DialectName, Postprocessor};
 use crate::program;
 use crate::program::plan::Plan;
 use serde_json::json;
@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", conflicts_with = "plan")]
     mounting: Option<String>,
     /// The program is meant to begin at this set-up
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     from: u32,
 }
 
@@ -44,11 +44,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
     io.report(&findings);
     let plan = args.plan.as_ref().map(|file| load_plan(file, &machine, io)).transpose()?;
-    let text = source(args.file.display().to_string(), files::read_text(&args.file)?);
+    let text = source(args.file.display().to_string(), files::read_text_as_it_is(&args.file)?);
     let beside = beside(&check::wanted_beside(&post, &text), &args.file)?;
     let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from, beside: &beside };
     let mut checked = check::check(&machine, &post, &text, &against)?;
     checked.findings.extend(plan.as_ref().and_then(|plan| lacks_program(plan, &post)));
+    checked.findings.extend(other_name(&post, &args.file, &text));
     io.report(&checked.findings);
     say_codes(&checked, io);
     say(&machine, args, &checked, io);
@@ -76,6 +77,21 @@ fn lacks_program(plan: &Plan, post: &Postprocessor) -> Option<Finding> {
     Some(Finding::warning("check::older_plan", says).help(help))
 }
 
+/// A HEIDENHAIN program that calls itself otherwise than its file.
+fn other_name(post: &Postprocessor, file: &Path, text: &Source) -> Option<Finding> {
+    const BEGIN: &str = "BEGIN PGM ";
+    post.check.as_ref().filter(|rule| rule.dialect == DialectName::Klartext)?;
+    let at = text.inner().find(BEGIN)? + BEGIN.len();
+    let name = text.inner().get(at..)?.split_whitespace().next()?;
+    let wanted = post.nc_name(&file.file_stem()?.to_string_lossy());
+    (name != wanted).then(|| {
+        let says = format!("the file is called {wanted}, BEGIN PGM says {name}: a control may refuse it");
+        Finding::warning("check::name", says)
+            .help("one name for the file, in BEGIN PGM and in END PGM")
+            .at(text, at..at + name.len())
+    })
+}
+
 /// The findings by their codes, as the guide lists them.
 fn say_codes(checked: &Checked, io: &Io) {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
@@ -90,7 +106,9 @@ fn say_codes(checked: &Checked, io: &Io) {
 fn beside(names: &[String], program: &Path) -> Result<Vec<(String, Source)>> {
     let folder = program.parent().unwrap_or_else(|| Path::new(""));
     let there = names.iter().map(|name| (name, folder.join(name))).filter(|(_, path)| path.is_file());
-    there.map(|(name, path)| Ok((name.clone(), source(path.display().to_string(), files::read_text(&path)?)))).collect()
+    there
+        .map(|(name, path)| Ok((name.clone(), source(path.display().to_string(), files::read_text_as_it_is(&path)?))))
+        .collect()
 }
 
 fn good(checked: &Checked) -> bool {

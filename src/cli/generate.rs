@@ -290,7 +290,10 @@ fn summary(
         }
     }
     if !skipped.is_empty() {
-        io.say(format!("\n{} touches were left out:", plan.skipped.len()));
+        io.say(match plan.skipped.len() {
+            1 => "\n1 touch was left out:".to_owned(),
+            n => format!("\n{n} touches were left out:"),
+        });
         let mut t = table(&["pose (deg)", "block", "face", "points", "why"]);
         for SkippedGroup { pose, block, face, points, reason, .. } in &skipped {
             t.add_row(vec![

@@ -356,13 +356,21 @@ fn load_plan_and_digest(path: &Path, machine: &Machine, io: &Io) -> Result<(Plan
 }
 
 /// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.
-/// Without `started` the runs follow one another, by the plan's times.
+/// Without `started` the runs follow one another, by the plan's times. A touch without a time behind others that have one
+/// (the program was started again) follows the last of them as the plan has it: time does not run backward.
 fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>) {
     let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
+    // the last touch with a time of its own: on the study's clock, and as planned
+    let mut last: Option<(f64, f64)> = None;
     for touch in touches {
+        let planned = plan.touch(touch.id).and_then(|t| t.time_s);
         touch.time_s = match (started_s, first, touch.time_s) {
-            (Some(started), Some((first_s, planned_s)), Some(time_s)) => Some(started + planned_s + time_s - first_s),
-            _ => None,
+            (Some(started), Some((first_s, planned_s)), Some(time_s)) => {
+                let time_s = started + planned_s + time_s - first_s;
+                last = planned.map(|planned| (time_s, planned)).or(last);
+                Some(time_s)
+            }
+            _ => last.zip(planned).map(|((time_s, then), now)| time_s + now - then),
         };
     }
 }
@@ -384,4 +392,39 @@ pub fn read_log(
     let (read, findings) = log::read_run(bytes, &path.display().to_string(), reader.writer(), machine, plan, run)?;
     io.report(&findings.0);
     Ok(read.touches)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_does_not_run_backward_behind_a_second_start() {
+        let machine = crate::post::tests::machine("swivel-head");
+        let mut plan = crate::post::tests::plan(&machine, "head", "x+");
+        plan.touches.iter_mut().zip([100.0, 160.0, 200.0]).for_each(|(t, s)| t.time_s = Some(s));
+        let touches = |times: [Option<f64>; 3]| -> Vec<Touch> {
+            let touch = |(planned, time_s): (&crate::program::plan::PlanTouch, Option<f64>)| Touch {
+                id: planned.id,
+                position: planned.nominal_position(),
+                status: log::Status::Hit,
+                time_s,
+                temperature_deg_c: None,
+                line: 0,
+            };
+            plan.touches.iter().zip(times).map(touch).collect()
+        };
+        let on_the_clock = |times: [Option<f64>; 3], started_s: Option<f64>| -> Vec<Option<f64>> {
+            let mut touches = touches(times);
+            on_the_study_clock(&mut touches, &plan, started_s);
+            touches.iter().map(|t| t.time_s).collect()
+        };
+        // 90 s where the plan has 60: behind it the plan goes on from there
+        let stopped = [Some(7.0), Some(97.0), None];
+        assert_eq!(on_the_clock(stopped, Some(1000.0)), [Some(1100.0), Some(1190.0), Some(1230.0)]);
+        assert_eq!(on_the_clock([Some(7.0), None, None], Some(0.0)), [Some(100.0), Some(160.0), Some(200.0)]);
+        assert_eq!(on_the_clock([None, Some(7.0), Some(8.0)], Some(0.0)), [None, Some(160.0), Some(161.0)]);
+        assert_eq!(on_the_clock(stopped, None), [None; 3]);
+        assert_eq!(on_the_clock([None; 3], Some(0.0)), [None; 3]);
+    }
 }

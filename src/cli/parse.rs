@@ -18,7 +18,7 @@ pub struct Args {
     /// The log that the probing program wrote
     pub log: PathBuf,
     /// Controller that wrote it: a name (`axiscal controllers` lists them), a FILE.toml of your own, `msr` (inspection results), or `csv`
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, short, value_name = "NAME|FILE")]
     pub controller: String,
     /// The plan that `generate` wrote together with the program
     #[arg(long, value_name = "FILE")]

@@ -27,7 +27,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
     /// Whose log to write: a controller's name, a postprocessor file, or csv
-    #[arg(long, default_value = "linuxcnc")]
+    #[arg(long, short, default_value = "linuxcnc")]
     pub controller: String,
     /// The compensation that the control applies: what `export` wrote
     #[arg(long, value_name = "DIR")]

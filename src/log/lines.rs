@@ -116,14 +116,15 @@ pub fn without_leader(line: &[u8]) -> &[u8] {
 /// What some editors put before a text.
 pub const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// How a run begins.
-const HEAD: &[u8] = b"H AXISCAL ";
+/// How a run begins; the second where a control writes no blanks.
+const HEADS: [&[u8]; 2] = [b"H AXISCAL ", b"HAXISCAL1"];
 
 /// Where the head of a run begins in the middle of a line: the line end before it was lost.
 #[must_use]
 pub fn inner_head(line: &[u8]) -> Option<usize> {
     let leader = line.len() - without_leader(line).len();
-    memchr::memmem::find(&line[(leader + 1).min(line.len())..], HEAD).map(|at| leader + 1 + at)
+    let rest = &line[(leader + 1).min(line.len())..];
+    HEADS.iter().filter_map(|head| memchr::memmem::find(rest, head)).min().map(|at| leader + 1 + at)
 }
 
 #[cfg(test)]
@@ -163,6 +164,8 @@ mod tests {
         assert_eq!(inner_head(b"E N202H AXISCAL 1"), Some(6));
         assert_eq!(inner_head(b" \xef\xbb\xbfH AXISCAL 1"), None);
         assert_eq!(inner_head(b"H AXISCAL 1 FAH AXISCAL 1"), Some(14));
+        assert_eq!(inner_head(b"EN202HAXISCAL1FANUC"), Some(5));
+        assert_eq!(inner_head(b"HAXISCAL1FANUC"), None);
         assert_eq!(inner_head(b""), None);
     }
 }

@@ -124,7 +124,12 @@ pub(crate) fn read_digested(
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());
-    if let Some(header) = &parsed.header {
+    if let Some(header) = &mut parsed.header {
+        if header.part(&log_word(&machine.name), &log_word(&plan.program))
+            && let Writer::Controller(post) = writer
+        {
+            parse::other_controller(header, post, &places, &mut findings);
+        }
         belongs(header, machine, plan, digest, &places, &mut findings).map_err(|f| joined(&findings, f))?;
     }
     if let Writer::Controller(_) = writer {
@@ -159,10 +164,8 @@ fn belongs(
 ) -> Result<()> {
     let (program, of_machine) = (log_word(&plan.program), log_word(&machine.name));
     if header.program != program || header.machine != of_machine {
-        let message = format!(
-            "the log is of program {} on machine {}, the plan is of program {program} on machine {of_machine}",
-            header.program, header.machine
-        );
+        let message =
+            format!("the log is of {}, the plan is of program {program} on machine {of_machine}", header.says());
         let finding = Finding::error("log::other_program", message)
             .help("use the plan that `axiscal generate` wrote together with the program");
         return Err(places.at_line(finding, header.line).into());

@@ -100,7 +100,8 @@ pub fn parse_run(
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
     glued(bytes, start, &read.events, &places, &mut findings);
     let runs = runs::split(&read.touches, &read.events, |line| reader.may_be_head(line));
-    let heads: Vec<String> = runs.iter().filter_map(|r| r.header.as_ref()).map(|h| h.controller.clone()).collect();
+    let heads = runs.iter().filter_map(|r| r.header.as_ref()).filter(|h| !h.written_together);
+    let heads: Vec<String> = heads.map(|h| h.controller.clone()).collect();
     let chosen = runs::choose(runs, &read.touches, asked, is_columns, &places, &mut findings)
         .map_err(|f| Failure([std::mem::take(&mut findings.0), f.0].concat()))?
         .filter(|(run, _)| run.has_touches());
@@ -128,9 +129,16 @@ pub fn parse_run(
     let unnamed = lost.iter().any(Option::is_none);
     let rejected = Rejected { ids: lost.into_iter().flatten().collect(), unnamed };
     let mut touches = run.take(read.touches);
-    run.say_resumed(&mut touches, &places, &mut findings);
+    run.say_resumed(&mut touches, &rule, &places, &mut findings);
     if let Some(header) = &run.header {
-        other_controller(header, post, &places, &mut findings);
+        if !header.written_together {
+            other_controller(header, post, &places, &mut findings);
+        }
+        if !header.says_unit {
+            let message = "the head does not say what X, Y and Z are in, MM or INCH: they are taken as mm";
+            let help = "heads of logs of older versions do not say it; where the program was in inches, write INCH behind the digest of the plan (the twelve digits)";
+            findings.push(places.at_line(Finding::warning("log::unit", message).help(help), header.line));
+        }
         if header.unit == LengthUnit::Inch {
             touches.iter_mut().for_each(|t| t.position = t.position.with_xyz_mm(t.position.xyz_mm().map(mm_from_inch)));
         }
@@ -159,7 +167,7 @@ fn glued(bytes: &[u8], start: usize, events: &[Event<'_>], places: &Places<'_>, 
 }
 
 /// The log was written by another controller than the one that is named.
-fn other_controller(header: &LogHeader, post: &Postprocessor, places: &Places<'_>, findings: &mut Findings) {
+pub(super) fn other_controller(header: &LogHeader, post: &Postprocessor, places: &Places<'_>, findings: &mut Findings) {
     if header.controller != log_word(&post.name) {
         let message =
             format!("the head says that {} wrote this log, it is read as one of {}", header.controller, post.name);

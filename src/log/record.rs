@@ -41,10 +41,32 @@ pub struct LogHeader {
     pub touches: u64,
     /// What X, Y and Z are in; a head that does not say so means mm.
     pub unit: LengthUnit,
+    /// It says so.
+    pub says_unit: bool,
+    /// The control writes no blanks: all three names stand in `controller`, one behind the other.
+    pub written_together: bool,
     /// Set-up with which the run begins: 1, or where it was started again.
     pub setup: u64,
     /// Line in the log, from 1.
     pub line: usize,
+}
+
+impl LogHeader {
+    /// Parts names that are written together, where they end with this machine and this program.
+    pub(super) fn part(&mut self, machine: &str, program: &str) -> bool {
+        let names = self.controller.strip_suffix(program).and_then(|names| names.strip_suffix(machine));
+        let Some(controller) = names.filter(|_| self.written_together).map(str::to_owned) else { return false };
+        (self.controller, self.machine, self.program) = (controller, machine.to_owned(), program.to_owned());
+        true
+    }
+
+    /// What it names, for a message.
+    pub(super) fn says(&self) -> String {
+        match self.program.as_str() {
+            "" => format!("{} (controller, machine and program)", self.controller),
+            program => format!("program {program} on machine {}", self.machine),
+        }
+    }
 }
 
 /// Reads a line of words.
@@ -264,38 +286,36 @@ fn end(line: &[u8], rest: &[u8]) -> Result<u64, Fault> {
         })
 }
 
+/// What stands behind the H of a head.
+const MARK: &[u8] = b"AXISCAL";
+
+/// Digits of a plan's digest.
+const DIGEST: usize = 12;
+
 fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault> {
     let fault = |message: &str| Fault::at(line, rest, rest.len(), "log::head", message);
     let form = "the head of a run is `H AXISCAL 1 controller machine program digest MM N touches U set-up`";
     if !rest.is_ascii() {
         return Err(fault("the head of a run holds characters that are not ASCII"));
     }
+    if rest.starts_with(MARK) {
+        return head_without_blanks(rest, line_number).ok_or_else(|| fault(form));
+    }
     let word =
         |input| -> IResult<&[u8], &[u8]> { preceded(space1, take_till1(|b: u8| b == b' ' || b == b'\t')).parse(input) };
     let mut words = (word, word, word, word, word, word);
     let (tail, (mark, version, controller, machine, program, digest)) = words.parse(rest).map_err(|_| fault(form))?;
-    if digest.len() != 12 || !digest.iter().all(u8::is_ascii_hexdigit) {
+    if digest.len() != DIGEST || !digest.iter().all(u8::is_ascii_hexdigit) {
         return Err(fault(form));
     }
-    if mark != b"AXISCAL" || version != crate::post::LOG_VERSION.to_string().as_bytes() {
+    if mark != MARK || version != crate::post::LOG_VERSION.to_string().as_bytes() {
         return Err(fault("this is not the head of a log of this version of axiscal"));
     }
     let unit = alt((is(LengthUnit::Inch, tag(&b"INCH"[..])), is(LengthUnit::Mm, tag(&b"MM"[..]))));
     let unit: IResult<&[u8], Option<LengthUnit>> = opt(preceded(space1, unit)).parse(tail);
     let (tail, unit) = unit.unwrap_or((tail, None));
-    // a control may pad these numbers, and write them with a mark
-    let count = |input: &[u8], letter: u8| -> Option<(usize, u64)> {
-        let digits = blanks(input).strip_prefix(&[letter])?;
-        let (after, n) = number(b'.')(digits).ok()?;
-        Some((after.len(), whole(n)?))
-    };
-    let numbers = count(tail, b'N').and_then(|(left, touches)| {
-        let tail = &tail[tail.len() - left..];
-        let (left, setup) = count(tail, b'U')?;
-        blanks(&tail[tail.len() - left..]).is_empty().then_some((touches, setup))
-    });
     let text = |word: &[u8]| String::from_utf8_lossy(word).into_owned();
-    let (touches, setup) = numbers.ok_or_else(|| {
+    let (touches, setup) = counts(tail).ok_or_else(|| {
         Fault::at(
             line,
             tail,
@@ -310,6 +330,46 @@ fn head(line: &[u8], rest: &[u8], line_number: usize) -> Result<LogHeader, Fault
         program: text(program),
         digest: text(digest),
         unit: unit.unwrap_or_default(),
+        says_unit: unit.is_some(),
+        written_together: false,
+        touches,
+        setup,
+        line: line_number,
+    })
+}
+
+/// `N202 U1`, the end of a head. A control may pad these numbers, and write them with a mark.
+fn counts(tail: &[u8]) -> Option<(u64, u64)> {
+    let count = |input: &[u8], letter: u8| -> Option<(usize, u64)> {
+        let digits = blanks(input).strip_prefix(&[letter])?;
+        let (after, n) = number(b'.')(digits).ok()?;
+        Some((after.len(), whole(n)?))
+    };
+    let (left, touches) = count(tail, b'N')?;
+    let tail = &tail[tail.len() - left..];
+    let (left, setup) = count(tail, b'U')?;
+    blanks(&tail[tail.len() - left..]).is_empty().then_some((touches, setup))
+}
+
+/// `AXISCAL1FANUCSWIVEL-HEADHEAD979A8518119DMMN202U1`: read from its end, for names may end and begin with anything.
+fn head_without_blanks(rest: &[u8], line_number: usize) -> Option<LogHeader> {
+    let text = std::str::from_utf8(rest).ok()?.strip_prefix("AXISCAL")?;
+    let text = text.strip_prefix(&crate::post::LOG_VERSION.to_string())?;
+    let (before, tail) = text.split_at_checked(text.rfind('N')?)?;
+    let (touches, setup) = counts(tail.as_bytes())?;
+    let units = [(LengthUnit::Inch, "INCH"), (LengthUnit::Mm, "MM")];
+    let unit = units.into_iter().find_map(|(unit, word)| Some((unit, before.strip_suffix(word)?)));
+    let (unit, before) = unit.map_or((None, before), |(unit, before)| (Some(unit), before));
+    let (names, digest) = before.split_at_checked(before.len().checked_sub(DIGEST)?)?;
+    let good = !names.is_empty() && !names.contains([' ', '\t']) && digest.bytes().all(|b| b.is_ascii_hexdigit());
+    good.then(|| LogHeader {
+        controller: names.to_owned(),
+        machine: String::new(),
+        program: String::new(),
+        digest: digest.to_owned(),
+        unit: unit.unwrap_or_default(),
+        says_unit: unit.is_some(),
+        written_together: true,
         touches,
         setup,
         line: line_number,

@@ -6,6 +6,7 @@ use super::record::LogHeader;
 use super::stretch::{Event, What};
 use super::touch::RawTouch;
 use crate::diag::{Failure, Finding, Findings};
+use crate::post::LogRule;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -44,8 +45,8 @@ pub struct Run {
     /// Count of touches of the plan, and line.
     pub end: Option<(u64, usize)>,
     last_line: usize,
-    /// The set-ups at which the program was started again, with the lines that say so.
-    resumed: Vec<(u64, usize)>,
+    /// The set-ups at which the program was started again, with the lines that say so; `None`: that line is not understood.
+    resumed: Vec<(Option<u64>, usize)>,
 }
 
 impl Run {
@@ -70,13 +71,24 @@ impl Run {
     }
 
     /// Says where the program was started again. Its clock counts from there: how long the pause was is not known, so the
-    /// touches behind it carry no time.
-    pub fn say_resumed(&self, touches: &mut [RawTouch], places: &Places<'_>, findings: &mut Findings) {
-        for (i, (setup, line)) in self.resumed.iter().enumerate() {
-            let until = self.resumed.get(i + 1).map_or(usize::MAX, |(_, next)| *next);
+    /// touches behind it carry no time. Where the line that says so is lost the clock shows it: it goes back.
+    pub fn say_resumed(&self, touches: &mut [RawTouch], rule: &LogRule, places: &Places<'_>, findings: &mut Findings) {
+        let mut resumed = self.resumed.clone();
+        // behind a line that says so no time is used anyhow
+        let said = resumed.first().map_or(usize::MAX, |(_, line)| *line);
+        let first = touches.iter().position(|t| t.line > said).unwrap_or(touches.len());
+        if let Some(line) = clock_begins_again(&touches[..first], rule) {
+            resumed.insert(0, (None, line));
+        }
+        for (i, (setup, line)) in resumed.iter().enumerate() {
+            let until = resumed.get(i + 1).map_or(usize::MAX, |(_, next)| *next);
             let behind = touches.iter_mut().filter(|t| (*line..until).contains(&t.line));
             let timed = behind.filter_map(|t| t.time_s.take()).count();
-            let says = format!("the log goes on here: the program was started again at set-up {setup}");
+            let says = match setup {
+                Some(setup) => format!("the log goes on here: the program was started again at set-up {setup}"),
+                None if timed == 0 => continue,
+                None => "here the program was started again, and the line H that says so is lost or damaged".to_owned(),
+            };
             let finding = if timed == 0 {
                 Finding::info("log::resumed", says)
             } else {
@@ -101,11 +113,37 @@ impl Run {
     }
 }
 
+/// The line of the touch whose time is before that of the touch before it, by more than both are rounded. Lines that were
+/// copied, or one that stands in the wrong place, are no second start.
+fn clock_begins_again(touches: &[RawTouch], rule: &LogRule) -> Option<usize> {
+    let tick_s = 10f64.powi(-i32::try_from(rule.time_decimals.min(rule.decimals)).unwrap_or(0));
+    let timed: Vec<(&RawTouch, f64)> = touches.iter().filter_map(|t| Some((t, t.time_s?))).collect();
+    let mut last: Option<(Option<u64>, f64)> = None;
+    // the times so far by number: most logs need none of it
+    let mut seen: Option<BTreeMap<Option<u64>, f64>> = None;
+    for (at, (touch, time_s)) in timed.iter().enumerate() {
+        if let Some((id, before_s)) = last.filter(|(_, before_s)| *time_s < before_s - 1.01 * tick_s) {
+            let known = seen.get_or_insert_with(|| timed[..at].iter().map(|(t, time_s)| (t.id, *time_s)).collect());
+            let copied = known.get(&touch.id) == Some(time_s);
+            let misplaced = touch.id <= id && timed.get(at + 1).is_none_or(|(_, next_s)| *next_s >= before_s);
+            if !copied && !misplaced {
+                return Some(touch.line);
+            }
+            continue;
+        }
+        if let Some(seen) = &mut seen {
+            seen.insert(touch.id, *time_s);
+        }
+        last = Some((touch.id, *time_s));
+    }
+    None
+}
+
 /// The runs of a log. `may_be_head`: is this line, which is not understood, the head of a run?
 pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&Line<'_>) -> bool) -> Vec<Run> {
     let mut runs = vec![Run::default()];
     let mut done = 0;
-    let mut beginnings = beginnings(touches, events, may_be_head).into_iter().peekable();
+    let mut beginnings = beginnings(touches, events, &may_be_head).into_iter().peekable();
     let mut add = |range: Range<usize>, runs: &mut Vec<Run>| {
         let mut from = range.start;
         while let Some(at) = beginnings.next_if(|at| *at < range.end) {
@@ -121,6 +159,9 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
         let Some(run) = runs.last_mut() else { continue };
         let number = event.line.number;
         match &event.what {
+            What::Fault if run.count() > 0 && run.end.is_none() && may_be_head(&event.line) => {
+                run.resumed.push((None, number));
+            }
             What::Fault => {}
             What::Head(header) => {
                 let goes_on = header.setup > 1
@@ -129,7 +170,7 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
                         h.digest == header.digest && h.program == header.program && h.unit == header.unit
                     });
                 if goes_on && (run.header.is_some() || run.count() > 0) {
-                    run.resumed.push((header.setup, number));
+                    run.resumed.push((Some(header.setup), number));
                     run.header.get_or_insert_with(|| (**header).clone());
                     run.last_line = number;
                 } else {

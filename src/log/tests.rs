@@ -105,9 +105,11 @@ fn times_behind_a_second_start_are_not_used() {
     for name in ["fanuc", "sinumerik", "heidenhain"] {
         let post = Postprocessor::load_built_in_or_file(name).unwrap().0;
         let mut all = records(&plan);
-        all.iter_mut().zip([400.0, 45.0, 60.0]).for_each(|(r, t)| r.time_s = Some(t));
-        let text = post.log_text(&machine, &plan, &all);
-        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let mut lines_of = |times: [f64; 3]| -> Vec<String> {
+            all.iter_mut().zip(times).for_each(|(r, t)| r.time_s = Some(t));
+            post.log_text(&machine, &plan, &all).lines().map(str::to_owned).collect()
+        };
+        let mut lines = lines_of([400.0, 45.0, 60.0]);
         let head = lines.iter().position(|l| l.starts_with("H ")).unwrap();
         let u = lines[head].rfind('U').unwrap();
         let again = lines[head][..u].to_owned() + &lines[head][u..].replace('1', "2");
@@ -116,9 +118,26 @@ fn times_behind_a_second_start_are_not_used() {
             let (read, findings) = read(text.as_bytes(), "t.log", Writer::Controller(&post), &machine, &plan).unwrap();
             (read.touches.iter().map(|t| t.time_s).collect::<Vec<_>>(), codes(&findings.0).contains(&"log::resumed"))
         };
-        assert_eq!(with_times(&lines), (vec![Some(400.0), Some(45.0), Some(60.0)], false), "{name}");
+        // the head of the second start is lost: its clock shows it
+        assert_eq!(with_times(&lines), (vec![Some(400.0), None, None], true), "{name}");
         lines.insert(head + 2, again);
         assert_eq!(with_times(&lines), (vec![Some(400.0), None, None], true), "{name}");
+        // it is damaged: there is something that may be one, and the clock may be further than before already
+        let mut lines = lines_of([30.0, 45.0, 60.0]);
+        let whole = vec![Some(30.0), Some(45.0), Some(60.0)];
+        assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");
+        lines.insert(head + 3, "H AXISXAL 1 FA".to_owned());
+        assert_eq!(with_times(&lines), (vec![Some(30.0), Some(45.0), None], true), "{name}");
+        lines[head + 3] = "no line of a log".to_owned();
+        assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");
+        // lines that were copied are no second start, nor is one in the wrong place
+        lines[head + 3] = lines[head + 1].clone();
+        assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");
+        lines.insert(head + 4, lines[head + 2].clone());
+        assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");
+        lines.drain(head + 3..=head + 4);
+        lines.swap(head + 1, head + 2);
+        assert_eq!(with_times(&lines), (whole, false), "{name}");
     }
 }
 

@@ -67,7 +67,8 @@ pub struct ProgramFile {
     #[serde(default = "yes")]
     pub blank_lines: bool,
     /// A running number before each line, where the control wants one.
-    pub block_numbers: Option<BlockNumbers>,
+    #[schemars(with = "Option<BlockNumbers>")]
+    pub block_numbers: Option<Spanned<BlockNumbers>>,
     /// What may stand in names of programs at the control (`nc_name` of the templates); others become `name_other`.
     #[serde(default = "name_characters")]
     pub name_characters: String,

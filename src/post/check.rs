@@ -1,6 +1,7 @@
 //! From a postprocessor file as written to a [`Postprocessor`] that can be relied on; all findings at once.
 
 use super::as_written::{self as w, Entry, axis_of};
+use super::numbers::wrong_block_numbers;
 use super::{CheckRule, ColumnRule, CommentRule, LogRule, NumberRule, Postprocessor, Tcp};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
@@ -76,14 +77,11 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
             log_always_open: c.log_always_open,
         }
     });
-    if file.check.as_ref().is_some_and(|c| c.dialect == w::DialectName::MacroB) && file.file.block_numbers.is_some() {
-        check.error(
-            &file.file.line_length.span(),
-            "post::block_numbers",
-            "block_numbers of [file]: N numbers are the labels of this control, a running number could be one of them"
-                .to_owned(),
-            "leave block_numbers out",
-        );
+    let block_numbers = file.file.block_numbers.as_ref();
+    if let Some(rule) = block_numbers
+        && let Some((says, help)) = wrong_block_numbers(rule.get_ref(), file.check.as_ref().map(|c| c.dialect))
+    {
+        check.error(&rule.span(), "post::block_numbers", format!("block_numbers of [file]: {says}"), help);
     }
     let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {
@@ -93,7 +91,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         end_of_line: file.file.end_of_line,
         line_length: *file.file.line_length.get_ref(),
         blank_lines: file.file.blank_lines,
-        block_numbers: file.file.block_numbers.clone(),
+        block_numbers: block_numbers.map(|rule| rule.get_ref().clone()),
         based_on: file.based_on.clone(),
         name_characters: (file.file.name_characters.clone(), file.file.name_other.clone()),
         last_label: file.file.last_label,
@@ -360,8 +358,8 @@ impl Check<'_> {
     fn templates(&mut self, file: &w::File, comment: &CommentRule, number: &NumberRule) -> Environment<'static> {
         // the number of a block stands in its line too
         const DIGITS: usize = 6;
-        let numbered =
-            file.file.block_numbers.as_ref().map_or(0, |n| n.word.replace("{n}", "").chars().count() + DIGITS);
+        let word = |n: &Spanned<w::BlockNumbers>| n.get_ref().word.replace("{n}", "").chars().count();
+        let numbered = file.file.block_numbers.as_ref().map_or(0, |n| word(n) + DIGITS);
         let room = file.file.line_length.get_ref().saturating_sub(numbered);
         let mut env = environment(comment, number, room);
         // globals reach into messages and macros too

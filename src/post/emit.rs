@@ -456,6 +456,7 @@ impl<'a> Writer<'a> {
 
     fn finish(self) -> Result<NcProgram> {
         let beside = self.beside()?;
+        self.post.check_block_numbers(&self.text)?;
         let text = self.post.lines(&self.text);
         let longest = text.lines().enumerate().find(|(_, line)| line.chars().count() > self.post.line_length);
         if let Some((index, line)) = longest {

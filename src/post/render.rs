@@ -6,7 +6,7 @@ use crate::diag::{Failure, Result};
 use minijinja::Value;
 
 /// Does a line take a block number? Not the head or end of a file (`%`), and not an O-word.
-fn is_block(line: &str) -> bool {
+pub(super) fn is_block(line: &str) -> bool {
     !line.starts_with(['%', 'O', 'o'])
 }
 
@@ -29,7 +29,7 @@ impl Postprocessor {
     }
 
     /// A name as the control takes it.
-    pub(super) fn nc_name(&self, name: &str) -> String {
+    pub(crate) fn nc_name(&self, name: &str) -> String {
         let (allowed, other) = &self.name_characters;
         let spelled = |c: char| if allowed.contains(c) { c.to_string() } else { other.clone() };
         name.to_ascii_uppercase().chars().map(spelled).collect()
@@ -44,9 +44,14 @@ impl Postprocessor {
         }
     }
 
+    /// Does a line stay in the program?
+    pub(super) fn keeps(&self, line: &str) -> bool {
+        self.blank_lines || !line.trim().is_empty()
+    }
+
     /// The text with or without its empty lines, numbered where the control wants it.
     pub(super) fn lines(&self, text: &str) -> String {
-        let kept = text.lines().filter(|line| self.blank_lines || !line.trim().is_empty());
+        let kept = text.lines().filter(|line| self.keeps(line));
         let mut out = String::with_capacity(text.len());
         let mut index = 0;
         for line in kept {

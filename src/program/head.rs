@@ -35,7 +35,10 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
     ]);
     lines.extend(sense_lines(machine, layout));
     if !routed.skipped.is_empty() {
-        lines.push(format!("  {} touches of the program were left out: they cannot be reached", routed.skipped.len()));
+        lines.push(match routed.skipped.len() {
+            1 => "  1 touch of the program was left out: it cannot be reached".to_owned(),
+            n => format!("  {n} touches of the program were left out: they cannot be reached"),
+        });
         lines.extend(losses(layout, &routed.touches, &routed.skipped).into_iter().map(|note| format!("    {note}")));
     }
     if let Some(near) = &routed.path.start_near {

@@ -7,7 +7,9 @@
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{
+    Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
+};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -203,7 +205,7 @@ impl Heidenhain {
     fn auxiliary(&mut self, m: f64, vm: &mut Vm) -> Result<Next, String> {
         match m as u32 {
             0 => vm.note(Event::Wait(String::new())),
-            5 => vm.note(Event::Other("spindle off".to_owned())),
+            5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
             19 => vm.note(Event::Orient(self.angle.ok_or("M19 without cycle 13: to which angle?")?)),
             30 => return Ok(Next::End),

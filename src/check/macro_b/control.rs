@@ -11,7 +11,9 @@ use super::builder::Builder;
 use super::lasting;
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{
+    Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
+};
 use crate::machine::Machine;
 use crate::post::{CallRule, Does, Postprocessor};
 use crate::units::mm_from_inch;
@@ -123,7 +125,7 @@ impl MacroB {
         match whole {
             30 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
-            5 => vm.note(Event::Other("spindle off".to_owned())),
+            5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
             _ => return Err(format!("M{m} is not known here")),
         }

@@ -5,7 +5,7 @@
 
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -263,7 +263,7 @@ impl Ngc {
         match tenth {
             20 | 300 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
-            50 => vm.note(Event::Other("spindle off".to_owned())),
+            50 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
             90 => vm.note(Event::Other("coolant off".to_owned())),
             190 => vm.note(Event::Orient(value("R").ok_or("M19 needs R")?)),
             500 => self.modes.override_on = value("P") != Some(0.0),

@@ -38,6 +38,8 @@ struct Reader {
     subs: BTreeMap<String, usize>,
     calls: Vec<(usize, String, Range<usize>)>,
     percents: usize,
+    /// A line that is not blank has come.
+    begun: bool,
 }
 
 /// A line without its number, which the control does not look at: `N10 G0 Z5`; at most five digits (manual 11.3.2).
@@ -77,15 +79,17 @@ impl Reader {
             if !after.trim().is_empty() {
                 return Err(line.not_understood(after, "nothing else in a line with %"));
             }
-            if self.percents == 0 && !self.code.statements.is_empty() {
-                return Err(line.fault(rest, "the first % does not stand at the beginning of the program"));
+            if self.percents == 0 && self.begun {
+                let says = "the first % does not stand at the beginning of the program: nothing but blank lines may stand before it, and no remark";
+                return Err(line.fault(rest, says));
             }
-            self.percents += 1;
+            (self.percents, self.begun) = (self.percents + 1, true);
             if self.percents == 2 {
                 self.code.push(line.all(), What::End);
             }
             return Ok(());
         }
+        self.begun = true;
         if rest.starts_with(['o', 'O']) {
             return self.o_word(line, rest);
         }
@@ -143,10 +147,15 @@ impl Reader {
     }
 
     fn o_word(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
-        let (after, label) = preceded(one_of("oO"), alt((bracketed_name, digit1)))
+        // o040 is o40, and so is o<40>; o<040> is another name
+        let name = bracketed_name.map(str::to_ascii_lowercase);
+        let plain = digit1.map(|digits: &str| match digits.trim_start_matches('0') {
+            "" => "0".to_owned(),
+            number => number.to_owned(),
+        });
+        let (after, label) = preceded(one_of("oO"), alt((name, plain)))
             .parse(rest)
             .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "an O-word"))?;
-        let label = label.trim_start_matches('0').to_ascii_lowercase();
         let (after, keyword) = preceded(blanks, take_while1(|c: char| c.is_ascii_alphabetic()))
             .parse(after)
             .map_err(|e: nom::Err<nom::error::Error<&str>>| line.unread(&e, "if, else, endif, sub, call, return"))?;
@@ -435,6 +444,13 @@ mod tests {
             ("(D E B U G,one)\n", 0),
             ("(MSG)\n", 0),
             ("(PYRUN x)\n", 0),
+            // a name in brackets is as it stands
+            ("o40 if [1 GT 0]\no<040> endif\n", 16),
+            ("o<a> sub\no<a> endsub\no<0a> call\n", 21),
+            ("o<01> if [1 GT 0]\no1 endif\n", 18),
+            // before the first % only what is blank
+            ("(A)\n%\nG0 X1\n%\n", 4),
+            ("N10\n%\nG0 X1\n%\n", 4),
         ] {
             let fault = parse(text).unwrap_err();
             if fault.at.start != place {
@@ -442,6 +458,19 @@ mod tests {
             }
         }
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+
+    #[test]
+    fn what_the_control_takes_is_read() {
+        for text in [
+            "o40 if [1 GT 0]\nO040 ENDIF\n",
+            "o40 if [1 GT 0]\no<40> endif\n",
+            "o0 if [1 GT 0]\no<0> endif\n",
+            "o<Ab> sub\no<aB> endsub\no<AB> call\n",
+            "\n \t\r\n%\nG0 X1\n%\n",
+        ] {
+            parse(text).unwrap_or_else(|e| panic!("{text:?}: {}", e.says));
+        }
     }
 
     #[test]

@@ -8,7 +8,9 @@
 use super::words::{Way, axis_word};
 use crate::axes::{AxisName, Position};
 use crate::check::code::{Values, Var};
-use crate::check::run::{Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, Spoken, Start, Vm, own};
+use crate::check::run::{
+    Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
+};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -172,7 +174,7 @@ impl Sinumerik {
         match m as i64 {
             30 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
-            5 => vm.note(Event::Other("spindle off".to_owned())),
+            5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
             _ if self.builder.contains(&m) => vm.note(Event::Other(format!("M{m}"))),
             _ => return Err(format!("M{m} is not known here")),

@@ -338,6 +338,9 @@ impl Reader {
             let says = format!("{name} is no label: the control reads a block number, an address or a word of its own");
             return Err(line.fault(rest, says));
         }
+        if self.names.types.contains_key(name) {
+            return Err(line.fault(rest, format!("{name} is no label: it is declared as a variable")));
+        }
         let place = (self.code.statements.len(), self.inside());
         match self.labels.insert(name.to_owned(), place) {
             Some(_) => Err(line.fault(rest, format!("the label {name} stands twice"))),
@@ -469,10 +472,11 @@ fn without_comment(text: &str) -> &str {
     text
 }
 
-/// A block behind its number; a number alone is that of a remark.
+/// A block behind its number, of eight digits at most; a number alone is that of a remark.
 fn without_number(rest: &str) -> &str {
+    const DIGITS: usize = 8;
     let number = (char('N'), digit1::<&str, nom::error::Error<&str>>).parse(rest);
-    let behind = number.map_or(rest, |(after, _)| after);
+    let behind = number.map_or(rest, |(after, (_, digits))| if digits.len() > DIGITS { rest } else { after });
     let block = behind.trim_start_matches([' ', '\t']);
     if behind.is_empty() || block.len() < behind.len() { block } else { rest }
 }

@@ -60,7 +60,7 @@ const RESERVED: [&str; 28] = [
 ];
 
 /// Words of the language that this grammar does not read: no name of a variable or label either.
-const OTHER_WORDS: [&str; 58] = [
+const OTHER_WORDS: [&str; 82] = [
     "RET",
     "PROC",
     "EXTERN",
@@ -119,6 +119,30 @@ const OTHER_WORDS: [&str; 58] = [
     "STARTFIFO",
     "STOPFIFO",
     "REDEF",
+    "ADIS",
+    "AMIRROR",
+    "ASCALE",
+    "BRISK",
+    "CFC",
+    "CFIN",
+    "CFTCP",
+    "DRIVE",
+    "FFWOF",
+    "FFWON",
+    "FGROUP",
+    "FINEA",
+    "NORM",
+    "KONT",
+    "ORIMKS",
+    "ORIWKS",
+    "PTP",
+    "CP",
+    "SOFT",
+    "TRACYL",
+    "TRANSMIT",
+    "TRAANG",
+    "COARSEA",
+    "IPOENDA",
 ];
 
 /// Can a name not be one because it means something: an address with digits (`N70`, `M30`, `L10`, `R1`) or a word? The first

@@ -52,6 +52,10 @@ fn what_is_not_known_is_an_error_with_its_place() {
         ("D0:\nM30\n", 0),
         ("DEF INT N1\nM30\n", 7),
         ("DEF INT FOR\nM30\n", 7),
+        ("N100000000 G0 X1\nM30\n", 0),
+        ("DEF INT AB\nAB:\nM30\n", 11),
+        ("SOFT:\nM30\n", 0),
+        ("TRANSMIT:\nM30\n", 0),
     ] {
         match read(text) {
             Ok(_) => wrong.push(format!("{text:?} was read")),
