@@ -87,7 +87,7 @@ impl Run {
             let says = match setup {
                 Some(setup) => format!("the log goes on here: the program was started again at set-up {setup}"),
                 None if timed == 0 => continue,
-                None => "here the program was started again, and the line H that says so is lost or damaged".to_owned(),
+                None => "here the program was started again (the line H that says so is lost or damaged)".to_owned(),
             };
             let finding = if timed == 0 {
                 Finding::info("log::resumed", says)
