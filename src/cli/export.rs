@@ -96,7 +96,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
     let active = loaded.active()?;
     free_folder(&args.out, &loaded)?;
-    if active.is_some() {
+    let all_acts =
+        |a: &Compensation| loaded.transformation() == Some(true) || a.idle_without_transformation(&loaded.machine) == 0;
+    if active.as_ref().is_some_and(all_acts) {
         io.report(&[Finding::info(
             "export::adds",
             "the identified errors are added to the compensation that was active during the measurement",

@@ -53,7 +53,7 @@ impl Postprocessor {
             return Ok(());
         }
         let shown = |n: usize| rule.word.trim_end().replace("{n}", &n.to_string());
-        let help = match (rule.first + steps <= last, steps + 1 <= last) {
+        let help = match (rule.first + steps <= last, steps < last) {
             (true, _) => "a smaller step",
             (false, true) => "a smaller first number, and a smaller step",
             (false, false) => "leave block_numbers out, or split the program: fewer touches in one",

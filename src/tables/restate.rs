@@ -62,7 +62,10 @@ pub fn stated_at(machine: &Machine, correction: &Correction, to_mm: [f64; 3]) ->
         let moved = correction.terms.iter().find(|t| t.spot() == term.spot()).map_or(0.0, |t| t.value) != term.value;
         if moved && !is_known(machine, correction, term.spot()) {
             term.value = old;
-            kept.push(term.spot());
+            // along its own line an axis stands nowhere in particular: nobody misses a number there
+            if !stands_along(machine, term.spot()) {
+                kept.push(term.spot());
+            }
         }
         term.value = rounded(term.value);
         term.active_before = rounded(old);
@@ -71,11 +74,16 @@ pub fn stated_at(machine: &Machine, correction: &Correction, to_mm: [f64; 3]) ->
     (terms, kept)
 }
 
+/// Is it a component along the axis's own line?
+fn stands_along(machine: &Machine, spot: Spot) -> bool {
+    machine.axis(spot.axis).is_some_and(|a| along(a, spot.dof).is_some())
+}
+
 /// Does the study know where this is? Along its own line an axis stands nowhere in particular; what moves it there moves the
 /// axes that it carries, so that their places must be known.
 fn is_known(machine: &Machine, correction: &Correction, spot: Spot) -> bool {
     let of = |axis: AxisName| Spot { axis, ..spot };
-    let is_along = |axis: AxisName| machine.axis(axis).is_some_and(|a| along(a, spot.dof).is_some());
+    let is_along = |axis: AxisName| stands_along(machine, of(axis));
     if !is_along(spot.axis) {
         return correction.found.contains(&spot);
     }

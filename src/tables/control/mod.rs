@@ -239,14 +239,18 @@ pub fn export(
         limits: options.limits,
     };
     let (mut filled, more) = question(spellings.first().copied()).fill();
-    findings.0.extend(more.0);
+    // what a loaded compensation wrote is off the description by what it holds
+    findings.0.extend(more.0.into_iter().filter(|f| active.is_none() || f.code != "tables::old_did_not_act"));
     let zero = add_angles(machine, tables, kind, &carried, &options.old, &mut filled);
     // the same values in another table, on top of that one's own old ones
     let mut others: BTreeMap<&str, Filled> = BTreeMap::new();
     for spelling in spellings.iter().skip(1) {
         let (mut other, more) = question(Some(spelling)).fill();
         findings.0.extend(
-            more.0.into_iter().filter(|f| !findings.0.iter().any(|g| g.message == f.message)).collect::<Vec<_>>(),
+            more.0
+                .into_iter()
+                .filter(|f| f.code != "tables::old_did_not_act" && !findings.0.iter().any(|g| g.message == f.message))
+                .collect::<Vec<_>>(),
         );
         add_angles(machine, tables, kind, &carried, &options.old, &mut other);
         others.insert(spelling, other);
