@@ -304,6 +304,41 @@ fn the_spindle_is_stopped_before_anything_moves() {
     }
 }
 
+/// A probe that the postprocessor file switches on is on before the first search, with a plan or without; what switches it is
+/// no function of the control's own.
+#[test]
+fn a_probe_is_switched_on_before_it_searches() {
+    for (controller, file) in [
+        ("linuxcnc", "small.ngc"),
+        ("fanuc", "small.nc"),
+        ("haas", "small.nc"),
+        ("sinumerik", "small.mpf"),
+        ("heidenhain", "small.h"),
+    ] {
+        let folder = folder(controller);
+        let with = |on: &str| {
+            let post = format!(
+                "format = \"axiscal-postprocessor/1\"\nbased_on = \"{controller}\"\nname = \"own\"\n[settings]\nprobe_on = \"{on}\"\nprobe_off = \"M102\"\n"
+            );
+            std::fs::write(folder.path().join("own.toml"), post).unwrap();
+            let mut generate = axiscal(folder.path());
+            generate.args(["generate", "--machine", "swivel-head", "--program", "small.toml", "--out", "."]);
+            generate.args(["--controller", "./own.toml"]);
+            generate.assert()
+        };
+        with("M101").success();
+        check(folder.path(), "./own.toml", file).assert().code(0);
+        edited(folder.path(), file, "M101", "M102");
+        check(folder.path(), "./own.toml", file)
+            .assert()
+            .code(1)
+            .stderr(predicate::str::contains("before M101 has switched the probe on"))
+            .stdout(predicate::str::contains("check::start"));
+        // a spindle that is started is no probe that is switched on
+        with("M3").code(2);
+    }
+}
+
 /// The cause stands first: what the control stops at, not what follows from it.
 #[test]
 fn the_cause_stands_before_what_follows_from_it() {

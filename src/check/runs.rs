@@ -229,6 +229,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
             }
         }
         findings.extend(runs.iter().filter_map(spindle::turns));
+        let setting = |name: &str| self.post.settings.get(name).map_or("", String::as_str);
+        let (on, off) = (setting("probe_on"), setting("probe_off"));
+        findings.extend(runs.iter().filter_map(|run| spindle::searches_dead(run, on, off)));
         findings.dedup();
         let refused = self.refused(beginning);
         findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));

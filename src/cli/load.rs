@@ -151,11 +151,17 @@ pub fn does_not_act(compensation: &Compensation, machine: &Machine, plan: &Plan)
         return None;
     }
     let of = compensation.terms.iter().filter(|t| t.value != 0.0).count();
-    let which = if idle == of { "it does".to_owned() } else { format!("{idle} of its {of} errors do") };
+    let tables = compensation.tables.as_ref().is_some_and(|t| !t.grids.is_empty())
+        || compensation.stock.as_ref().is_some_and(|s| !s.axis_tables.is_empty());
+    let which = match (idle == of, tables) {
+        (true, false) => "the compensation acts under the control's own transformation, and it does not act on it".to_owned(),
+        (true, true) => "only the position tables of the compensation act on it, its other errors under the control's own transformation".to_owned(),
+        (false, _) => format!("{idle} of the {of} errors of the compensation act under the control's own transformation only"),
+    };
     Some(
         Finding::info(
             "compensation::does_not_act",
-            format!("program {} gives axis positions: the compensation acts under the control's own transformation, and {which} not act on it", plan.program),
+            format!("program {} gives axis positions: {which}", plan.program),
         )
         .help("what these touches show is the machine without it, and an export takes its place; a program of `generate --tcp` shows what it leaves"),
     )
@@ -362,7 +368,10 @@ fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>
     let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
     // the last touch with a time of its own: on the study's clock, and as planned
     let mut last: Option<(f64, f64)> = None;
-    for touch in touches {
+    // in the order in which they were made: a run that was started again may have begun at an earlier set-up
+    let mut made: Vec<&mut Touch> = touches.iter_mut().collect();
+    made.sort_by_key(|t| t.line);
+    for touch in made {
         let planned = plan.touch(touch.id).and_then(|t| t.time_s);
         touch.time_s = match (started_s, first, touch.time_s) {
             (Some(started), Some((first_s, planned_s)), Some(time_s)) => {

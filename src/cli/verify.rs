@@ -8,7 +8,6 @@ use crate::diagnose::{self, Options, Subject, diagnose};
 use crate::fit::{self, Fit, Settings};
 use crate::program::plan::ControllerFrame;
 use crate::report;
-use crate::tables::compensation::Mode;
 use crate::units::um_from_mm;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -86,12 +85,13 @@ fn can_show(after: &Loaded, question: Question) -> Result<()> {
         return Ok(());
     }
     let axes = |f: ControllerFrame| f == ControllerFrame::Axes;
-    let off = after.runs.iter().find(|r| active.mode != Mode::Component && axes(r.plan.controller_frame));
+    let idle = active.idle_without_transformation(&after.machine);
+    let off = after.runs.iter().find(|r| idle > 0 && axes(r.plan.controller_frame));
     match off {
         Some(run) => Err(Failure::new(
             "verify::cannot_show",
             format!(
-                "the runs after cannot show the compensation: program {} gives axis positions, and this compensation acts under the control's own transformation only",
+                "the runs after cannot show the compensation: program {} gives axis positions, and {idle} of its errors act under the control's own transformation only",
                 run.plan.program
             ),
         )

@@ -92,7 +92,7 @@ impl Run {
             let finding = if timed == 0 {
                 Finding::info("log::resumed", says)
             } else {
-                let help = "where time matters, the plan's times stand for them, as where none are logged: the pause is not in them";
+                let help = "where time matters they follow the last timed one as planned: the pause is not in them";
                 let says =
                     format!("{says}, and its clock with it: the times of the {timed} touches behind it are not used");
                 Finding::warning("log::resumed", says).help(help)
@@ -159,7 +159,12 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
         let Some(run) = runs.last_mut() else { continue };
         let number = event.line.number;
         match &event.what {
-            What::Fault if run.count() > 0 && run.end.is_none() && may_be_head(&event.line) => {
+            What::Fault
+                if run.count() > 0
+                    && run.end.is_none()
+                    && may_be_head(&event.line)
+                    && (is_like_a_head(event.line.bytes) || !goes_on(touches, event.at)) =>
+            {
                 run.resumed.push((None, number));
             }
             What::Fault => {}
@@ -188,6 +193,21 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
     add(done..touches.len(), &mut runs);
     runs.retain(|r| r.header.is_some() || r.count() > 0);
     runs
+}
+
+/// Does a line that begins with H go on much as a head does, `H AXISCAL …`?
+fn is_like_a_head(line: &[u8]) -> bool {
+    let word = line.trim_ascii().get(1..).map_or(&[][..], <[u8]>::trim_ascii_start);
+    word.iter().zip(b"AXISCAL").filter(|(a, b)| a.eq_ignore_ascii_case(b)).count() >= 4
+}
+
+/// Do the touches go on before this one as if nothing had happened: the next number, and a clock that runs on?
+fn goes_on(touches: &[RawTouch], at: usize) -> bool {
+    let (Some(before), Some(next)) = (at.checked_sub(1).and_then(|n| touches.get(n)), touches.get(at)) else {
+        return true;
+    };
+    let numbers = before.id.zip(next.id).is_some_and(|(a, b)| b == a + 1);
+    numbers && before.time_s.zip(next.time_s).is_none_or(|(a, b)| b >= a)
 }
 
 /// Touches with which a run begins whose head is lost or not understood: their numbers start again, and no head says that

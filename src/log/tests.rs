@@ -128,8 +128,10 @@ fn times_behind_a_second_start_are_not_used() {
         assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");
         lines.insert(head + 3, "H AXISXAL 1 FA".to_owned());
         assert_eq!(with_times(&lines), (vec![Some(30.0), Some(45.0), None], true), "{name}");
-        lines[head + 3] = "no line of a log".to_owned();
-        assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");
+        for other in ["no line of a log", "HELLO OPERATOR", "H N3 S1 X37.9791"] {
+            lines[head + 3] = other.to_owned();
+            assert_eq!(with_times(&lines), (whole.clone(), false), "{name} {other}");
+        }
         // lines that were copied are no second start, nor is one in the wrong place
         lines[head + 3] = lines[head + 1].clone();
         assert_eq!(with_times(&lines), (whole.clone(), false), "{name}");

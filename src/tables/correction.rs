@@ -2,8 +2,8 @@
 //! what is left out, each with its reason.
 
 use super::compensation::{Compensation, Provenance, Term};
-use super::place::{Meaning, Spot, across, coordinate_off, meaning};
-use super::restate::restated;
+use super::place::{Meaning, Place, Spot, across, coordinate_off, meaning};
+use super::restate::{is_known, restated};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result};
 use crate::fit::outcome::{Outcome, Parameter, Status};
@@ -75,6 +75,8 @@ pub struct Correction {
     pub of_measurement: BTreeMap<String, usize>,
     /// Where `before` terms of workpiece-side axes are stated, mm in R.
     pub reference_mm: [f64; 3],
+    /// Tilts that the study holds: they are written nowhere.
+    pub held_tilts: Vec<Term>,
     /// Where the study found something.
     pub found: BTreeSet<Spot>,
     /// What was loaded during the measurement.
@@ -169,6 +171,7 @@ impl Correction {
                 left_out: Vec::new(),
                 of_measurement: BTreeMap::new(),
                 reference_mm: outcome.reference_mm,
+                held_tilts: Vec::new(),
                 found: BTreeSet::new(),
                 active: during.loaded.cloned(),
                 transformation: during.transformation,
@@ -265,7 +268,14 @@ impl Collector<'_> {
         }
         match p.status {
             Status::Identified => {}
-            Status::Fixed => return self.leave_out(p, false, "held by the user, not identified"),
+            Status::Fixed => {
+                if let Meaning::Location(spots) = &meaning {
+                    let tilts = spots.iter().filter(|(spot, _)| spot.dof.is_angle() && spot.place == Place::Before);
+                    let held = tilts.map(|(spot, per)| blank(*spot, &p.name, &p.effect, p.value * per, None));
+                    self.correction.held_tilts.extend(held);
+                }
+                return self.leave_out(p, false, "held by the user, not identified");
+            }
             Status::PriorDominated => return self.leave_out(p, false, "known from its prior, not from the data"),
             Status::Undetermined => return self.leave_out(p, false, "the data cannot tell it"),
         }
@@ -377,8 +387,11 @@ impl Collector<'_> {
             let to = self.correction.reference_mm;
             for old in restated(&loaded.terms, self.machine, loaded.reference_mm, to) {
                 let acted = self.correction.transformation || loaded.acts_without_transformation(self.machine, &old);
-                if !acted && terms.contains_key(&old.spot()) {
-                    // the touches show the whole error
+                // the touches show the whole error; what a tilt made of a place along its line is made anew
+                let offset = old.place == Place::Before && !old.dof.is_angle();
+                let told =
+                    terms.contains_key(&old.spot()) || (offset && is_known(self.machine, &self.correction, old.spot()));
+                if !acted && told {
                     continue;
                 }
                 let term = terms

@@ -55,7 +55,12 @@ pub fn restated(terms: &[Term], machine: &Machine, from_mm: [f64; 3], to_mm: [f6
 pub fn stated_at(machine: &Machine, correction: &Correction, to_mm: [f64; 3]) -> (Vec<Term>, Vec<Spot>) {
     let before: Vec<Term> = correction.terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect();
     let before = restated(&before, machine, correction.reference_mm, to_mm);
-    let mut terms = restated(&correction.terms, machine, correction.reference_mm, to_mm);
+    // a tilt that the study holds is no result of it, and moves the offsets that are all the same
+    let held = correction.held_tilts.iter().filter(|h| !correction.terms.iter().any(|t| t.spot() == h.spot()));
+    let all: Vec<Term> = correction.terms.iter().chain(held.clone()).cloned().collect();
+    let mut terms = restated(&all, machine, correction.reference_mm, to_mm);
+    let held: Vec<Spot> = held.map(Term::spot).collect();
+    terms.retain(|t| !held.contains(&t.spot()));
     let mut kept = Vec::new();
     for term in &mut terms {
         let old = before.iter().find(|b| b.spot() == term.spot()).map_or(0.0, |b| b.value);
@@ -81,7 +86,7 @@ fn stands_along(machine: &Machine, spot: Spot) -> bool {
 
 /// Does the study know where this is? Along its own line an axis stands nowhere in particular; what moves it there moves the
 /// axes that it carries, so that their places must be known.
-fn is_known(machine: &Machine, correction: &Correction, spot: Spot) -> bool {
+pub(super) fn is_known(machine: &Machine, correction: &Correction, spot: Spot) -> bool {
     let of = |axis: AxisName| Spot { axis, ..spot };
     let is_along = |axis: AxisName| stands_along(machine, of(axis));
     if !is_along(spot.axis) {

@@ -1,7 +1,8 @@
 //! Measured again: what acted on the touches is added to, what did not act is replaced, what the touches do not tell stays.
 
 use crate::controls::{
-    CONTROLS, Planted, accepting, correction, found_during, left, loaded, plan, readings, scenario, tables, text,
+    CONTROLS, Planted, accepting, correction, found_during, found_with_held, left, loaded, plan, readings, scenario,
+    tables, text,
 };
 use crate::support::machine;
 use axiscal::diag::source;
@@ -217,5 +218,80 @@ fn tables_in_inches_do_the_same() {
         let (export, _) = control::export(&machine, control, &tables(control), &found, &options).unwrap();
         let reads = reads(&machine, &errors(), &export);
         assert!(reads < 3.0, "{control}: {reads} um");
+    }
+}
+
+/// Tilts that the control cannot hold stand in its offsets at the workpiece's height. Measured again with axis positions the
+/// whole of them is found again: what they made along an axis's line is made anew, and not on top of itself.
+#[test]
+fn the_share_of_a_tilt_does_not_grow() {
+    let mut planted = errors();
+    planted.extend([
+        ("location-a", "EB0A", 0.0131),
+        ("location-a", "EC0A", -0.006),
+        ("location-c", "EA0C", 0.005),
+        ("location-c", "EB0C", -0.0124),
+    ]);
+    let machine = machine("trunnion");
+    let rounds = |control: &str, tilts_held: bool| {
+        let first = during(&machine, control, &planted, BARE, Old::default());
+        let again = During { loaded: Some(&first.compensation), transformation: false };
+        let held: &[&str] = if tilts_held { &["EB0A", "EC0A", "EA0C", "EB0C"] } else { &[] };
+        let found = found_with_held(&machine, &planted, held, again);
+        let second = control::export(&machine, control, &tables(control), &found, &accepting()).unwrap().0;
+        for ((id, _, new), (_, _, again)) in values(&first).into_iter().zip(values(&second)) {
+            assert!((new - again).abs() < 1.1e-3, "{control} {id} ({held:?}): {new}, measured again {again}");
+        }
+    };
+    for control in ["fanuc", "haas", "heidenhain"] {
+        rounds(control, false);
+        rounds(control, true);
+    }
+    rounds("sinumerik", false);
+    let stock = |during: During| {
+        let found = found_during(&machine, &planted, during);
+        linuxcnc::export(&machine, &found, &linuxcnc::Options::default()).unwrap().0.stock.compensation
+    };
+    let first = stock(BARE);
+    let second = stock(During { loaded: Some(&first), transformation: false });
+    for (pin, value) in &first.stock.as_ref().unwrap().pins {
+        let again = second.stock.as_ref().unwrap().pins[pin];
+        assert!((value - again).abs() < 1e-9, "{pin}: {value}, measured again {again}");
+    }
+}
+
+/// The head alone is measured: where the table stands next to it nobody touched, and the builder's number stays, moved with the
+/// head. C lies at 0.060 and the ball 0.101 beside B: the control knows both to 1 um.
+#[test]
+fn a_table_that_is_not_told_stays_next_to_the_head() {
+    let machine = machine("swivel-head");
+    let found: Planted = vec![("location-b", "EX0B", 0.101), ("location-b", "EZ0B", 0.0)];
+    for (control, text_of, name) in [
+        (
+            "fanuc",
+            "%\nN19700Q1M-0.040;\nN19701Q1M0.000;\nN19702Q1M0.000;\nN19709Q1M-0.100;\nN19710Q1M0.000;\nN19711Q1M0.000;\n%\n",
+            "N19700",
+        ),
+        (
+            "sinumerik",
+            "$MC_TRAFO5_BASE_TOOL_1[0]=-0.1\n$MC_TRAFO5_JOINT_OFFSET_1[0]=0.1\n$MC_TRAFO5_JOINT_OFFSET_PART_1[0]=-0.04\n$MC_TRAFO5_PART_OFFSET_1[0]=0.04\n",
+            "$MC_TRAFO5_JOINT_OFFSET_PART_1[0]",
+        ),
+    ] {
+        let t = tables(control);
+        let old = || backup::read(&source("b", text_of), &t.backup, &control::names(&machine, &t)).unwrap();
+        let of = |e: &Export| e.values.iter().find(|v| v.names.values().any(|n| n == name)).unwrap().new;
+        let bare = during(&machine, control, &found, BARE, old());
+        assert!((of(&bare) + 0.041).abs() < 1e-6, "{control}: {}", of(&bare));
+        // under the transformation the same is left to find
+        let on = During { loaded: None, transformation: true };
+        let rest: Planted = vec![("location-b", "EX0B", 0.001), ("location-b", "EZ0B", 0.0)];
+        assert!((of(&during(&machine, control, &rest, on, old())) + 0.041).abs() < 1e-6, "{control}");
+        // and from what a first export wrote, without a backup
+        let both: Planted = vec![("location-b", "EX0B", 0.101), ("location-c", "EX0C", 0.060)];
+        let first = during(&machine, control, &both, BARE, Old::default());
+        let again = During { loaded: Some(&first.compensation), transformation: false };
+        let second = during(&machine, control, &found, again, Old::default());
+        assert!((of(&second) + 0.041).abs() < 1e-6, "{control}: {}", of(&second));
     }
 }

@@ -47,14 +47,19 @@ pub fn correction(machine: &Machine, planted: &Planted, active: Option<&compensa
 
 /// What a study finds whose touches were made so.
 pub fn found_during(machine: &Machine, planted: &Planted, during: During) -> Correction {
+    found_with_held(machine, planted, &[], during)
+}
+
+/// The same; these parameters the study holds.
+pub fn found_with_held(machine: &Machine, planted: &Planted, held: &[&str], during: During) -> Correction {
+    let status = |name: &str| if held.contains(&name) { Status::Fixed } else { Status::Identified };
     let catalogue = catalogue();
     let unit = |effect: &str, name: &str| {
         let row = catalogue.get(effect, machine).unwrap();
         row.parameters.iter().find(|p| p.name == name).unwrap().unit.clone()
     };
     let units: Vec<String> = planted.iter().map(|(e, n, _)| unit(e, n)).collect();
-    let rows: Vec<_> =
-        planted.iter().zip(&units).map(|((e, n, v), u)| (*n, *e, *v, u.as_str(), Status::Identified)).collect();
+    let rows: Vec<_> = planted.iter().zip(&units).map(|((e, n, v), u)| (*n, *e, *v, u.as_str(), status(n))).collect();
     let provenance =
         Provenance { study: "study.toml".into(), study_sha256: "0123abcd".into(), data_date: "2026-11-20".into() };
     let mut outcome = crate::export::outcome(&machine.name, &rows);

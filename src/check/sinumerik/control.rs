@@ -76,6 +76,11 @@ pub struct Sinumerik {
     measuring: [bool; 6],
 }
 
+/// M functions whose meaning is the control's own, and never that of a probe: end of program, spindle on and off, tool change,
+/// gears. (SINUMERIK Fundamentals, predefined M functions.)
+const OWN_FUNCTIONS: [f64; 17] =
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 17.0, 19.0, 30.0, 40.0, 41.0, 42.0, 43.0, 44.0, 45.0, 70.0];
+
 impl Sinumerik {
     fn unit(&self, axis: AxisName) -> f64 {
         if self.inch && !axis.is_rotary() { mm_from_inch(1.0) } else { 1.0 }
@@ -351,7 +356,11 @@ impl Dialect for Sinumerik {
         Self {
             input: setting("probe").trim().parse().unwrap_or(1.0),
             edge: setting("tool_edge").trim().trim_start_matches('D').parse().unwrap_or(1.0),
-            builder: lines.split_whitespace().filter_map(|w| w.strip_prefix('M')?.parse().ok()).collect(),
+            builder: lines
+                .split_whitespace()
+                .filter_map(|w| w.strip_prefix('M')?.parse().ok())
+                .filter(|m| !OWN_FUNCTIONS.contains(m))
+                .collect(),
             modulo,
             origin: machine.origin.position(),
             inch: awkward,

@@ -370,7 +370,7 @@ impl Question<'_> {
         findings: &mut Findings,
     ) {
         let Some(replaced) = self.replaced else { return };
-        let worst = replaced.keep(self.before, off, turned);
+        let worst = replaced.keep((self.before, self.now), off, turned);
         if let Some((mm, axis)) = worst.filter(|(mm, _)| *mm > self.step_mm().max(1e-3)) {
             let says = format!(
                 "the old values place axis {axis} {mm:.4} mm from where the machine's description has it; the program gave axis \

@@ -69,7 +69,7 @@ pub fn other_than_active<'a>(
         n => format!(" ({} more differ)", n - 1),
     };
     let says = format!(
-        "the compensation that was active during the measurement wrote {name} = {written} {unit}, the old value that is given is {old} {unit}{more}: what was identified adds to the first"
+        "the compensation that was active during the measurement wrote {name} = {written} {unit}, the old value that is given is {old} {unit}{more}: one of the two is not what the control held"
     );
     vec![Finding::error("tables::old_not_active", says).help(
         "give a backup of the control from after that compensation was loaded, or none: then the values that it wrote are the old ones; values of a table that was not loaded do not belong into it",

@@ -23,8 +23,8 @@ const NOTHING: f64 = 1e-7;
 #[derive(Debug)]
 pub struct Replaced {
     described: Seen,
-    /// Offsets moved.
-    offsets: Vec<Seen>,
+    /// Offsets moved, by the side of their axis.
+    offsets: Vec<(Side, Seen)>,
     /// Tilts moved.
     tilts: Vec<Seen>,
 }
@@ -36,60 +36,86 @@ impl Replaced {
         let moved = |t: &Term| seen(&[Term { value: STEP, ..t.clone() }]);
         Self {
             described: seen(&[]),
-            offsets: found().filter(|t| !t.dof.is_angle()).map(moved).collect(),
+            offsets: found()
+                .filter(|t| !t.dof.is_angle())
+                .filter_map(|t| Some((machine.axis(t.axis)?.side, moved(t))))
+                .collect(),
             tilts: found().filter(|t| t.dof.is_angle()).map(moved).collect(),
         }
     }
 
     /// What of a difference of two places stays: the components that no found offset moves.
     pub fn place(&self, off: Vector3<f64>, of: impl Fn(&Seen) -> Vector3<f64>) -> Vector3<f64> {
-        self.unmoved(&self.offsets, off, of)
+        self.unmoved(self.offsets.iter().map(|(_, seen)| seen), off, of)
     }
 
     /// Takes out of the differences between old values and description what was found: of a point counted from what carries
     /// it, of a direction. Gives the largest that was taken out, mm, and whose.
     pub fn keep(
         &self,
-        before: &Seen,
+        (before, now): (&Seen, &Seen),
         off: &mut BTreeMap<Point, Vector3<f64>>,
         turned: &mut BTreeMap<Turn, Vector3<f64>>,
     ) -> Option<(f64, AxisName)> {
         let mut worst: Option<(f64, AxisName)> = None;
-        for side in [Side::Workpiece, Side::Tool] {
+        // lines of the table are counted from the ball at zero: what a found offset of the head moves there is the ball
+        let mut head_moved = Vector3::zeros();
+        for side in [Side::Tool, Side::Workpiece] {
             let (mut given, mut kept, mut carrier) = (Vector3::zeros(), Vector3::zeros(), None);
             for place in in_chain_order(before, side) {
-                let Some(line) = before.side(side).get(place) else { continue };
+                let (Some(line), Some(new)) = (before.side(side).get(place), now.side(side).get(place)) else {
+                    continue;
+                };
                 let Some(by) = off.iter_mut().find(|(point, _)| stands_at(**point, side, place)).map(|(_, by)| by)
                 else {
                     continue;
                 };
+                let d = line.direction.into_inner();
+                let across = |v: Vector3<f64>| v - d * v.dot(&d);
                 let relative = *by - given;
-                let along = line.direction.into_inner() * relative.dot(&line.direction);
+                let along = d * relative.dot(&d);
                 let at = |seen: &Seen| {
                     let point = |n: usize| seen.side(side).get(n).map_or_else(Vector3::zeros, |l| l.point);
                     point(place) - carrier.map_or_else(Vector3::zeros, point)
                 };
-                let stays = self.place(relative - along, at);
-                let taken = (relative - along - stays).norm();
+                let own = || self.offsets.iter().filter(|(of, _)| *of == side).map(|(_, seen)| seen);
+                // what stays, stays as the control has it next to the head, wherever the head was found
+                let moved = if side == Side::Workpiece && carrier.is_none() {
+                    across(head_moved - (new.point - line.point))
+                } else {
+                    Vector3::zeros()
+                };
+                let off_line = relative - along;
+                let stays = self.unmoved(own(), off_line + moved, at);
+                let taken = (off_line - self.unmoved(own(), off_line, at)).norm();
                 if worst.is_none_or(|(most, _)| taken > most) {
                     worst = Some((taken, line.axis));
                 }
                 // where along its line the carrier's point was chosen moves nothing
-                (given, kept, carrier) = (given + relative - along, kept + stays, Some(place));
+                (given, kept, carrier) = (given + off_line, kept + stays, Some(place));
+                if side == Side::Tool {
+                    head_moved = across(new.point + kept - line.point - given);
+                }
                 *by = kept + along;
             }
         }
         for (turn, by) in turned.iter_mut() {
             let at =
                 |seen: &Seen| line_of(seen, *turn).map_or_else(Vector3::zeros, |(_, _, l)| l.direction.into_inner());
-            *by = self.unmoved(&self.tilts, *by, at);
+            *by = self.unmoved(self.tilts.iter(), *by, at);
         }
         worst
     }
 
-    fn unmoved(&self, moved: &[Seen], off: Vector3<f64>, of: impl Fn(&Seen) -> Vector3<f64>) -> Vector3<f64> {
+    /// The components that none of these moves.
+    fn unmoved<'s>(
+        &self,
+        moved: impl Iterator<Item = &'s Seen>,
+        off: Vector3<f64>,
+        of: impl Fn(&Seen) -> Vector3<f64>,
+    ) -> Vector3<f64> {
         let at = of(&self.described);
-        let steps: Vec<Vector3<f64>> = moved.iter().map(|seen| of(seen) - at).collect();
+        let steps: Vec<Vector3<f64>> = moved.map(|seen| of(seen) - at).collect();
         Vector3::from_fn(|k, _| if steps.iter().any(|step| step[k].abs() > NOTHING) { 0.0 } else { off[k] })
     }
 }
