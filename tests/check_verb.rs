@@ -15,6 +15,15 @@ fn axiscal(folder: &Path) -> Command {
     command
 }
 
+/// Each control, and the file of its small program.
+const EACH: [(&str, &str); 5] = [
+    ("linuxcnc", "small.ngc"),
+    ("fanuc", "small.nc"),
+    ("haas", "small.nc"),
+    ("sinumerik", "small.mpf"),
+    ("heidenhain", "small.h"),
+];
+
 /// A folder with a small program for a control.
 fn folder(controller: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -264,13 +273,7 @@ fn a_byte_order_mark_is_refused() {
 /// A program that moves before it has stopped the spindle, without a plan that would say so.
 #[test]
 fn the_spindle_is_stopped_before_anything_moves() {
-    for (controller, file) in [
-        ("linuxcnc", "small.ngc"),
-        ("fanuc", "small.nc"),
-        ("haas", "small.nc"),
-        ("sinumerik", "small.mpf"),
-        ("heidenhain", "small.h"),
-    ] {
+    for (controller, file) in EACH {
         let folder = folder(controller);
         let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
         let stops = |line: &str| {
@@ -308,13 +311,7 @@ fn the_spindle_is_stopped_before_anything_moves() {
 /// no function of the control's own.
 #[test]
 fn a_probe_is_switched_on_before_it_searches() {
-    for (controller, file) in [
-        ("linuxcnc", "small.ngc"),
-        ("fanuc", "small.nc"),
-        ("haas", "small.nc"),
-        ("sinumerik", "small.mpf"),
-        ("heidenhain", "small.h"),
-    ] {
+    for (controller, file) in EACH {
         let folder = folder(controller);
         let with = |on: &str| {
             let post = format!(

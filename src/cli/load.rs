@@ -366,21 +366,18 @@ fn load_plan_and_digest(path: &Path, machine: &Machine, io: &Io) -> Result<(Plan
 /// (the program was started again) follows the last of them as the plan has it: time does not run backward.
 fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>) {
     let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
-    // the last touch with a time of its own: on the study's clock, and as planned
+    // the touch made before, once one had a time of its own: on the study's clock, and as planned
     let mut last: Option<(f64, f64)> = None;
-    // in the order in which they were made: a run that was started again may have begun at an earlier set-up
     let mut made: Vec<&mut Touch> = touches.iter_mut().collect();
     made.sort_by_key(|t| t.line);
     for touch in made {
         let planned = plan.touch(touch.id).and_then(|t| t.time_s);
         touch.time_s = match (started_s, first, touch.time_s) {
-            (Some(started), Some((first_s, planned_s)), Some(time_s)) => {
-                let time_s = started + planned_s + time_s - first_s;
-                last = planned.map(|planned| (time_s, planned)).or(last);
-                Some(time_s)
-            }
-            _ => last.zip(planned).map(|((time_s, then), now)| time_s + now - then),
+            (Some(started), Some((first_s, planned_s)), Some(time_s)) => Some(started + planned_s + time_s - first_s),
+            // begun again at an earlier set-up it comes after the last one all the same
+            _ => last.zip(planned).map(|((time_s, then), now)| time_s + (now - then).max(0.0)),
         };
+        last = touch.time_s.zip(planned).or(last);
     }
 }
 
@@ -412,27 +409,31 @@ mod tests {
         let machine = crate::post::tests::machine("swivel-head");
         let mut plan = crate::post::tests::plan(&machine, "head", "x+");
         plan.touches.iter_mut().zip([100.0, 160.0, 200.0]).for_each(|(t, s)| t.time_s = Some(s));
-        let touches = |times: [Option<f64>; 3]| -> Vec<Touch> {
-            let touch = |(planned, time_s): (&crate::program::plan::PlanTouch, Option<f64>)| Touch {
+        let touches = |times: [Option<f64>; 3], lines: [usize; 3]| -> Vec<Touch> {
+            let touch = |((planned, time_s), line): ((&crate::program::plan::PlanTouch, Option<f64>), usize)| Touch {
                 id: planned.id,
                 position: planned.nominal_position(),
                 status: log::Status::Hit,
                 time_s,
                 temperature_deg_c: None,
-                line: 0,
+                line,
             };
-            plan.touches.iter().zip(times).map(touch).collect()
+            plan.touches.iter().zip(times).zip(lines).map(touch).collect()
         };
-        let on_the_clock = |times: [Option<f64>; 3], started_s: Option<f64>| -> Vec<Option<f64>> {
-            let mut touches = touches(times);
+        let made = |times: [Option<f64>; 3], lines: [usize; 3], started_s: Option<f64>| -> Vec<Option<f64>> {
+            let mut touches = touches(times, lines);
             on_the_study_clock(&mut touches, &plan, started_s);
             touches.iter().map(|t| t.time_s).collect()
         };
+        let on_the_clock = |times: [Option<f64>; 3], started_s: Option<f64>| made(times, [1, 2, 3], started_s);
         // 90 s where the plan has 60: behind it the plan goes on from there
         let stopped = [Some(7.0), Some(97.0), None];
         assert_eq!(on_the_clock(stopped, Some(1000.0)), [Some(1100.0), Some(1190.0), Some(1230.0)]);
         assert_eq!(on_the_clock([Some(7.0), None, None], Some(0.0)), [Some(100.0), Some(160.0), Some(200.0)]);
         assert_eq!(on_the_clock([None, Some(7.0), Some(8.0)], Some(0.0)), [None, Some(160.0), Some(161.0)]);
+        // begun again at an earlier set-up: what was made last comes last
+        let again = made([Some(7.0), None, Some(107.0)], [1, 3, 2], Some(0.0));
+        assert_eq!(again, [Some(100.0), Some(200.0), Some(200.0)]);
         assert_eq!(on_the_clock(stopped, None), [None; 3]);
         assert_eq!(on_the_clock([None; 3], Some(0.0)), [None; 3]);
     }
