@@ -74,10 +74,11 @@ fn line(case: &coverage::Case, summary: &coverage::Summary, results: &[&coverage
     // a scatter that neither the study states nor the plan can tell is the declared one
     let declared = case.tau_mm > 0.0 && case.stated_tau_mm.is_none() && !summary.tau_estimated;
     format!(
-        "| {} {}, {tau} µm{} | {:.3} | {:.3} … {:.3} over {} results | {:.1} … {:.1} % |\n",
+        "| {} {}, {tau} µm{}{} | {:.3} | {:.3} … {:.3} over {} results | {:.1} … {:.1} % |\n",
         case.machine,
         case.programs.join(" + "),
         if declared { ", as the machine's file declares it" } else { "" },
+        case.planted.iter().map(|(id, _)| format!(", {id} in machine and model")).collect::<String>(),
         summary.chi2_per_dof,
         ratio.0,
         ratio.1,

@@ -177,6 +177,9 @@ fn set_ups_come_back_and_visits_are_counted() {
             .collect();
         let data = assemble(&machine, &[Run { plan: &plan, touches: &nominal, mounting: None, started_s: None }]);
         assert_eq!((data.set_ups.len(), data.unusable.len()), (4, 0), "{name}");
+        // a spindle that turns while the rotary axes stand makes no other visit of it: their scatter is one
+        assert!(plan.touches.iter().any(|t| t.spindle_deg.is_some()), "{name}");
+        assert_eq!(data.poses.len(), visits.len(), "{name}");
     }
 }
 

@@ -291,6 +291,7 @@ mod tests {
             value: *value,
             sigma: Some(1.0),
             expanded: Some(Z_95),
+            interval: None,
             holds: Vec::new(),
             status: Status::Identified,
             alias: None,

@@ -3,7 +3,7 @@
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
 use super::type_b::TypeB;
-use super::{Fit, Settings, contradictions, held_out, snoop, statement, uncertainty, weak};
+use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
@@ -12,6 +12,9 @@ use nalgebra::DVector;
 
 /// A result further off than so many typical sizes is worth a warning by itself.
 const NOT_CREDIBLE: f64 = 300.0;
+
+/// With more touches a shape parameter is known so well that its doubt is the same on both sides.
+const MOST_PROFILED: usize = 20_000;
 
 pub(super) fn outcome(
     fit: &Fit,
@@ -25,6 +28,7 @@ pub(super) fn outcome(
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
+    let shapes_told = !settings.quick && n <= MOST_PROFILED;
     let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
         .then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
@@ -51,10 +55,20 @@ pub(super) fn outcome(
             };
             let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
             let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
-            let expanded = known.zip(sigma).map(|(c, s)| {
+            let factor = known.zip(sigma).map(|(c, s)| {
                 let share = if s > 0.0 { by_visits[c] / (s * s) } else { 0.0 };
-                s * fit.noise.coverage(share.clamp(0.0, 1.0))
+                fit.noise.coverage(share.clamp(0.0, 1.0))
             });
+            let expanded = sigma.zip(factor).map(|(s, k)| s * k);
+            // the ends are those of the noise's interval, with all else that is counted
+            let interval = known.zip(factor).filter(|_| u.shape && shapes_told).and_then(|(c, k)| {
+                let ends = profile::interval(fit, machine, effects, i, (noise_variance(c).sqrt(), k))?;
+                let more = k * (b_variance[c] + moves[c] * moves[c]).sqrt();
+                let side = |end: f64| (end - fit.theta[i]).hypot(more).copysign(end - fit.theta[i]);
+                Some(ends.map(|end| fit.theta[i] + side(end)))
+            });
+            let wider = |ends: [f64; 2]| (fit.theta[i] - ends[0]).max(ends[1] - fit.theta[i]);
+            let expanded = interval.map(wider).or(expanded);
             Parameter {
                 name: u.name.clone(),
                 alias: u.alias.clone(),
@@ -63,6 +77,7 @@ pub(super) fn outcome(
                 unit: u.unit.clone(),
                 sigma,
                 expanded,
+                interval,
                 sigma_noise: known.map(|c| (noise_variance(c) - by_visits[c]).max(0.0).sqrt()),
                 sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
                 moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),

@@ -14,8 +14,10 @@ mod knowledge;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
+mod profile;
 pub mod quantiles;
 mod rank;
+mod revisits;
 mod search;
 pub mod shapes;
 pub mod snoop;
@@ -266,11 +268,27 @@ fn identify_started(
     }
     let fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;
     let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
+    // a first step too far: everything else settles while the shape stays where it began, and the search goes on from there
+    let mut fit = fit;
+    if let Some(&began) = starts.get(&name) {
+        let mut waiting = Settings { quick: true, ..held_settings.clone() };
+        waiting.knowledge.insert(name.clone(), Knowledge::Fixed(began));
+        let settled = identify_from(machine, catalogue, effects, fit.data, &waiting, starts)?;
+        let values = settled.model.unknowns.iter().zip(settled.theta.iter()).map(|(u, v)| (u.name.clone(), *v));
+        let from: BTreeMap<String, f64> = values.collect();
+        fit = identify_from(machine, catalogue, effects, settled.data, &held_settings, &from)?;
+        if shapes::out_of_range(&fit, catalogue, machine).is_none() {
+            return Ok(fit);
+        }
+    }
     held_settings.knowledge.insert(name.clone(), held);
     let mut fit = identify_from(machine, catalogue, effects, fit.data, &held_settings, starts)?;
     fit.outcome.warnings.push(format!("{name} ran out of its range in the search and is held at the end of it"));
     Ok(fit)
 }
+
+/// What a formula may depend on that is not the same in two visits of one pose.
+const MOVING: [&str; 5] = ["t", "T", "wA", "wB", "wC"];
 
 /// Fits a model from given starts.
 fn identify_from(
@@ -329,23 +347,23 @@ fn identify_from(
     let first = solve::Problem::normal(&touches, &start, true);
     let (observability, condition) =
         rank::observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
-    let mut search = Search { data: &data, observability: observability.clone(), touches, masked, known, beyond: None };
+    let moving =
+        effects.iter().any(|e| e.terms.iter().any(|t| t.formula.variables().iter().any(|v| MOVING.contains(v))));
+    let mut search =
+        Search { data: &data, observability: observability.clone(), touches, masked, known, moving, beyond: None };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     let solution = search.follow_bends(solution, &model, &free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
     let solution = search.without_strangers(solution, 0.0);
-    let noise = noise::estimate(&search.samples(&solution), &known);
-    search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
     let first_steps = solution.iterations;
-    let solution = search.refit_here(solution.theta);
+    let (noise, solution) = search.settle(solution);
     let before = search.touches.weights().to_vec();
     let mut solution = search.without_strangers(solution, noise.dof.unwrap_or(0.0));
     let noise = if search.touches.weights() == before {
         noise
     } else {
-        let noise = noise::estimate(&search.samples(&solution), &known);
-        search.touches.set_noise(noise.sigma_mm, noise.tau_mm);
-        solution = search.refit_here(solution.theta);
+        let (noise, settled) = search.settle(solution);
+        solution = settled;
         noise
     };
     solution = search.follow_bends(solution, &model, &free);

@@ -1,25 +1,19 @@
 //! How much a touch scatters, and how much the ball's place scatters from one index visit to the next.
 //!
 //! Both from contrasts that no model error can enter: touches of one point made right after each other differ by σ only;
-//! touches of the same points in two visits of one pose differ by σ and by one displacement per visit. With y the
-//! residuals of such a group, X its points and Z its normals by visit, X is projected out of y and of Z; the projected
-//! ZZᵀ has eigenvalues λₖ, and yₖ² has the expectation σ² + τ²·λₖ. τ̂ solves Σ yₖ²/(σ² + τ²λₖ) = K (Paule and Mandel's
-//! estimator, exact in its degrees of freedom), and its 90 % bound solves the same sum for the 10 % quantile of χ²(K).
+//! touches of the same points in two visits of one pose differ by σ and by one displacement per visit (`revisits`).
 
 use super::quantiles;
+use super::revisits::{Followed, revisits};
 use crate::units::um_from_mm;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::collections::HashMap;
 
 /// Fewer degrees of freedom than this say too little: their 95 % interval for σ spans more than a factor of two.
 const LEAST_REPEATS: usize = 8;
 
 /// Fewer contrasts than this say too little about visits.
 const LEAST_REVISITS: usize = 6;
-
-/// A pose visited this often at most enters the estimate of τ: the work grows with its cube.
-const MOST_ROWS: usize = 600;
 
 /// The noise of the touches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,11 +76,12 @@ pub struct Sample {
     pub point: usize,
 }
 
-/// σ and τ from the touches in their order, or as known.
+/// σ and τ from the touches in their order, or as known. `followed`: how the fit followed what changes between the visits of
+/// a pose, where its model holds anything that does.
 #[must_use]
-pub fn estimate(samples: &[Sample], known: &Known) -> Noise {
+pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) -> Noise {
     let immediate = immediate_repeats(samples);
-    let revisits = revisits(samples);
+    let revisits = revisits(samples, followed);
     // a revisit also repeats each point once the visit's displacement is taken off, unless something else changes meanwhile
     let later_mm = later(immediate, revisits.within);
     let (squares, dof) = match later_mm {
@@ -266,104 +261,6 @@ fn immediate_repeats(samples: &[Sample]) -> (f64, usize) {
     (squares, dof)
 }
 
-/// What revisited poses say.
-#[derive(Debug, Default)]
-struct Revisits {
-    /// (λ, y²) of each contrast between visits.
-    contrasts: Vec<(f64, f64)>,
-    /// Sum of squares and degrees of freedom of what is left when each visit is displaced freely.
-    within: (f64, usize),
-}
-
-fn revisits(samples: &[Sample]) -> Revisits {
-    let mut out = Revisits::default();
-    let mut poses: Vec<usize> = samples.iter().map(|s| s.pose).collect();
-    poses.sort_unstable();
-    poses.dedup();
-    for pose in poses {
-        // touches made right after each other count by their mean: their own scatter is used already
-        let mut rows: Vec<(Sample, f64)> = Vec::new();
-        for group in samples.chunk_by(|a, b| a.repeat == b.repeat).filter(|g| g[0].pose == pose) {
-            let mean = group.iter().map(|s| s.residual_mm).sum::<f64>() / group.len() as f64;
-            rows.push((Sample { residual_mm: mean, ..group[0] }, (group.len() as f64).sqrt()));
-        }
-        // only points that stand in several visits say anything
-        let mut times: HashMap<usize, usize> = HashMap::new();
-        rows.iter().for_each(|r| *times.entry(r.0.point).or_default() += 1);
-        rows.retain(|r| times[&r.0.point] > 1);
-        if rows.len() < 2 || rows.len() > MOST_ROWS {
-            continue;
-        }
-        let mut visits: Vec<usize> = rows.iter().map(|r| r.0.visit).collect();
-        visits.sort_unstable();
-        visits.dedup();
-        if visits.len() < 2 {
-            continue;
-        }
-        out.add(&rows, &visits);
-    }
-    out
-}
-
-impl Revisits {
-    /// One pose: rows with the root of their weights.
-    fn add(&mut self, rows: &[(Sample, f64)], visits: &[usize]) {
-        let n = rows.len();
-        let mut y = DVector::from_iterator(n, rows.iter().map(|(s, root)| s.residual_mm * root));
-        let mut z = DMatrix::zeros(n, 3 * visits.len());
-        for (i, (s, root)) in rows.iter().enumerate() {
-            if let Some(v) = visits.iter().position(|v| *v == s.visit) {
-                for k in 0..3 {
-                    z[(i, 3 * v + k)] = s.normal[k] * root;
-                }
-            }
-        }
-        // the mean of each point is a fixed unknown: project it out of both
-        let mut points: Vec<usize> = rows.iter().map(|r| r.0.point).collect();
-        points.sort_unstable();
-        points.dedup();
-        for point in &points {
-            let of: Vec<usize> = (0..n).filter(|&i| rows[i].0.point == *point).collect();
-            let norm2: f64 = of.iter().map(|&i| rows[i].1.powi(2)).sum();
-            let mean = of.iter().map(|&i| rows[i].1 * y[i]).sum::<f64>() / norm2;
-            of.iter().for_each(|&i| y[i] -= rows[i].1 * mean);
-            for mut column in z.column_iter_mut() {
-                let mean = of.iter().map(|&i| rows[i].1 * column[i]).sum::<f64>() / norm2;
-                of.iter().for_each(|&i| column[i] -= rows[i].1 * mean);
-            }
-        }
-        let svd = z.svd(true, false);
-        let Some(u) = svd.u else { return };
-        let mut explained = 0.0;
-        let mut n_contrasts = 0;
-        for (k, s) in svd.singular_values.iter().enumerate() {
-            if *s > 1e-6 {
-                let y2 = u.column(k).dot(&y).powi(2);
-                self.contrasts.push((s * s, y2));
-                explained += y2;
-                n_contrasts += 1;
-            }
-        }
-        self.within.0 += (y.norm_squared() - explained).max(0.0);
-        self.within.1 += (n - points.len()).saturating_sub(n_contrasts);
-    }
-
-    /// τ, its degrees of freedom and its 90 % upper bound, mm.
-    fn solve(&self, sigma_mm: f64) -> (f64, f64, f64) {
-        let k = self.contrasts.len() as f64;
-        let sum = |tau2: f64| -> f64 {
-            self.contrasts.iter().map(|(lambda, y2)| y2 / (sigma_mm * sigma_mm + tau2 * lambda)).sum()
-        };
-        let tau2 = root(sum, k);
-        let quantile = ChiSquared::new(k).map_or(k, |d| d.inverse_cdf(0.1));
-        let upper2 = root(sum, quantile);
-        let information: f64 =
-            self.contrasts.iter().map(|(lambda, _)| lambda / (sigma_mm * sigma_mm + tau2 * lambda)).sum();
-        let dof = (tau2 * information).powi(2) / k;
-        (tau2.sqrt(), dof, upper2.sqrt())
-    }
-}
-
 /// Degrees of freedom as a person reads them: effective ones may be far below one, and none at all is something else.
 fn degrees(dof: f64) -> String {
     match dof {
@@ -371,23 +268,6 @@ fn degrees(dof: f64) -> String {
         d if d < 9.5 => format!("{d:.1} degrees"),
         d => format!("{d:.0} degrees"),
     }
-}
-
-/// Where a falling function of x ≥ 0 takes a value; 0 where it starts below.
-fn root(f: impl Fn(f64) -> f64, value: f64) -> f64 {
-    if f(0.0) <= value {
-        return 0.0;
-    }
-    let mut high = 1e-12;
-    while f(high) > value && high < 1e6 {
-        high *= 4.0;
-    }
-    let mut low = 0.0;
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if f(middle) > value { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }
 
 /// Two-sided 95 % factor of Student's t, or of the normal distribution where the uncertainty is taken as known.
@@ -422,7 +302,7 @@ mod tests {
     fn repeats_give_the_pure_error() {
         let at = |i: usize| 0.01 * (i / 2) as f64 + if i.is_multiple_of(2) { 1e-3 } else { -1e-3 };
         let samples: Vec<Sample> = (0..20).map(|i| sample(at(i), i / 2)).collect();
-        let noise = estimate(&samples, &known());
+        let noise = estimate(&samples, &known(), None);
         assert_eq!((noise.source, noise.visit_source), ("repeats", "one pose"));
         assert!((noise.sigma_mm - 2f64.sqrt() * 1e-3).abs() < 1e-15);
         assert!((noise.coverage(0.0) - 2.228).abs() < 1e-3);
@@ -456,7 +336,7 @@ mod tests {
                     }
                 }
             }
-            estimate(&samples, &known())
+            estimate(&samples, &known(), None)
         };
         let calm = run(0.0);
         assert!(calm.later_mm.is_none() && calm.dof > Some(60.0), "{calm:?}");
@@ -469,7 +349,7 @@ mod tests {
     #[test]
     fn too_few_repeats_mean_the_declared_value() {
         let samples = [sample(0.1, 0), sample(0.2, 0), sample(0.3, 1)];
-        let noise = estimate(&samples, &known());
+        let noise = estimate(&samples, &known(), None);
         assert_eq!((noise.sigma_mm, noise.source), (5.0, "declared"));
         assert!((noise.coverage(0.5) - 1.96).abs() < 1e-3);
     }
@@ -503,7 +383,7 @@ mod tests {
                     }
                 }
             }
-            let noise = estimate(&samples, &known());
+            let noise = estimate(&samples, &known(), None);
             assert_eq!((noise.source, noise.visit_source), ("repeats", "revisits"));
             mean_tau2 += noise.tau_mm.powi(2) / f64::from(runs);
             mean_sigma2 += noise.sigma_mm.powi(2) / f64::from(runs);

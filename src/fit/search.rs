@@ -2,6 +2,7 @@
 
 use super::noise::{self, Known, Sample};
 use super::normal::Touches;
+use super::revisits::Followed;
 use super::snoop::{self, Snoop};
 use super::solve;
 use crate::model::data::Data;
@@ -36,6 +37,8 @@ pub(super) struct Search<'a> {
     pub masked: Vec<bool>,
     /// What is known of the noise without the touches.
     pub known: Known,
+    /// Does the model hold anything that changes between the visits of a pose?
+    pub moving: bool,
     /// As [`super::Fit::strangers_beyond`].
     pub beyond: Option<usize>,
 }
@@ -47,7 +50,7 @@ impl Search<'_> {
 
     /// The touches that are used, as the noise sees them.
     pub fn samples(&self, solution: &solve::Solution) -> Vec<Sample> {
-        let mut points: HashMap<[u64; 8], usize> = HashMap::new();
+        let mut points: HashMap<[u64; 11], usize> = HashMap::new();
         let gaps = self.gaps(solution);
         let mut out = Vec::with_capacity(gaps.len());
         for (i, o) in self.data.observations.iter().enumerate() {
@@ -61,6 +64,10 @@ impl Search<'_> {
                 bits(o.normal.y),
                 bits(o.normal.z),
                 bits(o.state[slot::FEED]),
+                // another orientation of the spindle or another stylus is another touch
+                bits(o.state[slot::SPINDLE]),
+                bits(o.state[slot::LENGTHS]),
+                bits(o.ball_radius),
             ];
             let n = points.len();
             let point = *points.entry(key).or_insert(n);
@@ -77,6 +84,35 @@ impl Search<'_> {
             }
         }
         out
+    }
+
+    /// How a solution follows what changes between the visits of a pose.
+    fn followed(&self, solution: &solve::Solution) -> Followed {
+        let used: Vec<usize> = (0..self.data.observations.len()).filter(|&i| self.touches.weights()[i] > 0.0).collect();
+        let (_, rows) = self.touches.unwhitened_of(&solution.theta, &used);
+        Followed { rows, covariance: solution.covariance.clone() }
+    }
+
+    /// Takes the noise that the touches show, and the solution with it.
+    pub fn settle(&mut self, mut solution: solve::Solution) -> (noise::Noise, solve::Solution) {
+        /// Rounds, and the change of τ that is none, relative.
+        const ROUNDS: usize = 6;
+        const NONE: f64 = 0.01;
+        let mut noise = noise::estimate(&self.samples(&solution), &self.known, None);
+        for _ in 0..ROUNDS {
+            self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+            solution = self.refit_here(solution.theta);
+            // what the fit follows between visits depends on how much they are taken to scatter
+            if !self.moving || noise.visit_source != "revisits" {
+                break;
+            }
+            let before = noise.tau_mm;
+            noise = noise::estimate(&self.samples(&solution), &self.known, Some(&self.followed(&solution)));
+            if (noise.tau_mm - before).abs() <= NONE * before {
+                break;
+            }
+        }
+        (noise, solution)
     }
 
     fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
@@ -244,7 +280,7 @@ impl Search<'_> {
         let mut weights = all.to_vec();
         out.iter().for_each(|&i| weights[i] = 0.0);
         let mut solution = self.refit(weights, from);
-        let noise = noise::estimate(&self.samples(&solution), &self.known);
+        let noise = noise::estimate(&self.samples(&solution), &self.known, None);
         self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
         solution = self.refit_here(solution.theta);
         // touches that the robust fit took for strangers, and that are not, come back

@@ -106,14 +106,27 @@ fn rooms_of_shapes(fit: &Fit) -> BTreeMap<usize, f64> {
         let product = |a: usize, b: usize| theta[a] * theta[b] * gram[(a, b)];
         let square: f64 = sizes.iter().map(|&a| sizes.iter().map(|&b| product(a, b)).sum::<f64>()).sum();
         let small = |k: &usize| theta[*k].abs() < SHOWN * sigma(*k);
-        // the shape was chosen as the best of many: chance makes more of it than of a size
+        // what of it the other unknowns cannot do. The shape was chosen as the best of many: chance makes more of it than of a size
         let by_chance = SHOWN * SHOWN * (sizes.len() + 1) as f64;
-        if slope <= 0.0 || square < by_chance || sizes.iter().all(small) {
+        if slope <= 0.0 || shown(fit, &sizes) < by_chance || sizes.iter().all(small) {
             return (c, NONE * typical);
         }
         (c, (square.max(0.0) / slope).sqrt().clamp(NONE * typical, typical))
     };
     shapes.into_iter().map(room).collect()
+}
+
+/// χ² by which some of the free unknowns are not 0, with all others free to follow.
+fn shown(fit: &Fit, which: &[usize]) -> f64 {
+    let each = |k: usize| fit.free[which[k]];
+    let n = which.len();
+    let theta = DVector::from_fn(n, |k, _| fit.theta[each(k)]);
+    let covariance = DMatrix::from_fn(n, n, |a, b| fit.covariance[(each(a), each(b))]);
+    // scaled to a diagonal of ones: sizes may have different units
+    let scale = covariance.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
+    let scaled = DMatrix::from_fn(n, n, |a, b| covariance[(a, b)] / (scale[a] * scale[b]));
+    let off = theta.component_div(&scale);
+    scaled.cholesky().map_or(f64::INFINITY, |c| off.dot(&c.solve(&off)))
 }
 
 /// Effects that may act although a model with these unknowns does not hold them: all of the catalogue but those that share a

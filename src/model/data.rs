@@ -65,8 +65,9 @@ pub struct Data {
     pub repeats: Vec<usize>,
     /// For each observation: its index visit, counted through all runs; touches of a visit follow one another.
     pub visits: Vec<usize>,
-    /// For each visit: visits of equal poses share a number. The rotary axes were moved there in the same sense, the
-    /// same blocks and stylus and the same orientation of the spindle are in use: only scatter and time part them.
+    /// For each visit: visits of equal poses share a number. The rotary axes were moved there in the same sense and the same
+    /// blocks stand there: between touches of one point with one stylus and one orientation of the spindle, only scatter and
+    /// time part such visits.
     pub poses: Vec<usize>,
     /// Where touches of a run are far from their places: the one simple mistake that would explain it. What is left of such
     /// a run is no sample of the machine, however many touches it has.
@@ -221,8 +222,6 @@ struct Indexed {
     mounting: String,
     pose: AxisMap,
     from: AxisMap,
-    spindle_deg: Option<f64>,
-    tool_length_mm: Option<f64>,
 }
 
 /// The visits so far.
@@ -234,15 +233,10 @@ struct Visits {
 }
 
 impl Visits {
-    /// The visit that a touch belongs to: a new one where the run, the plan's visit number or the pose changes.
+    /// The visit that a touch belongs to: a new one where the run, the plan's visit number or the pose changes. The axes stand
+    /// where they stood while the spindle turns or the stylus is changed: their scatter is drawn once for all of it.
     fn of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
-        let at = Indexed {
-            mounting,
-            pose: touch.pose,
-            from: touch.from,
-            spindle_deg: touch.spindle_deg,
-            tool_length_mm: touch.tool_length_mm,
-        };
+        let at = Indexed { mounting, pose: touch.pose, from: touch.from };
         let now = (run, touch.visit, at);
         if self.last.as_ref() != Some(&now) {
             let pose = self.poses.iter().position(|p| *p == now.2).unwrap_or_else(|| {

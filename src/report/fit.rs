@@ -82,7 +82,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     }
     head.push("status");
     let mut t = table(&head);
-    for p in results {
+    for p in &results {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |a| format!("{} ({a})", p.name));
         let mut cells = vec![
             Cell::new(name),
@@ -102,6 +102,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     let left_out = lay(&mut t, paper.width.min(120), &["probe noise", "std. unc.", "unmodelled"]);
     out += &t.to_string();
     out.push('\n');
+    out += &uneven(&results);
     let shown = |head: &str| !left_out.iter().any(|h| h == head);
     match (shown("probe noise"), shown("std. unc.")) {
         (true, _) => {
@@ -204,6 +205,26 @@ pub fn significant(x: f64) -> String {
 
 /// From this width on the last column has its whole words.
 const ROOMY: usize = 96;
+
+/// Shape parameters whose doubt is not the same on both sides, in words.
+fn uneven(results: &[&Parameter]) -> String {
+    /// Sides that differ by less need no words.
+    const TENTH: f64 = 1.1;
+    let mut out = String::new();
+    for p in results {
+        let Some([low, high]) = p.interval else { continue };
+        let (below, above) = (p.value - low, high - p.value);
+        if below.max(above) > TENTH * below.min(above) {
+            out += &format!(
+                "{}: {} to {} with 95 %; the wider side stands in the table\n",
+                p.name,
+                digits(low, p.sigma),
+                with_unit(digits(high, p.sigma), &p.unit)
+            );
+        }
+    }
+    out
+}
 
 fn status(status: Status, short: bool) -> &'static str {
     match status {

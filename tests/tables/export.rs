@@ -12,6 +12,7 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
             effect: (*effect).to_owned(),
             value: *value,
             unit: (*unit).to_owned(),
+            interval: None,
             sigma: Some(0.0002),
             expanded: Some(0.0004),
             sigma_noise: None,
