@@ -129,7 +129,7 @@ fn a_sketch_finds_its_place_and_takes_the_error_away() {
     // it is the turntable that turns by it; the other places stand beside it with what they would leave
     assert!(text.contains("at = \"C\"") && text.contains("dof = \"rz\"") && text.contains("7*C"), "{text}");
     assert!(
-        text.contains("# places that were tried") && text.contains("base (") && text.contains(" leaves "),
+        text.contains("# places that were tried") && text.contains("workpiece (") && text.contains(" leaves "),
         "{text}"
     );
     let left: Vec<f64> = made["places"].as_array().unwrap().iter().map(|p| p["left_um"].as_f64().unwrap()).collect();

@@ -359,7 +359,7 @@ fn a_warm_up_of_the_usual_size_is_told_with_its_time_constant() {
             }
             for (name, truth) in [("wx", 3.0), ("wy", 0.0), ("wz", 8.0), ("tau", 0.5)] {
                 let p = o.parameters.iter().find(|p| p.name == name).unwrap();
-                let sigma = p.sigma.unwrap_or_else(|| panic!("{} seed {seed}: {name} is not told", machine.name));
+                assert!(p.sigma.is_some(), "{} seed {seed}: {name} is not told", machine.name);
                 // two and a half times the 95 % interval, of a time constant on the side of the truth
                 let expanded = match p.interval {
                     Some([_, high]) if truth > p.value => high - p.value,

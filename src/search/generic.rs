@@ -11,6 +11,9 @@ use nalgebra::{DMatrix, Vector3};
 /// Highest order of a rotary axis that is looked for.
 pub const ORDERS: u32 = 12;
 
+/// Up to so many angles, no polynomial says more than waves do.
+const FEW_ANGLES: usize = 4;
+
 /// Most frequencies of the periodogram in time.
 const FREQUENCIES: usize = 120;
 
@@ -317,7 +320,10 @@ impl Plan {
             }
             Kind::Rotary => {
                 self.put(id(""), name, &[v], d, (1..=3).flat_map(waves).collect());
-                self.put(id("-cubic"), name, &[v], d, powers(3));
+                // through so few angles of one turn the waves go as well, and what turns comes back after a turn
+                if values.len() > FEW_ANGLES || high - low > std::f64::consts::TAU - 1e-6 {
+                    self.put(id("-cubic"), name, &[v], d, powers(3));
+                }
                 let orders = (1..=ORDERS).map(|k| (f64::from(k), waves(k))).collect();
                 self.scan(id("-order"), name, &[v], Some(d), orders, 1);
                 self.breaks(d, v, variable, &values);
