@@ -377,3 +377,91 @@ fn the_controller_has_one_letter_everywhere() {
     run(&["simulate", "-m", "swivel-head", "--plan", "small.plan.json", "--out", "small.log"]);
     run(&["parse", "small.log", "--plan", "small.plan.json"]);
 }
+
+/// Where another block or stylus is mounted on the way, or the control's own transformation acts, a program without its plan is
+/// not judged at all rather than with faults that are none.
+#[test]
+fn what_only_a_plan_says_needs_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("stop.toml"), STOPS).unwrap();
+    for (controller, ending) in
+        [("linuxcnc", "ngc"), ("fanuc", "nc"), ("haas", "nc"), ("sinumerik", "mpf"), ("heidenhain", "h")]
+    {
+        let judged = |machine: &str, program: &str, more: &[&str], says: &str| {
+            let at = folder.path().join(controller);
+            let args = ["generate", "--machine", machine, "--program", program, "--controller", controller, "--out"];
+            axiscal(folder.path()).args(args).arg(&at).args(more).assert().success();
+            let name = program.strip_suffix(".toml").unwrap_or(program);
+            let check = || {
+                let mut command = axiscal(&at);
+                command.args(["check", &format!("{name}.{ending}"), "--machine", machine, "--controller", controller]);
+                command
+            };
+            let place = predicate::str::is_match(format!(r"{name}\.{ending}:\d+:\d+: error: ")).unwrap();
+            let said = place.and(predicate::str::contains(says)).and(predicate::str::contains("add --plan"));
+            check().assert().code(2).stderr(said);
+            check().args(["--plan", &format!("{name}.plan.json")]).assert().code(0);
+        };
+        judged("swivel-head", "stop.toml", &[], "waits, between two touches, for a person");
+        judged("trunnion", "basic", &["--tcp"], "the control's own transformation");
+    }
+}
+
+/// One touch, a stop at which the stylus is changed, and one with the other stylus.
+const STOPS: &str = r#"
+format   = "axiscal-programs/1"
+name     = "stop"
+says     = "a stylus is changed"
+mounting = "head"
+faces_in = "machine"
+[[grid]]
+name  = "S1"
+u     = [0.0]
+depth = [3.0]
+[[stage]]
+name = "own"
+[[stage.setup]]
+pose   = { B = 0.0, C = 0.0 }
+blocks = ["x+"]
+touch  = [ { faces = ["+X"], grid = "S1" } ]
+[[stage]]
+name   = "long"
+stylus = "long"
+[[stage.setup]]
+pose   = { B = 0.0, C = 0.0 }
+blocks = ["x+"]
+touch  = [ { faces = ["+X"], grid = "S1" } ]
+"#;
+
+/// Words of a control in inches are rounded to 2.5 um: gaps that were proven clear before that stay proven.
+#[test]
+fn what_an_inch_control_rounds_is_no_collision() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = STOPS.split("[[stage]]").take(2).collect::<Vec<_>>().join("[[stage]]");
+    let own = own.replace("B = 0.0", "B = [0.0, -90.0]").replace("[\"+X\"]", "[\"+X\", \"+Y\"]");
+    std::fs::write(folder.path().join("stop.toml"), own).unwrap();
+    for controller in ["fanuc", "haas"] {
+        let file = format!(
+            "format = \"axiscal-postprocessor/1\"\nbased_on = \"{controller}\"\nname = \"inch\"\n\
+             [log]\nunit = \"inch\"\nsource = \"ours\"\n[number]\ndecimals = 4\nsource = \"ours\"\n"
+        );
+        std::fs::write(folder.path().join("inch.toml"), file).unwrap();
+        let args = ["generate", "--machine", "swivel-head", "--program", "stop.toml", "--controller", "inch.toml"];
+        axiscal(folder.path()).args(args).args(["--out", controller]).assert().success();
+    }
+}
+
+/// A shop's own variant of LinuxCNC knows no more transformations than LinuxCNC does.
+#[test]
+fn a_variant_of_linuxcnc_has_its_transformations() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = "format = \"axiscal-postprocessor/1\"\nbased_on = \"linuxcnc\"\nname = \"ours\"\n";
+    std::fs::write(folder.path().join("ours.toml"), file).unwrap();
+    let args = ["generate", "--machine", "swivel-head", "--program", "head", "--controller", "ours.toml", "--tcp"];
+    axiscal(folder.path())
+        .args(args)
+        .args(["--out", "."])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("under a transformation of LinuxCNC's own"));
+}

@@ -9,6 +9,7 @@
 //! program was made; shapes and the proof of a single move come from [`crate::program`], contacts from
 //! [`crate::simulate`].
 
+mod blind;
 mod branches;
 mod code;
 mod explore;
@@ -226,15 +227,24 @@ fn with_parts(
     parts: Vec<Part>,
 ) -> Result<Checked> {
     let tcp = against.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
-    let scenes: Vec<Scene<'_>> = parts.iter().map(|p| Scene::new(&p.machine, &p.mounting)).collect::<Result<_>>()?;
+    let step = post.number.mm(10f64.powi(-(post.number.decimals as i32)));
+    // half a step of three words: what was proven before they were rounded
+    let slack_mm = 0.5 * 3f64.sqrt() * step;
+    let scenes: Vec<Scene<'_>> =
+        parts.iter().map(|p| Ok(Scene::new(&p.machine, &p.mounting)?.rounded(slack_mm))).collect::<Result<_>>()?;
     let bodies = parts.iter().map(|p| Errorless::new(&p.machine, Some(&p.mounting))).collect();
     let world = Arc::new(World::new(bodies, &machine.origin, tcp));
     let told = runs::all(machine, post, against.plan, program, &world, &scenes);
     let first = told.runs.first();
+    if against.plan.is_none() {
+        let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
+        if let Some(failure) = program.blind(trunk, source) {
+            return Err(failure);
+        }
+    }
     // what the control rounds, and under a transformation what the rounding of three words does
     // a search that is a way along a vector: begin, way and end are rounded each
     let roundings = if program.is_relative() { 3.0 } else { 1.0 };
-    let step = post.number.mm(10f64.powi(-(post.number.decimals as i32)));
     // under a transformation the rounding of one word shows in the others as well
     let turned = if tcp { 3f64.sqrt() } else { 1.0 };
     let same = 0.51 * roundings * turned * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };

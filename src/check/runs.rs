@@ -4,6 +4,7 @@
 mod otherwise;
 mod spindle;
 
+use super::blind;
 use super::code::{Code, Expr, Var, What};
 use super::explore::{Limits, Told, explore};
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
@@ -11,6 +12,7 @@ use super::seconds::Clock;
 use super::world::World;
 use super::{heidenhain, macro_b, ngc, sinumerik, statements};
 use crate::axes::{AxisName, Position};
+use crate::diag::{Failure, Source};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
 use crate::program::plan::Plan;
@@ -60,6 +62,11 @@ impl Program {
     /// Probing moves are programmed by direction and length.
     pub fn is_relative(&self) -> bool {
         self.dialect == DialectName::Klartext
+    }
+
+    /// Why it cannot be judged without its plan.
+    pub fn blind(&self, trunk: &[Happened], source: &Source) -> Option<Failure> {
+        blind::reason(self.dialect, &self.code, trunk, source)
     }
 
     /// The set-up at which it is told to begin.

@@ -12,7 +12,7 @@ use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::{Run, assemble};
-use crate::post::{NcProgram, Postprocessor};
+use crate::post::{DialectName, NcProgram, Postprocessor};
 use crate::program::path::{Step, Stop};
 use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
@@ -68,7 +68,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;
     if args.tcp
-        && args.controller.as_deref() == Some(linuxcnc::CONTROLLER)
+        && post.check.as_ref().is_some_and(|rule| rule.dialect == DialectName::Ngc)
         && let Err(why) = linuxcnc::stock::module_of(&machine)
     {
         return Err(Failure::new("generate::no_transformation", format!("{} cannot run under a transformation of LinuxCNC's own: {why}", machine.name))

@@ -15,6 +15,9 @@ use crate::program::plan::Plan;
 use minijinja::{Value, context};
 use std::collections::BTreeMap;
 
+/// What the head of a program says whose X, Y and Z are not axis positions.
+pub const TOOL_PLACE: &str = "coordinates are the tool's place in the workpiece";
+
 /// Labels that one step may use.
 const LABELS_PER_STEP: usize = 10;
 
@@ -287,7 +290,7 @@ impl<'a> Writer<'a> {
         let folder = place.ends_with(['\\', '/']);
         head.push(if folder { format!("the log is {place}{name}") } else { format!("the log is {name} in {place}") });
         if let Some(tcp) = self.post.tcp.as_ref().filter(|_| self.frame.is_tcp()) {
-            head.push(format!("coordinates are the tool's place in the workpiece: needs {}", tcp.says));
+            head.push(format!("{TOOL_PLACE}: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());
         }
         for (entry, why) in &self.post.unverified {

@@ -19,6 +19,7 @@ mod spelling;
 pub mod tables;
 
 pub use as_written::{CallRule, DialectName, Does, LengthUnit, Overflow};
+pub use emit::TOOL_PLACE;
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
 pub use log_text::{LogRecord, digest};

@@ -130,6 +130,8 @@ pub struct Scene<'m> {
     pub(super) obstacles: Vec<Obstacle>,
     /// The first is the mounting's own.
     pub(super) carriers: Vec<Carrier>,
+    /// By how much every gap may fall short of what is needed, mm.
+    pub(super) slack_mm: f64,
 }
 
 /// Where the bodies of the machine are: the tool and each carrier of obstacles, in R.
@@ -140,6 +142,12 @@ pub struct Placement {
 }
 
 impl<'m> Scene<'m> {
+    /// The same for a program whose words are rounded: a place that was proven clear may stand so much off, mm.
+    #[must_use]
+    pub fn rounded(self, slack_mm: f64) -> Self {
+        Self { slack_mm, ..self }
+    }
+
     /// The solids of a machine with an artefact mounted.
     ///
     /// # Errors
@@ -161,7 +169,7 @@ impl<'m> Scene<'m> {
         parts.push((Part::Stem, Solid::cylinder(ball, up, probe.stem_radius, probe.stem_length)));
         parts.push((Part::Ball, Solid::ball(ball, probe.ball_radius)));
 
-        let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: vec![mounting.carrier] };
+        let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: vec![mounting.carrier], slack_mm: 0.0 };
         for (i, block) in mounting.blocks.iter().enumerate() {
             let solid = Solid::cuboid(block.centre, block.size);
             scene.add(format!("block {}", block.name), Role::Block(i), block.carrier, solid);

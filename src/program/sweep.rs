@@ -59,7 +59,7 @@ impl Scene<'_> {
     /// Gap that a part must keep from an obstacle, mm; `None`: it is allowed to touch.
     fn needed(&self, part: Part, obstacle: &Obstacle, manner: Manner) -> Option<f64> {
         let probe = &self.machine.probe;
-        match (manner, obstacle.role) {
+        let needed = match (manner, obstacle.role) {
             (Manner::Rapid, Role::Block(_) | Role::Mounted) => Some(probe.clearance + probe.placement_tolerance),
             (Manner::ToContact(b), Role::Block(o)) if b == o && part == Part::Ball => None,
             (Manner::PastContact(b), Role::Block(o)) if b == o => None,
@@ -68,7 +68,8 @@ impl Scene<'_> {
                 Some(probe.clearance + probe.placement_tolerance)
             }
             _ => Some(probe.clearance),
-        }
+        };
+        needed.map(|mm| (mm - self.slack_mm).max(0.0))
     }
 
     /// Proves a straight move of linear axes clear.

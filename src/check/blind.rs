@@ -1,0 +1,57 @@
+//! What nobody can judge of a program whose plan is not there.
+
+use super::code::{Code, Expr, What};
+use super::run::Event;
+use super::vm::Happened;
+use crate::diag::{Failure, Finding, Source};
+use crate::post::{DialectName, TOOL_PLACE};
+use std::ops::Range;
+
+const HELP: &str = "add --plan NAME.plan.json, the plan that was written with it";
+
+/// Why a program cannot be judged without its plan: its coordinates are not axis positions, or it waits for a person between two
+/// touches, who may mount something else. `trunk`: its whole run, where nothing goes wrong.
+pub fn reason(dialect: DialectName, code: &Code, trunk: &[Happened], source: &Source) -> Option<Failure> {
+    let refuse = |says: &str, at: Range<usize>| -> Failure {
+        Finding::error("check::needs_plan", says).help(HELP).at(source, at).into()
+    };
+    if let Some(at) = transformation(dialect, code, source.inner()) {
+        return Some(refuse(
+            "from here on its coordinates are those of the control's own transformation: where the axes stand, and what they may meet, only its plan says",
+            at,
+        ));
+    }
+    stop(trunk).map(|at| {
+        refuse(
+            "here the program waits, between two touches, for a person who mounts something else: what stands on the machine from then on only its plan says",
+            at,
+        )
+    })
+}
+
+/// Where a program goes over to the control's own transformation.
+fn transformation(dialect: DialectName, code: &Code, text: &str) -> Option<Range<usize>> {
+    if dialect == DialectName::Ngc {
+        // it finds the transformation switched on: only its head says so
+        return text.find(TOOL_PLACE).map(|at| at..at + TOOL_PLACE.len());
+    }
+    let turns_on = |address: &str, value: &Expr| match (dialect, address, value) {
+        (DialectName::Sinumerik, "TRAORI", _) => true,
+        (DialectName::Klartext, "M", Expr::Number(n)) => *n == 128.0,
+        (DialectName::MacroB, "G", Expr::Number(n)) => [43.4, 43.5, 234.0].contains(n),
+        _ => false,
+    };
+    let found = code.statements.iter().find(|s| match &s.what {
+        What::Block(words) => words.iter().any(|w| turns_on(w.address, &w.value)),
+        _ => false,
+    });
+    found.map(|s| s.at.clone())
+}
+
+/// The first stop for a person between two touches.
+fn stop(trunk: &[Happened]) -> Option<Range<usize>> {
+    let probe = |h: &Happened| matches!(h.event, Event::Probe { .. });
+    let (first, last) = (trunk.iter().position(probe)?, trunk.iter().rposition(probe)?);
+    let between = trunk.get(first..last)?;
+    between.iter().find(|h| matches!(h.event, Event::Wait(_))).map(|h| h.at.clone())
+}
