@@ -362,11 +362,11 @@ fn a_warm_up_of_the_usual_size_is_told_with_its_time_constant() {
                 assert!(p.sigma.is_some(), "{} seed {seed}: {name} is not told", machine.name);
                 // two and a half times the 95 % interval, of a time constant on the side of the truth
                 let expanded = match p.interval {
-                    Some([_, high]) if truth > p.value => high - p.value,
-                    Some([low, _]) => p.value - low,
-                    None => p.expanded.unwrap(),
+                    Some([_, Some(high)]) if truth > p.value => high - p.value,
+                    Some([Some(low), _]) => p.value - low,
+                    _ => p.expanded.unwrap(),
                 };
-                assert_eq!(p.interval.is_some(), name == "tau");
+                assert!(p.interval.is_some() || name != "tau");
                 assert!((p.value - truth).abs() < 2.5 * expanded, "{name}: {} ± {expanded}", p.value);
             }
         }
@@ -398,5 +398,60 @@ fn scatter_of_visits_is_no_warm_up() {
     for visit_mm in [0.3e-3, 3e-3] {
         let n = told(visit_mm, &mut rng);
         assert!(n == 0, "with {visit_mm} mm a warm-up is seen in {n} of 6 runs in which there is none");
+    }
+}
+
+/// A warm-up that is still under way when the run ends, and a pitch that nothing shows: how large they are depends on a shape that
+/// the touches hardly tell, and their intervals say so.
+#[test]
+fn sizes_are_no_surer_than_their_shapes() {
+    let machine = machine("trunnion");
+    let full = plan(&machine, "full");
+    let (mut n, mut inside) = (0, 0);
+    for (seed, visit_mm) in (1..=20).map(|seed| (seed, if seed % 2 == 0 { 0.3e-3 } else { 0.5e-3 })) {
+        let scenario = Scenario::flawless().with_noise(1e-3, visit_mm, seed);
+        let slow = [("wx", 5.0), ("wz", 12.0), ("tau", 2.0)];
+        let scenario = scenario.with(&machine, "warm-up", &slow).unwrap();
+        let touches = touch(&machine, &full, &scenario, None);
+        let model = ["location-a", "location-c", "block-setup", "pretravel", "warm-up", "pitch-x"];
+        let fit = identify(&machine, &[(&full, &touches)], &model);
+        for (name, truth) in [("wx", 5.0), ("wz", 12.0), ("tau", 2.0), ("EXXc", 0.0), ("EXXs", 0.0)] {
+            let p = fit.outcome.parameters.iter().find(|p| p.name == name).unwrap();
+            let Some(expanded) = p.expanded else {
+                // nobody fixed it: what the search holds is not told
+                assert!(name == "tau" && p.status == Status::Undetermined, "{name}: {p:?}");
+                continue;
+            };
+            assert!(expanded.is_finite());
+            let [low, high] = p.interval.unwrap_or([Some(p.value - expanded), Some(p.value + expanded)]);
+            n += 1;
+            inside += i32::from(low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high));
+        }
+        assert!(fit.noise.tau_mm < 1.2e-3, "seed {seed}: {} mm", fit.noise.tau_mm);
+    }
+    // nineteen of twenty, and three standard deviations below; nominal sizes alone held four of five
+    assert!(inside * 10 >= n * 9, "{inside} of {n}");
+}
+
+/// A prior on a time constant counts in its interval: the surer, the narrower.
+#[test]
+fn a_prior_on_a_shape_narrows_its_interval() {
+    use axiscal::fit::Knowledge;
+    let machine = machine("swivel-head");
+    let full = plan(&machine, "full");
+    let scenario = Scenario::flawless().with_noise(1e-3, 0.3e-3, 1);
+    let scenario = scenario.with(&machine, "warm-up", &[("wz", 8.0)]).unwrap();
+    let touches = touch(&machine, &full, &scenario, None);
+    let mut last = f64::INFINITY;
+    for sigma in [0.1, 0.01, 1e-6] {
+        let prior = Knowledge::Prior { value: 0.5, sigma };
+        let settings = Settings { knowledge: [("tau".to_owned(), prior)].into(), ..Settings::default() };
+        let model = ["location-b", "location-c", "block-setup", "pretravel", "warm-up"];
+        let fit = identify_with(&machine, &[(&full, &touches)], &model, settings);
+        let p = fit.outcome.parameters.iter().find(|p| p.name == "tau").unwrap();
+        let [low, high] = p.interval.unwrap().map(Option::unwrap);
+        assert!(low < p.value && p.value < high && high - low < last, "{sigma}: {p:?}");
+        assert!(high - low < 6.0 * sigma, "{sigma}: {low} to {high}");
+        last = high - low;
     }
 }

@@ -23,7 +23,8 @@ pub struct Args {
     /// With the covariance matrix of the results (--json)
     #[arg(long)]
     pub covariance: bool,
-    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations; and without the intervals of
+    /// time constants and pitches
     #[arg(long)]
     pub quick: bool,
 }

@@ -9,6 +9,7 @@ use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use nalgebra::DVector;
+use std::collections::BTreeMap;
 
 /// A result further off than so many typical sizes is worth a warning by itself.
 const NOT_CREDIBLE: f64 = 300.0;
@@ -40,11 +41,24 @@ pub(super) fn outcome(
     let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
     let moves = uncertainty::moves_with_unseen(fit);
     let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
+    let factor = |c: usize| {
+        let s2 = noise_variance(c) + b_variance[c] + moves[c] * moves[c];
+        let share = if s2 > 0.0 { by_visits[c] / s2 } else { 0.0 };
+        fit.noise.coverage(share.clamp(0.0, 1.0))
+    };
+    let unseen_shape = |c: usize| unseen(c) > 1e-6 || moves[c] * moves[c] > noise_variance(c);
+    let spread = |i: usize| {
+        let c = fit.free.binary_search(&i).ok().filter(|&c| noise_variance(c).is_finite() && !unseen_shape(c))?;
+        Some((noise_variance(c).sqrt(), factor(c)))
+    };
+    let intervals =
+        if shapes_told { profile::intervals(fit, machine, effects, &settings.held, &spread) } else { BTreeMap::new() };
     let parameters: Vec<Parameter> = (0..fit.theta.len())
         .map(|i| {
             let u = &fit.model.unknowns[i];
             let column = fit.free.binary_search(&i).ok();
             let status = match column {
+                None if settings.held.contains(&u.name) => Status::Undetermined,
                 None => Status::Fixed,
                 Some(c) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
                 // it follows what is not known by more than its uncertainty
@@ -55,20 +69,23 @@ pub(super) fn outcome(
             };
             let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
             let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
-            let factor = known.zip(sigma).map(|(c, s)| {
-                let share = if s > 0.0 { by_visits[c] / (s * s) } else { 0.0 };
-                fit.noise.coverage(share.clamp(0.0, 1.0))
-            });
+            let factor = known.map(factor);
             let expanded = sigma.zip(factor).map(|(s, k)| s * k);
             // the ends are those of the noise's interval, with all else that is counted
-            let interval = known.zip(factor).filter(|_| u.shape && shapes_told).and_then(|(c, k)| {
-                let ends = profile::interval(fit, machine, effects, i, (noise_variance(c).sqrt(), k))?;
+            let interval = known.zip(factor).and_then(|(c, k)| {
                 let more = k * (b_variance[c] + moves[c] * moves[c]).sqrt();
-                let side = |end: f64| (end - fit.theta[i]).hypot(more).copysign(end - fit.theta[i]);
-                Some(ends.map(|end| fit.theta[i] + side(end)))
+                let with = |end: f64| fit.theta[i] + (end - fit.theta[i]).hypot(more).copysign(end - fit.theta[i]);
+                intervals.get(&i).map(|ends| ends.map(|end| end.map(with)))
             });
-            let wider = |ends: [f64; 2]| (fit.theta[i] - ends[0]).max(ends[1] - fit.theta[i]);
+            // an end that the touches do not set is that of the range
+            let range = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == u.name).and_then(|p| p.shape);
+            let wider = |[low, high]: [Option<f64>; 2]| {
+                let (low, high) = (low.or(range.map(|r| r.1)), high.or(range.map(|r| r.2)));
+                let side = |end: Option<f64>| end.map_or(0.0, |end| (end - fit.theta[i]).abs());
+                side(low).max(side(high))
+            };
             let expanded = interval.map(wider).or(expanded);
+            let interval = interval.filter(|[low, high]| u.shape || uneven(fit.theta[i], *low, *high, sigma, factor));
             Parameter {
                 name: u.name.clone(),
                 alias: u.alias.clone(),
@@ -146,6 +163,13 @@ pub(super) fn outcome(
         ]
         .concat(),
     }
+}
+
+/// Is an interval other than the value and so many standard uncertainties on either side, by more than a twentieth?
+fn uneven(value: f64, low: Option<f64>, high: Option<f64>, sigma: Option<f64>, factor: Option<f64>) -> bool {
+    const TWENTIETH: f64 = 1.05;
+    let usual = sigma.zip(factor).map_or(f64::INFINITY, |(s, k)| s * k * TWENTIETH);
+    low.is_none_or(|low| value - low > usual) || high.is_none_or(|high| high - value > usual)
 }
 
 fn residuals(fit: &Fit) -> Vec<Residual> {

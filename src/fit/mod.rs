@@ -91,6 +91,8 @@ pub struct Settings {
     pub masked: Vec<Mask>,
     /// Without the figures that need the whole catalogue (uncertainty with unmodelled effects, type B rows).
     pub quick: bool,
+    /// Shape parameters that the search holds at an end of their range: nobody knows them.
+    pub held: Vec<String>,
 }
 
 /// A fit with everything that later rooms need.
@@ -267,7 +269,7 @@ fn identify_started(
         }
     }
     let fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;
-    let Some((name, held)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
+    let Some((name, ends_of)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
     // a first step too far: everything else settles while the shape stays where it began, and the search goes on from there
     let mut fit = fit;
     if let Some(&began) = starts.get(&name) {
@@ -281,9 +283,24 @@ fn identify_started(
             return Ok(fit);
         }
     }
-    held_settings.knowledge.insert(name.clone(), held);
-    let mut fit = identify_from(machine, catalogue, effects, fit.data, &held_settings, starts)?;
-    fit.outcome.warnings.push(format!("{name} ran out of its range in the search and is held at the end of it"));
+    // a step too far says nothing of the side: the end that fits better
+    held_settings.held.push(name.clone());
+    let mut ends = Vec::new();
+    for end in ends_of {
+        held_settings.knowledge.insert(name.clone(), Knowledge::Fixed(end));
+        ends.push(identify_from(machine, catalogue, effects, fit.data.clone(), &held_settings, starts)?);
+    }
+    let tau_mm = ends.iter().map(|f| f.noise.tau_mm).fold(f64::INFINITY, f64::min);
+    let misfit = ends.first().map(|f| f.whitening(tau_mm)).map(|white| {
+        move |f: &Fit| {
+            let mut residual = DMatrix::from_column_slice(f.residual_mm.len(), 1, &f.residual_mm);
+            white.apply(&mut residual);
+            residual.norm_squared()
+        }
+    });
+    let better = |a: &Fit, b: &Fit| misfit.as_ref().map_or(std::cmp::Ordering::Equal, |of| of(a).total_cmp(&of(b)));
+    let mut fit = ends.into_iter().min_by(better).unwrap_or(fit);
+    fit.outcome.warnings.push(format!("{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"));
     Ok(fit)
 }
 

@@ -201,13 +201,13 @@ pub struct Parameter {
     pub unit: String,
     /// Standard uncertainty from the noise and the type B rows; none when undetermined or fixed.
     pub sigma: Option<f64>,
-    /// Expanded uncertainty (95 %, Student's t with the degrees of freedom of the noise); of a shape parameter the wider side of its
-    /// interval.
+    /// Expanded uncertainty (95 %, Student's t with the degrees of freedom of the noise); of a shape parameter, and of a size
+    /// beside one, the wider side of its interval.
     pub expanded: Option<f64>,
-    /// The ends of the 95 % interval of a shape parameter (a time constant, a pitch), in its unit: its doubt is not the same on
-    /// both sides.
+    /// The ends of the 95 % interval of a shape parameter (a time constant, a pitch), and of a size beside one that is told weakly,
+    /// in its unit: its doubt is not the same on both sides. An end that the touches do not set is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub interval: Option<[f64; 2]>,
+    pub interval: Option<[Option<f64>; 2]>,
     /// Standard uncertainty from the touches' own noise alone: the scatter of index visits, from whatever source, has no part
     /// in it, and neither have type B rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -5,7 +5,7 @@
 //! taken with the size that it asks for.
 
 use super::candidates::columns;
-use super::{Fit, Knowledge, Settings, uncertainty};
+use super::{Fit, Settings, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
@@ -195,8 +195,17 @@ pub(super) fn without(settings: &Settings, shaped: &[&Effect]) -> Settings {
     }
 }
 
-/// A shape that ran out of its range, with the value at which it is held instead.
-pub(super) fn out_of_range(fit: &Fit, catalogue: &Catalogue, machine: &Machine) -> Option<(String, Knowledge)> {
+/// All values of a shape parameter that a scan tries.
+pub(super) fn all_tried(p: &Parameter, data: &Data) -> Vec<f64> {
+    let mut values = scan(p, data).unwrap_or_else(|| tried(p));
+    if p.between.is_none() {
+        values.extend(between(&values));
+    }
+    values
+}
+
+/// A shape that ran out of its range, with the ends of that.
+pub(super) fn out_of_range(fit: &Fit, catalogue: &Catalogue, machine: &Machine) -> Option<(String, [f64; 2])> {
     fit.free.iter().find_map(|&i| {
         let u = &fit.model.unknowns[i];
         let name = u.name.split('@').next().unwrap_or(&u.name);
@@ -204,6 +213,6 @@ pub(super) fn out_of_range(fit: &Fit, catalogue: &Catalogue, machine: &Machine) 
         let (_, low, high) = p.shape?;
         let value = fit.theta[i];
         let out = !(low..=high).contains(&value);
-        out.then(|| (u.name.clone(), Knowledge::Fixed(if value.is_finite() { value.clamp(low, high) } else { high })))
+        out.then(|| (u.name.clone(), [low, high]))
     })
 }

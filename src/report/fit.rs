@@ -213,15 +213,20 @@ fn uneven(results: &[&Parameter]) -> String {
     let mut out = String::new();
     for p in results {
         let Some([low, high]) = p.interval else { continue };
-        let (below, above) = (p.value - low, high - p.value);
-        if below.max(above) > TENTH * below.min(above) {
-            out += &format!(
-                "{}: {} to {} with 95 %; the wider side stands in the table\n",
-                p.name,
-                digits(low, p.sigma),
-                with_unit(digits(high, p.sigma), &p.unit)
-            );
-        }
+        let shown = |end: f64| digits(end, p.sigma);
+        let says = match (low, high) {
+            (Some(low), Some(high)) => {
+                let (below, above) = (p.value - low, high - p.value);
+                if below.max(above) <= TENTH * below.min(above) {
+                    continue;
+                }
+                format!("{} to {}", shown(low), with_unit(shown(high), &p.unit))
+            }
+            (Some(low), None) => format!("{} or more", with_unit(shown(low), &p.unit)),
+            (None, Some(high)) => format!("{} or less", with_unit(shown(high), &p.unit)),
+            (None, None) => "anything in its range".to_owned(),
+        };
+        out += &format!("{}: {says} with 95 %; the wider side stands in the table\n", p.name);
     }
     out
 }

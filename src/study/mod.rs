@@ -311,6 +311,7 @@ impl Study {
             type_b: self.type_b.clone(),
             masked: self.masked.clone(),
             quick: false,
+            held: Vec::new(),
         }
     }
 

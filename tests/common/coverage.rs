@@ -262,7 +262,10 @@ pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
             let of = |i: usize| &fit.outcome.parameters[i];
             let error: Vec<f64> = results.iter().map(|&i| of(i).value - exact.outcome.parameters[i].value).collect();
             let inside = |i: usize, e: f64| match of(i).interval {
-                Some([low, high]) => low <= of(i).value - e && of(i).value - e <= high,
+                Some([low, high]) => {
+                    let truth = of(i).value - e;
+                    low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high)
+                }
                 None => of(i).expanded.is_some_and(|x| e.abs() <= x),
             };
             let covered = results.iter().zip(&error).map(|(&i, e)| inside(i, *e)).collect();
