@@ -465,3 +465,17 @@ fn a_variant_of_linuxcnc_has_its_transformations() {
         .code(2)
         .stderr(predicate::str::contains("under a transformation of LinuxCNC's own"));
 }
+
+/// The zero of a rotary axis need not be that of R: the opening turn has its sense all the same.
+#[test]
+fn a_rotary_axis_may_have_its_own_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let machines = include_str!("../machines.toml");
+    let (before, own) = machines.split_once("name = \"trunnion\"").unwrap();
+    let own = own.replacen("C = 0.0 }", "C = -31.0 }", 1);
+    std::fs::write(folder.path().join("ours.toml"), format!("{before}name = \"trunnion\"{own}")).unwrap();
+    for (controller, _) in EACH {
+        let args = ["generate", "--machine", "trunnion", "--machines", "ours.toml", "--program", "basic", "--out"];
+        axiscal(folder.path()).args(args).args([controller, "--controller", controller]).assert().success();
+    }
+}

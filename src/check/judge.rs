@@ -384,9 +384,12 @@ impl<'a, 'b> Walk<'a, 'b> {
     }
 
     fn turned_in_opening(&mut self, axis: AxisName, to: &Position) {
+        // the run has the control's coordinates, `to` those of R
+        let origin = self.case.machine.origin.get(axis).unwrap_or(0.0);
+        let in_r = |at: &Position| at.get(axis) - origin;
         let before = self.told.trunk.iter().find_map(|h| match &h.event {
-            Event::Move { from, to: end, .. } if end.get(axis) == to.get(axis) && from.get(axis) != end.get(axis) => {
-                Some(from.get(axis))
+            Event::Move { from, to: end, .. } if in_r(end) == to.get(axis) && in_r(from) != in_r(end) => {
+                Some(in_r(from))
             }
             _ => None,
         });
