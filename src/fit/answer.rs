@@ -46,9 +46,11 @@ pub(super) fn outcome(
         let share = if s2 > 0.0 { by_visits[c] / s2 } else { 0.0 };
         fit.noise.coverage(share.clamp(0.0, 1.0))
     };
-    let unseen_shape = |c: usize| unseen(c) > 1e-6 || moves[c] * moves[c] > noise_variance(c);
+    // it leaves no trace, or follows what is not known by more than its uncertainty
+    let untold =
+        |c: usize| unseen(c) > 1e-6 || !noise_variance(c).is_finite() || moves[c] * moves[c] > noise_variance(c);
     let spread = |i: usize| {
-        let c = fit.free.binary_search(&i).ok().filter(|&c| noise_variance(c).is_finite() && !unseen_shape(c))?;
+        let c = fit.free.binary_search(&i).ok().filter(|&c| !untold(c))?;
         Some((noise_variance(c).sqrt(), factor(c)))
     };
     let intervals =
@@ -60,9 +62,7 @@ pub(super) fn outcome(
             let status = match column {
                 None if settings.held.contains(&u.name) => Status::Undetermined,
                 None => Status::Fixed,
-                Some(c) if unseen(c) > 1e-6 || !noise_variance(c).is_finite() => Status::Undetermined,
-                // it follows what is not known by more than its uncertainty
-                Some(c) if moves[c] * moves[c] > noise_variance(c) => Status::Undetermined,
+                Some(c) if untold(c) => Status::Undetermined,
                 // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
                 Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
                 _ => Status::Identified,

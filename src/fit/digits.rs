@@ -35,6 +35,7 @@ mod tests {
     fn the_last_digit_of_a_log() {
         assert_eq!(of(&[1.234, -200.001, 17.0]), Some(1e-3));
         assert_eq!(of(&[1.2345, 17.0]), Some(1e-4));
+        assert_eq!(of(&[1.234_567, 17.0]), Some(1e-6));
         assert_eq!(of(&[1.234_567_8, 17.0]), None);
         // 0.1234 and 3.0001 inches
         let inches = of(&[0.1234 * 25.4, 3.0001 * 25.4]).unwrap();

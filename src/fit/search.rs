@@ -112,6 +112,12 @@ impl Search<'_> {
                 break;
             }
         }
+        let (sigma_mm, tau_mm) = self.touches.noise_mm();
+        if (sigma_mm, tau_mm) != (noise.sigma_mm, noise.tau_mm) {
+            // what is answered belongs to the noise that is answered
+            self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+            solution = self.refit_here(solution.theta);
+        }
         (noise, solution)
     }
 
