@@ -345,12 +345,12 @@ fn identify_from(
         .collect();
     let known = Known {
         declared_sigma_mm: crate::units::mm_from_um(machine.probe.repeatability_um),
-        digit_mm: digits::digit_mm(data.observations.iter().map(|o| o.position)),
+        rounding: digits::Rounding::of_touches(&data.observations),
         declared_tau_mm: declared_tau_mm(machine, &data.observations),
         stated_sigma_mm: settings.touch_sigma_mm,
         stated_tau_mm: settings.visit_sigma_mm,
     };
-    let first_noise = (settings.touch_sigma_mm.unwrap_or(known.declared_sigma_mm), 0.0);
+    let first_noise = (known.rounding.added_to(settings.touch_sigma_mm.unwrap_or(known.declared_sigma_mm)), 0.0);
     let batch = model.prepare(&data.observations);
     let start = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
     let mut touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &priors, first_noise);

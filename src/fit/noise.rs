@@ -3,6 +3,7 @@
 //! Both from contrasts that no model error can enter: touches of one point made right after each other differ by σ only;
 //! touches of the same points in two visits of one pose differ by σ and by one displacement per visit (`revisits`).
 
+use super::digits::Rounding;
 use super::quantiles;
 use super::revisits::{Followed, revisits};
 use crate::units::um_from_mm;
@@ -42,6 +43,8 @@ pub struct Noise {
     pub contradicted_mm: Option<f64>,
     /// There are repeats enough, and they agree as far as the digits of the log go: they say nothing of the noise.
     pub repeats_agree: bool,
+    /// The part of σ that the digits of the log make, mm.
+    pub rounding_mm: f64,
 }
 
 /// What is known without looking at the touches.
@@ -51,8 +54,8 @@ pub struct Known {
     pub declared_sigma_mm: f64,
     /// The indexing repeatability of the axes that are indexed, mm.
     pub declared_tau_mm: f64,
-    /// The last digit of the log, mm, where all its positions are multiples of one.
-    pub digit_mm: Option<f64>,
+    /// What the digits of the log take away.
+    pub rounding: Rounding,
     /// σ where the user states it, mm.
     pub stated_sigma_mm: Option<f64>,
     /// τ where the user states it, mm.
@@ -89,19 +92,19 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         None => (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1),
     };
     let from_repeats = (dof >= LEAST_REPEATS).then(|| (squares / dof as f64).sqrt());
-    // what a log rounds away is the same in all touches of one place, and does not show in them
-    let digits_mm = known.digit_mm.map_or(1e-9, |digit| (digit / 12f64.sqrt()).max(1e-9));
+    let rounding = known.rounding;
+    let digits_mm = rounding.sigma_mm().max(1e-9);
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
     let repeats_agree = from_repeats.is_some_and(|s| s <= digits_mm);
-    let from_repeats = from_repeats.filter(|s| *s > digits_mm);
+    let from_repeats = from_repeats.filter(|s| *s > digits_mm).map(|s| rounding.with_what_repeats_hide(s));
     // a wrong σ is no fault of the model: where the log itself contradicts it, the log counts
     let contradicted_mm =
-        known.stated_sigma_mm.filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, *s)));
+        known.stated_sigma_mm.filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, rounding.added_to(*s))));
     let (sigma_mm, source, sigma_dof) =
         match (known.stated_sigma_mm.filter(|_| contradicted_mm.is_none()), from_repeats) {
-            (Some(stated), _) => (stated, "study", None),
+            (Some(stated), _) => (rounding.added_to(stated), "study", None),
             (None, Some(found)) => (found, "repeats", Some(dof as f64)),
-            (None, None) => (known.declared_sigma_mm, "declared", None),
+            (None, None) => (rounding.added_to(known.declared_sigma_mm), "declared", None),
         };
     let n_poses = samples.iter().map(|s| s.pose).collect::<std::collections::BTreeSet<_>>().len();
     let fixed = |tau_mm, visit_source| (tau_mm, visit_source, None, tau_mm);
@@ -128,6 +131,7 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         repeats,
         contradicted_mm,
         repeats_agree,
+        rounding_mm: rounding.sigma_mm(),
     }
 }
 
@@ -187,6 +191,12 @@ impl Noise {
             _ if self.repeats_agree => "the probe's declared repeatability: the repeats agree as far as the digits of the log show (a log that was rounded, or made without noise?)".to_owned(),
             _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
         };
+        let sigma = match self.rounding_shows() {
+            true if self.source != "repeats" => {
+                format!("{sigma}; with {:.2} um that the digits of the log make", um_from_mm(self.rounding_mm))
+            }
+            _ => sigma,
+        };
         let tau = match (self.visit_source, self.visit_dof) {
             // the revisits scatter by less than the touches' own noise makes: a bound of nothing says nothing
             ("revisits", Some(_)) if self.tau_test_mm <= 0.0 => {
@@ -209,6 +219,12 @@ impl Noise {
             um_from_mm(self.sigma_mm),
             um_from_mm(self.tau_mm)
         )
+    }
+
+    /// Do the digits of the log make a part of σ that a person would miss in it, a hundredth and more?
+    fn rounding_shows(&self) -> bool {
+        let without = (self.sigma_mm * self.sigma_mm - self.rounding_mm * self.rounding_mm).max(0.0).sqrt();
+        without < 0.99 * self.sigma_mm
     }
 
     /// What the study states of the touches' noise and the log contradicts, in words.

@@ -256,13 +256,30 @@ fn again(touches: &[RawTouch], range: Range<usize>, unread: &[usize], out: &mut 
         };
         let follows = |next: usize| range.contains(&next) && touches[next].id > Some(id) && other(next);
         // one touch alone may stand in the wrong place
-        if unread.contains(&at) || (other(at) && follows(at + 1)) {
+        let begins = unread.contains(&at) || (other(at) && follows(at + 1));
+        if begins && is_started_again(touches, at, known) {
+            // behind a second start in the middle the later touches count
+            known.insert(id, at);
+            last = Some(id);
+        } else if begins {
             out.push(at);
             (from, last, seen) = (at, Some(id), None);
         } else {
             known.insert(id, at);
         }
     }
+}
+
+/// Is it the same run, started again at a later set-up, whose head is lost? Not with its first touch, and the clock, where there is
+/// one, counts from this start: in another run that has lost its beginning this touch would have come about as late as the first time.
+/// `known`: the touches of the run so far, by number.
+fn is_started_again(touches: &[RawTouch], at: usize, known: &BTreeMap<u64, usize>) -> bool {
+    const AS_LATE: f64 = 0.7;
+    let Some(id) = touches[at].id.filter(|id| known.first_key_value().is_some_and(|(first, _)| first < id)) else {
+        return false;
+    };
+    let before = known.range(..=id).next_back().and_then(|(_, i)| touches[*i].time_s);
+    before.zip(touches[at].time_s).is_none_or(|(before, now)| now < AS_LATE * before)
 }
 
 fn add_touches(range: Range<usize>, touches: &[RawTouch], runs: &mut Vec<Run>) {

@@ -97,6 +97,48 @@ fn a_run_that_was_started_again_goes_on() {
     assert_eq!(read.touches.iter().map(|t| t.line).collect::<Vec<_>>(), [2, 5, 6]);
 }
 
+/// A run that was started again in the middle, whose second head is lost, is one run; one that has lost its beginning is another.
+#[test]
+fn a_second_start_without_its_head_is_the_same_run() {
+    let machine = machine("swivel-head");
+    let mut plan = plan(&machine, "head", "x+");
+    let last = plan.touches[2].clone();
+    for _ in 0..4 {
+        plan.touches.push(crate::program::plan::PlanTouch { id: plan.touches.len() as u64 + 1, ..last.clone() });
+    }
+    for name in ["fanuc", "sinumerik", "heidenhain", "linuxcnc"] {
+        let post = Postprocessor::load_built_in_or_file(name).unwrap().0;
+        let mut all = records(&plan);
+        let mut lines_of = |from_s: f64, aside: f64| -> Vec<String> {
+            all.iter_mut().enumerate().for_each(|(i, r)| {
+                r.time_s = Some(from_s + 20.0 * i as f64);
+                r.position.0[1] += aside;
+            });
+            post.log_text(&machine, &plan, &all).lines().map(str::to_owned).collect()
+        };
+        let (first, again, other) = (lines_of(30.0, 0.0), lines_of(-30.0, 0.001), lines_of(31.0, 0.001));
+        let head = first.iter().position(|l| l.starts_with("H ")).unwrap();
+        let touch = |n: usize| head + n;
+        let with = |behind: &[String]| {
+            let text = [&first[..=touch(5)], behind, &[String::new()]].concat().join("\r\n");
+            read(text.as_bytes(), "t.log", Writer::Controller(&post), &machine, &plan).unwrap()
+        };
+        // touches 4 and 5 are made again
+        let (log, findings) = with(&again[touch(4)..]);
+        assert!(log.complete && log.runs.len() == 1, "{name}: {findings:?}");
+        assert!(codes(&findings.0).contains(&"log::twice"), "{name}: {findings:?}");
+        assert_eq!(codes(&findings.0).contains(&"log::resumed"), post.log.writes_time, "{name}: {findings:?}");
+        let times: Vec<bool> = log.touches.iter().map(|t| t.time_s.is_some()).collect();
+        let timed = post.log.writes_time;
+        assert_eq!(times, [timed, timed, timed, false, false, false, false], "{name}");
+        // with a clock another run shows that it is one
+        let (log, _) = with(&other[touch(3)..]);
+        assert_eq!(log.runs.len(), if timed { 2 } else { 1 }, "{name}");
+        // and so it does where it begins at its beginning
+        assert_eq!(with(&again[touch(1)..]).0.runs.len(), 2, "{name}");
+    }
+}
+
 /// The clock of a program counts from its start: behind a second start it says nothing of the first one's.
 #[test]
 fn times_behind_a_second_start_are_not_used() {

@@ -246,6 +246,12 @@ fn a_sheet_of_the_other_unit_is_converted() {
         };
         assert_eq!(numbers(&first), numbers(&inches), "{control}");
         assert!(text(&inches, &restore).contains("; lengths in mm"), "{control}");
+        let readme = text(&inches, "README.txt");
+        assert!(readme.contains("The restoring files are in mm, as the old values were given"), "{control}: {readme}");
+        assert!(!text(&first, "README.txt").contains("The restoring files are in"), "{control}");
+        // found on top of what the control held: where that puts the workpiece the study does not say
+        assert!(readme.contains("measured on top of the old values"), "{control}: {readme}");
+        assert!(text(&first, "README.txt").contains("The workpiece itself stands"), "{control}");
     }
 }
 

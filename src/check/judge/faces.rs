@@ -105,6 +105,9 @@ impl Walk<'_, '_> {
         if !contact.made.backed_off {
             self.say("check::in_contact", at, "it searches again without having moved off the face".into(), "");
         }
+        if hit {
+            self.search_is_gentle(at, probe.feed, (to.xyz_mm() - reached.xyz_mm()).norm());
+        }
         contact.made.measure(probe, from, to, &reached, hit);
         self.contact = Some(contact);
     }
@@ -136,6 +139,7 @@ impl Walk<'_, '_> {
             self.prove(at, part, *from, *reached, How::Straight(Manner::ToContact(b)));
             self.prove(at, part, *reached, *to, How::Straight(Manner::PastContact(b)));
         }
+        self.search_is_gentle(at, probe.feed, (to.xyz_mm() - reached.xyz_mm()).norm());
         if !self.came_guarded {
             let says =
                 "the ball did not come to the beginning of the search by a move that stops at contact".to_owned();
@@ -145,5 +149,26 @@ impl Walk<'_, '_> {
         let along = way.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
         let made = Made::search(at, part, block, probe, from, to, reached);
         self.contact = Some(Contact { start: *from, along, made });
+    }
+
+    /// A search is no faster than the probe allows, and one that goes on although the probe does not answer ends before the
+    /// probe is pushed past its overtravel, wherever within the tolerance the block stands. `past_mm`: how far it is
+    /// programmed to go past the nominal contact.
+    fn search_is_gentle(&mut self, at: &Range<usize>, feed: f64, past_mm: f64) {
+        /// Words of a rounded start and end.
+        const ROUNDED_MM: f64 = 0.01;
+        let probe = &self.case.machine.probe;
+        let (overtravel, tolerance) = (probe.overtravel, probe.placement_tolerance);
+        if past_mm + tolerance > overtravel + ROUNDED_MM + self.case.same {
+            let says = format!(
+                "the search ends {past_mm:.3} mm past the face: a probe that does not answer would be pushed past its overtravel \
+                 ({overtravel} mm, of which {tolerance} mm are for where the block stands)"
+            );
+            self.say("check::overtravel", at, says, "");
+        }
+        if feed > probe.fast_feed + self.case.same {
+            let says = format!("it searches at {feed} mm/min, the machine's fast_feed is {}", probe.fast_feed);
+            self.say("check::feed", at, says, "");
+        }
     }
 }

@@ -160,6 +160,8 @@ pub(super) fn write(
         .map(|l| context! { parameter => l.parameter.clone(), effect => l.effect.clone(), why => one_line(&l.why) })
         .collect();
     let shift = export.compensation.tables.as_ref().map_or([0.0; 3], |t| t.workpiece_shift_mm);
+    // old values acted during the measurement, and are not of this program's making: the study says nothing of their part
+    let on_top = correction.transformation && correction.active.is_none() && !options.old.values.is_empty();
     let shape = |s: &crate::tables::correction::AxisShape| format!("{} ({})", s.parameter, s.effect);
     let in_grids: Vec<String> = if grids.is_empty() {
         Vec::new()
@@ -196,6 +198,7 @@ pub(super) fn write(
                 files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
                 variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
                 reads => tables.reads.is_some(),
+                restore_unit => options.old.unit().filter(|unit| *unit != options.unit).map(|unit| unit.says()), on_top,
                 left, omitted => not, in_grids, points, grids_known, radius => format!("{}", options.radius_mm),
                 rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
                 longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
