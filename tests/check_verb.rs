@@ -433,6 +433,45 @@ blocks = ["x+"]
 touch  = [ { faces = ["+X"], grid = "S1" } ]
 "#;
 
+/// What breaks a probe needs no plan to be seen: a rapid that leaves a face, a search that goes on past the overtravel, one
+/// that is too fast.
+#[test]
+fn a_rough_touch_is_refused_without_a_plan() {
+    let edits = [
+        ("fanuc", "small.nc", "G1 Z[#5063-[-0.5]] F300.", "G0 Z[#5063-[-0.5]]", "a rapid leaves the face"),
+        ("haas", "small.nc", "G1 X[#5061-[0.5]] F300.", "G0 X[#5061-[0.5]]", "a rapid leaves the face"),
+        (
+            "sinumerik",
+            "small.mpf",
+            "G1 SUPA Z=$AA_MM[Z]-(-0.5) F=300",
+            "G0 SUPA Z=$AA_MM[Z]-(-0.5)",
+            "a rapid leaves the face",
+        ),
+        ("fanuc", "small.nc", "G31 Z6. F60.", "G31 Z4. F60.", "pushed past its overtravel"),
+        ("fanuc", "small.nc", "G31 X-36. F60.", "G31 X-33. F60.", "pushed past its overtravel"),
+        ("haas", "small.nc", "G31 Z6. F60.", "G31 Z4. F60.", "pushed past its overtravel"),
+        ("linuxcnc", "small.ngc", "G38.3 X-36 F60", "G38.3 X-33 F60", "pushed past its overtravel"),
+        (
+            "sinumerik",
+            "small.mpf",
+            "X=-30 Y=0 Z=6 MEAS=1 F=60",
+            "X=-30 Y=0 Z=4 MEAS=1 F=60",
+            "pushed past its overtravel",
+        ),
+        ("heidenhain", "small.h", "DIST+4 F60", "DIST+6 F60", "pushed past its overtravel"),
+        ("fanuc", "small.nc", "G31 X-36. F300.", "G31 X-36. F900.", "fast_feed is 300"),
+        ("sinumerik", "small.mpf", "X=-36 Y=0 Z=1.5 MEAS=1 F=300", "X=-36 Y=0 Z=1.5 MEAS=1 F=900", "fast_feed is 300"),
+        ("heidenhain", "small.h", "DIST+4 F300", "DIST+4 F900", "fast_feed is 300"),
+    ];
+    for (controller, file, from, to, code) in edits {
+        let folder = folder(controller);
+        edited(folder.path(), file, from, to);
+        let said = predicate::str::contains(code);
+        check(folder.path(), controller, file).assert().code(1).stderr(said.clone());
+        check(folder.path(), controller, file).args(["--plan", "small.plan.json"]).assert().code(1).stderr(said);
+    }
+}
+
 /// Words of a control in inches are rounded to 2.5 um: gaps that were proven clear before that stay proven.
 #[test]
 fn what_an_inch_control_rounds_is_no_collision() {

@@ -348,7 +348,7 @@ fn axes_have_the_control_s_own_names_and_numbers() {
     assert!(nc.text.contains("G0 SUPA C1=0") && nc.text.contains("$AA_IM[B1]") && !nc.text.contains("$AA_IM[B]"));
     let post = variant("fanuc", "[number]\naxis_numbers = { C = 6 }\nsource = \"our machine\"\n");
     let nc = written(&post, &machine, &generated);
-    assert!(nc.text.contains("=#5066") && nc.text.contains("[#5046-#5026]") && nc.text.contains("=#5064"));
+    assert!(nc.text.contains("=#5066") && nc.text.contains("=#5046-#5026") && nc.text.contains("=#5064"));
 }
 
 #[test]
@@ -364,10 +364,48 @@ fn machine_coordinates_hold_the_origin_of_r() {
     for (name, first, touch) in [
         ("sinumerik", "G0 SUPA X=67\n", "AXC_X=$AA_MM[X]-(100)\n"),
         ("heidenhain", "L X+67 R0 FMAX M91", "Q1621 = Q1601 - 100\r\n"),
-        ("fanuc", "G0 X-33.\n", "G52 X[#5041-#5021+[100.]] Y[#5042-#5022+[-50.]] Z[#5043-#5023]"),
+        ("fanuc", "G0 X-33.\n", "#27=#5041-#5021+[100.]\n#28=#5042-#5022+[-50.]\n#29=#5043-#5023\n"),
     ] {
         let nc = written(&controller(name), &machine, &generated);
         assert!(nc.text.contains(first) && nc.text.contains(touch), "{name}");
+    }
+}
+
+/// An origin of many digits in every axis makes no line that a control would not take.
+#[test]
+fn an_origin_of_many_digits_fits_the_lines() {
+    let origin = "origin = { X = -1350.125, Y = -1412.625, Z = -1287.315, ";
+    let text = machine::BUILT_IN.replace("origin = { X = 0.0, Y = 0.0, Z = 0.0, ", origin);
+    assert!(text.matches(origin).count() >= 3);
+    // the ends of the axes stand in machine coordinates
+    let mut by = 0.0;
+    let ends = |line: &str, by: f64| -> Option<String> {
+        let (low, high) = line.strip_prefix("range = [")?.split_once(']')?.0.split_once(',')?;
+        let shifted = |end: &str| end.trim().parse::<f64>().map(|v| format!("{:.3}", v + by)).unwrap();
+        Some(format!("range = [{}, {}]\n", shifted(low), shifted(high)))
+    };
+    let mut moved = String::new();
+    for line in text.lines() {
+        if let Some(name) = line.strip_prefix("name = \"") {
+            by = ["X\"", "Y\"", "Z\""]
+                .iter()
+                .position(|n| name.starts_with(n))
+                .map_or(0.0, |i| [-1350.125, -1412.625, -1287.315][i]);
+        }
+        moved += &ends(line, by).unwrap_or_else(|| format!("{line}\n"));
+    }
+    let (machines, _) = machine::load(&source("machines", &moved)).unwrap();
+    for (name, program) in [("swivel-head", "head"), ("trunnion", "basic"), ("double-head", "double-head")] {
+        let machine = machines.iter().find(|m| m.name == name).unwrap();
+        for tcp in [false, true] {
+            let generated = generated(machine, program, tcp);
+            for control in ["sinumerik", "heidenhain", "fanuc", "haas", "linuxcnc"] {
+                let post = controller(control);
+                if let Err(why) = post.program(machine, &generated.plan, &generated.path) {
+                    assert_ne!(why.0[0].code, "post::line_length", "{control} {name} {tcp}: {why}");
+                }
+            }
+        }
     }
 }
 

@@ -315,7 +315,12 @@ impl<'a, 'b> Walk<'a, 'b> {
         if let Some(contact) = self.contact.take() {
             if rate == Rate::Rapid {
                 let says = "a rapid leaves the face: nothing there has the clearance of a rapid".to_owned();
-                self.say("check::in_contact", at, says, "leave it by a move at a feed (G1) that stops at contact or is short");
+                self.say(
+                    "check::in_contact",
+                    at,
+                    says,
+                    "leave it by a move at a feed (G1) that stops at contact or is short",
+                );
             }
             self.leave_face(at, part, contact, from, to, &rotary);
             return;

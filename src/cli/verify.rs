@@ -74,7 +74,12 @@ fn still_missing(after: &Loaded, fit: &Fit) -> Result<Option<String>> {
     let settings = Settings { quick: true, ..after.settings() };
     let subject = Subject { machine: &after.machine, catalogue: &after.catalogue, settings: &settings, fit };
     let found = diagnose(subject, &Options { at_most: 1, refit: false, power: false, planned: None })?;
-    let missing = found.verdict == diagnose::Verdict::MissingEffect || found.mistake().is_some();
+    let fails = match found.verdict {
+        diagnose::Verdict::MissingEffect => true,
+        diagnose::Verdict::Unexplained => !found.faint,
+        _ => false,
+    };
+    let missing = fails || found.mistake().is_some();
     Ok(missing.then(|| format!("`axiscal diagnose` says of the study after: {}", found.says)))
 }
 
@@ -122,5 +127,6 @@ fn figures(loaded: &Loaded, fit: &Fit) -> Result<Figures> {
         readings_dof,
         fit_rms_um: fit.outcome.rms_um,
         noise_um: um_from_mm(fit.noise.sigma_mm),
+        explained: fit.dof == 0 || fit.outcome.chi2_per_dof <= fit.noise.limit(fit.dof),
     })
 }

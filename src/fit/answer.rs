@@ -54,15 +54,20 @@ pub(super) fn outcome(
         Some((noise_variance(c).sqrt(), factor(c)))
     };
     let intervals =
-        if shapes_told { profile::intervals(fit, machine, effects, &settings.held, &spread) } else { BTreeMap::new() };
+        if shapes_told { profile::intervals(fit, machine, effects, settings, &spread) } else { BTreeMap::new() };
+    // sizes beside a shape that nobody knows
+    let runs_along = |i: usize| !fit.model.unknowns[i].shape && intervals.get(&i) == Some(&[None, None]);
     let parameters: Vec<Parameter> = (0..fit.theta.len())
         .map(|i| {
             let u = &fit.model.unknowns[i];
             let column = fit.free.binary_search(&i).ok();
+            let jumps = shapes_told && settings.jumps.contains(&u.name);
+            let jump = intervals.get(&i).filter(|_| jumps).and_then(|[low, high]| Some([(*low)?, (*high)?]));
             let status = match column {
-                None if settings.held.contains(&u.name) => Status::Undetermined,
+                None if jump.is_some() => Status::Identified,
+                None if jumps || settings.held.contains(&u.name) => Status::Undetermined,
                 None => Status::Fixed,
-                Some(c) if untold(c) => Status::Undetermined,
+                Some(c) if untold(c) || runs_along(i) => Status::Undetermined,
                 // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
                 Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
                 _ => Status::Identified,
@@ -71,12 +76,15 @@ pub(super) fn outcome(
             let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
             let factor = known.map(factor);
             let expanded = sigma.zip(factor).map(|(s, k)| s * k);
+            // any moment between the ends may be it
+            let sigma = sigma.or(jump.map(|[low, high]| (high - low) / 12f64.sqrt()));
             // the ends are those of the noise's interval, with all else that is counted
             let interval = known.zip(factor).and_then(|(c, k)| {
                 let more = k * (b_variance[c] + moves[c] * moves[c]).sqrt();
                 let with = |end: f64| fit.theta[i] + (end - fit.theta[i]).hypot(more).copysign(end - fit.theta[i]);
                 intervals.get(&i).map(|ends| ends.map(|end| end.map(with)))
             });
+            let interval = interval.or(jump.map(|ends| ends.map(Some)));
             // an end that the touches do not set is that of the range
             let range = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == u.name).and_then(|p| p.shape);
             let wider = |[low, high]: [Option<f64>; 2]| {
@@ -157,7 +165,7 @@ pub(super) fn outcome(
         covariance_type_a: None,
         residuals: Some(residuals(fit)),
         warnings: [
-            warnings(fit, effects, solution, chi2_per_dof),
+            warnings(fit, machine, effects, solution, chi2_per_dof),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
@@ -183,7 +191,7 @@ fn residuals(fit: &Fit) -> Vec<Residual> {
     each.collect()
 }
 
-fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f64) -> Vec<String> {
+fn warnings(fit: &Fit, machine: &Machine, effects: &[&Effect], solution: &Solution, chi2_per_dof: f64) -> Vec<String> {
     let mut out = Vec::new();
     if fit.data.observations.iter().all(|o| !o.has_temperature) {
         for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
@@ -247,7 +255,7 @@ fn warnings(fit: &Fit, effects: &[&Effect], solution: &Solution, chi2_per_dof: f
         ));
     }
     out.extend(fit.noise.contradiction());
-    let contradictions = contradictions::contradictions(fit);
+    let contradictions = contradictions::contradictions(fit, machine, effects);
     // what is stated wrongly is no fault of the model
     let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
     let dof = fit.dof.saturating_sub(contradictions.len());

@@ -2,7 +2,9 @@
 
 use super::normal::Touches;
 use super::uncertainty::free_covariance;
-use super::{Fit, Knowledge};
+use super::{Fit, Knowledge, profile};
+use crate::machine::Machine;
+use crate::model::catalogue::Effect;
 use nalgebra::DVector;
 
 /// A value that the user states and that the touches contradict.
@@ -18,12 +20,16 @@ pub(super) struct Contradiction {
 /// chance of that is 6e-5 where both are right.
 const CONTRADICTS: f64 = 4.0;
 
-/// Priors and held values that the touches contradict: each compared with the estimate without it (a rank-one downdate), at
-/// the scatter that the touches would then have.
-pub(super) fn contradictions(fit: &Fit) -> Vec<Contradiction> {
+/// Priors and held values that the touches contradict: each compared with the estimate without it (a rank-one downdate; of a shape
+/// parameter its likelihood profile), at the scatter that the touches would then have.
+pub(super) fn contradictions(fit: &Fit, machine: &Machine, effects: &[&Effect]) -> Vec<Contradiction> {
     let scale2 = |falls: f64| ((fit.chi2 - falls).max(0.0) / fit.dof.saturating_sub(1).max(1) as f64).max(1.0);
     let mut out = Vec::new();
     for &(i, stated, sigma) in &fit.priors {
+        if fit.model.unknowns[i].shape {
+            out.extend(of_a_shape(fit, machine, effects, (i, stated, sigma), scale2));
+            continue;
+        }
         let (variance, prior) = (fit.covariance[(i, i)], sigma * sigma);
         let rest = 1.0 / variance - 1.0 / prior;
         // the touches say next to nothing of it
@@ -50,6 +56,31 @@ pub(super) fn contradictions(fit: &Fit) -> Vec<Contradiction> {
     }
     out.extend(held_contradictions(fit, scale2));
     out
+}
+
+/// The same of a shape parameter, which the touches do not follow evenly: a line through the solution may lead to a negative time
+/// constant.
+fn of_a_shape(
+    fit: &Fit,
+    machine: &Machine,
+    effects: &[&Effect],
+    (i, stated, sigma): (usize, f64, f64),
+    scale2: impl Fn(f64) -> f64 + Copy,
+) -> Option<Contradiction> {
+    let alone = profile::without_prior(fit, machine, effects, i, scale2)?;
+    let apart = (alone.falls / scale2(alone.falls)).max(0.0).sqrt();
+    let u = &fit.model.unknowns[i];
+    let [low, high] = alone.interval;
+    let doubt = 0.25 * (high - low);
+    let says = format!(
+        "the touches contradict the prior of {}: it says {stated} ± {sigma} {}, and without it they say {} (95 % between {} and {}; {apart:.0} standard deviations apart); check it, or give it a larger sigma",
+        u.name,
+        u.unit,
+        with_digits(alone.value, doubt),
+        with_digits(low, doubt),
+        with_digits(high, doubt),
+    );
+    (apart > CONTRADICTS).then_some(Contradiction { says, chi2: alone.falls })
 }
 
 /// The same for held values: the score test of each, and what the touches would make of it.

@@ -93,6 +93,8 @@ pub struct Settings {
     pub quick: bool,
     /// Shape parameters that the search holds at an end of their range: nobody knows them.
     pub held: Vec<String>,
+    /// Shape parameters at which something jumps, as a moment: the search holds each at the best of the places between touches.
+    pub jumps: Vec<String>,
 }
 
 /// A fit with everything that later rooms need.
@@ -265,7 +267,10 @@ fn identify_started(
             continue;
         }
         for (name, value) in shapes::jumps(effect, &values, &data) {
-            held_settings.knowledge.entry(name.to_owned()).or_insert(Knowledge::Fixed(value));
+            if !held_settings.knowledge.contains_key(name) {
+                held_settings.knowledge.insert(name.to_owned(), Knowledge::Fixed(value));
+                held_settings.jumps.push(name.to_owned());
+            }
         }
     }
     let fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;

@@ -92,14 +92,19 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         None => (immediate.0 + revisits.within.0, immediate.1 + revisits.within.1),
     };
     let from_repeats = (dof >= LEAST_REPEATS).then(|| (squares / dof as f64).sqrt());
-    let rounding = known.rounding;
+    // touches that scatter by far less than a digit are no rounded ones: their places have few digits by themselves
+    const EXACT: f64 = 0.3;
+    let mean_square = samples.iter().map(|s| s.residual_mm * s.residual_mm).sum::<f64>() / samples.len().max(1) as f64;
+    let shows = mean_square.sqrt() > EXACT * known.rounding.sigma_mm();
+    let rounding = if shows { known.rounding } else { Rounding::default() };
     let digits_mm = rounding.sigma_mm().max(1e-9);
     // repeats without any scatter come from a noise-free log: dividing by them would mean nothing
     let repeats_agree = from_repeats.is_some_and(|s| s <= digits_mm);
     let from_repeats = from_repeats.filter(|s| *s > digits_mm).map(|s| rounding.with_what_repeats_hide(s));
     // a wrong σ is no fault of the model: where the log itself contradicts it, the log counts
-    let contradicted_mm =
-        known.stated_sigma_mm.filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, rounding.added_to(*s))));
+    let contradicted_mm = known
+        .stated_sigma_mm
+        .filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, rounding.added_to(*s))));
     let (sigma_mm, source, sigma_dof) =
         match (known.stated_sigma_mm.filter(|_| contradicted_mm.is_none()), from_repeats) {
             (Some(stated), _) => (rounding.added_to(stated), "study", None),

@@ -7,7 +7,8 @@
 //! beside a shape that is told weakly may be all that it is beside any of the shape's values that the touches allow.
 
 use super::candidates::columns;
-use super::{Fit, shapes};
+use super::shapes::{self, Stretch};
+use super::{Fit, Settings};
 use crate::machine::Machine;
 use crate::model::catalogue::Effect;
 use nalgebra::{DMatrix, DVector};
@@ -22,15 +23,23 @@ const MOST_STEPS: usize = 120;
 /// Halvings between two steps.
 const HALVINGS: usize = 30;
 
+/// χ² grows by this much at the ends of the 95 % interval of a moment at which something jumps: it is flat between two touches
+/// and a random walk from one to the next (B. E. Hansen, Econometrica 68, 2000, p. 575, table I).
+const GROWTH_OF_A_JUMP: f64 = 7.35;
+/// χ² grows by this much at the ends of a 95 % interval.
+const GROWTH_95: f64 = 3.841;
+/// So many places behind one that the touches contradict are looked at before the rest counts as contradicted.
+const LOOKED_AHEAD: usize = 40;
+
 /// 95 % intervals of shape parameters and of the sizes beside them, by index among the unknowns, in their units; an end is none
 /// where the touches set none within the range of the shape. `spread`: standard uncertainty and t-factor of a free unknown at
-/// the solution. `held`: shapes that the search holds.
+/// the solution. `settings`: which shapes the search holds.
 #[must_use]
 pub fn intervals(
     fit: &Fit,
     machine: &Machine,
     effects: &[&Effect],
-    held: &[String],
+    settings: &Settings,
     spread: &dyn Fn(usize) -> Option<(f64, f64)>,
 ) -> BTreeMap<usize, [Option<f64>; 2]> {
     let mut out = BTreeMap::new();
@@ -41,11 +50,16 @@ pub fn intervals(
                 continue;
             };
             let free = fit.free.contains(&unknown);
-            if !free && !held.contains(&p.name) {
+            let jumps = settings.jumps.contains(&p.name);
+            if !free && !jumps && !settings.held.contains(&p.name) {
                 continue;
             }
             let Some(profile) = Profile::new(fit, machine, effect, unknown) else { continue };
             let Some((_, low, high)) = p.shape else { continue };
+            if jumps {
+                out.insert(unknown, profile.ends_of_a_jump(&shapes::stretches_of_a_jump(p, &fit.data)));
+                continue;
+            }
             // a shape that the touches do not tell may be any of those that were tried
             let (places, tried) = match spread(unknown).filter(|_| free) {
                 Some(of) => {
@@ -61,9 +75,74 @@ pub fn intervals(
                 }
             };
             profile.widen(&places, tried, spread, &mut out);
+            if !free {
+                profile.size_runs_along([low, high], spread, &mut out);
+            }
         }
     }
     out
+}
+
+/// What the touches say of a shape parameter that has a prior, without the prior; none where the search does not follow it.
+/// `scale2`: the variance of the touches' scatter, as a multiple of their noise, where χ² falls by so much.
+#[must_use]
+pub fn without_prior(
+    fit: &Fit,
+    machine: &Machine,
+    effects: &[&Effect],
+    unknown: usize,
+    scale2: impl Fn(f64) -> f64,
+) -> Option<Alone> {
+    let u = &fit.model.unknowns[unknown];
+    let effect = effects.iter().find(|e| e.id == u.effect && !e.per_block)?;
+    let (_, low, high) = effect.parameters.iter().find(|p| p.name == u.name)?.shape?;
+    let mut profile = Profile::new(fit, machine, effect, unknown)?;
+    let whole = profile.residual.norm_squared();
+    profile.drop_prior_of_shape();
+    let growth = |at: f64| profile.held(at).growth;
+    // the best of many places, and then between its neighbours
+    let places = between([low, high]);
+    let best = (0..places.len()).min_by(|&a, &b| growth(places[a]).total_cmp(&growth(places[b])))?;
+    let (mut from, mut to) = (places[best.saturating_sub(1)], places[(best + 1).min(places.len() - 1)]);
+    for _ in 0..HALVINGS {
+        let third = (to - from) / 3.0;
+        if growth(from + third) < growth(to - third) { to -= third } else { from += third }
+    }
+    let value = 0.5 * (from + to);
+    let least = growth(value);
+    let falls = whole - profile.residual.norm_squared() - least;
+    let limit = GROWTH_95 * scale2(falls);
+    let over = |at: f64| growth(at) - least > limit;
+    let end = |mut inside: f64, limit: f64| -> f64 {
+        // the first place that is contradicted, and back to where that begins
+        let beyond = places.iter().copied().filter(|at| (at - inside) * (limit - inside) > 0.0);
+        let by_distance = |a: &f64, b: &f64| (a - inside).abs().total_cmp(&(b - inside).abs());
+        let mut beyond: Vec<f64> = beyond.collect();
+        beyond.sort_by(by_distance);
+        for at in beyond {
+            if over(at) {
+                let mut outside = at;
+                for _ in 0..HALVINGS {
+                    let middle = 0.5 * (inside + outside);
+                    if over(middle) { outside = middle } else { inside = middle }
+                }
+                return inside;
+            }
+            inside = at;
+        }
+        limit
+    };
+    Some(Alone { value, interval: [end(value, low), end(value, high)], falls })
+}
+
+/// A shape without its prior.
+pub struct Alone {
+    /// Its best value, in its unit.
+    pub value: f64,
+    /// 95 % interval; an end of its range where the touches set none.
+    pub interval: [f64; 2],
+    /// By how much χ² falls.
+    pub falls: f64,
 }
 
 /// Places from one end to the other, by equal factors where both are above 0.
@@ -142,6 +221,15 @@ impl<'a> Profile<'a> {
         Some(out)
     }
 
+    /// Takes out what the user states of the shape itself: its row has no other entry.
+    fn drop_prior_of_shape(&mut self) {
+        let first = self.residual.len() - self.prior_of_shape.len();
+        for (row, slope) in self.prior_of_shape.iter_mut().enumerate().filter(|(_, slope)| **slope != 0.0) {
+            *slope = 0.0;
+            self.residual[first + row] = 0.0;
+        }
+    }
+
     /// Whitened columns of the effect's free sizes at a value of the shape, and what its sizes do there (touches only).
     fn does(&self, at: f64) -> (DMatrix<f64>, DVector<f64>) {
         let mut values = self.values.clone();
@@ -218,6 +306,30 @@ impl<'a> Profile<'a> {
         [end(-1.0, range[0]), end(1.0, range[1])]
     }
 
+    /// The first and the last moment of a jump that the touches do not contradict; `stretches`: where it may be, in order.
+    fn ends_of_a_jump(&self, stretches: &[Stretch]) -> [Option<f64>; 2] {
+        let value = self.values[self.shape];
+        let allowed = |at: &Stretch| self.held(at.place).growth < GROWTH_OF_A_JUMP;
+        let here = stretches.iter().position(|s| s.ends[0] <= value && value <= s.ends[1]);
+        let Some(here) = here else { return [None, None] };
+        let end = |further: &mut dyn Iterator<Item = &Stretch>, side: usize| -> Option<f64> {
+            let (mut last, mut beyond) = (stretches[here].ends[side], 0);
+            for stretch in further {
+                if allowed(stretch) {
+                    (last, beyond) = (stretch.ends[side], 0);
+                } else {
+                    beyond += 1;
+                }
+                if beyond == LOOKED_AHEAD {
+                    break;
+                }
+            }
+            // up to the last touch there is nothing that would speak against a jump behind it
+            (beyond > 0).then_some(last)
+        };
+        [end(&mut stretches[..here].iter().rev(), 0), end(&mut stretches[here + 1..].iter(), 1)]
+    }
+
     /// Intervals of the sizes: all that each may be beside some places of the shape, of which the best of `tried` was taken.
     fn widen(
         &self,
@@ -241,6 +353,34 @@ impl<'a> Profile<'a> {
                 }
             }
             out.insert(unknown, [Some(low), Some(high)]);
+        }
+    }
+}
+
+impl Profile<'_> {
+    /// Sizes that run away along with a shape that is held at an end of its range: how large they are is what the end was chosen to
+    /// be, and no interval holds that.
+    fn size_runs_along(
+        &self,
+        [low, high]: [f64; 2],
+        spread: &dyn Fn(usize) -> Option<(f64, f64)>,
+        out: &mut BTreeMap<usize, [Option<f64>; 2]>,
+    ) {
+        /// The range would end so much earlier.
+        const SHARE: f64 = 0.2;
+        let value = self.values[self.shape];
+        let part = |end: f64| SHARE * if low > 0.0 { end } else { high - low };
+        let inner = match value {
+            v if v == low => low + part(low),
+            v if v == high => high - part(high),
+            _ => return,
+        };
+        let (at, aside) = (self.held(value), self.held(inner));
+        for (&unknown, (one, other)) in self.unknowns.iter().zip(at.sizes.iter().zip(&aside.sizes)) {
+            let Some((sigma, k)) = spread(unknown) else { continue };
+            if (one.0 - other.0).abs() > k * sigma {
+                out.insert(unknown, [None, None]);
+            }
         }
     }
 }

@@ -140,6 +140,37 @@ pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
     (!p.scan.is_empty()).then(|| p.scan.clone())
 }
 
+/// A stretch of a shape parameter in which a jump shows in the same touches, wherever in it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    /// Some place in it.
+    pub place: f64,
+    /// Its ends.
+    pub ends: [f64; 2],
+}
+
+/// All stretches in which a jump may be, in order: from one touch to the next; where it is not known which of the parameter's values part
+/// touches, half-way to the next value that was tried.
+pub(super) fn stretches_of_a_jump(p: &Parameter, data: &Data) -> Vec<Stretch> {
+    let half_way = |w: &[f64]| 0.5 * (w[0] + w[1]);
+    let mut all: Vec<f64> = match p.between {
+        Some(variable) => data.observations.iter().map(|o| o.state[variable]).collect(),
+        None => all_tried(p, data),
+    };
+    all.retain(|v| v.is_finite());
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    if p.between.is_none() {
+        let middles: Vec<f64> = all.windows(2).map(half_way).collect();
+        return middles
+            .windows(2)
+            .zip(all.iter().skip(1))
+            .map(|(w, &place)| Stretch { place, ends: [w[0], w[1]] })
+            .collect();
+    }
+    all.windows(2).map(|w| Stretch { place: half_way(w), ends: [w[0], w[1]] }).collect()
+}
+
 /// Values between one of a scan's values and its neighbours, for a closer look: the places of a jump that the scan did not try,
 /// or some steps of a number that changes smoothly.
 #[must_use]

@@ -473,7 +473,7 @@ impl<'a> Writer<'a> {
                     self.post.line_length
                 ),
             )
-            .help("shorten the template, or the names of machine, program and blocks"));
+            .help("shorten its template in the postprocessor file, or the names of machine, program and blocks where they stand in it; raise line_length there if your control takes longer lines"));
         }
         let text = self.post.ended(text);
         Ok(NcProgram { text, extension: self.post.extension.clone(), beside, findings: self.findings })

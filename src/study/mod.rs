@@ -312,6 +312,7 @@ impl Study {
             masked: self.masked.clone(),
             quick: false,
             held: Vec::new(),
+            jumps: Vec::new(),
         }
     }
 

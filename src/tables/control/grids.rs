@@ -120,11 +120,11 @@ pub fn occupied(form: &GridForm, grids: &[Grid], active: &[Grid], old: &Old) -> 
             );
         } else if let Some((_, name, value)) = other {
             let says = format!(
-                "position table {} of the control is in use: {name} = {value} is not axiscal's, and would be written over",
+                "position table {} of the control is in use: {name} = {value} is not what the study's compensation wrote, and would be written over",
                 grid.number
             );
             findings.push(Finding::error("tables::occupied", says).help(
-                "write the first free number into a file of your own ([tables.grid] first = …): the tables of one axis add up; --force writes over it",
+                "where axiscal wrote it and it acted during the measurement, name that export as `compensation` in the study; else write the first free number into a file of your own ([tables.grid] first = …): the tables of one axis add up; --force writes over it",
             ));
         }
     }
