@@ -6,7 +6,7 @@ use super::run::{Event, Probe};
 use crate::axes::{AxisMap, Position};
 use crate::log;
 use crate::post::digest;
-use crate::program::plan::PlanTouch;
+use crate::program::plan::{ControllerFrame, PlanTouch};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -138,9 +138,11 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
             continue;
         };
         let step = 0.5 * 10f64.powi(-(case.post.log.decimals as i32)) * case.post.number.mm(1.0);
-        let room = step
-            + LOGGED
-            + if plan.controller_frame == crate::program::plan::ControllerFrame::Tcp { 1e-4 } else { 0.0 };
+        // three rounded words of a place that is turned may all fall on one axis
+        let room = match plan.controller_frame {
+            ControllerFrame::Tcp => 3f64.sqrt() * step + 1e-4,
+            ControllerFrame::Axes => step,
+        } + LOGGED;
         if made.latched.0.iter().zip(raw.position.0).any(|(a, b)| (a - b).abs() > room) {
             let says = format!("touch {id}: the log does not hold the place of the contact");
             said.say(case, "check::log", &place, says, "");

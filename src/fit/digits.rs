@@ -1,23 +1,6 @@
-//! The last digit of a log, from its positions, and what it takes away.
+//! What the last digit of a log takes away.
 
-use crate::axes::{AxisName, Position};
-use crate::model::predict::Observation;
-use crate::units::mm_from_inch;
-use std::collections::BTreeMap;
-
-/// The coarsest step, mm, of which every position of the linear axes is a multiple: decimal fractions of a millimetre or of an
-/// inch. None where there is none down to a nanometre: nothing is lost that a touch would show.
-fn digit_mm(positions: impl Iterator<Item = Position> + Clone) -> Option<f64> {
-    const STEPS: [f64; 7] = [1e-2, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5, 1e-6];
-    let steps = STEPS.iter().flat_map(|&s| [s, mm_from_inch(0.1 * s)]);
-    let mut steps: Vec<f64> = steps.collect();
-    steps.sort_by(|a, b| b.total_cmp(a));
-    let linear = || positions.clone().flat_map(|p| [AxisName::X, AxisName::Y, AxisName::Z].map(|a| p.get(a)));
-    steps.into_iter().find(|step| {
-        // as far as the digits of a coordinate of machine size go
-        linear().all(|x| (x / step - (x / step).round()).abs() * step < 1e-9 + 1e-14 * x.abs())
-    })
-}
+use crate::model::data::Data;
 
 /// What rounding to the last digit of a log does to a touch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -28,10 +11,9 @@ pub struct Rounding {
 
 impl Rounding {
     /// Of the touches of a study, each with the digits of its own log.
-    pub(super) fn of_touches(observations: &[Observation]) -> Self {
-        let mut logs: BTreeMap<usize, Vec<Position>> = BTreeMap::new();
-        observations.iter().for_each(|o| logs.entry(o.run).or_default().push(o.position));
-        Self::of(logs.values().map(|log| (log.len(), digit_mm(log.iter().copied()))))
+    pub(super) fn of_touches(data: &Data) -> Self {
+        let touches = |run: usize| data.observations.iter().filter(|o| o.run == run).count();
+        Self::of(data.digits_mm.iter().enumerate().map(|(run, digit_mm)| (touches(run), *digit_mm)))
     }
 
     /// Of logs whose touches count as many as given, each with its last digit, mm: the root mean square.
@@ -92,17 +74,7 @@ impl Rounding {
 
 #[cfg(test)]
 mod tests {
-    use super::{Rounding, digit_mm};
-    use crate::axes::Position;
-
-    fn of(places: &[f64]) -> Option<f64> {
-        let at = |&x: &f64| {
-            let mut p = Position::default();
-            p.0[..3].copy_from_slice(&[x, 2.0 * x, -x]);
-            p
-        };
-        digit_mm(places.iter().map(at))
-    }
+    use super::Rounding;
 
     /// Rounded draws at places of their own say what repeats see and what there is, for coarse and fine digits.
     #[test]
@@ -130,16 +102,5 @@ mod tests {
         }
         assert!((Rounding::of([(300, Some(2e-3)), (100, None)].into_iter()).sigma_mm() - 5e-4).abs() < 1e-12);
         assert_eq!(Rounding::default().with_what_repeats_hide(1e-3), 1e-3);
-    }
-
-    #[test]
-    fn the_last_digit_of_a_log() {
-        assert_eq!(of(&[1.234, -200.001, 17.0]), Some(1e-3));
-        assert_eq!(of(&[1.2345, 17.0]), Some(1e-4));
-        assert_eq!(of(&[1.234_567, 17.0]), Some(1e-6));
-        assert_eq!(of(&[1.234_567_8, 17.0]), None);
-        // 0.1234 and 3.0001 inches
-        let inches = of(&[0.1234 * 25.4, 3.0001 * 25.4]).unwrap();
-        assert!((inches - 0.00254).abs() < 1e-12, "{inches}");
     }
 }

@@ -94,6 +94,27 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
     if findings.is_empty() { Ok(out) } else { Err(Failure(findings)) }
 }
 
+/// A time constant of -1 h is no knowledge either: what is said of a shape parameter lies within its range.
+pub(super) fn within_range(model: &Model, knowledge: &[Option<Knowledge>], effects: &[&Effect]) -> Result<()> {
+    let mut findings = Vec::new();
+    for (u, known) in model.unknowns.iter().zip(knowledge).filter(|(u, _)| u.shape) {
+        let Some(Knowledge::Fixed(value) | Knowledge::Prior { value, .. }) = known else { continue };
+        let name = u.name.split('@').next().unwrap_or(&u.name);
+        let of_effect = effects.iter().filter(|e| e.id == u.effect).flat_map(|e| &e.parameters);
+        let Some((_, low, high)) = of_effect.filter(|p| p.name == name).find_map(|p| p.shape) else { continue };
+        if !(low..=high).contains(value) {
+            findings.push(
+                Finding::error(
+                    "model::knowledge",
+                    format!("what is said of {}, {value} {}, lies outside of its range, {low} to {high}", u.name, u.unit),
+                )
+                .help("write a value within it; where the machine has another one, the effect in a file of your own with a wider range"),
+            );
+        }
+    }
+    if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
+}
+
 /// A held value or a prior of a length among the location errors counts at the machine's pivot: at another point it would be
 /// another line on the machine that is held, and with it another fit.
 pub(super) fn stated_at_the_pivot(model: &Model, knowledge: &[Option<Knowledge>], machine: &Machine) -> Result<()> {

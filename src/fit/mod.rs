@@ -290,21 +290,19 @@ fn identify_started(
     }
     // a step too far says nothing of the side: the end that fits better
     held_settings.held.push(name.clone());
-    let mut ends = Vec::new();
-    for end in ends_of {
+    let mut held_at = |end: f64| {
         held_settings.knowledge.insert(name.clone(), Knowledge::Fixed(end));
-        ends.push(identify_from(machine, catalogue, effects, fit.data.clone(), &held_settings, starts)?);
-    }
-    let tau_mm = ends.iter().map(|f| f.noise.tau_mm).fold(f64::INFINITY, f64::min);
-    let misfit = ends.first().map(|f| f.whitening(tau_mm)).map(|white| {
-        move |f: &Fit| {
-            let mut residual = DMatrix::from_column_slice(f.residual_mm.len(), 1, &f.residual_mm);
-            white.apply(&mut residual);
-            residual.norm_squared()
-        }
-    });
-    let better = |a: &Fit, b: &Fit| misfit.as_ref().map_or(std::cmp::Ordering::Equal, |of| of(a).total_cmp(&of(b)));
-    let mut fit = ends.into_iter().min_by(better).unwrap_or(fit);
+        identify_from(machine, catalogue, effects, fit.data.clone(), &held_settings, starts)
+    };
+    let [low, high] = [held_at(ends_of[0])?, held_at(ends_of[1])?];
+    // by one measure: the smaller scatter of visits hides less
+    let white = low.whitening(low.noise.tau_mm.min(high.noise.tau_mm));
+    let misfit = |f: &Fit| {
+        let mut residual = DMatrix::from_column_slice(f.residual_mm.len(), 1, &f.residual_mm);
+        white.apply(&mut residual);
+        residual.norm_squared()
+    };
+    let mut fit = if misfit(&low) <= misfit(&high) { low } else { high };
     fit.outcome.warnings.push(format!("{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"));
     Ok(fit)
 }
@@ -328,6 +326,7 @@ fn identify_from(
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
     let model = Model::new(machine, effects, &data.set_ups, reference);
     let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
+    knowledge::within_range(&model, &knowledge, effects)?;
     knowledge::every_formula_has_a_value(effects, &data)?;
     knowledge::stated_at_the_pivot(&model, &knowledge, machine)?;
     let mut theta = model.start();
@@ -350,7 +349,7 @@ fn identify_from(
         .collect();
     let known = Known {
         declared_sigma_mm: crate::units::mm_from_um(machine.probe.repeatability_um),
-        rounding: digits::Rounding::of_touches(&data.observations),
+        rounding: digits::Rounding::of_touches(&data),
         declared_tau_mm: declared_tau_mm(machine, &data.observations),
         stated_sigma_mm: settings.touch_sigma_mm,
         stated_tau_mm: settings.visit_sigma_mm,

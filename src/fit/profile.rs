@@ -6,11 +6,12 @@
 //! Analysis and Its Applications*, 1988, section 6.1). All but the effect's own sizes follow linearly, as they nearly do. A size
 //! beside a shape that is told weakly may be all that it is beside any of the shape's values that the touches allow.
 
-use super::candidates::columns;
+use super::candidates::{Trials, Variant};
 use super::shapes::{self, Stretch};
 use super::{Fit, Settings};
 use crate::machine::Machine;
-use crate::model::catalogue::Effect;
+use crate::model::catalogue::{Effect, Parameter};
+use crate::model::predict::Model;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -28,6 +29,8 @@ const HALVINGS: usize = 30;
 const GROWTH_OF_A_JUMP: f64 = 7.35;
 /// χ² grows by this much at the ends of a 95 % interval.
 const GROWTH_95: f64 = 3.841;
+/// Values at which χ² has grown by no more than so many times the limit may have a better one beside them.
+const NEARLY: f64 = 8.0;
 /// So many places behind one that the touches contradict are looked at before the rest counts as contradicted.
 const LOOKED_AHEAD: usize = 40;
 
@@ -54,7 +57,9 @@ pub fn intervals(
             if !free && !jumps && !settings.held.contains(&p.name) {
                 continue;
             }
-            let Some(profile) = Profile::new(fit, machine, effect, unknown) else { continue };
+            let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+            let trials = Trials::of(&model, &fit.data.observations);
+            let Some(profile) = Profile::new(fit, &trials, effect, unknown) else { continue };
             let Some((_, low, high)) = p.shape else { continue };
             if jumps {
                 out.insert(unknown, profile.ends_of_a_jump(&shapes::stretches_of_a_jump(p, &fit.data)));
@@ -64,11 +69,18 @@ pub fn intervals(
             let (places, tried) = match spread(unknown).filter(|_| free) {
                 Some(of) => {
                     let ends = profile.ends(of, [low, high]);
-                    out.insert(unknown, ends);
-                    (between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]), 1)
+                    let beyond = profile.beyond(&profile.all_places(p), ends, of.1 * of.1);
+                    out.insert(unknown, hull(ends, &beyond));
+                    if !beyond.is_empty() {
+                        // another value altogether: then everything else may be otherwise, too
+                        profile.widen_others(&beyond, spread, &mut out);
+                    }
+                    let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
+                    places.extend(beyond);
+                    (places, 1)
                 }
                 None => {
-                    let mut places = shapes::all_tried(p, &fit.data);
+                    let mut places = profile.all_places(p);
                     places.extend([low, high, fit.theta[unknown]]);
                     let n = places.len();
                     (places, n)
@@ -96,12 +108,15 @@ pub fn without_prior(
     let u = &fit.model.unknowns[unknown];
     let effect = effects.iter().find(|e| e.id == u.effect && !e.per_block)?;
     let (_, low, high) = effect.parameters.iter().find(|p| p.name == u.name)?.shape?;
-    let mut profile = Profile::new(fit, machine, effect, unknown)?;
+    let p = effect.parameters.iter().find(|p| p.name == u.name)?;
+    let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+    let trials = Trials::of(&model, &fit.data.observations);
+    let mut profile = Profile::new(fit, &trials, effect, unknown)?;
     let whole = profile.residual.norm_squared();
     profile.drop_prior_of_shape();
     let growth = |at: f64| profile.held(at).growth;
     // the best of many places, and then between its neighbours
-    let places = between([low, high]);
+    let places = profile.all_places(p);
     let best = (0..places.len()).min_by(|&a, &b| growth(places[a]).total_cmp(&growth(places[b])))?;
     let (mut from, mut to) = (places[best.saturating_sub(1)], places[(best + 1).min(places.len() - 1)]);
     for _ in 0..HALVINGS {
@@ -145,6 +160,13 @@ pub struct Alone {
     pub falls: f64,
 }
 
+/// An interval with further places; an end that is open stays so.
+fn hull([low, high]: [Option<f64>; 2], places: &[f64]) -> [Option<f64>; 2] {
+    let least = places.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    [low.map(|low| low.min(least)), high.map(|high| high.max(most))]
+}
+
 /// Places from one end to the other, by equal factors where both are above 0.
 fn between([low, high]: [f64; 2]) -> Vec<f64> {
     const PLACES: usize = 40;
@@ -158,7 +180,8 @@ fn between([low, high]: [f64; 2]) -> Vec<f64> {
 /// χ² as a function of one shape parameter, everything else following.
 struct Profile<'a> {
     fit: &'a Fit,
-    machine: &'a Machine,
+    /// The effect's columns at any shape.
+    trials: &'a Trials<'a>,
     effect: &'a Effect,
     /// Place of the shape among the effect's parameters.
     shape: usize,
@@ -170,6 +193,8 @@ struct Profile<'a> {
     residual: DVector<f64>,
     /// Whitened Jacobian of all free unknowns but the shape and the sizes.
     others: DMatrix<f64>,
+    /// Their indices among the unknowns.
+    rest: Vec<usize>,
     /// The others' covariance.
     covariance: DMatrix<f64>,
     /// Index of each size among the unknowns.
@@ -182,7 +207,7 @@ struct Profile<'a> {
 }
 
 impl<'a> Profile<'a> {
-    fn new(fit: &'a Fit, machine: &'a Machine, effect: &'a Effect, unknown: usize) -> Option<Self> {
+    fn new(fit: &'a Fit, trials: &'a Trials<'a>, effect: &'a Effect, unknown: usize) -> Option<Self> {
         let places = effect
             .parameters
             .iter()
@@ -204,7 +229,7 @@ impl<'a> Profile<'a> {
         let prior_of_shape = here.map_or_else(|| DVector::zeros(n_priors), |c| prior_rows.column(c).into_owned());
         let mut out = Self {
             fit,
-            machine,
+            trials,
             effect,
             shape,
             values: places.iter().map(|&i| fit.theta[i]).collect(),
@@ -212,6 +237,7 @@ impl<'a> Profile<'a> {
             sizes,
             residual: linear.residual,
             covariance: inverse(&others.tr_mul(&others)),
+            rest: rest.iter().map(|&c| fit.free[c]).collect(),
             others,
             priors,
             prior_of_shape,
@@ -236,9 +262,7 @@ impl<'a> Profile<'a> {
         values[self.shape] = at;
         let shapes: Vec<f64> =
             values.iter().zip(&self.effect.parameters).filter(|(_, p)| p.shape.is_some()).map(|(v, _)| *v).collect();
-        let data = &self.fit.data;
-        let reference = self.fit.model.reference;
-        let mut all = columns(self.machine, &[self.effect], data, &data.observations, reference, Some(&shapes)).values;
+        let mut all = self.trials.columns(&Variant { effects: vec![0], shapes }).values;
         self.fit.whitening(self.fit.noise.tau_mm).apply(&mut all);
         let size = |i: usize| if self.effect.parameters[i].shape.is_some() { 0.0 } else { values[i] };
         let does = &all * DVector::from_fn(values.len(), |i, _| size(i));
@@ -250,7 +274,7 @@ impl<'a> Profile<'a> {
         let (columns, does) = self.does(at);
         let n = columns.nrows();
         if does.iter().any(|x| !x.is_finite()) {
-            return Held { growth: f64::INFINITY, sizes: Vec::new() };
+            return Held { growth: f64::INFINITY, sizes: Vec::new(), others: Vec::new() };
         }
         let mut y = self.residual.clone();
         let mut touches = y.rows_mut(0, n);
@@ -267,7 +291,16 @@ impl<'a> Profile<'a> {
         let (inverse, whole) = (inverse(&gram), y.norm_squared() - along.dot(&(&self.covariance * &along)));
         let step = &inverse * &slope;
         let sizes = self.sizes.iter().enumerate();
+        // what the others do while the sizes and they settle, and how far they scatter there
+        let follow = &self.covariance * &seen;
+        let moved = &follow * &step - &self.covariance * &along;
+        let scatter = &follow * &inverse;
+        let others = (0..self.rest.len()).map(|r| {
+            let variance = self.covariance[(r, r)] + scatter.row(r).dot(&follow.row(r));
+            (self.fit.theta[self.rest[r]] + moved[r], variance.max(0.0).sqrt())
+        });
         Held {
+            others: others.collect(),
             growth: whole - slope.dot(&step) - self.residual.norm_squared(),
             sizes: sizes.map(|(c, &i)| (self.values[i] - step[c], inverse[(c, c)].max(0.0).sqrt())).collect(),
         }
@@ -328,6 +361,63 @@ impl<'a> Profile<'a> {
             (beyond > 0).then_some(last)
         };
         [end(&mut stretches[..here].iter().rev(), 0), end(&mut stretches[here + 1..].iter(), 1)]
+    }
+
+    /// Values of the shape over all of its range, near to each other; n of them where they are many.
+    fn all_places(&self, p: &Parameter) -> Vec<f64> {
+        if p.between.is_some() {
+            return shapes::all_tried(p, &self.fit.data);
+        }
+        shapes::fine(p, self.fit.data.observations.len(), &|at| self.does(at).0)
+    }
+
+    /// Values beyond the ends of the first crossing that the touches allow as well.
+    fn beyond(&self, places: &[f64], [low, high]: [Option<f64>; 2], growth: f64) -> Vec<f64> {
+        let outside = |at: &f64| low.is_some_and(|low| *at < low) || high.is_some_and(|high| *at > high);
+        // between two values that were tried the best one may lie
+        let near = |at: f64| self.held(at).growth;
+        let all: Vec<f64> = places.iter().copied().filter(outside).collect();
+        let growths: Vec<f64> = all.iter().map(|&at| near(at)).collect();
+        let mut out = Vec::new();
+        for k in 0..all.len() {
+            let neighbour = |by: usize| growths.get(by).copied().unwrap_or(f64::INFINITY);
+            let lowest = growths[k] <= neighbour(k.wrapping_sub(1)) && growths[k] <= neighbour(k + 1);
+            if growths[k] < growth {
+                out.push(all[k]);
+            } else if lowest && growths[k] < NEARLY * growth {
+                let (mut from, mut to) = (all[k.saturating_sub(1)], all[(k + 1).min(all.len() - 1)]);
+                for _ in 0..HALVINGS {
+                    let third = (to - from) / 3.0;
+                    if near(from + third) < near(to - third) { to -= third } else { from += third }
+                }
+                let best = 0.5 * (from + to);
+                if near(best) < growth && outside(&best) {
+                    out.push(best);
+                }
+            }
+        }
+        out
+    }
+
+    /// Intervals of everything else that is told, beside values of the shape that fit as well.
+    fn widen_others(
+        &self,
+        places: &[f64],
+        spread: &dyn Fn(usize) -> Option<(f64, f64)>,
+        out: &mut BTreeMap<usize, [Option<f64>; 2]>,
+    ) {
+        let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
+        for (r, &unknown) in self.rest.iter().enumerate() {
+            let Some((sigma, k)) = spread(unknown) else { continue };
+            let value = self.fit.theta[unknown];
+            let [mut low, mut high] = [value - k * sigma, value + k * sigma];
+            for h in held.iter().filter(|h| h.growth < k * k) {
+                let Some((at, sigma)) = h.others.get(r) else { continue };
+                let room = (k * k - h.growth).sqrt();
+                (low, high) = (low.min(at - sigma * room), high.max(at + sigma * room));
+            }
+            out.insert(unknown, [Some(low), Some(high)]);
+        }
     }
 
     /// Intervals of the sizes: all that each may be beside some places of the shape, of which the best of `tried` was taken.
@@ -391,6 +481,8 @@ struct Held {
     growth: f64,
     /// Value and standard uncertainty of each free size.
     sizes: Vec<(f64, f64)>,
+    /// The same of every other free unknown.
+    others: Vec<(f64, f64)>,
 }
 
 /// The inverse of a matrix of products; of what leaves no trace in it, none.

@@ -4,12 +4,12 @@
 //! Its values are tried one after another beside the fit of everything else, as a score test does, and the best one is
 //! taken with the size that it asks for.
 
-use super::candidates::columns;
+use super::candidates::{Trials, Variant};
 use super::{Fit, Settings, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
-use crate::model::predict::Observation;
+use crate::model::predict::{Model, Observation};
 use nalgebra::{DMatrix, DVector};
 
 /// Values that are tried where the catalogue names none.
@@ -17,6 +17,9 @@ const TRIED: usize = 12;
 
 /// More places of a jump than this are tried between index visits first.
 const MOST_PLACES: usize = 120;
+
+/// Values that are tried, times touches: more takes longer than a user waits.
+const MOST_OF_ALL: usize = 1_500_000;
 
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
 const LEAST_GAIN: f64 = 9.0;
@@ -46,10 +49,16 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
     let covariance = uncertainty::free_covariance(fit);
     let sizes: Vec<usize> = (0..effect.parameters.len()).filter(|i| !shaped.contains(i)).collect();
     let whitening = fit.whitening(fit.noise.tau_mm);
-    let judge = |shapes: &[f64]| -> (f64, DVector<f64>) {
-        let all = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, Some(shapes));
-        let mut a: DMatrix<f64> = all.values.select_columns(&sizes);
+    let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+    let trials = Trials::of(&model, &fit.data.observations);
+    let does = |shapes: &[f64]| -> DMatrix<f64> {
+        let all = trials.columns(&Variant { effects: vec![0], shapes: shapes.to_vec() });
+        let mut a = all.values.select_columns(&sizes);
         whitening.apply(&mut a);
+        a
+    };
+    let judge = |shapes: &[f64]| -> (f64, DVector<f64>) {
+        let a = does(shapes);
         let seen = jacobian.tr_mul(&a);
         let raw = a.tr_mul(&a);
         let gram = &raw - seen.tr_mul(&(&covariance * &seen));
@@ -85,18 +94,29 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
                     }
                 }
             };
-            let values = scan(&effect.parameters[i], &fit.data).unwrap_or_else(|| tried(&effect.parameters[i]));
+            let p = &effect.parameters[i];
+            if p.between.is_some() {
+                // a jump may also come in mid-visit
+                let values = scan(p, &fit.data).unwrap_or_else(|| tried(p));
+                try_all(&values, &mut best);
+                try_all(&around(p, &fit.data, &values, best[k]), &mut best);
+                continue;
+            }
+            let others = best.clone();
+            let at = |value: f64| {
+                let mut shapes = others.clone();
+                shapes[k] = value;
+                does(&shapes)
+            };
+            let mut values = fine(p, n, &at);
             try_all(&values, &mut best);
-            let mut values = values;
-            if effect.parameters[i].between.is_none() {
-                // what goes up and down with the number has its best place anywhere
-                let finer = between(&values);
+            for _ in 0..2 {
+                // between the best one and its neighbours
+                let finer = around(p, &fit.data, &values, best[k]);
                 try_all(&finer, &mut best);
                 values.extend(finer);
                 values.sort_by(f64::total_cmp);
             }
-            // a jump may also come in mid-visit, and a number lie between those that were tried
-            try_all(&around(&effect.parameters[i], &fit.data, &values, best[k]), &mut best);
         }
     }
     let (gain, size) = found;
@@ -129,8 +149,15 @@ pub(super) fn jumps<'e>(effect: &'e Effect, values: &[f64], data: &Data) -> Vec<
 pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
     if let (Some(variable), Some((_, low, high))) = (p.between, p.shape) {
         let mut all = places(data, variable, false);
-        if all.len() > MOST_PLACES {
+        let most = (MOST_OF_ALL / data.observations.len().max(1)).clamp(MOST_PLACES, 1000);
+        if all.len() > most {
+            // a visit may be long: some places within it, too
+            let every = all.len().div_ceil(most);
+            let within: Vec<f64> = all.iter().copied().skip(every / 2).step_by(every).collect();
             all = places(data, variable, true);
+            all.extend(within);
+            all.sort_by(f64::total_cmp);
+            all.dedup();
         }
         all.retain(|v| (low..=high).contains(v));
         if !all.is_empty() {
@@ -202,6 +229,45 @@ fn places(data: &Data, variable: usize, by_visit: bool) -> Vec<f64> {
     at.sort_by(|a, b| a.0.total_cmp(&b.0));
     let apart = at.windows(2).filter(|w| w[1].0 > w[0].0 && (!by_visit || w[1].1 != w[0].1));
     apart.map(|w| 0.5 * (w[0].0 + w[1].0)).collect()
+}
+
+/// Values of a shape parameter over all of its range, so near to each other that what the effect does at one is nearly what it does at
+/// the next: no value that fits lies unseen between two of them. `does`: whitened columns of the effect's sizes; `n`: touches.
+pub(super) fn fine(p: &Parameter, n: usize, does: &dyn Fn(f64) -> DMatrix<f64>) -> Vec<f64> {
+    /// Before it is looked closer, from one end to the other.
+    const COARSE: usize = 24;
+    /// What two neighbours have in common (mean squared cosine of the principal angles).
+    const ALIKE: f64 = 0.8;
+    /// Touches that are enough to see how alike two values are.
+    const ENOUGH: usize = 1000;
+    let Some((start, low, high)) = p.shape else { return Vec::new() };
+    let middle = |a: f64, b: f64| if low > 0.0 { (a * b).sqrt() } else { 0.5 * (a + b) };
+    let at = |share: f64| if low > 0.0 { low * (high / low).powf(share) } else { low + (high - low) * share };
+    let most = (MOST_OF_ALL / n.max(1)).clamp(3 * COARSE, 1500);
+    let some: Vec<usize> = (0..n).step_by(n.div_ceil(ENOUGH).max(1)).collect();
+    let basis = |value: f64| -> DMatrix<f64> {
+        let a = does(value).select_rows(&some);
+        if a.iter().all(|x| x.is_finite()) { a.qr().q() } else { DMatrix::zeros(a.nrows(), a.ncols()) }
+    };
+    let alike = |a: &DMatrix<f64>, b: &DMatrix<f64>| a.tr_mul(b).norm_squared() / a.ncols().max(1) as f64 > ALIKE;
+    let mut values: Vec<(f64, DMatrix<f64>)> =
+        (0..=COARSE).map(|k| at(k as f64 / COARSE as f64)).map(|v| (v, basis(v))).collect();
+    // stretches that are still to be looked into, the widest first
+    let mut open: std::collections::VecDeque<(usize, usize)> = (1..values.len()).map(|k| (k - 1, k)).collect();
+    while let Some((a, b)) = open.pop_front().filter(|_| values.len() < most) {
+        let value = middle(values[a].0, values[b].0);
+        let own = basis(value);
+        let (left, right) = (alike(&values[a].1, &own), alike(&own, &values[b].1));
+        values.push((value, own));
+        let own = values.len() - 1;
+        if !(left && right) {
+            open.extend([(a, own), (own, b)]);
+        }
+    }
+    let mut values: Vec<f64> = values.into_iter().map(|(v, _)| v).chain(p.scan.iter().copied()).chain([start]).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    values
 }
 
 /// Values of a shape parameter that are tried.

@@ -85,8 +85,8 @@ fn one(
     let says = match (&members[..], &physical[..]) {
         ([], _) => "a combination of many parameters leaves no trace in these touches".to_owned(),
         ([one], [(u, _)]) if u.shape && effects.iter().any(|e| e.id == u.effect && !e.per_block) => format!(
-            "{one} leaves no trace in these touches: its value is not known; it stands where its search begins, at the value of \
-             its range that fits best"
+            "{one} is not told: beside an effect that does not show clearly in these touches there is nothing to tell it by; it \
+             stands where its search begins, at the value of its range that fits best"
         ),
         ([one], _) => format!(
             "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"

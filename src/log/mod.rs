@@ -28,7 +28,7 @@ pub use runs::RunFound;
 pub use swaps::{Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
 
-use crate::axes::{AxisMap, AxisName};
+use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
 use crate::post::{Frame, Postprocessor, digest, log_word};
@@ -208,6 +208,13 @@ pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Resu
         })?;
     }
     Ok(())
+}
+
+/// Where a control shows a touch: the inverse of [`to_axes`].
+#[must_use]
+pub fn as_logged(machine: &Machine, plan: &Plan, touch: &Touch) -> Position {
+    let length = plan.touch(touch.id).and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
+    Frame::new(machine, plan.controller_frame, length).controller_from_axes(&touch.position)
 }
 
 #[cfg(test)]

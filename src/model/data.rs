@@ -74,6 +74,8 @@ pub struct Data {
     pub supposed: Option<Supposed>,
     /// What is to be said of touches that carry no temperature while others do.
     pub temperature_says: Option<String>,
+    /// For each run: the last digit of its log, mm, where all its lengths are multiples of one.
+    pub digits_mm: Vec<Option<f64>>,
 }
 
 /// Why a touch that is far from its place is not used.
@@ -113,6 +115,10 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let mut last_sense = [0.0; 6];
         let mut before = Before::default();
         visits.last = None;
+        let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
+        // a log under the control's transformation has its digits in the coordinates of that; one of axis positions, in those
+        let shown = super::digits::digit_mm(logged.clone().map(|t| crate::log::as_logged(machine, run.plan, t)));
+        data.digits_mm.push(shown.or_else(|| super::digits::digit_mm(logged.map(|t| t.position))));
         data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run));
         for (touch, &temperature_deg_c) in run.touches.iter().zip(&temperatures[index]) {
             let Some(planned) = run.plan.touch(touch.id) else {

@@ -5,6 +5,7 @@ pub mod batch;
 pub mod catalogue;
 mod check;
 pub mod data;
+mod digits;
 pub mod formula;
 pub mod mistake;
 pub mod predict;

@@ -90,6 +90,47 @@ pub(super) struct Writer<'a> {
     of_program: Value,
 }
 
+/// The program names the origin of R in the control's own words: between two of its steps it would be another place than that of the
+/// machine's description, and everything measured would be off by that.
+fn refuse_origin_between_steps(post: &Postprocessor, machine: &Machine) -> Result<()> {
+    const SAME: f64 = 1e-6;
+    let one = 10f64.powi(-i32::try_from(post.number.decimals).unwrap_or(0));
+    let nearest = |axis: AxisName, value: f64| {
+        let step = if axis.is_rotary() { one } else { post.number.mm(one) };
+        (value / step).round() * step
+    };
+    let off: Vec<(AxisName, f64, f64)> = machine
+        .axes
+        .iter()
+        .filter_map(|a| machine.origin.get(a.name).map(|v| (a.name, v, nearest(a.name, v))))
+        .filter(|(_, value, near)| (value - near).abs() > SAME)
+        .collect();
+    if off.is_empty() {
+        return Ok(());
+    }
+    let list = |of: &dyn Fn(&(AxisName, f64, f64)) -> f64| -> String {
+        let each = off.iter().map(|o| {
+            let value = format!("{:.6}", of(o));
+            format!("{} = {}", o.0, value.trim_end_matches('0').trim_end_matches('.'))
+        });
+        each.collect::<Vec<_>>().join(", ")
+    };
+    Err(Failure::new(
+        "post::origin",
+        format!(
+            "the origin of R lies between the steps of controller {}, whose words have {} decimals in {}: {}",
+            post.name,
+            post.number.decimals,
+            match post.number.unit {
+                LengthUnit::Mm => "mm",
+                LengthUnit::Inch => "inch",
+            },
+            list(&|o| o.1)
+        ),
+    )
+    .help(format!("write the nearest place that the control can name into `origin` of machines.toml (mm, deg): {}", list(&|o| o.2))))
+}
+
 /// Under a transformation a turn goes in steps that take X, Y and Z along: a controller may have no way to write the sense of such a step.
 fn refuse_roll_over(post: &Postprocessor, machine: &Machine) -> Result<()> {
     let modulo = post.settings.get("modulo").map_or("", String::as_str);
@@ -107,6 +148,7 @@ fn refuse_roll_over(post: &Postprocessor, machine: &Machine) -> Result<()> {
 
 impl<'a> Writer<'a> {
     fn new(post: &'a Postprocessor, machine: &'a Machine, plan: &'a Plan, path: &'a Path) -> Result<Self> {
+        refuse_origin_between_steps(post, machine)?;
         let frame = Frame::of(machine, plan);
         let mut at = AxisMap::default();
         if frame.is_tcp() {
