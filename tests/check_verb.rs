@@ -490,6 +490,57 @@ fn what_an_inch_control_rounds_is_no_collision() {
     }
 }
 
+/// A log of few digits under the control's transformation: three rounded words of a place may fall on one axis. The program of a sound
+/// machine is written, and what is rounded away is found in the log and counted.
+#[test]
+fn few_digits_under_the_transformation() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (controller, lines) in [
+        ("fanuc", "[log]\ndecimals = 3\nsource = \"ours\"\n"),
+        ("sinumerik", "[log]\ndecimals = 3\nsource = \"ours\"\n"),
+        (
+            "fanuc",
+            "[log]\nunit = \"inch\"\ndecimals = 4\nsource = \"ours\"\n[number]\ndecimals = 4\nsource = \"ours\"\n",
+        ),
+    ] {
+        let file =
+            format!("format = \"axiscal-postprocessor/1\"\nbased_on = \"{controller}\"\nname = \"ours\"\n{lines}");
+        std::fs::write(at.join("ours.toml"), file).unwrap();
+        let common = ["--machine", "trunnion", "--controller", "ours.toml"];
+        let _ = std::fs::remove_dir_all(at.join("out"));
+        axiscal(at)
+            .arg("generate")
+            .args(common)
+            .args(["--program", "basic", "--tcp", "--out", "out"])
+            .assert()
+            .success();
+        std::fs::write(at.join("wrong.toml"), "seed = 11\n[noise]\ntouch_um = 0.7\n").unwrap();
+        let plan = ["--plan", "out/basic.plan.json"];
+        for name in ["run.log", "study.toml"] {
+            let _ = std::fs::remove_file(at.join(name));
+        }
+        axiscal(at)
+            .arg("simulate")
+            .args(common)
+            .args(plan)
+            .args(["--scenario", "wrong.toml", "--out", "run.log"])
+            .assert()
+            .success();
+        let effects =
+            ["--log", "run.log", "--effects", "location-a,location-c,block-setup,pretravel", "--out", "study.toml"];
+        axiscal(at).arg("new").args(common).args(plan).args(effects).assert().success();
+        let run = axiscal(at).args(["diagnose", "study.toml", "--json"]).assert().code(0);
+        let answer: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        assert_eq!(answer["verdict"], "adequate", "{controller} {lines}");
+        axiscal(at)
+            .args(["identify", "study.toml"])
+            .assert()
+            .success()
+            .stdout(predicate::str::contains("that the digits of the log make"));
+    }
+}
+
 /// A shop's own variant of LinuxCNC knows no more transformations than LinuxCNC does.
 #[test]
 fn a_variant_of_linuxcnc_has_its_transformations() {

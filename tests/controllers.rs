@@ -371,6 +371,34 @@ fn machine_coordinates_hold_the_origin_of_r() {
     }
 }
 
+/// Between two steps of a control the origin of R cannot be named: that is said, with the place next to it, which then serves.
+#[test]
+fn an_origin_between_the_steps_of_a_control_is_named() {
+    let inch = "[number]\ndecimals = 4\nsource = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = 4\nsource = \"ours\"\n";
+    let with = |origin: &str| {
+        let text =
+            machine::BUILT_IN.replace("origin = { X = 0.0, Y = 0.0, Z = 0.0, A", &format!("origin = {{ {origin}, A"));
+        let (machines, _) = machine::load(&source("machines", &text)).unwrap();
+        machines.into_iter().find(|m| m.name == "trunnion").unwrap()
+    };
+    for (post, origin, nearest) in [
+        (controller("fanuc"), "X = 1.1234, Y = 0.5, Z = 0.0", "X = 1.123"),
+        (variant("fanuc", inch), "X = 0.1, Y = 0.5, Z = 0.254", "X = 0.09906, Y = 0.50038"),
+    ] {
+        let machine = with(origin);
+        let generated = generated(&machine, "basic", false);
+        let failure = post.program(&machine, &generated.plan, &generated.path).unwrap_err();
+        assert_eq!(failure.0[0].code, "post::origin", "{failure}");
+        assert!(failure.0[0].help.as_deref().unwrap().ends_with(nearest), "{failure}");
+        let machine = with(&if post.number.decimals == 4 {
+            format!("{nearest}, Z = 0.254")
+        } else {
+            format!("{nearest}, Y = 0.5, Z = 0.0")
+        });
+        written(&post, &machine, &generated);
+    }
+}
+
 /// An origin of many digits in every axis makes no line that a control would not take.
 #[test]
 fn an_origin_of_many_digits_fits_the_lines() {

@@ -9,10 +9,12 @@ use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use nalgebra::DVector;
-use std::collections::BTreeMap;
 
 /// A result further off than so many typical sizes is worth a warning by itself.
 const NOT_CREDIBLE: f64 = 300.0;
+
+/// Sides of an interval that differ from the usual one by more than a twentieth are shown.
+const UNEVEN: f64 = 1.05;
 
 /// With more touches a shape parameter is known so well that its doubt is the same on both sides.
 const MOST_PROFILED: usize = 20_000;
@@ -54,9 +56,23 @@ pub(super) fn outcome(
         Some((noise_variance(c).sqrt(), factor(c)))
     };
     let intervals =
-        if shapes_told { profile::intervals(fit, machine, effects, settings, &spread) } else { BTreeMap::new() };
+        if shapes_told { profile::intervals(fit, machine, effects, settings, &spread) } else { Default::default() };
+    let profile::Intervals { ends: intervals, other_values } = intervals;
     // sizes beside a shape that nobody knows
     let runs_along = |i: usize| !fit.model.unknowns[i].shape && intervals.get(&i) == Some(&[None, None]);
+    // a time constant that may as well be endless is none that is told
+    let open = |i: usize| {
+        let ends = intervals.get(&i).filter(|_| fit.model.unknowns[i].shape);
+        ends.filter(|[low, high]| low.is_none() || high.is_none()).copied()
+    };
+    // where a shape may as well have another value, what goes with it by more than its own uncertainty is not told either
+    let goes_with = |c: usize| {
+        const FAR: f64 = 2.0;
+        let i = fit.free[c];
+        let usual = factor(c) * noise_variance(c).sqrt();
+        let far = |end: Option<f64>| end.is_none_or(|end| (end - fit.theta[i]).abs() > FAR * usual);
+        !other_values.is_empty() && intervals.get(&i).is_some_and(|ends| ends.iter().any(|end| far(*end)))
+    };
     let parameters: Vec<Parameter> = (0..fit.theta.len())
         .map(|i| {
             let u = &fit.model.unknowns[i];
@@ -67,7 +83,7 @@ pub(super) fn outcome(
                 None if jump.is_some() => Status::Identified,
                 None if jumps || settings.held.contains(&u.name) => Status::Undetermined,
                 None => Status::Fixed,
-                Some(c) if untold(c) || runs_along(i) => Status::Undetermined,
+                Some(c) if untold(c) || runs_along(i) || open(i).is_some() || goes_with(c) => Status::Undetermined,
                 // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
                 Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
                 _ => Status::Identified,
@@ -75,7 +91,7 @@ pub(super) fn outcome(
             let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
             let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
             let factor = known.map(factor);
-            let expanded = sigma.zip(factor).map(|(s, k)| s * k);
+            let usual = sigma.zip(factor).map(|(s, k)| s * k);
             // any moment between the ends may be it
             let sigma = sigma.or(jump.map(|[low, high]| (high - low) / 12f64.sqrt()));
             // the ends are those of the noise's interval, with all else that is counted
@@ -84,7 +100,9 @@ pub(super) fn outcome(
                 let with = |end: f64| fit.theta[i] + (end - fit.theta[i]).hypot(more).copysign(end - fit.theta[i]);
                 intervals.get(&i).map(|ends| ends.map(|end| end.map(with)))
             });
-            let interval = interval.or(jump.map(|ends| ends.map(Some)));
+            let one_sided = open(i).filter(|ends| *ends != [None, None]);
+            let bare = one_sided.or_else(|| other_values.get(&i).and(intervals.get(&i).copied()));
+            let interval = interval.or(jump.map(|ends| ends.map(Some))).or(bare);
             // an end that the touches do not set is that of the range
             let range = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == u.name).and_then(|p| p.shape);
             let wider = |[low, high]: [Option<f64>; 2]| {
@@ -92,8 +110,12 @@ pub(super) fn outcome(
                 let side = |end: Option<f64>| end.map_or(0.0, |end| (end - fit.theta[i]).abs());
                 side(low).max(side(high))
             };
-            let expanded = interval.map(wider).or(expanded);
-            let interval = interval.filter(|[low, high]| u.shape || uneven(fit.theta[i], *low, *high, sigma, factor));
+            let expanded = interval.filter(|_| bare.is_none()).map(wider).or(usual);
+            // where the likelihood is wider than a line through the solution says, so is the standard uncertainty
+            let by_profile =
+                expanded.zip(factor).filter(|(e, _)| usual.is_some_and(|u| *e > UNEVEN * u)).map(|(e, k)| e / k);
+            let sigma = by_profile.or(sigma);
+            let interval = interval.filter(|[low, high]| u.shape || uneven(fit.theta[i], *low, *high, usual));
             Parameter {
                 name: u.name.clone(),
                 alias: u.alias.clone(),
@@ -165,7 +187,11 @@ pub(super) fn outcome(
         covariance_type_a: None,
         residuals: Some(residuals(fit)),
         warnings: [
-            warnings(fit, machine, effects, solution, chi2_per_dof),
+            warnings(fit, machine, effects, settings, (solution, chi2_per_dof)),
+            other_values
+                .iter()
+                .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
+                .collect(),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
@@ -174,10 +200,22 @@ pub(super) fn outcome(
 }
 
 /// Is an interval other than the value and so many standard uncertainties on either side, by more than a twentieth?
-fn uneven(value: f64, low: Option<f64>, high: Option<f64>, sigma: Option<f64>, factor: Option<f64>) -> bool {
-    const TWENTIETH: f64 = 1.05;
-    let usual = sigma.zip(factor).map_or(f64::INFINITY, |(s, k)| s * k * TWENTIETH);
+fn uneven(value: f64, low: Option<f64>, high: Option<f64>, usual: Option<f64>) -> bool {
+    let usual = usual.map_or(f64::INFINITY, |e| e * UNEVEN);
     low.is_none_or(|low| value - low > usual) || high.is_none_or(|high| high - value > usual)
+}
+
+/// That a shape parameter may as well have other values, in words.
+fn may_be_another(u: &Unknown, value: f64, others: &[f64]) -> String {
+    let shown = |v: f64| format!("{v:.3}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    let others: Vec<String> = others.iter().map(|v| shown(*v)).collect();
+    format!(
+        "{} is not told: {} {} fits best, and {} about as well; what depends on it is as unsure. Touches at more positions would tell, or hold it at what is known of the machine (`value` and `fixed = true` or `sigma`, [model.parameters])",
+        u.name,
+        shown(value),
+        u.unit,
+        others.join(" or ")
+    )
 }
 
 fn residuals(fit: &Fit) -> Vec<Residual> {
@@ -191,7 +229,13 @@ fn residuals(fit: &Fit) -> Vec<Residual> {
     each.collect()
 }
 
-fn warnings(fit: &Fit, machine: &Machine, effects: &[&Effect], solution: &Solution, chi2_per_dof: f64) -> Vec<String> {
+fn warnings(
+    fit: &Fit,
+    machine: &Machine,
+    effects: &[&Effect],
+    settings: &Settings,
+    (solution, chi2_per_dof): (&Solution, f64),
+) -> Vec<String> {
     let mut out = Vec::new();
     if fit.data.observations.iter().all(|o| !o.has_temperature) {
         for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
@@ -255,7 +299,8 @@ fn warnings(fit: &Fit, machine: &Machine, effects: &[&Effect], solution: &Soluti
         ));
     }
     out.extend(fit.noise.contradiction());
-    let contradictions = contradictions::contradictions(fit, machine, effects);
+    out.extend(fit.noise.coarse());
+    let contradictions = contradictions::contradictions(fit, machine, effects, settings);
     // what is stated wrongly is no fault of the model
     let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
     let dof = fit.dof.saturating_sub(contradictions.len());

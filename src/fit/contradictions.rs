@@ -2,7 +2,7 @@
 
 use super::normal::Touches;
 use super::uncertainty::free_covariance;
-use super::{Fit, Knowledge, profile};
+use super::{Fit, Knowledge, Settings, profile};
 use crate::machine::Machine;
 use crate::model::catalogue::Effect;
 use nalgebra::DVector;
@@ -22,12 +22,17 @@ const CONTRADICTS: f64 = 4.0;
 
 /// Priors and held values that the touches contradict: each compared with the estimate without it (a rank-one downdate; of a shape
 /// parameter its likelihood profile), at the scatter that the touches would then have.
-pub(super) fn contradictions(fit: &Fit, machine: &Machine, effects: &[&Effect]) -> Vec<Contradiction> {
+pub(super) fn contradictions(
+    fit: &Fit,
+    machine: &Machine,
+    effects: &[&Effect],
+    settings: &Settings,
+) -> Vec<Contradiction> {
     let scale2 = |falls: f64| ((fit.chi2 - falls).max(0.0) / fit.dof.saturating_sub(1).max(1) as f64).max(1.0);
     let mut out = Vec::new();
     for &(i, stated, sigma) in &fit.priors {
         if fit.model.unknowns[i].shape {
-            out.extend(of_a_shape(fit, machine, effects, (i, stated, sigma), scale2));
+            out.extend(of_a_shape(fit, machine, effects, (i, stated, Some(sigma)), scale2));
             continue;
         }
         let (variance, prior) = (fit.covariance[(i, i)], sigma * sigma);
@@ -55,6 +60,13 @@ pub(super) fn contradictions(fit: &Fit, machine: &Machine, effects: &[&Effect]) 
         }
     }
     out.extend(held_contradictions(fit, scale2));
+    // of shapes only what the user holds: the search holds some by itself
+    let by_search = |name: &String| settings.held.contains(name) || settings.jumps.contains(name);
+    for (i, _) in fit.model.unknowns.iter().enumerate().filter(|(_, u)| u.shape && !by_search(&u.name)) {
+        if let Some(Knowledge::Fixed(stated)) = fit.knowledge[i] {
+            out.extend(of_a_shape(fit, machine, effects, (i, stated, None), scale2));
+        }
+    }
     out
 }
 
@@ -64,7 +76,7 @@ fn of_a_shape(
     fit: &Fit,
     machine: &Machine,
     effects: &[&Effect],
-    (i, stated, sigma): (usize, f64, f64),
+    (i, stated, sigma): (usize, f64, Option<f64>),
     scale2: impl Fn(f64) -> f64 + Copy,
 ) -> Option<Contradiction> {
     let alone = profile::without_prior(fit, machine, effects, i, scale2)?;
@@ -72,14 +84,21 @@ fn of_a_shape(
     let u = &fit.model.unknowns[i];
     let [low, high] = alone.interval;
     let doubt = 0.25 * (high - low);
-    let says = format!(
-        "the touches contradict the prior of {}: it says {stated} ± {sigma} {}, and without it they say {} (95 % between {} and {}; {apart:.0} standard deviations apart); check it, or give it a larger sigma",
-        u.name,
-        u.unit,
+    let (name, unit) = (&u.name, &u.unit);
+    let they = format!(
+        "they say {} (95 % between {} and {}; {apart:.0} standard deviations apart)",
         with_digits(alone.value, doubt),
         with_digits(low, doubt),
         with_digits(high, doubt),
     );
+    let says = match sigma {
+        Some(sigma) => format!(
+            "the touches contradict the prior of {name}: it says {stated} ± {sigma} {unit}, and without it {they}; check it, or give it a larger sigma"
+        ),
+        None => format!(
+            "the touches contradict the held value of {name}: it is held at {stated} {unit}, and if it were free {they}; check it, or let it free"
+        ),
+    };
     (apart > CONTRADICTS).then_some(Contradiction { says, chi2: alone.falls })
 }
 

@@ -302,7 +302,20 @@ fn identify_started(
         white.apply(&mut residual);
         residual.norm_squared()
     };
-    let mut fit = if misfit(&low) <= misfit(&high) { low } else { high };
+    // what the user says of it counts, too
+    let known = settings.knowledge.iter().find(|(word, _)| crate::symbols::same(word, &name)).map(|(_, k)| *k);
+    let against = |end: f64| match known {
+        Some(Knowledge::Prior { value, sigma }) => ((end - value) / sigma).powi(2),
+        _ => 0.0,
+    };
+    let lower = misfit(&low) + against(ends_of[0]) <= misfit(&high) + against(ends_of[1]);
+    let mut fit = if lower { low } else { high };
+    if let Some(Knowledge::Prior { value, sigma }) = known {
+        fit.outcome.warnings.push(format!(
+            "{name} ran out of its range in the search beside its prior of {value} ± {sigma}: touches and prior do not agree, or its range is too narrow; it stands at the end of its range that fits both better"
+        ));
+        return Ok(fit);
+    }
     fit.outcome.warnings.push(format!("{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"));
     Ok(fit)
 }

@@ -244,6 +244,18 @@ impl Noise {
         ))
     }
 
+    /// What digits too few make of the answer, in words.
+    #[must_use]
+    pub fn coarse(&self) -> Option<String> {
+        let own2 = self.sigma_mm * self.sigma_mm - self.rounding_mm * self.rounding_mm;
+        (self.rounding_mm * self.rounding_mm > own2).then(|| {
+            format!(
+                "the digits of the log take away {:.2} um, more than the touches' own noise: that is the same wherever a place is touched again, so that uncertainties may be too small and a pattern be seen that is none; let the program write more decimals",
+                um_from_mm(self.rounding_mm)
+            )
+        })
+    }
+
     /// χ²/dof above this says that the model fails, whatever σ is taken: with a stated σ that repeats do not bear out quite,
     /// what the repeats say counts too.
     #[must_use]

@@ -34,6 +34,34 @@ const NEARLY: f64 = 8.0;
 /// So many places behind one that the touches contradict are looked at before the rest counts as contradicted.
 const LOOKED_AHEAD: usize = 40;
 
+/// What the profiles say, by index among the unknowns.
+#[derive(Debug, Default)]
+pub struct Intervals {
+    /// 95 % intervals of shape parameters and of what depends on them, in their units.
+    pub ends: BTreeMap<usize, [Option<f64>; 2]>,
+    /// Other values of a shape parameter, apart from its own, that fit about as well: nobody knows which it is.
+    pub other_values: BTreeMap<usize, Vec<f64>>,
+}
+
+/// The best of so many values is better by chance, as χ² falls.
+fn by_chance(tried: usize) -> f64 {
+    2.0 * (tried.max(1) as f64).ln()
+}
+
+/// Some of the values that fit best, each with its χ²; those that are next to a better one are the same.
+fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
+    const SHOWN: usize = 3;
+    const SAME: f64 = 0.02;
+    values.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut out: Vec<f64> = Vec::new();
+    for (value, _) in values {
+        if out.len() < SHOWN && out.iter().all(|o| (o - value).abs() > SAME * value.abs()) {
+            out.push(value);
+        }
+    }
+    out
+}
+
 /// 95 % intervals of shape parameters and of the sizes beside them, by index among the unknowns, in their units; an end is none
 /// where the touches set none within the range of the shape. `spread`: standard uncertainty and t-factor of a free unknown at
 /// the solution. `settings`: which shapes the search holds.
@@ -44,8 +72,8 @@ pub fn intervals(
     effects: &[&Effect],
     settings: &Settings,
     spread: &dyn Fn(usize) -> Option<(f64, f64)>,
-) -> BTreeMap<usize, [Option<f64>; 2]> {
-    let mut out = BTreeMap::new();
+) -> Intervals {
+    let mut out = Intervals::default();
     for effect in effects.iter().filter(|e| !e.per_block) {
         for p in effect.parameters.iter().filter(|p| p.shape.is_some()) {
             let Some(unknown) = fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == p.name)
@@ -62,22 +90,26 @@ pub fn intervals(
             let Some(profile) = Profile::new(fit, &trials, effect, unknown) else { continue };
             let Some((_, low, high)) = p.shape else { continue };
             if jumps {
-                out.insert(unknown, profile.ends_of_a_jump(&shapes::stretches_of_a_jump(p, &fit.data)));
+                out.ends.insert(unknown, profile.ends_of_a_jump(&shapes::stretches_of_a_jump(p, &fit.data)));
                 continue;
             }
             // a shape that the touches do not tell may be any of those that were tried
             let (places, tried) = match spread(unknown).filter(|_| free) {
                 Some(of) => {
                     let ends = profile.ends(of, [low, high]);
-                    let beyond = profile.beyond(&profile.all_places(p), ends, of.1 * of.1);
-                    out.insert(unknown, hull(ends, &beyond));
+                    let all = profile.all_places(p);
+                    let beyond = profile.beyond(&all, ends, of.1 * of.1 + by_chance(all.len()));
+                    let at: Vec<f64> = beyond.iter().map(|b| b.0).collect();
+                    out.ends.insert(unknown, hull(ends, &at));
+                    let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
+                    let tried = if beyond.is_empty() { 1 } else { all.len() };
                     if !beyond.is_empty() {
                         // another value altogether: then everything else may be otherwise, too
-                        profile.widen_others(&beyond, spread, &mut out);
+                        profile.widen_others(&at, tried, spread, &mut out.ends);
+                        out.other_values.insert(unknown, best_of(beyond));
                     }
-                    let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
-                    places.extend(beyond);
-                    (places, 1)
+                    places.extend(at);
+                    (places, tried)
                 }
                 None => {
                     let mut places = profile.all_places(p);
@@ -86,9 +118,9 @@ pub fn intervals(
                     (places, n)
                 }
             };
-            profile.widen(&places, tried, spread, &mut out);
+            profile.widen(&places, tried, spread, &mut out.ends);
             if !free {
-                profile.size_runs_along([low, high], spread, &mut out);
+                profile.size_runs_along([low, high], spread, &mut out.ends);
             }
         }
     }
@@ -371,29 +403,28 @@ impl<'a> Profile<'a> {
         shapes::fine(p, self.fit.data.observations.len(), &|at| self.does(at).0)
     }
 
-    /// Values beyond the ends of the first crossing that the touches allow as well.
-    fn beyond(&self, places: &[f64], [low, high]: [Option<f64>; 2], growth: f64) -> Vec<f64> {
-        let outside = |at: &f64| low.is_some_and(|low| *at < low) || high.is_some_and(|high| *at > high);
-        // between two values that were tried the best one may lie
-        let near = |at: f64| self.held(at).growth;
-        let all: Vec<f64> = places.iter().copied().filter(outside).collect();
-        let growths: Vec<f64> = all.iter().map(|&at| near(at)).collect();
+    /// Values beyond the ends of the first crossing that the touches allow as well, with by how much χ² is higher there.
+    fn beyond(&self, places: &[f64], [low, high]: [Option<f64>; 2], growth: f64) -> Vec<(f64, f64)> {
+        let outside = |at: f64| low.is_some_and(|low| at < low) || high.is_some_and(|high| at > high);
+        let growth_at = |at: f64| self.held(at).growth;
+        let growths: Vec<f64> = places.iter().map(|&at| growth_at(at)).collect();
+        let neighbour = |by: usize| growths.get(by).copied().unwrap_or(f64::INFINITY);
         let mut out = Vec::new();
-        for k in 0..all.len() {
-            let neighbour = |by: usize| growths.get(by).copied().unwrap_or(f64::INFINITY);
+        for k in 0..places.len() {
+            // a value that is worse than the one beside it belongs to that one
             let lowest = growths[k] <= neighbour(k.wrapping_sub(1)) && growths[k] <= neighbour(k + 1);
-            if growths[k] < growth {
-                out.push(all[k]);
-            } else if lowest && growths[k] < NEARLY * growth {
-                let (mut from, mut to) = (all[k.saturating_sub(1)], all[(k + 1).min(all.len() - 1)]);
-                for _ in 0..HALVINGS {
-                    let third = (to - from) / 3.0;
-                    if near(from + third) < near(to - third) { to -= third } else { from += third }
-                }
-                let best = 0.5 * (from + to);
-                if near(best) < growth && outside(&best) {
-                    out.push(best);
-                }
+            if !lowest || growths[k] >= NEARLY * growth {
+                continue;
+            }
+            let (mut from, mut to) = (places[k.saturating_sub(1)], places[(k + 1).min(places.len() - 1)]);
+            for _ in 0..HALVINGS {
+                let third = (to - from) / 3.0;
+                if growth_at(from + third) < growth_at(to - third) { to -= third } else { from += third }
+            }
+            let best = 0.5 * (from + to);
+            let least = growth_at(best);
+            if least < growth && outside(best) {
+                out.push((best, least));
             }
         }
         out
@@ -403,17 +434,19 @@ impl<'a> Profile<'a> {
     fn widen_others(
         &self,
         places: &[f64],
+        tried: usize,
         spread: &dyn Fn(usize) -> Option<(f64, f64)>,
         out: &mut BTreeMap<usize, [Option<f64>; 2]>,
     ) {
+        let chance = by_chance(tried);
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         for (r, &unknown) in self.rest.iter().enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
             let value = self.fit.theta[unknown];
             let [mut low, mut high] = [value - k * sigma, value + k * sigma];
-            for h in held.iter().filter(|h| h.growth < k * k) {
+            for h in held.iter().filter(|h| h.growth < k * k + chance) {
                 let Some((at, sigma)) = h.others.get(r) else { continue };
-                let room = (k * k - h.growth).sqrt();
+                let room = (k * k + chance - h.growth).sqrt().min(k);
                 (low, high) = (low.min(at - sigma * room), high.max(at + sigma * room));
             }
             out.insert(unknown, [Some(low), Some(high)]);
@@ -428,8 +461,7 @@ impl<'a> Profile<'a> {
         spread: &dyn Fn(usize) -> Option<(f64, f64)>,
         out: &mut BTreeMap<usize, [Option<f64>; 2]>,
     ) {
-        // the best of many places is better by chance
-        let chance = 2.0 * (tried as f64).ln();
+        let chance = by_chance(tried);
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         let lowest = held.iter().map(|h| h.growth).fold(0.0, f64::min);
         for (c, (&i, &unknown)) in self.sizes.iter().zip(&self.unknowns).enumerate() {

@@ -21,6 +21,13 @@ const MOST_PLACES: usize = 120;
 /// Values that are tried, times touches: more takes longer than a user waits.
 const MOST_OF_ALL: usize = 1_500_000;
 
+/// What of an effect the rest of the model could not do as well: with less of it (as a share of the variance) the rest of the model only
+/// trades with it, and a size that would show would be thirty times what it does.
+const LEAST_OWN: f64 = 1e-3;
+
+/// Shapes that nobody has listed count where their sizes are no more than so many times the typical ones.
+const CREDIBLE: f64 = 50.0;
+
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
 const LEAST_GAIN: f64 = 9.0;
 
@@ -69,7 +76,7 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
         let eigen = scaled.symmetric_eigen();
         let (mut gain, mut step) = (0.0, DVector::zeros(sizes.len()));
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > 1e-6 {
+            if *value > LEAST_OWN {
                 let along = vector.dot(&rhs);
                 gain += along * along / value;
                 step -= vector * (along / value);
@@ -79,27 +86,34 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
     };
     let mut best: Vec<f64> =
         shaped.iter().map(|&i| effect.parameters[i].shape.map_or(0.0, |(start, _, _)| start)).collect();
+    // touches on a grid all but stand still in a wave that is as short as its steps: it then follows where each was made, its noise too,
+    // with an amplitude as large as the wave is long
+    let credible = |size: &DVector<f64>| {
+        sizes.iter().zip(size.iter()).all(|(&i, v)| v.abs() < CREDIBLE * effect.parameters[i].typical)
+    };
     let mut found = judge(&best);
+    let mut usual = best.clone();
     // one after another, twice: shapes of one effect are few
     for _ in 0..if shaped.len() > 1 { 2 } else { 1 } {
         for (k, &i) in shaped.iter().enumerate() {
+            let p = &effect.parameters[i];
+            let common = scan(p, &fit.data).unwrap_or_else(|| tried(p));
             let mut try_all = |values: &[f64], best: &mut Vec<f64>| {
                 for &value in values {
                     let mut shapes = best.clone();
                     shapes[k] = value;
                     let now = judge(&shapes);
-                    if now.0 > found.0 {
+                    if now.0 > found.0 && (common.contains(&value) || credible(&now.1)) {
                         *best = shapes;
                         found = now;
                     }
                 }
             };
-            let p = &effect.parameters[i];
             if p.between.is_some() {
                 // a jump may also come in mid-visit
-                let values = scan(p, &fit.data).unwrap_or_else(|| tried(p));
-                try_all(&values, &mut best);
-                try_all(&around(p, &fit.data, &values, best[k]), &mut best);
+                try_all(&common, &mut best);
+                try_all(&around(p, &fit.data, &common, best[k]), &mut best);
+                usual[k] = best[k];
                 continue;
             }
             let others = best.clone();
@@ -108,6 +122,15 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
                 shapes[k] = value;
                 does(&shapes)
             };
+            // the usual values first: they stand where nothing shows
+            try_all(&common, &mut best);
+            let mut values = common.clone();
+            let finer = between(&values);
+            try_all(&finer, &mut best);
+            values.extend(finer);
+            values.sort_by(f64::total_cmp);
+            try_all(&around(p, &fit.data, &values, best[k]), &mut best);
+            usual[k] = best[k];
             let mut values = fine(p, n, &at);
             try_all(&values, &mut best);
             for _ in 0..2 {
@@ -121,6 +144,7 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
     }
     let (gain, size) = found;
     let shown = gain > LEAST_GAIN * effect.parameters.len() as f64;
+    let best = if shown { best } else { usual };
     let mut values = vec![0.0; effect.parameters.len()];
     shaped.iter().zip(&best).for_each(|(&i, v)| values[i] = *v);
     if shown {
@@ -264,7 +288,8 @@ pub(super) fn fine(p: &Parameter, n: usize, does: &dyn Fn(f64) -> DMatrix<f64>) 
             open.extend([(a, own), (own, b)]);
         }
     }
-    let mut values: Vec<f64> = values.into_iter().map(|(v, _)| v).chain(p.scan.iter().copied()).chain([start]).collect();
+    let mut values: Vec<f64> =
+        values.into_iter().map(|(v, _)| v).chain(p.scan.iter().copied()).chain([start]).collect();
     values.sort_by(f64::total_cmp);
     values.dedup();
     values

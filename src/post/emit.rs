@@ -128,7 +128,10 @@ fn refuse_origin_between_steps(post: &Postprocessor, machine: &Machine) -> Resul
             list(&|o| o.1)
         ),
     )
-    .help(format!("write the nearest place that the control can name into `origin` of machines.toml (mm, deg): {}", list(&|o| o.2))))
+    .help(format!(
+        "write the nearest place that the control can name into `origin` of machines.toml (mm, deg): {}",
+        list(&|o| o.2)
+    )))
 }
 
 /// Under a transformation a turn goes in steps that take X, Y and Z along: a controller may have no way to write the sense of such a step.

@@ -222,9 +222,16 @@ fn uneven(results: &[&Parameter]) -> String {
                 }
                 format!("{} to {}", shown(low), with_unit(shown(high), &p.unit))
             }
-            (Some(low), None) => format!("{} or more", with_unit(shown(low), &p.unit)),
-            (None, Some(high)) => format!("{} or less", with_unit(shown(high), &p.unit)),
-            (None, None) => "anything in its range".to_owned(),
+            // an end that the touches do not set: more than that they do not tell
+            (Some(low), None) => {
+                out += &format!("{}: {} or more with 95 %\n", p.name, with_unit(significant(low), &p.unit));
+                continue;
+            }
+            (None, Some(high)) => {
+                out += &format!("{}: {} or less with 95 %\n", p.name, with_unit(significant(high), &p.unit));
+                continue;
+            }
+            (None, None) => continue,
         };
         out += &format!("{}: {says} with 95 %; the wider side stands in the table\n", p.name);
     }
