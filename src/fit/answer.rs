@@ -16,6 +16,9 @@ const NOT_CREDIBLE: f64 = 300.0;
 /// Sides of an interval that differ from the usual one by more than a twentieth are shown.
 const UNEVEN: f64 = 1.05;
 
+/// And one that is wider by this is no longer that of a standard uncertainty that holds near the solution.
+const MUCH_WIDER: f64 = 1.5;
+
 /// With more touches a shape parameter is known so well that its doubt is the same on both sides.
 const MOST_PROFILED: usize = 20_000;
 
@@ -111,9 +114,9 @@ pub(super) fn outcome(
                 side(low).max(side(high))
             };
             let expanded = interval.filter(|_| bare.is_none()).map(wider).or(usual);
-            // where the likelihood is wider than a line through the solution says, so is the standard uncertainty
+            // where the likelihood is much wider than a line through the solution says, so is the standard uncertainty
             let by_profile =
-                expanded.zip(factor).filter(|(e, _)| usual.is_some_and(|u| *e > UNEVEN * u)).map(|(e, k)| e / k);
+                expanded.zip(factor).filter(|(e, _)| usual.is_some_and(|u| *e > MUCH_WIDER * u)).map(|(e, k)| e / k);
             let sigma = by_profile.or(sigma);
             let interval = interval.filter(|[low, high]| u.shape || uneven(fit.theta[i], *low, *high, usual));
             Parameter {
