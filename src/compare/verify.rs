@@ -322,6 +322,31 @@ mod tests {
         verify((b, figures), (a, figures), Question::Change, true)
     }
 
+    /// Readings that are better while the model after fails prove no compensation, and its errors accuse no sign.
+    #[test]
+    fn what_the_model_after_does_not_explain_proves_nothing() {
+        let (before, after) = (outcome(&[9.0, 1.0], &NAMES[..2]), outcome(&[0.0, 20.0], &NAMES[..2]));
+        let figures = |rms, explained| Figures {
+            readings_rms_um: rms,
+            readings_dof: 300,
+            fit_rms_um: 1.0,
+            noise_um: 1.0,
+            explained,
+        };
+        let says = |explained| {
+            let answer = verify(
+                (&before, figures(20.0, true)),
+                (&after, figures(10.0, explained)),
+                Question::Compensation,
+                true,
+            );
+            assert_eq!(answer.verdict, Verdict::Improved);
+            let accuses = answer.remarks.iter().any(|r| r.contains("EZ0B is larger than before"));
+            (answer.says.starts_with("the compensation works"), accuses)
+        };
+        assert_eq!((says(true), says(false)), ((true, true), (false, false)));
+    }
+
     #[test]
     fn equal_machines_are_said_to_have_changed_in_five_of_a_hundred_pairs() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(31);
