@@ -75,7 +75,8 @@ pub fn inch_from_mm(mm: f64) -> f64 {
     mm / 25.4
 }
 
-/// A number as messages show it: with an exponent where its digits would fill the line.
+/// A number as messages show it: with an exponent where its digits would fill the line, and without the last ones of a sum
+/// (61.7, not 61.69999999999999).
 #[derive(Debug, Clone, Copy)]
 pub struct Plain(pub f64);
 
@@ -84,6 +85,8 @@ impl std::fmt::Display for Plain {
         let size = self.0.abs();
         if size.is_finite() && size != 0.0 && !(1e-9..=1e9).contains(&size) {
             write!(f, "{:e}", self.0)
+        } else if (1e-3..1e6).contains(&size) {
+            write!(f, "{}", (self.0 * 1e9).round() / 1e9)
         } else {
             write!(f, "{}", self.0)
         }
@@ -99,5 +102,21 @@ mod tests {
         assert_eq!(um_from_mm(mm_from_um(1.5)), 1.5);
         assert!((deg_from_rad(rad_from_deg(33.0)) - 33.0).abs() < 1e-13);
         assert_eq!(hours_from_s(1800.0), 0.5);
+    }
+
+    #[test]
+    fn numbers_are_shown_without_the_dirt_of_a_sum() {
+        for (value, shown) in [
+            (0.1 + 0.2, "0.3"),
+            (61.69999999999999, "61.7"),
+            (-500.0, "-500"),
+            (1e-12, "1e-12"),
+            (2e-5, "0.00002"),
+            (0.0, "0"),
+            (1e300, "1e300"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(Plain(value).to_string(), shown);
+        }
     }
 }

@@ -9,24 +9,22 @@ use std::ops::Range;
 
 const HELP: &str = "add --plan NAME.plan.json, the plan that was written with it";
 
-/// Why a program cannot be judged without its plan: its coordinates are not axis positions, or it waits for a person between two
-/// touches, who may mount something else. `trunk`: its whole run, where nothing goes wrong.
-pub fn reason(dialect: DialectName, code: &Code, trunk: &[Happened], source: &Source) -> Option<Failure> {
-    let refuse = |says: &str, at: Range<usize>| -> Failure {
-        Finding::error("check::needs_plan", says).help(HELP).at(source, at).into()
-    };
-    if let Some(at) = transformation(dialect, code, source.inner()) {
-        return Some(refuse(
-            "from here on its coordinates are those of the control's own transformation: where the axes stand, and what they may meet, only its plan says",
-            at,
-        ));
-    }
-    stop(trunk).map(|at| {
-        refuse(
-            "here the program waits, between two touches, for a person who mounts something else: what stands on the machine from then on only its plan says",
-            at,
-        )
-    })
+fn refuse(says: &str, at: Range<usize>, source: &Source) -> Failure {
+    Finding::error("check::needs_plan", says).help(HELP).at(source, at).into()
+}
+
+/// Refuses a program whose coordinates are not axis positions.
+pub fn transforms(dialect: DialectName, code: &Code, source: &Source) -> Option<Failure> {
+    let at = transformation(dialect, code, source.inner())?;
+    let says = "from here on its coordinates are those of the control's own transformation: where the axes stand, and what they may meet, only its plan says";
+    Some(refuse(says, at, source))
+}
+
+/// Refuses a program that waits for a person between two touches, who may mount something else. `trunk`: its whole run, where
+/// nothing goes wrong.
+pub fn waits(trunk: &[Happened], source: &Source) -> Option<Failure> {
+    let says = "here the program waits, between two touches, for a person who mounts something else: what stands on the machine from then on only its plan says";
+    Some(refuse(says, stop(trunk)?, source))
 }
 
 /// Where a program goes over to the control's own transformation.

@@ -20,6 +20,7 @@ use crate::program::heights::Lift;
 use crate::program::plan::{ControllerFrame, Plan};
 use crate::program::scene::Scene;
 use crate::program::sweep::Manner;
+use crate::units::Plain;
 use nalgebra::Vector3;
 use proofs::{How, Key, Proof};
 use rayon::prelude::*;
@@ -263,8 +264,8 @@ impl<'a, 'b> Walk<'a, 'b> {
                     "{} = {:.3} is outside the range of the axis ({} to {}, machine coordinates)",
                     axis.name,
                     value + origin,
-                    low + origin,
-                    high + origin
+                    Plain(low + origin),
+                    Plain(high + origin)
                 );
                 self.say("check::limit", at, says, "");
             }
@@ -303,7 +304,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             self.say(
                 "check::feed",
                 at,
-                format!("the feed is {feed} mm/min, the machine's position_feed is {most}"),
+                format!("the feed is {} mm/min, the machine's position_feed is {}", Plain(feed), Plain(most)),
                 "",
             );
         }

@@ -35,6 +35,7 @@ use crate::post::Postprocessor;
 use crate::program::plan::{ControllerFrame, Plan, Proof};
 use crate::program::scene::Scene;
 use crate::simulate::Errorless;
+use crate::units::Plain;
 use judge::Case;
 use run::Event;
 use std::sync::{Arc, OnceLock};
@@ -156,6 +157,8 @@ fn without_plan(
     against: &Against<'_>,
     program: &runs::Program,
 ) -> Result<Checked> {
+    // the text alone shows it: there is nothing to run
+    program.transforms(source).map_or(Ok(()), Err)?;
     let named = against.mounting.map(|name| {
         machine.mounting(name).ok_or_else(|| {
             let there: Vec<&str> = machine.mountings.iter().map(|m| m.name.as_str()).collect();
@@ -209,9 +212,9 @@ fn parts_of_plan(machine: &Machine, plan: &Plan) -> Result<Vec<Part>> {
                     .help("plan and machine belong together: make the plan again")
             };
             Ok(Part {
-                machine: machine
-                    .with_stylus_of(length_mm, radius_mm)
-                    .ok_or_else(|| lacks(format!("a stylus of {length_mm} mm with a ball of radius {radius_mm} mm")))?,
+                machine: machine.with_stylus_of(length_mm, radius_mm).ok_or_else(|| {
+                    lacks(format!("a stylus of {} mm with a ball of radius {} mm", Plain(length_mm), Plain(radius_mm)))
+                })?,
                 mounting: machine.mounting(name).ok_or_else(|| lacks(format!("mounting {name:?}")))?.clone(),
             })
         })
@@ -238,9 +241,7 @@ fn with_parts(
     let first = told.runs.first();
     if against.plan.is_none() {
         let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
-        if let Some(failure) = program.blind(trunk, source) {
-            return Err(failure);
-        }
+        program.waits_for_a_mounting(trunk, source).map_or(Ok(()), Err)?;
     }
     // what the control rounds, and under a transformation what the rounding of three words does
     // a search that is a way along a vector: begin, way and end are rounded each

@@ -64,9 +64,14 @@ impl Program {
         self.dialect == DialectName::Klartext
     }
 
-    /// Why it cannot be judged without its plan.
-    pub fn blind(&self, trunk: &[Happened], source: &Source) -> Option<Failure> {
-        blind::reason(self.dialect, &self.code, trunk, source)
+    /// Where it goes over to the control's own transformation: it cannot be judged without its plan.
+    pub fn transforms(&self, source: &Source) -> Option<Failure> {
+        blind::transforms(self.dialect, &self.code, source)
+    }
+
+    /// Where it waits for a person between two touches: it cannot be judged without its plan.
+    pub fn waits_for_a_mounting(&self, trunk: &[Happened], source: &Source) -> Option<Failure> {
+        blind::waits(trunk, source)
     }
 
     /// The set-up at which it is told to begin.

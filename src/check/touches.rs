@@ -7,6 +7,7 @@ use crate::axes::{AxisMap, Position};
 use crate::log;
 use crate::post::digest;
 use crate::program::plan::{ControllerFrame, PlanTouch};
+use crate::units::Plain;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -151,7 +152,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
         if first && made.search.1 > case.machine.probe.slow_feed + case.same {
             let says = format!(
                 "touch {id}: the first touch of a block must search at slow_feed ({} mm/min)",
-                case.machine.probe.slow_feed
+                Plain(case.machine.probe.slow_feed)
             );
             said.say(case, "check::feed", &place, says, "");
         }
@@ -329,7 +330,10 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
                 near(&places[1], &planned.end_position()),
                 "the measuring touch does not end at the plan's end".into(),
             );
-            need((feed - slow).abs() <= case.same, format!("it measures at {feed} mm/min, the plan has {slow}"));
+            need(
+                (feed - slow).abs() <= case.same,
+                format!("it measures at {} mm/min, the plan has {}", Plain(*feed), Plain(slow)),
+            );
             need(!overridden, "the feed override acts on the measuring touch".into());
             let back = (places[0].xyz_mm() - contact.xyz_mm()).norm();
             need(
@@ -351,7 +355,7 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
         let wanted = (planned.spindle_deg.unwrap_or(0.0) * case.machine.tool.spindle_sense).rem_euclid(360.0);
         let found = made.spindle_deg.map(|d| d.rem_euclid(360.0));
         let off = found.map_or(360.0, |f| (f - wanted).abs());
-        need(off.min(360.0 - off) <= case.same, format!("the spindle is not oriented to {wanted} deg"));
+        need(off.min(360.0 - off) <= case.same, format!("the spindle is not oriented to {} deg", Plain(wanted)));
     }
     says
 }

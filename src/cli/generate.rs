@@ -143,7 +143,7 @@ pub(super) fn prove(
         let mut findings = checked.findings;
         findings.push(
             Finding::error("check::refused", format!("{name} cannot be proven safe: no file was written"))
-                .help("a template of the postprocessor file was changed? otherwise report it with machine, program and postprocessor"),
+                .help("the findings above say where: look there in the templates of a postprocessor file of your own; with a built-in controller it is a fault of axiscal: report it with machines.toml, program and controller"),
         );
         return Err(Failure(findings));
     }

@@ -4,6 +4,7 @@ use super::explain::{Remedy, Results, part};
 use super::habits::{Habit, habits};
 use super::record::{Advice, Assessment, Expected, FORMAT, Seen};
 use super::score;
+use super::shapes::shapes;
 use super::view::{Noise, Planned, Task, View};
 use crate::diag::Result;
 use crate::fit::solve::observe;
@@ -117,6 +118,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         });
     }
     let mut parameters = parameters;
+    let of_shapes = shapes(task, &view, &mut parameters);
     for p in &mut parameters {
         let equal = effects
             .iter()
@@ -146,7 +148,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         alias_pairs: pairs.len(),
         advice,
         compared: Vec::new(),
-        warnings: view.left_out.iter().map(|(_, says)| says.clone()).collect(),
+        warnings: view.left_out.iter().map(|(_, says)| says.clone()).chain(of_shapes).collect(),
     };
     (out.score, out.says) = score::of(&out, task);
     Ok(out)

@@ -12,6 +12,7 @@ pub mod next;
 pub mod questions;
 pub mod record;
 mod score;
+mod shapes;
 pub mod vary;
 pub mod view;
 

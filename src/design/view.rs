@@ -1,10 +1,11 @@
-//! A plan linearised at an errorless machine: the whitened columns of a model and of every effect that it leaves out.
+//! A plan linearised at an errorless machine (a time constant or a pitch where its effect has its typical size): the whitened columns of a model and of every effect that it leaves out.
 
 use crate::axes::AxisName;
 use crate::diag::{Failure, Result};
 use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
+use crate::fit::{design_jacobian, free_in_a_design};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -13,7 +14,7 @@ use crate::model::predict::Model;
 use crate::program::plan::{Plan, PlanTouch};
 use crate::search::{Basis, KEPT, Library, Origin, without_rounding};
 use crate::units::um_from_mm;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use std::collections::{BTreeMap, HashSet};
 
 /// A touch with its way there, s, where a plan does not predict its times.
@@ -247,11 +248,9 @@ impl View {
                 .help("is it a plan for this machine, and does it touch any block?"));
         }
         let model = Model::new(task.machine, &task.effects, &data.set_ups, task.reference);
-        let is_held = |name: &str| task.held.iter().any(|h| crate::symbols::same(h, name));
-        let free: Vec<usize> = (0..model.n_unknowns()).filter(|&i| !is_held(&model.unknowns[i].name)).collect();
-        let start = DVector::from_iterator(free.len(), free.iter().map(|&i| model.unknowns[i].start));
+        let free = free_in_a_design(&model, &task.effects, &task.held);
         let touched = whitening(&model, &data, &free, noise, |t| {
-            let mut jacobian = t.unwhitened(&start).1;
+            let mut jacobian = design_jacobian(t, &model, &free);
             t.whiten(&mut jacobian);
             jacobian
         });
@@ -344,7 +343,7 @@ impl View {
     }
 
     /// Columns whitened: touches only, what is known beside them has no part in it.
-    fn whitened(&self, plain: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(super) fn whitened(&self, plain: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.data.nominal.len();
         let mut touched = plain.rows(0, n).into_owned();
         whitening(&self.model, &self.data, &self.free, self.noise, |t| t.whiten(&mut touched));

@@ -9,6 +9,7 @@ use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use nalgebra::DVector;
+use std::collections::BTreeMap;
 
 /// A result further off than so many typical sizes is worth a warning by itself.
 const NOT_CREDIBLE: f64 = 300.0;
@@ -19,9 +20,13 @@ const UNEVEN: f64 = 1.05;
 /// And one that is wider by this is no longer that of a standard uncertainty that holds near the solution.
 const MUCH_WIDER: f64 = 1.5;
 
+/// Other values of a shape parameter that are named.
+const NAMED: usize = 3;
+
 /// With more touches a shape parameter is known so well that its doubt is the same on both sides.
 const MOST_PROFILED: usize = 20_000;
 
+/// The answer, and other values of shape parameters that fit about as well, by unknown.
 pub(super) fn outcome(
     fit: &Fit,
     machine: &Machine,
@@ -30,7 +35,7 @@ pub(super) fn outcome(
     settings: &Settings,
     (solution, condition): (&Solution, f64),
     type_b: &[TypeB],
-) -> Outcome {
+) -> (Outcome, BTreeMap<usize, Vec<f64>>) {
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
@@ -152,7 +157,7 @@ pub(super) fn outcome(
         let o = &fit.data.observations[i];
         Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
     });
-    Outcome {
+    let outcome = Outcome {
         format: FORMAT.into(),
         machine: machine.name.clone(),
         effects: settings.effects.clone(),
@@ -199,7 +204,8 @@ pub(super) fn outcome(
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
         .concat(),
-    }
+    };
+    (outcome, other_values)
 }
 
 /// Is an interval other than the value and so many standard uncertainties on either side, by more than a twentieth?
@@ -211,7 +217,7 @@ fn uneven(value: f64, low: Option<f64>, high: Option<f64>, usual: Option<f64>) -
 /// That a shape parameter may as well have other values, in words.
 fn may_be_another(u: &Unknown, value: f64, others: &[f64]) -> String {
     let shown = |v: f64| format!("{v:.3}").trim_end_matches('0').trim_end_matches('.').to_owned();
-    let others: Vec<String> = others.iter().map(|v| shown(*v)).collect();
+    let others: Vec<String> = others.iter().take(NAMED).map(|v| shown(*v)).collect();
     format!(
         "{} is not told: {} {} fits best, and {} about as well; what depends on it is as unsure. Touches at more positions would tell, or hold it at what is known of the machine (`value` and `fixed = true` or `sigma`, [model.parameters])",
         u.name,

@@ -22,6 +22,7 @@ mod search;
 pub mod shapes;
 pub mod snoop;
 pub mod solve;
+mod starts;
 pub mod statement;
 mod type_b;
 pub mod uncertainty;
@@ -29,8 +30,9 @@ mod weak;
 pub mod whitening;
 
 pub use knowledge::effects_of;
-pub use rank::{held_first, observe_plan};
-pub use shapes::{around, between, scan, start_shapes};
+pub use rank::{design_jacobian, free_in_a_design, held_first, observe_plan};
+pub use shapes::{around, between, fine, scan, start_shapes};
+pub use starts::identify_data;
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
@@ -133,6 +135,8 @@ pub struct Fit {
     pub noise: Noise,
     /// How many touches a robust fit finds off the rest, where they are too many to be left out on its word.
     pub strangers_beyond: Option<usize>,
+    /// Other values of shape parameters that fit about as well, the best first, by unknown.
+    pub other_values: BTreeMap<usize, Vec<f64>>,
     /// χ² of the touches and priors.
     pub chi2: f64,
     /// Degrees of freedom.
@@ -194,130 +198,6 @@ impl Fit {
 pub fn identify(machine: &Machine, catalogue: &Catalogue, runs: &[Run], settings: &Settings) -> Result<Fit> {
     let data = assemble(machine, runs);
     identify_data(machine, catalogue, data, settings)
-}
-
-/// Fits a model to assembled data.
-///
-/// # Errors
-/// As [`identify`].
-pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
-    let effects = effects_of(&settings.effects, catalogue, machine)?;
-    let mut starts = BTreeMap::new();
-    let shaped = effects.iter().copied().filter(|e| !e.per_block && e.parameters.iter().any(|p| p.shape.is_some()));
-    let unseen = look_for((machine, catalogue), shaped.collect(), &data, settings, &mut starts)?;
-    let fit = identify_started(machine, catalogue, &effects, data, settings, &starts)?;
-    // what an effect changes from one visit to the next is scatter of the visits to a fit without it, which then hardly sees it:
-    // where less scatter is left beside it, that is what it is judged by
-    let Some(unseen) = unseen.filter(|u| fit.noise.tau_mm < u.tau_mm) else { return Ok(fit) };
-    let calm = Settings { visit_sigma_mm: Some(fit.noise.tau_mm), ..settings.clone() };
-    let n_unseen = unseen.effects.len();
-    let still = look_for((machine, catalogue), unseen.effects, &fit.data, &calm, &mut starts)?;
-    if still.is_some_and(|s| s.effects.len() == n_unseen) {
-        return Ok(fit);
-    }
-    identify_started(machine, catalogue, &effects, fit.data, settings, &starts)
-}
-
-/// Effects with shape parameters that the data does not show, and with which scatter of index visits, mm.
-struct Unseen<'e> {
-    effects: Vec<&'e Effect>,
-    tau_mm: f64,
-}
-
-/// Where the search begins for effects with shape parameters, by name of the unknown, beside the fit of everything else; what
-/// the data does not show is handed back.
-fn look_for<'e>(
-    (machine, catalogue): (&Machine, &Catalogue),
-    shaped: Vec<&'e Effect>,
-    data: &Data,
-    settings: &Settings,
-    starts: &mut BTreeMap<String, f64>,
-) -> Result<Option<Unseen<'e>>> {
-    if shaped.is_empty() || data.observations.is_empty() {
-        return Ok(None);
-    }
-    let base = shapes::without(settings, &shaped);
-    let others = effects_of(&base.effects, catalogue, machine)?;
-    let fit = identify_started(machine, catalogue, &others, data.clone(), &base, starts)?;
-    let mut unseen = Unseen { effects: Vec::new(), tau_mm: fit.noise.tau_mm };
-    for effect in shaped {
-        let Some(start) = shapes::start_shapes(&fit, machine, effect) else { continue };
-        starts.extend(effect.parameters.iter().zip(start.values).map(|(p, v)| (p.name.clone(), v)));
-        if !start.shown {
-            unseen.effects.push(effect);
-        }
-    }
-    Ok(Some(unseen).filter(|u| !u.effects.is_empty()))
-}
-
-/// Fits a model from given starts: where something jumps, and what runs out of its range, is held.
-fn identify_started(
-    machine: &Machine,
-    catalogue: &Catalogue,
-    effects: &[&Effect],
-    data: Data,
-    settings: &Settings,
-    starts: &BTreeMap<String, f64>,
-) -> Result<Fit> {
-    let mut held_settings = settings.clone();
-    for effect in effects.iter().filter(|e| starts.contains_key(&e.parameters[0].name)) {
-        let values: Vec<f64> = effect.parameters.iter().map(|p| starts.get(&p.name).copied().unwrap_or(0.0)).collect();
-        // what the data does not show has no place to be held at
-        if effect.parameters.iter().zip(&values).all(|(p, v)| p.shape.is_some() || *v == 0.0) {
-            continue;
-        }
-        for (name, value) in shapes::jumps(effect, &values, &data) {
-            if !held_settings.knowledge.contains_key(name) {
-                held_settings.knowledge.insert(name.to_owned(), Knowledge::Fixed(value));
-                held_settings.jumps.push(name.to_owned());
-            }
-        }
-    }
-    let fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;
-    let Some((name, ends_of)) = shapes::out_of_range(&fit, catalogue, machine) else { return Ok(fit) };
-    // a first step too far: everything else settles while the shape stays where it began, and the search goes on from there
-    let mut fit = fit;
-    if let Some(&began) = starts.get(&name) {
-        let mut waiting = Settings { quick: true, ..held_settings.clone() };
-        waiting.knowledge.insert(name.clone(), Knowledge::Fixed(began));
-        let settled = identify_from(machine, catalogue, effects, fit.data, &waiting, starts)?;
-        let values = settled.model.unknowns.iter().zip(settled.theta.iter()).map(|(u, v)| (u.name.clone(), *v));
-        let from: BTreeMap<String, f64> = values.collect();
-        fit = identify_from(machine, catalogue, effects, settled.data, &held_settings, &from)?;
-        if shapes::out_of_range(&fit, catalogue, machine).is_none() {
-            return Ok(fit);
-        }
-    }
-    // a step too far says nothing of the side: the end that fits better
-    held_settings.held.push(name.clone());
-    let mut held_at = |end: f64| {
-        held_settings.knowledge.insert(name.clone(), Knowledge::Fixed(end));
-        identify_from(machine, catalogue, effects, fit.data.clone(), &held_settings, starts)
-    };
-    let [low, high] = [held_at(ends_of[0])?, held_at(ends_of[1])?];
-    // by one measure: the smaller scatter of visits hides less
-    let white = low.whitening(low.noise.tau_mm.min(high.noise.tau_mm));
-    let misfit = |f: &Fit| {
-        let mut residual = DMatrix::from_column_slice(f.residual_mm.len(), 1, &f.residual_mm);
-        white.apply(&mut residual);
-        residual.norm_squared()
-    };
-    // what the user says of it counts, too
-    let known = settings.knowledge.iter().find(|(word, _)| crate::symbols::same(word, &name)).map(|(_, k)| *k);
-    let against = |end: f64| match known {
-        Some(Knowledge::Prior { value, sigma }) => ((end - value) / sigma).powi(2),
-        _ => 0.0,
-    };
-    let lower = misfit(&low) + against(ends_of[0]) <= misfit(&high) + against(ends_of[1]);
-    let mut fit = if lower { low } else { high };
-    if let Some(Knowledge::Prior { value, sigma }) = known {
-        fit.outcome.warnings.push(format!(
-            "{name} ran out of its range in the search beside its prior of {value} ± {sigma}: touches and prior do not agree, or its range is too narrow; it stands at the end of its range that fits both better"
-        ));
-        return Ok(fit);
-    }
-    fit.outcome.warnings.push(format!("{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"));
-    Ok(fit)
 }
 
 /// What a formula may depend on that is not the same in two visits of one pose.
@@ -464,14 +344,17 @@ fn identify_from(
         type_b: Vec::new(),
         noise,
         strangers_beyond,
+        other_values: BTreeMap::new(),
         chi2,
         dof,
         outcome: Outcome::default(),
     };
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
-    fit.outcome = answer::outcome(&fit, machine, catalogue, effects, settings, (&solution, condition), &type_b);
-    fit.outcome.warnings.extend(unknown_masks);
+    let (mut outcome, other_values) =
+        answer::outcome(&fit, machine, catalogue, effects, settings, (&solution, condition), &type_b);
+    outcome.warnings.extend(unknown_masks);
+    (fit.outcome, fit.other_values) = (outcome, other_values);
     Ok(fit)
 }
 

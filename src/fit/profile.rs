@@ -50,12 +50,12 @@ fn by_chance(tried: usize) -> f64 {
 
 /// Some of the values that fit best, each with its χ²; those that are next to a better one are the same.
 fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
-    const SHOWN: usize = 3;
+    const KEPT: usize = 12;
     const SAME: f64 = 0.02;
     values.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut out: Vec<f64> = Vec::new();
     for (value, _) in values {
-        if out.len() < SHOWN && out.iter().all(|o| (o - value).abs() > SAME * value.abs()) {
+        if out.len() < KEPT && out.iter().all(|o| (o - value).abs() > SAME * value.abs()) {
             out.push(value);
         }
     }
@@ -197,6 +197,16 @@ fn hull([low, high]: [Option<f64>; 2], places: &[f64]) -> [Option<f64>; 2] {
     let least = places.iter().copied().fold(f64::INFINITY, f64::min);
     let most = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     [low.map(|low| low.min(least)), high.map(|high| high.max(most))]
+}
+
+/// The interval of a value, its standard uncertainty and t-factor, with those that it has beside other values of a shape: there
+/// with a factor of their own.
+fn with_all((value, sigma, k): (f64, f64, f64), beside: impl Iterator<Item = ((f64, f64), f64)>) -> [Option<f64>; 2] {
+    let [mut low, mut high] = [value - k * sigma, value + k * sigma];
+    for ((at, sigma), k) in beside {
+        (low, high) = (low.min(at - sigma * k), high.max(at + sigma * k));
+    }
+    [Some(low), Some(high)]
 }
 
 /// Places from one end to the other, by equal factors where both are above 0.
@@ -442,14 +452,11 @@ impl<'a> Profile<'a> {
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         for (r, &unknown) in self.rest.iter().enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
-            let value = self.fit.theta[unknown];
-            let [mut low, mut high] = [value - k * sigma, value + k * sigma];
-            for h in held.iter().filter(|h| h.growth < k * k + chance) {
-                let Some((at, sigma)) = h.others.get(r) else { continue };
-                let room = (k * k + chance - h.growth).sqrt().min(k);
-                (low, high) = (low.min(at - sigma * room), high.max(at + sigma * room));
-            }
-            out.insert(unknown, [Some(low), Some(high)]);
+            let beside = held.iter().filter_map(|h| {
+                let room = k * k + chance - h.growth;
+                h.others.get(r).filter(|_| room > 0.0).map(|of| (*of, room.sqrt().min(k)))
+            });
+            out.insert(unknown, with_all((self.fit.theta[unknown], sigma, k), beside));
         }
     }
 
@@ -466,15 +473,11 @@ impl<'a> Profile<'a> {
         let lowest = held.iter().map(|h| h.growth).fold(0.0, f64::min);
         for (c, (&i, &unknown)) in self.sizes.iter().zip(&self.unknowns).enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
-            let value = self.values[i];
-            let [mut low, mut high] = [value - k * sigma, value + k * sigma];
-            for h in &held {
+            let beside = held.iter().filter_map(|h| {
                 let room = k * k + chance - (h.growth - lowest);
-                if let Some((at, sigma)) = h.sizes.get(c).filter(|_| room > 0.0) {
-                    (low, high) = (low.min(at - sigma * room.sqrt()), high.max(at + sigma * room.sqrt()));
-                }
-            }
-            out.insert(unknown, [Some(low), Some(high)]);
+                h.sizes.get(c).filter(|_| room > 0.0).map(|of| (*of, room.sqrt()))
+            });
+            out.insert(unknown, with_all((self.values[i], sigma, k), beside));
         }
     }
 }

@@ -4,7 +4,7 @@ use super::normal::{Prior, Touches};
 use super::{effects_of, solve};
 use crate::diag::Result;
 use crate::machine::Machine;
-use crate::model::catalogue::Catalogue;
+use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
 use crate::model::predict::Model;
 use nalgebra::{DMatrix, DVector};
@@ -91,4 +91,41 @@ pub fn observe_plan(
     let free: Vec<usize> = (0..theta.len()).collect();
     let seen = observe_nominal(&model, data, &theta, &free, &[], None).0;
     Ok((model, seen))
+}
+
+/// The unknowns that a search will follow on planned touches: not those that are held, and not a moment at which something
+/// jumps, which is found by trying all places between touches.
+#[must_use]
+pub fn free_in_a_design(model: &Model, effects: &[&Effect], held: &[String]) -> Vec<usize> {
+    let is_held = |name: &str| held.iter().any(|h| crate::symbols::same(h, name));
+    let jumps = |name: &str| {
+        let mut shared = effects.iter().filter(|e| !e.per_block).flat_map(|e| &e.parameters);
+        shared.any(|p| p.name == name && p.between.is_some())
+    };
+    let of = |i: &usize| !is_held(&model.unknowns[*i].name) && !jumps(&model.unknowns[*i].name);
+    (0..model.n_unknowns()).filter(of).collect()
+}
+
+/// Jacobian of touches that are only planned, mm per unit, before whitening: at an errorless machine, but a shape parameter
+/// (a time constant, a pitch) where its effect has its typical size. Without a size nothing depends on its shape. Only the
+/// shape's own column is taken there: errors of the machine must not make a combination look seen.
+#[must_use]
+pub fn design_jacobian(touches: &Touches, model: &Model, free: &[usize]) -> DMatrix<f64> {
+    let start = DVector::from_iterator(free.len(), free.iter().map(|&i| model.unknowns[i].start));
+    let mut jacobian = touches.unwhitened(&start).1;
+    let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
+    if !shapes.is_empty() {
+        let mut shown = start;
+        for (c, &i) in free.iter().enumerate() {
+            let u = &model.unknowns[i];
+            if !u.shape && shapes.iter().any(|&s| model.unknowns[free[s]].effect == u.effect) {
+                shown[c] = u.typical;
+            }
+        }
+        let there = touches.unwhitened(&shown).1;
+        for c in shapes {
+            jacobian.set_column(c, &there.column(c));
+        }
+    }
+    jacobian
 }

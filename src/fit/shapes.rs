@@ -257,7 +257,8 @@ fn places(data: &Data, variable: usize, by_visit: bool) -> Vec<f64> {
 
 /// Values of a shape parameter over all of its range, so near to each other that what the effect does at one is nearly what it does at
 /// the next: no value that fits lies unseen between two of them. `does`: whitened columns of the effect's sizes; `n`: touches.
-pub(super) fn fine(p: &Parameter, n: usize, does: &dyn Fn(f64) -> DMatrix<f64>) -> Vec<f64> {
+#[must_use]
+pub fn fine(p: &Parameter, n: usize, does: &dyn Fn(f64) -> DMatrix<f64>) -> Vec<f64> {
     /// Before it is looked closer, from one end to the other.
     const COARSE: usize = 24;
     /// What two neighbours have in common (mean squared cosine of the principal angles).

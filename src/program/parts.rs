@@ -6,6 +6,7 @@ use super::plan::PlanBlock;
 use super::spec::{At, ProgramSpec};
 use crate::diag::Finding;
 use crate::machine::{Machine, Mounting, Stylus};
+use crate::units::Plain;
 use std::collections::BTreeSet;
 
 /// What a stage writes for the probe's own stylus.
@@ -121,9 +122,9 @@ impl<'a> Part<'a> {
     pub fn probe_says(&self) -> String {
         format!(
             "ball {} mm across, stem {} mm, {} mm from the pivot or gauge line to the ball's centre",
-            2.0 * self.machine.probe.ball_radius,
-            self.machine.probe.stem_length,
-            self.machine.tool.length_mm
+            Plain(2.0 * self.machine.probe.ball_radius),
+            Plain(self.machine.probe.stem_length),
+            Plain(self.machine.tool.length_mm)
         )
     }
 }

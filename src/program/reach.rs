@@ -6,6 +6,7 @@ use super::scene::Scene;
 use super::sweep::Manner;
 use crate::axes::Position;
 use crate::machine::Carrier;
+use crate::units::Plain;
 
 /// A search ends at least this far past the placement tolerance, mm: a block at the very limit must still be met.
 const PAST_TOLERANCE_MM: f64 = 0.1;
@@ -101,8 +102,8 @@ impl Scene<'_> {
                     "{} = {:.3} {unit} is outside the range of the axis ({} to {}, machine coordinates)",
                     axis.name,
                     value + origin,
-                    low + origin,
-                    high + origin,
+                    Plain(low + origin),
+                    Plain(high + origin),
                 ));
             }
         }

@@ -4,6 +4,7 @@
 use super::path::Step;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::machine::Machine;
+use crate::units::Plain;
 
 /// Angles that differ by less are the same, deg.
 const SAME: f64 = 1e-9;
@@ -29,9 +30,10 @@ pub(super) fn turns(
             let before = target - sense * overshoot_deg;
             (low..=high).contains(&before).then_some(before).ok_or_else(|| {
                 format!(
-                    "{name} cannot come to {target} deg with {} angles: its range ends at {}",
+                    "{name} cannot come to {} deg with {} angles: its range ends at {}",
+                    Plain(target),
                     if sense > 0.0 { "rising" } else { "falling" },
-                    if sense > 0.0 { low } else { high },
+                    Plain(if sense > 0.0 { low } else { high }),
                 )
             })
         };

@@ -11,6 +11,7 @@ use super::sweep::Manner;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
 use crate::machine::{Axis, Machine};
+use crate::units::Plain;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -39,7 +40,7 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
     let parts: Vec<(&String, f64, f64)> = std::iter::once(first).chain(stops).collect();
     let machines = parts.iter().map(|(_, length_mm, radius_mm)| {
         machine.with_stylus_of(*length_mm, *radius_mm).ok_or_else(|| {
-            let what = format!("a stylus of {length_mm} mm with a ball of radius {radius_mm} mm");
+            let what = format!("a stylus of {} mm with a ball of radius {} mm", Plain(*length_mm), Plain(*radius_mm));
             not_this_machine("program::unknown_stylus", &what, machine)
         })
     });

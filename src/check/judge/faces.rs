@@ -6,6 +6,7 @@ use crate::axes::{AxisName, Position};
 use crate::check::run::Probe;
 use crate::check::touches::Made;
 use crate::program::sweep::Manner;
+use crate::units::Plain;
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -61,8 +62,11 @@ impl Walk<'_, '_> {
         let mut bounded = [false; 6];
         moving.iter().for_each(|a| bounded[a.index()] = true);
         if probe.feed > machine.position_feed + self.case.same {
-            let says =
-                format!("it probes at {} mm/min, the machine's position_feed is {}", probe.feed, machine.position_feed);
+            let says = format!(
+                "it probes at {} mm/min, the machine's position_feed is {}",
+                Plain(probe.feed),
+                Plain(machine.position_feed)
+            );
             self.say("check::feed", at, says, "");
         }
         if moving.iter().any(|a| a.is_rotary()) {
@@ -167,7 +171,8 @@ impl Walk<'_, '_> {
             self.say("check::overtravel", at, says, "");
         }
         if feed > probe.fast_feed + self.case.same {
-            let says = format!("it searches at {feed} mm/min, the machine's fast_feed is {}", probe.fast_feed);
+            let says =
+                format!("it searches at {} mm/min, the machine's fast_feed is {}", Plain(feed), Plain(probe.fast_feed));
             self.say("check::feed", at, says, "");
         }
     }
