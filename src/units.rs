@@ -75,6 +75,14 @@ pub fn inch_from_mm(mm: f64) -> f64 {
     mm / 25.4
 }
 
+/// A number with so many significant digits, and no more zeros than needed.
+#[must_use]
+pub fn significant(x: f64, digits: i32) -> String {
+    let magnitude = if x == 0.0 || !x.is_finite() { 0 } else { x.abs().log10().floor() as i32 };
+    let text = format!("{x:.*}", usize::try_from((digits - 1 - magnitude).clamp(0, 12)).unwrap_or(0));
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// A number as messages show it: with an exponent where its digits would fill the line, and without the last ones of a sum
 /// (61.7, not 61.69999999999999).
 #[derive(Debug, Clone, Copy)]
@@ -85,8 +93,10 @@ impl std::fmt::Display for Plain {
         let size = self.0.abs();
         if size.is_finite() && size != 0.0 && !(1e-9..=1e9).contains(&size) {
             write!(f, "{:e}", self.0)
-        } else if (1e-3..1e6).contains(&size) {
-            write!(f, "{}", (self.0 * 1e9).round() / 1e9)
+        } else if (1e-3..1e9).contains(&size) {
+            // what is larger has fewer digits behind the point
+            let per = if size < 1e6 { 1e9 } else { 1e6 };
+            write!(f, "{}", (self.0 * per).round() / per)
         } else {
             write!(f, "{}", self.0)
         }
@@ -105,6 +115,20 @@ mod tests {
     }
 
     #[test]
+    fn significant_digits() {
+        for (value, digits, shown) in [
+            (10.0494, 4, "10.05"),
+            (0.00041236, 3, "0.000412"),
+            (-3.1, 3, "-3.1"),
+            (1234.5, 3, "1234"),
+            (0.0, 4, "0"),
+            (f64::INFINITY, 3, "inf"),
+        ] {
+            assert_eq!(significant(value, digits), shown);
+        }
+    }
+
+    #[test]
     fn numbers_are_shown_without_the_dirt_of_a_sum() {
         for (value, shown) in [
             (0.1 + 0.2, "0.3"),
@@ -114,6 +138,7 @@ mod tests {
             (2e-5, "0.00002"),
             (0.0, "0"),
             (1e300, "1e300"),
+            (11_300_002.799_999_999, "11300002.8"),
             (f64::NAN, "NaN"),
         ] {
             assert_eq!(Plain(value).to_string(), shown);

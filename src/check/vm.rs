@@ -3,6 +3,7 @@
 use super::seconds::Clock;
 use super::world::World;
 use crate::axes::{AxisName, Position};
+use crate::units::Plain;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -241,7 +242,7 @@ impl Vm {
                 return Err(format!("the machine has no axis {axis}"));
             }
             if !value.is_finite() || value.abs() > 1e6 {
-                return Err(format!("{axis} is sent to {value}"));
+                return Err(format!("{axis} is sent to {}", Plain(value)));
             }
         }
         Ok(())

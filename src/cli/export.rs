@@ -15,6 +15,7 @@ use crate::tables::compensation::{Compensation, Provenance};
 use crate::tables::control::{self, backup, backup::Old};
 use crate::tables::correction::Correction;
 use crate::tables::linuxcnc::{self, Export, Left, Options, ini::UserIni};
+use crate::units::Plain;
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -84,7 +85,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if !(args.radius.is_finite() && args.radius > 0.0 && args.radius <= 1e5) {
         return Err(Failure::new(
             "export::radius",
-            format!("--radius {:e} mm is no radius of a workpiece", args.radius),
+            format!("--radius {} mm is no radius of a workpiece", Plain(args.radius)),
         )
         .help("write the distance from the rotary axis in mm, up to 100000"));
     }
@@ -108,8 +109,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         Some(date) => date.clone(),
         None => newest_log(&loaded),
     };
-    judged(&loaded, &fit, &settings, args, io)?;
-    let correction = correction(&loaded, &fit, active.as_ref(), date, io)?;
+    let forced: Vec<String> = judged(&loaded, &fit, &settings, args, io)?.into_iter().collect();
+    let provenance = provenance(&loaded, date, forced);
+    let correction = correction(&loaded, &fit, active.as_ref(), provenance, io)?;
     if let Some((name, tables)) = &post {
         return control(&loaded, name, tables, (&correction, &fit.outcome.undetermined), args, io);
     }
@@ -133,8 +135,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     Ok(Answer::Done)
 }
 
-/// A model that does not fit must not become a compensation: what is missing stands in the wrong parameters.
-fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io) -> Result<()> {
+/// A model that does not fit must not become a compensation: what is missing stands in the wrong parameters. Where it is forced
+/// all the same: what speaks against it.
+fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io) -> Result<Option<String>> {
     let settings = Settings { quick: true, ..settings.clone() };
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit };
     let options = diagnose::Options { at_most: 1, refit: false, power: false, ..diagnose::Options::default() };
@@ -143,7 +146,7 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
         Verdict::TooLittleData if found.most_missed => {
             ("too-little-data", "most touches cannot be used, and the rest is no sample of the machine".to_owned())
         }
-        Verdict::Adequate | Verdict::TooLittleData => return Ok(()),
+        Verdict::Adequate | Verdict::TooLittleData => return Ok(None),
         Verdict::MissingEffect => {
             let named = found.candidates.first().map_or_else(String::new, |c| format!(" (first: {})", c.effect));
             ("missing-effect", format!("an effect is missing from the model{named}"))
@@ -159,13 +162,25 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
     )
     .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
     if args.force {
+        let says = finding.message.clone();
         io.report(&[Finding { severity: crate::diag::Severity::Warning, help: None, ..finding }]);
-        return Ok(());
+        return Ok(Some(says));
     }
     Err(finding.into())
 }
 
-fn correction(loaded: &Loaded, fit: &Fit, active: Option<&Compensation>, date: String, io: &Io) -> Result<Correction> {
+fn provenance(loaded: &Loaded, data_date: String, forced: Vec<String>) -> Provenance {
+    let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    Provenance { study, study_sha256: loaded.sha256.clone(), data_date, forced }
+}
+
+fn correction(
+    loaded: &Loaded,
+    fit: &Fit,
+    active: Option<&Compensation>,
+    provenance: Provenance,
+    io: &Io,
+) -> Result<Correction> {
     if !fit.outcome.converged {
         return Err(Failure::new(
             "export::not_converged",
@@ -181,8 +196,6 @@ fn correction(loaded: &Loaded, fit: &Fit, active: Option<&Compensation>, date: S
                     again before this is loaded";
         io.report(&[Finding::info("export::holds", says).help(help)]);
     }
-    let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let provenance = Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date };
     let (correction, findings) =
         Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, loaded.during(active), provenance)?;
     io.report(&findings.0);

@@ -72,7 +72,8 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
 
 fn correction(loaded: &Loaded, fit: &Fit, date: &str) -> std::result::Result<Correction, String> {
     let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let provenance = Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date.to_owned() };
+    let provenance =
+        Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date.to_owned(), forced: Vec::new() };
     if !fit.outcome.converged {
         return Err(format!("the fit did not converge: {}", fit.outcome.stopped));
     }

@@ -6,193 +6,302 @@
 
 use super::record::Expected;
 use super::view::{Task, View};
+use crate::diag::{Failure, Result};
 use crate::fit::candidates::{Trials, Variant};
-use crate::fit::fine;
+use crate::fit::whitening::Whitening;
+use crate::fit::{all_tried, fine, jumps_in_a_design};
 use crate::model::catalogue::{Effect, Parameter};
-use crate::model::predict::Model;
-use crate::search::Basis;
-use nalgebra::{DMatrix, DVector};
+use crate::model::data::Data;
+use crate::model::predict::{Model, Unknown};
+use crate::search::{Basis, without_rounding};
+use crate::units::significant;
+use nalgebra::{DMatrix, DVector, Dyn, SVD};
+use std::collections::BTreeMap;
 
 /// χ² grows by this much at the ends of a 95 % interval.
 const GROWTH_95: f64 = 3.841;
 
-/// Other values that are named.
+/// Other values that are named, and with how many digits.
 const NAMED: usize = 3;
+const DIGITS: i32 = 4;
 
-/// What is said of the shape parameters of a model; those that will not be told, and the sizes that are others beside another
-/// value, lose their uncertainty in `expected`.
+/// Choices of signs of the typical sizes that are tried.
+const MOST_SIGNS: usize = 4;
+
+/// What is said of the shape parameters of a model; those that will not be told, and what is another beside another value, lose
+/// their uncertainty in `expected`.
 pub(super) fn shapes(task: &Task, view: &View, expected: &mut [Expected]) -> Vec<String> {
     let shared = task.effects.iter().filter(|e| !e.per_block);
-    let shaped = shared.flat_map(|e| e.parameters.iter().filter(|p| p.shape.is_some()).map(move |p| (*e, p)));
+    let shaped = shared.flat_map(|e| e.parameters.iter().filter_map(move |p| Some((*e, p, p.shape?))));
     let mut out = Vec::new();
-    for (effect, p) in shaped {
-        let is = |i: &usize| view.model.unknowns[*i].effect == effect.id && view.model.unknowns[*i].name == p.name;
-        if !view.free.iter().any(is) {
-            out.extend(p.between.map(|_| {
-                format!(
-                    "{} ({}) will be found by trying every place between the touches: how well it will be told depends on how large the jump is, and the rest is what is expected where it is known",
-                    p.name, effect.name
-                )
-            }));
+    for (effect, p, (start, low, high)) in shaped {
+        let is = |u: &Unknown| u.effect == effect.id && u.name == p.name;
+        let Some(unknown) = view.model.unknowns.iter().position(is) else { continue };
+        if !view.free.contains(&unknown) {
+            if !task.held.iter().any(|h| crate::symbols::same(h, &p.name)) {
+                out.push(format!(
+                    "{} ({}) will be found by trying every place between the touches: how well it will be told depends on how large the jump is, and the rest is what is expected where it is known to be {}",
+                    p.name,
+                    effect.name,
+                    with_unit(&significant(view.theta[unknown], DIGITS), &p.unit)
+                ));
+            }
             continue;
         }
-        let Some((start, low, high)) = p.shape else { continue };
-        let tried = Tried::new(task, view, effect, p, start);
         let looked_at = format!(
             "{} ({}) is looked at where it is {} and {} has its typical sizes",
             p.name,
             effect.name,
-            with_unit(&shown(start), &p.unit),
+            with_unit(&significant(start, DIGITS), &p.unit),
             effect.id
         );
-        let row = |name: &str| expected.iter().position(|x| x.effect == effect.id && x.name == name);
-        let told = row(&p.name).is_some_and(|r| expected[r].sigma.is_some());
-        let others = if told { tried.others() } else { Others::default() };
+        let row = expected.iter().position(|x| x.effect == effect.id && x.name == p.name);
+        let told = row.is_some_and(|r| expected[r].sigma.is_some());
+        let others = if told { others(task, view, effect, p, start) } else { Others::default() };
         let what = match (&others.values[..], others.open) {
             _ if !told => "there it leaves no trace, and of other values nothing is said here".to_owned(),
             ([], None) => "how well it will be told, and what goes with it, depends on both".to_owned(),
             ([], Some(upwards)) => format!(
-                "there these touches will not tell it from any value {} {}",
+                "there these touches may not tell it from any value {} {}",
                 if upwards { "up to" } else { "down to" },
-                with_unit(&shown(if upwards { high } else { low }), &p.unit)
+                with_unit(&significant(if upwards { high } else { low }, DIGITS), &p.unit)
             ),
             (values, _) => {
-                let values: Vec<String> = values.iter().map(|v| shown(*v)).collect();
+                let values: Vec<String> = values.iter().map(|v| significant(*v, DIGITS)).collect();
                 format!(
-                    "there these touches will not tell it from {}: touches at more positions would, or hold it at what is known of the machine",
+                    "there these touches may not tell it from {}: touches at more positions would, or hold it at what is known of the machine",
                     with_unit(&values.join(" or "), &p.unit)
                 )
             }
         };
-        out.push(format!("{looked_at}: {what}"));
-        if !others.values.is_empty() || others.open.is_some() {
-            let lost = others.far_sizes(expected, &tried).into_iter().chain(row(&p.name));
-            for r in lost.collect::<Vec<_>>() {
-                let x = &mut expected[r];
-                (x.sigma, x.sigma_with_visits, x.sigma_with_unmodelled) = (None, None, None);
-            }
+        let mut lost = if others.any() { others.lost(expected) } else { Vec::new() };
+        lost.extend(row.filter(|_| others.any()));
+        let also: Vec<&str> = lost.iter().filter(|r| Some(**r) != row).map(|&r| expected[r].name.as_str()).collect();
+        let also = if also.is_empty() { String::new() } else { format!("; with it go {}", also.join(", ")) };
+        out.push(format!("{looked_at}: {what}{also}"));
+        for r in lost {
+            let x = &mut expected[r];
+            (x.sigma, x.sigma_with_visits, x.sigma_with_unmodelled) = (None, None, None);
         }
     }
     out
-}
-
-fn shown(value: f64) -> String {
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 fn with_unit(number: &str, unit: &str) -> String {
     if unit == "1" { number.to_owned() } else { format!("{number} {unit}") }
 }
 
-/// Values of a shape parameter, each against the effect with the typical sizes at its start.
-struct Tried<'a> {
-    effect: &'a Effect,
-    /// Names of the sizes with their typical values.
-    sizes: Vec<(String, f64)>,
-    start: f64,
-    /// Values over the range, in order, with what the effect does at each: beside what the rest of the model follows.
-    places: Vec<(f64, DMatrix<f64>)>,
-    /// What it does at the start with its typical sizes.
-    signal: DVector<f64>,
-}
-
-/// Values beside the start that these touches cannot tell from it.
+/// Values beside the start that these touches may not tell from it.
 #[derive(Default)]
 struct Others {
-    /// Apart from it, with a better one between neither: the nearest in what they do first.
+    /// Apart from it, with a worse one between: those that come nearest in what they do first.
     values: Vec<f64>,
     /// Nothing tells it from any value up to the upper (`true`) or the lower end of the range.
     open: Option<bool>,
-    /// The effect's sizes at all those values.
-    sizes: Vec<DVector<f64>>,
+    /// How far each unknown goes with it at most, by name.
+    goes: BTreeMap<String, f64>,
 }
 
 impl Others {
-    /// Rows of sizes that are others there, by more than twice what their interval is.
-    fn far_sizes(&self, expected: &[Expected], tried: &Tried) -> Vec<usize> {
-        const FAR: f64 = 2.0 * 1.96;
-        let own = tried.sizes.iter().enumerate().filter_map(|(k, (name, typical))| {
-            let r = expected.iter().position(|x| x.effect == tried.effect.id && x.name == *name)?;
-            let sigma = expected[r].sigma_with_visits.or(expected[r].sigma)?;
-            self.sizes.iter().any(|s| (s[k] - typical).abs() > FAR * sigma).then_some(r)
-        });
-        own.collect()
+    fn any(&self) -> bool {
+        !self.values.is_empty() || self.open.is_some()
+    }
+
+    /// Rows that go with it by more than their own interval.
+    fn lost(&self, expected: &[Expected]) -> Vec<usize> {
+        const FAR: f64 = 1.96;
+        let far = |x: &Expected| {
+            let goes = self.goes.get(&x.name).copied().unwrap_or(0.0);
+            x.sigma_with_visits.or(x.sigma).is_some_and(|sigma| goes > FAR * sigma)
+        };
+        (0..expected.len()).filter(|&r| far(&expected[r])).collect()
     }
 }
 
-impl<'a> Tried<'a> {
-    fn new(task: &Task, view: &View, effect: &'a Effect, p: &Parameter, start: f64) -> Self {
-        let model = Model::new(task.machine, &[effect], &view.data.set_ups, task.reference);
-        let trials = Trials::of(&model, &view.data.nominal);
-        let shaped = || effect.parameters.iter().filter(|p| p.shape.is_some());
-        let starts: Vec<f64> = shaped().filter_map(|p| p.shape.map(|s| s.0)).collect();
-        let which = shaped().position(|q| q.name == p.name).unwrap_or(0);
-        let own: Vec<usize> = (0..model.n_unknowns()).filter(|&i| !model.unknowns[i].shape).collect();
-        let does = |value: f64| -> DMatrix<f64> {
-            let mut shapes = starts.clone();
-            shapes[which] = value;
-            let all = trials.columns(&Variant { effects: vec![0], shapes });
-            view.whitened(&all.values.select_columns(&own))
-        };
-        let others = (0..view.free.len()).filter(|&c| view.model.unknowns[view.free[c]].effect != effect.id);
-        let base = Basis::new(&view.jacobian.select_columns(&others.collect::<Vec<_>>()));
-        let sizes: Vec<(String, f64)> =
-            own.iter().map(|&i| (model.unknowns[i].name.clone(), model.unknowns[i].typical)).collect();
-        let typical = DVector::from_iterator(sizes.len(), sizes.iter().map(|s| s.1));
-        let values = fine(p, view.n_touches(), &does);
-        Self {
-            signal: base.project(&(does(start) * typical)),
-            places: values.into_iter().map(|v| (v, base.project_columns(&does(v)))).collect(),
-            effect,
-            sizes,
-            start,
-        }
-    }
+/// Could noise bring χ² there below a limit? What is expected scatters by twice its root.
+fn may_be_below(growth: f64, limit: f64) -> bool {
+    growth - 2.0 * growth.sqrt() < limit
+}
 
-    /// By how much χ² is higher at a value, and the sizes there.
-    fn growth(&self, columns: &DMatrix<f64>) -> (f64, DVector<f64>) {
-        let norms: Vec<f64> = columns.column_iter().map(|c| c.norm()).collect();
-        let scale = |k: usize| if norms[k] > 0.0 { 1.0 / norms[k] } else { 0.0 };
-        let scaled = DMatrix::from_fn(columns.nrows(), columns.ncols(), |r, c| columns[(r, c)] * scale(c));
-        let zero = DVector::zeros(columns.ncols());
-        if scaled.iter().any(|x| !x.is_finite()) {
-            return (f64::INFINITY, zero);
-        }
-        let x = scaled.clone().svd(true, true).solve(&self.signal, 1e-6).unwrap_or(zero);
-        let left = (&self.signal - scaled * &x).norm_squared();
-        (left, DVector::from_fn(x.len(), |k, _| x[k] * scale(k)))
-    }
-
-    fn others(&self) -> Others {
-        let all: Vec<(f64, DVector<f64>)> = self.places.iter().map(|(_, columns)| self.growth(columns)).collect();
-        let limit = GROWTH_95 + 2.0 * (all.len().max(1) as f64).ln();
-        let mut out = Others::default();
-        let mut found: Vec<(f64, f64)> = Vec::new();
-        let below: Vec<usize> = (0..all.len()).rev().filter(|&k| self.places[k].0 < self.start).collect();
-        let above: Vec<usize> = (0..all.len()).filter(|&k| self.places[k].0 > self.start).collect();
-        for (side, upwards) in [(below, false), (above, true)] {
-            // its own values end where one is contradicted
-            let Some(end) = side.iter().position(|&k| all[k].0 > GROWTH_95) else {
-                // a range that begins at its start has no such side
-                if let Some(&last) = side.last() {
-                    out.open = Some(upwards);
-                    out.sizes.push(all[last].1.clone());
-                }
+/// What an effect with its typical sizes at the start of a shape could be taken for.
+fn others(task: &Task, view: &View, effect: &Effect, p: &Parameter, start: f64) -> Others {
+    let model = Model::new(task.machine, &[effect], &view.data.set_ups, task.reference);
+    let trials = Trials::of(&model, &view.data.nominal);
+    let shaped = || effect.parameters.iter().filter(|p| p.shape.is_some());
+    let starts: Vec<f64> = shaped().filter_map(|p| p.shape.map(|s| s.0)).collect();
+    let which = shaped().position(|q| q.name == p.name).unwrap_or(0);
+    let sizes: Vec<usize> = (0..model.n_unknowns()).filter(|&i| !model.unknowns[i].shape).collect();
+    let white = view.whitening();
+    let does = |value: f64| -> DMatrix<f64> {
+        let mut shapes = starts.clone();
+        shapes[which] = value;
+        let all = trials.columns(&Variant { effects: vec![0], shapes });
+        let mut columns = all.values.select_columns(&sizes);
+        white.apply(&mut columns);
+        without_rounding(&mut columns);
+        columns.resize_vertically(view.jacobian.nrows(), 0.0)
+    };
+    let rest: Vec<usize> =
+        (0..view.free.len()).filter(|&c| view.model.unknowns[view.free[c]].effect != effect.id).collect();
+    let jacobian = view.jacobian.select_columns(&rest);
+    let base = Basis::new(&jacobian);
+    let places: Vec<(f64, Basis)> = fine(p, view.n_touches(), &does)
+        .into_iter()
+        .filter_map(|v| Some((v, base.project_columns(&does(v)))).filter(|(_, a)| a.iter().all(|x| x.is_finite())))
+        .map(|(v, a)| (v, Basis::new(&a)))
+        .collect();
+    let (here, follow) = (does(start), Follow::new(&jacobian));
+    let limit = GROWTH_95 + 2.0 * (places.len().max(1) as f64).ln();
+    let mut out = Others::default();
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    // a wave of another phase has other rivals
+    for signs in 0..(1_usize << sizes.len().saturating_sub(1)).min(MOST_SIGNS) {
+        let sign = |k: usize| if k > 0 && signs >> (k - 1) & 1 == 1 { -1.0 } else { 1.0 };
+        let typical = DVector::from_fn(sizes.len(), |k, _| sign(k) * model.unknowns[sizes[k]].typical);
+        let whole = &here * &typical;
+        let signal = base.project(&whole);
+        let all: Vec<f64> = places.iter().map(|(_, basis)| basis.project(&signal).norm_squared()).collect();
+        let mut rivals: Vec<usize> = Vec::new();
+        for upwards in [false, true] {
+            let aside = |k: &usize| if upwards { places[*k].0 > start } else { places[*k].0 < start };
+            let mut side: Vec<usize> = (0..places.len()).filter(aside).collect();
+            if !upwards {
+                side.reverse();
+            }
+            // a range that begins at its start has no such side
+            if !side.is_empty() && side.iter().all(|&k| may_be_below(all[k], GROWTH_95)) {
+                out.open = Some(upwards);
+                rivals.extend(side.last());
                 continue;
-            };
-            for n in end..side.len() {
-                let growth = |n: usize| side.get(n).map_or(f64::INFINITY, |&k| all[k].0);
-                // a value that is worse than the one beside it belongs to that one, the first to the start
-                let best = n > 0 && growth(n) <= growth(n - 1) && growth(n) <= growth(n + 1);
-                if best && growth(n) < limit {
-                    found.push((growth(n), self.places[side[n]].0));
-                    out.sizes.push(all[side[n]].1.clone());
+            }
+            // its own values end where one is contradicted
+            let end = side.iter().position(|&k| all[k] > GROWTH_95).unwrap_or(side.len());
+            for n in end.max(1)..side.len() {
+                let growth = |n: usize| side.get(n).map_or(f64::INFINITY, |&k| all[k]);
+                // a value that is worse than the one beside it belongs to that one
+                let best = growth(n) <= growth(n - 1) && growth(n) <= growth(n + 1);
+                if best && may_be_below(growth(n), limit) {
+                    found.push((growth(n), places[side[n]].0));
+                    rivals.push(side[n]);
                 }
             }
         }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        out.values = found.into_iter().map(|f| f.1).take(NAMED).collect();
-        out
+        for k in rivals {
+            let there = does(places[k].0);
+            let size = Follow::new(&base.project_columns(&there)).of(&signal);
+            let go = follow.of(&(&whole - &there * &size));
+            let own = (0..sizes.len()).map(|k| (sizes[k], size[k] - typical[k]));
+            let own = own.map(|(i, by)| (model.unknowns[i].name.clone(), by));
+            let others =
+                rest.iter().zip(go.iter()).map(|(&c, by)| (view.model.unknowns[view.free[c]].name.clone(), *by));
+            for (name, by) in own.chain(others) {
+                let most = out.goes.entry(name).or_insert(0.0);
+                *most = most.max(by.abs());
+            }
+        }
     }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, value) in found {
+        if out.values.len() < NAMED && !out.values.contains(&value) {
+            out.values.push(value);
+        }
+    }
+    out
+}
+
+/// What unknowns do while they follow something as well as they can.
+struct Follow {
+    svd: SVD<f64, Dyn, Dyn>,
+    scale: Vec<f64>,
+}
+
+impl Follow {
+    fn new(columns: &DMatrix<f64>) -> Self {
+        let norm = |c: nalgebra::DVectorView<f64>| c.norm();
+        let scale: Vec<f64> = columns.column_iter().map(norm).map(|n| if n > 0.0 { 1.0 / n } else { 0.0 }).collect();
+        let scaled = DMatrix::from_fn(columns.nrows(), columns.ncols(), |r, c| columns[(r, c)] * scale[c]);
+        Self { svd: scaled.svd(true, true), scale }
+    }
+
+    fn of(&self, what: &DVector<f64>) -> DVector<f64> {
+        const LEAST: f64 = 1e-7;
+        let x = self.svd.solve(what, LEAST).unwrap_or_else(|_| DVector::zeros(self.scale.len()));
+        DVector::from_fn(x.len(), |k, _| x[k] * self.scale[k])
+    }
+}
+
+/// Moments at which something jumps, in a model on planned touches.
+pub(super) struct Moments<'a> {
+    pub task: &'a Task<'a>,
+    pub model: &'a Model,
+    pub data: &'a Data,
+    pub free: &'a [usize],
+    pub white: &'a Whitening,
+}
+
+impl Moments<'_> {
+    /// Puts each among the touches where its jump leaves most that the rest of the model cannot follow: behind the last touch it
+    /// would leave nothing. `jacobian`: whitened, of the free unknowns. Was there any?
+    pub fn put_where_they_show(&self, theta: &mut [f64], jacobian: &DMatrix<f64>) -> bool {
+        /// Places that are tried.
+        const MOST: usize = 60;
+        let mut any = false;
+        for effect in self.task.effects.iter().filter(|e| !e.per_block) {
+            for p in jumps_in_a_design(effect, self.data) {
+                let unknowns = &self.model.unknowns;
+                let Some(i) = unknowns.iter().position(|u| u.effect == effect.id && u.name == p.name) else { continue };
+                let rest: Vec<usize> =
+                    (0..self.free.len()).filter(|&c| unknowns[self.free[c]].effect != effect.id).collect();
+                let rest = jacobian.select_columns(&rest);
+                if rest.iter().any(|x| !x.is_finite()) {
+                    continue;
+                }
+                let base = Basis::new(&rest);
+                let alone = Model::new(self.task.machine, &[effect], &self.data.set_ups, self.task.reference);
+                let trials = Trials::of(&alone, &self.data.nominal);
+                let shaped: Vec<&Parameter> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
+                let sizes: Vec<usize> = (0..alone.n_unknowns()).filter(|&i| !alone.unknowns[i].shape).collect();
+                let typical = DVector::from_fn(sizes.len(), |k, _| alone.unknowns[sizes[k]].typical);
+                let kept = |value: f64| {
+                    let at = |q: &&Parameter| if q.name == p.name { value } else { q.shape.map_or(0.0, |s| s.0) };
+                    let shapes = shaped.iter().map(at).collect();
+                    let mut all = trials.columns(&Variant { effects: vec![0], shapes }).values.select_columns(&sizes);
+                    self.white.apply(&mut all);
+                    base.project(&(all * &typical).resize_vertically(jacobian.nrows(), 0.0)).norm()
+                };
+                let places = all_tried(p, self.data);
+                let few = places.iter().copied().step_by(places.len().div_ceil(MOST).max(1));
+                let best = few.map(|v| (v, kept(v))).filter(|(_, kept)| kept.is_finite());
+                if let Some((value, _)) = best.max_by(|a, b| a.1.total_cmp(&b.1)) {
+                    theta[i] = value;
+                    any = true;
+                }
+            }
+        }
+        any
+    }
+}
+
+/// A slope that is no number, as that of a root where it begins, would be one of everything.
+///
+/// # Errors
+/// Names the parameter and the touch.
+pub(super) fn every_slope_is_a_number(
+    model: &Model,
+    data: &Data,
+    free: &[usize],
+    jacobian: &DMatrix<f64>,
+) -> Result<()> {
+    let Some(at) = jacobian.iter().position(|x| !x.is_finite()) else { return Ok(()) };
+    let (row, column) = (at % jacobian.nrows(), at / jacobian.nrows());
+    let u = &model.unknowns[free[column]];
+    let touch = data.nominal.get(row).map_or(0, |o| o.id);
+    Err(Failure::new(
+        "assess::no_slope",
+        format!(
+            "how the touches go with {} of effect {} is no number at touch {touch}, where it is {}",
+            u.name, u.effect, u.start
+        ),
+    )
+    .help("begin it (`start`) where its formula is smooth at all touches"))
 }

@@ -1,10 +1,12 @@
 //! A plan linearised at an errorless machine (a time constant or a pitch where its effect has its typical size): the whitened columns of a model and of every effect that it leaves out.
 
+use super::shapes::{Moments, every_slope_is_a_number};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Result};
 use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
+use crate::fit::whitening::Whitening;
 use crate::fit::{design_jacobian, free_in_a_design};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
@@ -187,6 +189,8 @@ pub struct View {
     pub data: Data,
     /// The model.
     pub model: Model,
+    /// Where it is linearised: an errorless machine, and moments of jumps where they show.
+    pub theta: Vec<f64>,
     /// Indices of the unknowns that are not held.
     pub free: Vec<usize>,
     /// Whitened Jacobian of the free unknowns: touches, then what is known beside them.
@@ -248,12 +252,20 @@ impl View {
                 .help("is it a plan for this machine, and does it touch any block?"));
         }
         let model = Model::new(task.machine, &task.effects, &data.set_ups, task.reference);
-        let free = free_in_a_design(&model, &task.effects, &task.held);
-        let touched = whitening(&model, &data, &free, noise, |t| {
-            let mut jacobian = design_jacobian(t, &model, &free);
-            t.whiten(&mut jacobian);
-            jacobian
-        });
+        let free = free_in_a_design(&model, &task.effects, &data, &task.held);
+        let mut theta = model.start();
+        let jacobian_at = |theta: &[f64]| {
+            whitening(&model, &data, theta, &free, noise, |t| {
+                let mut jacobian = design_jacobian(t, &model, &free);
+                t.whiten(&mut jacobian);
+                jacobian
+            })
+        };
+        let white = whitening(&model, &data, &theta, &free, noise, |t| t.whitening());
+        let moments = Moments { task, model: &model, data: &data, free: &free, white: &white };
+        let jacobian = jacobian_at(&theta);
+        let touched = if moments.put_where_they_show(&mut theta, &jacobian) { jacobian_at(&theta) } else { jacobian };
+        every_slope_is_a_number(&model, &data, &free, &touched)?;
         let n = touched.nrows();
         let mut jacobian = touched.resize_vertically(n + known.len(), 0.0);
         for (row, k) in known.iter().enumerate() {
@@ -267,7 +279,7 @@ impl View {
         let library = Library::new(jacobian.nrows());
         let raw_um = DMatrix::zeros(jacobian.nrows(), 0);
         let (shapes, left_out) = (Vec::new(), Vec::new());
-        Ok(Self { data, model, free, jacobian, base, library, raw_um, shapes, left_out, noise, end_s })
+        Ok(Self { data, model, theta, free, jacobian, base, library, raw_um, shapes, left_out, noise, end_s })
     }
 
     /// Puts effects into the library, each at the given shape; else at its usual one, or where that leaves no trace at the
@@ -343,12 +355,17 @@ impl View {
     }
 
     /// Columns whitened: touches only, what is known beside them has no part in it.
-    pub(super) fn whitened(&self, plain: &DMatrix<f64>) -> DMatrix<f64> {
+    fn whitened(&self, plain: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.data.nominal.len();
         let mut touched = plain.rows(0, n).into_owned();
-        whitening(&self.model, &self.data, &self.free, self.noise, |t| t.whiten(&mut touched));
+        whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whiten(&mut touched));
         without_rounding(&mut touched);
         touched.resize_vertically(plain.nrows(), 0.0)
+    }
+
+    /// What whitens columns of the touches.
+    pub(super) fn whitening(&self) -> Whitening {
+        whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whitening())
     }
 
     /// Share of a block's norm that the model cannot follow.
@@ -379,9 +396,16 @@ fn shapes_at(effect: &Effect, value: f64) -> Option<Vec<f64>> {
 }
 
 /// Calls `f` with the nominal touches as a problem.
-fn whitening<T>(model: &Model, data: &Data, free: &[usize], noise: Noise, f: impl FnOnce(&Touches) -> T) -> T {
+fn whitening<T>(
+    model: &Model,
+    data: &Data,
+    theta: &[f64],
+    free: &[usize],
+    noise: Noise,
+    f: impl FnOnce(&Touches) -> T,
+) -> T {
     let batch = model.prepare(&data.nominal);
-    f(&Touches::new(&batch, &data.visits, model.start(), free, &[], (noise.sigma_mm, noise.tau_mm)))
+    f(&Touches::new(&batch, &data.visits, theta.to_vec(), free, &[], (noise.sigma_mm, noise.tau_mm)))
 }
 
 /// The touches of runs as an errorless machine makes them, and when the last one is made, s.

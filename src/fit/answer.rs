@@ -7,7 +7,7 @@ use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, 
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
-use crate::units::um_from_mm;
+use crate::units::{significant, um_from_mm};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
@@ -112,7 +112,8 @@ pub(super) fn outcome(
             let bare = one_sided.or_else(|| other_values.get(&i).and(intervals.get(&i).copied()));
             let interval = interval.or(jump.map(|ends| ends.map(Some))).or(bare);
             // an end that the touches do not set is that of the range
-            let range = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == u.name).and_then(|p| p.shape);
+            let own = u.name.split('@').next().unwrap_or_default();
+            let range = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == own).and_then(|p| p.shape);
             let wider = |[low, high]: [Option<f64>; 2]| {
                 let (low, high) = (low.or(range.map(|r| r.1)), high.or(range.map(|r| r.2)));
                 let side = |end: Option<f64>| end.map_or(0.0, |end| (end - fit.theta[i]).abs());
@@ -145,6 +146,7 @@ pub(super) fn outcome(
             }
         })
         .collect();
+    let beside: Vec<Status> = parameters.iter().map(|p| p.status).collect();
     let free_unknowns: Vec<&Unknown> = fit.free.iter().map(|&i| &fit.model.unknowns[i]).collect();
     let squares: f64 = fit.residual_mm.iter().zip(&fit.weight).map(|(r, w)| w * r * r).sum();
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
@@ -200,6 +202,7 @@ pub(super) fn outcome(
                 .iter()
                 .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
                 .collect(),
+            if shapes_told { Vec::new() } else { beside_a_shape_that_is_not_told(fit, &beside) },
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
@@ -214,9 +217,30 @@ fn uneven(value: f64, low: Option<f64>, high: Option<f64>, usual: Option<f64>) -
     low.is_none_or(|low| value - low > usual) || high.is_none_or(|high| high - value > usual)
 }
 
+/// Without profiles sizes have the doubt that they have where the shape stands.
+fn beside_a_shape_that_is_not_told(fit: &Fit, status: &[Status]) -> Vec<String> {
+    let unknowns = &fit.model.unknowns;
+    let untold = (0..unknowns.len()).filter(|&i| unknowns[i].shape && status[i] == Status::Undetermined);
+    let says = untold.filter_map(|i| {
+        let u = &unknowns[i];
+        let size = |k: &usize| unknowns[*k].effect == u.effect && unknowns[*k].set_up == u.set_up && status[*k] == Status::Identified;
+        let sizes: Vec<&str> = (0..unknowns.len()).filter(size).map(|k| unknowns[k].name.as_str()).collect();
+        (!sizes.is_empty()).then(|| {
+            format!(
+                "{} is not told: the doubt of {} is what it is beside {} {}, and without --quick it is all that it may be",
+                u.name,
+                sizes.join(", "),
+                significant(fit.theta[i], 4),
+                u.unit
+            )
+        })
+    });
+    says.collect()
+}
+
 /// That a shape parameter may as well have other values, in words.
 fn may_be_another(u: &Unknown, value: f64, others: &[f64]) -> String {
-    let shown = |v: f64| format!("{v:.3}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    let shown = |v: f64| significant(v, 4);
     let others: Vec<String> = others.iter().take(NAMED).map(|v| shown(*v)).collect();
     format!(
         "{} is not told: {} {} fits best, and {} about as well; what depends on it is as unsure. Touches at more positions would tell, or hold it at what is known of the machine (`value` and `fixed = true` or `sigma`, [model.parameters])",

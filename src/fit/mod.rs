@@ -30,8 +30,8 @@ mod weak;
 pub mod whitening;
 
 pub use knowledge::effects_of;
-pub use rank::{design_jacobian, free_in_a_design, held_first, observe_plan};
-pub use shapes::{around, between, fine, scan, start_shapes};
+pub use rank::{design_jacobian, free_in_a_design, held_first, jumps_in_a_design, observe_plan};
+pub use shapes::{all_tried, around, between, fine, scan, start_shapes};
 pub use starts::identify_data;
 
 use crate::diag::{Failure, Result};

@@ -6,14 +6,16 @@
 //! Analysis and Its Applications*, 1988, section 6.1). All but the effect's own sizes follow linearly, as they nearly do. A size
 //! beside a shape that is told weakly may be all that it is beside any of the shape's values that the touches allow.
 
-use super::candidates::{Trials, Variant};
+use super::candidates::Trials;
 use super::shapes::{self, Stretch};
 use super::{Fit, Settings};
 use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Parameter};
 use crate::model::predict::Model;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Steps from the value to the end of its usual interval: a profile that goes up and down is followed to its first crossing.
 const STEPS: f64 = 4.0;
@@ -74,21 +76,21 @@ pub fn intervals(
     spread: &dyn Fn(usize) -> Option<(f64, f64)>,
 ) -> Intervals {
     let mut out = Intervals::default();
-    for effect in effects.iter().filter(|e| !e.per_block) {
-        for p in effect.parameters.iter().filter(|p| p.shape.is_some()) {
-            let Some(unknown) = fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == p.name)
-            else {
+    for effect in effects.iter().filter(|e| e.parameters.iter().any(|p| p.shape.is_some())) {
+        let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+        let trials = Trials::of(&model, &fit.data.observations);
+        // an effect of blocks has a set of parameters for each
+        let all = model.unknowns.iter().zip(effect.parameters.iter().cycle());
+        for (u, p, (_, low, high)) in all.filter_map(|(u, p)| Some((u, p, p.shape?))) {
+            let Some(unknown) = fit.model.unknowns.iter().position(|v| v.effect == u.effect && v.name == u.name) else {
                 continue;
             };
             let free = fit.free.contains(&unknown);
-            let jumps = settings.jumps.contains(&p.name);
-            if !free && !jumps && !settings.held.contains(&p.name) {
+            let jumps = settings.jumps.contains(&u.name);
+            if !free && !jumps && !settings.held.contains(&u.name) {
                 continue;
             }
-            let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
-            let trials = Trials::of(&model, &fit.data.observations);
-            let Some(profile) = Profile::new(fit, &trials, effect, unknown) else { continue };
-            let Some((_, low, high)) = p.shape else { continue };
+            let Some(profile) = Profile::new(fit, (&model, &trials), effect, unknown) else { continue };
             if jumps {
                 out.ends.insert(unknown, profile.ends_of_a_jump(&shapes::stretches_of_a_jump(p, &fit.data)));
                 continue;
@@ -115,6 +117,8 @@ pub fn intervals(
                     let mut places = profile.all_places(p);
                     places.extend([low, high, fit.theta[unknown]]);
                     let n = places.len();
+                    // any of them may be it, and everything else as it is beside that one
+                    profile.widen_others(&places, n, spread, &mut out.ends);
                     (places, n)
                 }
             };
@@ -138,12 +142,13 @@ pub fn without_prior(
     scale2: impl Fn(f64) -> f64,
 ) -> Option<Alone> {
     let u = &fit.model.unknowns[unknown];
-    let effect = effects.iter().find(|e| e.id == u.effect && !e.per_block)?;
-    let (_, low, high) = effect.parameters.iter().find(|p| p.name == u.name)?.shape?;
-    let p = effect.parameters.iter().find(|p| p.name == u.name)?;
+    let effect = effects.iter().find(|e| e.id == u.effect)?;
+    let name = u.name.split('@').next()?;
+    let p = effect.parameters.iter().find(|p| p.name == name)?;
+    let (_, low, high) = p.shape?;
     let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
     let trials = Trials::of(&model, &fit.data.observations);
-    let mut profile = Profile::new(fit, &trials, effect, unknown)?;
+    let mut profile = Profile::new(fit, (&model, &trials), effect, unknown)?;
     let whole = profile.residual.norm_squared();
     profile.drop_prior_of_shape();
     let growth = |at: f64| profile.held(at).growth;
@@ -209,6 +214,11 @@ fn with_all((value, sigma, k): (f64, f64, f64), beside: impl Iterator<Item = ((f
     [Some(low), Some(high)]
 }
 
+/// An interval that holds two others; an end that is open stays so.
+fn both([a, b]: [Option<f64>; 2], [c, d]: [Option<f64>; 2]) -> [Option<f64>; 2] {
+    [a.zip(c).map(|(a, c)| a.min(c)), b.zip(d).map(|(b, d)| b.max(d))]
+}
+
 /// Places from one end to the other, by equal factors where both are above 0.
 fn between([low, high]: [f64; 2]) -> Vec<f64> {
     const PLACES: usize = 40;
@@ -222,8 +232,10 @@ fn between([low, high]: [f64; 2]) -> Vec<f64> {
 /// χ² as a function of one shape parameter, everything else following.
 struct Profile<'a> {
     fit: &'a Fit,
-    /// The effect's columns at any shape.
-    trials: &'a Trials<'a>,
+    /// The effect alone, and its columns at any shape.
+    alone: (&'a Model, &'a Trials<'a>),
+    /// Its unknowns in that model; of an effect of blocks those of one.
+    set: Range<usize>,
     effect: &'a Effect,
     /// Place of the shape among the effect's parameters.
     shape: usize,
@@ -249,11 +261,12 @@ struct Profile<'a> {
 }
 
 impl<'a> Profile<'a> {
-    fn new(fit: &'a Fit, trials: &'a Trials<'a>, effect: &'a Effect, unknown: usize) -> Option<Self> {
-        let places = effect
-            .parameters
-            .iter()
-            .map(|p| fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == p.name))
+    /// `alone`: the model of the effect alone, with its columns.
+    fn new(fit: &'a Fit, alone: (&'a Model, &'a Trials<'a>), effect: &'a Effect, unknown: usize) -> Option<Self> {
+        let set = shapes::set_of(alone.0, effect, &fit.model.unknowns[unknown].name)?;
+        let own = alone.0.unknowns[set.clone()].iter();
+        let places = own
+            .map(|own| fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == own.name))
             .collect::<Option<Vec<usize>>>()?;
         let shape = places.iter().position(|&i| i == unknown)?;
         let free = |i: usize| fit.free.binary_search(&places[i]).ok();
@@ -271,7 +284,8 @@ impl<'a> Profile<'a> {
         let prior_of_shape = here.map_or_else(|| DVector::zeros(n_priors), |c| prior_rows.column(c).into_owned());
         let mut out = Self {
             fit,
-            trials,
+            alone,
+            set,
             effect,
             shape,
             values: places.iter().map(|&i| fit.theta[i]).collect(),
@@ -302,9 +316,9 @@ impl<'a> Profile<'a> {
     fn does(&self, at: f64) -> (DMatrix<f64>, DVector<f64>) {
         let mut values = self.values.clone();
         values[self.shape] = at;
-        let shapes: Vec<f64> =
-            values.iter().zip(&self.effect.parameters).filter(|(_, p)| p.shape.is_some()).map(|(v, _)| *v).collect();
-        let mut all = self.trials.columns(&Variant { effects: vec![0], shapes }).values;
+        let (model, trials) = self.alone;
+        let all = trials.columns(&shapes::variant(model, &self.set, &values)).values;
+        let mut all = all.columns_range(self.set.clone()).into_owned();
         self.fit.whitening(self.fit.noise.tau_mm).apply(&mut all);
         let size = |i: usize| if self.effect.parameters[i].shape.is_some() { 0.0 } else { values[i] };
         let does = &all * DVector::from_fn(values.len(), |i, _| size(i));
@@ -417,7 +431,7 @@ impl<'a> Profile<'a> {
     fn beyond(&self, places: &[f64], [low, high]: [Option<f64>; 2], growth: f64) -> Vec<(f64, f64)> {
         let outside = |at: f64| low.is_some_and(|low| at < low) || high.is_some_and(|high| at > high);
         let growth_at = |at: f64| self.held(at).growth;
-        let growths: Vec<f64> = places.iter().map(|&at| growth_at(at)).collect();
+        let growths: Vec<f64> = places.par_iter().map(|&at| growth_at(at)).collect();
         let neighbour = |by: usize| growths.get(by).copied().unwrap_or(f64::INFINITY);
         let mut out = Vec::new();
         for k in 0..places.len() {
@@ -456,7 +470,8 @@ impl<'a> Profile<'a> {
                 let room = k * k + chance - h.growth;
                 h.others.get(r).filter(|_| room > 0.0).map(|of| (*of, room.sqrt().min(k)))
             });
-            out.insert(unknown, with_all((self.fit.theta[unknown], sigma, k), beside));
+            let ends = with_all((self.fit.theta[unknown], sigma, k), beside);
+            out.entry(unknown).and_modify(|e| *e = both(*e, ends)).or_insert(ends);
         }
     }
 

@@ -4,7 +4,7 @@ use super::normal::{Prior, Touches};
 use super::{effects_of, solve};
 use crate::diag::Result;
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
 use crate::model::predict::Model;
 use nalgebra::{DMatrix, DVector};
@@ -96,14 +96,24 @@ pub fn observe_plan(
 /// The unknowns that a search will follow on planned touches: not those that are held, and not a moment at which something
 /// jumps, which is found by trying all places between touches.
 #[must_use]
-pub fn free_in_a_design(model: &Model, effects: &[&Effect], held: &[String]) -> Vec<usize> {
+pub fn free_in_a_design(model: &Model, effects: &[&Effect], data: &Data, held: &[String]) -> Vec<usize> {
     let is_held = |name: &str| held.iter().any(|h| crate::symbols::same(h, name));
-    let jumps = |name: &str| {
-        let mut shared = effects.iter().filter(|e| !e.per_block).flat_map(|e| &e.parameters);
-        shared.any(|p| p.name == name && p.between.is_some())
-    };
-    let of = |i: &usize| !is_held(&model.unknowns[*i].name) && !jumps(&model.unknowns[*i].name);
+    let jumps: Vec<&str> = effects
+        .iter()
+        .filter(|e| !e.per_block)
+        .flat_map(|e| jumps_in_a_design(e, data))
+        .map(|p| p.name.as_str())
+        .collect();
+    let of = |i: &usize| !is_held(&model.unknowns[*i].name) && !jumps.contains(&model.unknowns[*i].name.as_str());
     (0..model.n_unknowns()).filter(of).collect()
+}
+
+/// Shape parameters of an effect at which something jumps, as the search will take them.
+#[must_use]
+pub fn jumps_in_a_design<'e>(effect: &'e Effect, data: &Data) -> Vec<&'e Parameter> {
+    let usual: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(p.typical, |s| s.0)).collect();
+    let names = super::shapes::jumps(effect, &usual, data);
+    effect.parameters.iter().filter(|p| names.iter().any(|(name, _)| *name == p.name)).collect()
 }
 
 /// Jacobian of touches that are only planned, mm per unit, before whitening: at an errorless machine, but a shape parameter

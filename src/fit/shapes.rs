@@ -11,6 +11,8 @@ use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
 use crate::model::predict::{Model, Observation};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Values that are tried where the catalogue names none.
 const TRIED: usize = 12;
@@ -34,6 +36,8 @@ const LEAST_GAIN: f64 = 9.0;
 /// Where to begin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
+    /// Names of the unknowns.
+    pub names: Vec<String>,
     /// Values of all parameters of the effect in their order, in their units; sizes are 0 where the data does not show it.
     pub values: Vec<f64>,
     /// By how much χ² falls.
@@ -42,25 +46,54 @@ pub struct Start {
     pub shown: bool,
 }
 
-/// The best start for the parameters of an effect that is not in a fit; `None` for one without shape parameters, or with
-/// a set of its own for each block.
+/// Unknowns of an effect in the model of it alone: all of them, or of one block where it has a set of its own for each. `name`:
+/// one of them.
+pub(super) fn set_of(alone: &Model, effect: &Effect, name: &str) -> Option<Range<usize>> {
+    let at = alone.unknowns.iter().position(|u| u.name == name)?;
+    let count = effect.parameters.len();
+    let first = at / count * count;
+    Some(first..first + count)
+}
+
+/// The effect with given values of one set of its parameters; the shapes of other sets are no part of what that one does.
+pub(super) fn variant(alone: &Model, set: &Range<usize>, values: &[f64]) -> Variant {
+    let value = |i: usize| if set.contains(&i) { values[i - set.start] } else { alone.unknowns[i].start };
+    let shapes = (0..alone.n_unknowns()).filter(|&i| alone.unknowns[i].shape).map(value).collect();
+    Variant { effects: vec![0], shapes }
+}
+
+/// The best start for the parameters of an effect that is not in a fit: one for each block where it has a set of its own for each,
+/// none where it has no shape parameters.
 #[must_use]
-pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Start> {
+pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Vec<Start> {
     let shaped: Vec<usize> = (0..effect.parameters.len()).filter(|&i| effect.parameters[i].shape.is_some()).collect();
-    if shaped.is_empty() || effect.per_block {
-        return None;
+    if shaped.is_empty() {
+        return Vec::new();
     }
+    let alone = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+    let trials = Trials::of(&alone, &fit.data.observations);
+    let sets = alone.instances(0).iter().map(|&(first, count)| first..first + count);
+    sets.map(|set| start_of_a_set(fit, effect, &shaped, (&alone, &trials), &set)).collect()
+}
+
+fn start_of_a_set(
+    fit: &Fit,
+    effect: &Effect,
+    shaped: &[usize],
+    (alone, trials): (&Model, &Trials),
+    set: &Range<usize>,
+) -> Start {
     let linear = fit.linear(fit.noise.tau_mm);
     let n = fit.data.observations.len();
     let (jacobian, residual) = (linear.jacobian.rows(0, n).into_owned(), linear.residual.rows(0, n).into_owned());
     let covariance = uncertainty::free_covariance(fit);
     let sizes: Vec<usize> = (0..effect.parameters.len()).filter(|i| !shaped.contains(i)).collect();
     let whitening = fit.whitening(fit.noise.tau_mm);
-    let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
-    let trials = Trials::of(&model, &fit.data.observations);
+    let columns: Vec<usize> = sizes.iter().map(|i| set.start + i).collect();
     let does = |shapes: &[f64]| -> DMatrix<f64> {
-        let all = trials.columns(&Variant { effects: vec![0], shapes: shapes.to_vec() });
-        let mut a = all.values.select_columns(&sizes);
+        let mut values = vec![0.0; effect.parameters.len()];
+        shaped.iter().zip(shapes).for_each(|(&i, v)| values[i] = *v);
+        let mut a = trials.columns(&variant(alone, set, &values)).values.select_columns(&columns);
         whitening.apply(&mut a);
         a
     };
@@ -99,12 +132,15 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
             let p = &effect.parameters[i];
             let common = scan(p, &fit.data).unwrap_or_else(|| tried(p));
             let mut try_all = |values: &[f64], best: &mut Vec<f64>| {
-                for &value in values {
+                let at = |value: &f64| {
                     let mut shapes = best.clone();
-                    shapes[k] = value;
-                    let now = judge(&shapes);
+                    shapes[k] = *value;
+                    judge(&shapes)
+                };
+                let all: Vec<(f64, DVector<f64>)> = values.par_iter().map(at).collect();
+                for (&value, now) in values.iter().zip(all) {
                     if now.0 > found.0 && (common.contains(&value) || credible(&now.1)) {
-                        *best = shapes;
+                        best[k] = value;
                         found = now;
                     }
                 }
@@ -150,7 +186,8 @@ pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Option<Sta
     if shown {
         sizes.iter().zip(size.iter()).for_each(|(&i, v)| values[i] = *v);
     }
-    Some(Start { values, gain, shown })
+    let names = alone.unknowns[set.clone()].iter().map(|u| u.name.clone()).collect();
+    Start { names, values, gain, shown }
 }
 
 /// Shape parameters at which something jumps, as the moment at which a block slips: there is no slope that a search could
@@ -308,7 +345,9 @@ fn tried(p: &Parameter) -> Vec<f64> {
 
 /// Settings of the fit beside which the shapes of some effects are tried: everything but them, and quickly.
 pub(super) fn without(settings: &Settings, shaped: &[&Effect]) -> Settings {
-    let of_them = |name: &str| shaped.iter().any(|e| e.parameters.iter().any(|p| crate::symbols::same(&p.name, name)));
+    let own = |name: &str| name.split('@').next().unwrap_or_default().to_owned();
+    let of_them =
+        |name: &str| shaped.iter().any(|e| e.parameters.iter().any(|p| crate::symbols::same(&p.name, &own(name))));
     Settings {
         effects: settings.effects.iter().filter(|id| !shaped.iter().any(|e| e.id == **id)).cloned().collect(),
         knowledge: settings.knowledge.iter().filter(|(name, _)| !of_them(name)).map(|(n, k)| (n.clone(), *k)).collect(),
@@ -319,7 +358,8 @@ pub(super) fn without(settings: &Settings, shaped: &[&Effect]) -> Settings {
 }
 
 /// All values of a shape parameter that a scan tries.
-pub(super) fn all_tried(p: &Parameter, data: &Data) -> Vec<f64> {
+#[must_use]
+pub fn all_tried(p: &Parameter, data: &Data) -> Vec<f64> {
     let mut values = scan(p, data).unwrap_or_else(|| tried(p));
     if p.between.is_none() {
         values.extend(between(&values));

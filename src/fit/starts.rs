@@ -5,7 +5,7 @@ use super::whitening::Whitening;
 use super::{Fit, Knowledge, Settings, effects_of, identify_from};
 use crate::diag::Result;
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
     let mut starts = BTreeMap::new();
-    let shaped = effects.iter().copied().filter(|e| !e.per_block && e.parameters.iter().any(|p| p.shape.is_some()));
+    let shaped = effects.iter().copied().filter(|e| e.parameters.iter().any(|p| p.shape.is_some()));
     let unseen = look_for((machine, catalogue), shaped.collect(), &data, settings, &mut starts)?;
     let fit = identify_started(machine, catalogue, &effects, data, settings, &starts)?;
     // what an effect changes from one visit to the next is scatter of the visits to a fit without it, which then hardly sees it:
@@ -55,11 +55,11 @@ fn look_for<'e>(
     let fit = identify_started(machine, catalogue, &others, data.clone(), &base, starts)?;
     let mut unseen = Unseen { effects: Vec::new(), tau_mm: fit.noise.tau_mm };
     for effect in shaped {
-        let Some(start) = shapes::start_shapes(&fit, machine, effect) else { continue };
-        starts.extend(effect.parameters.iter().zip(start.values).map(|(p, v)| (p.name.clone(), v)));
-        if !start.shown {
+        let found = shapes::start_shapes(&fit, machine, effect);
+        if found.iter().any(|s| !s.shown) {
             unseen.effects.push(effect);
         }
+        starts.extend(found.into_iter().flat_map(|s| s.names.into_iter().zip(s.values)));
     }
     Ok(Some(unseen).filter(|u| !u.effects.is_empty()))
 }
@@ -74,16 +74,22 @@ fn identify_started(
     starts: &BTreeMap<String, f64>,
 ) -> Result<Fit> {
     let mut held_settings = settings.clone();
-    for effect in effects.iter().filter(|e| starts.contains_key(&e.parameters[0].name)) {
-        let values: Vec<f64> = effect.parameters.iter().map(|p| starts.get(&p.name).copied().unwrap_or(0.0)).collect();
-        // what the data does not show has no place to be held at
-        if effect.parameters.iter().zip(&values).all(|(p, v)| p.shape.is_some() || *v == 0.0) {
-            continue;
-        }
-        for (name, value) in shapes::jumps(effect, &values, &data) {
-            if !held_settings.knowledge.keys().any(|word| crate::symbols::same(word, name)) {
-                held_settings.knowledge.insert(name.to_owned(), Knowledge::Fixed(value));
-                held_settings.jumps.push(name.to_owned());
+    for effect in effects.iter().filter(|e| e.parameters.iter().any(|p| p.shape.is_some())) {
+        let blocks: Vec<String> = data.set_ups.iter().map(|s| format!("@{}", s.label)).collect();
+        for block in if effect.per_block { blocks } else { vec![String::new()] } {
+            let named = |name: &str| format!("{name}{block}");
+            let value = |p: &Parameter| starts.get(&named(&p.name)).copied().unwrap_or(0.0);
+            let values: Vec<f64> = effect.parameters.iter().map(value).collect();
+            // what the data does not show has no place to be held at
+            if effect.parameters.iter().zip(&values).all(|(p, v)| p.shape.is_some() || *v == 0.0) {
+                continue;
+            }
+            for (name, value) in shapes::jumps(effect, &values, &data) {
+                let name = named(name);
+                if !held_settings.knowledge.keys().any(|word| crate::symbols::same(word, &name)) {
+                    held_settings.knowledge.insert(name.clone(), Knowledge::Fixed(value));
+                    held_settings.jumps.push(name);
+                }
             }
         }
     }

@@ -5,6 +5,7 @@ use super::solve::Observability;
 use crate::model::catalogue::{Effect, Place, Term};
 use crate::model::formula::VARIABLES;
 use crate::model::predict::Unknown;
+use crate::units::significant;
 use nalgebra::DVector;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -60,7 +61,7 @@ fn one(
     let mut block_words: BTreeSet<String> = BTreeSet::new();
     let named = unknowns.iter().zip(direction.iter().zip(scale.iter())).filter(|(_, (w, _))| w.abs() > WORTH_NAMING);
     for (u, (weight, scale)) in named {
-        match u.name.split_once('@') {
+        match u.name.split_once('@').filter(|_| u.nuisance) {
             Some((word, block)) => {
                 blocks.insert(block.to_owned());
                 block_words.insert(word.to_owned());
@@ -84,7 +85,7 @@ fn one(
     };
     let says = match (&members[..], &physical[..]) {
         ([], _) => "a combination of many parameters leaves no trace in these touches".to_owned(),
-        ([one], [(u, _)]) if u.shape && effects.iter().any(|e| e.id == u.effect && !e.per_block) => format!(
+        ([one], [(u, _)]) if u.shape && effects.iter().any(|e| e.id == u.effect) => format!(
             "{one} is not told: beside an effect that does not show clearly in these touches there is nothing to tell it by; it \
              stands where its search begins, at the value of its range that fits best"
         ),
@@ -129,7 +130,7 @@ fn what_is_seen(a: (&Unknown, f64), b: (&Unknown, f64)) -> String {
         (a, "1") => format!(" {a}"),
         (a, b) => format!(" {a}/{b}"),
     };
-    format!("{} {sign} {}{unit} * {}", a.0.name, digits(factor.abs()), b.0.name)
+    format!("{} {sign} {}{unit} * {}", a.0.name, significant(factor.abs(), 3), b.0.name)
 }
 
 /// How results trade against each other: "+1 mm of EX0B with -0.283 deg of EB0B".
@@ -143,7 +144,7 @@ fn trade(physical: &[(&Unknown, f64)], with_blocks: bool) -> String {
             let x = amount / one;
             // a number without a dimension has no unit beside it
             let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-            format!("{}{}{unit} of {}", if x < 0.0 { '-' } else { '+' }, digits(x.abs()), p.0.name)
+            format!("{}{}{unit} of {}", if x < 0.0 { '-' } else { '+' }, significant(x.abs(), 3), p.0.name)
         })
         .chain(with_blocks.then(|| "a set-up of the blocks that goes with it".to_owned()))
         .collect();
@@ -151,13 +152,6 @@ fn trade(physical: &[(&Unknown, f64)], with_blocks: bool) -> String {
         [] => "a change of the set-ups together".to_owned(),
         [first, rest @ ..] => format!("{first} with {}", join(rest)),
     }
-}
-
-/// Three significant digits, no more zeros than needed.
-fn digits(x: f64) -> String {
-    let magnitude = if x > 0.0 { x.log10().floor() as i32 } else { 0 };
-    let text = format!("{x:.*}", (2 - magnitude).clamp(0, 12) as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// What an unknown means at the machine, with its symbol: "the place of axis C in Y (EY0C)".
@@ -248,5 +242,5 @@ pub(super) fn weak(weights: &[(&Unknown, f64)], effects: &[&Effect], times: f64)
             format!("the combination {} (each in its usual size)", join(&each))
         }
     };
-    format!("{what} is known to {} times its usual size only: these touches hardly see it", digits(times))
+    format!("{what} is known to {} times its usual size only: these touches hardly see it", significant(times, 3))
 }

@@ -100,6 +100,8 @@ pub fn parse_run(
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
     glued(bytes, start, &read.events, &places, &mut findings);
     let runs = runs::split(&read.touches, &read.events, |line| reader.may_be_head(line));
+    let units: Vec<LengthUnit> =
+        runs.iter().filter_map(|r| r.header.as_ref()).filter(|h| h.says_unit).map(|h| h.unit).collect();
     let heads = runs.iter().filter_map(|r| r.header.as_ref()).filter(|h| !h.written_together);
     let heads: Vec<String> = heads.map(|h| h.controller.clone()).collect();
     let chosen = runs::choose(runs, &read.touches, asked, is_columns, &places, &mut findings)
@@ -139,9 +141,15 @@ pub fn parse_run(
             let help = "heads of logs of older versions do not say it; where the program was in inches, write INCH behind the digest of the plan (the twelve digits)";
             findings.push(places.at_line(Finding::warning("log::unit", message).help(help), header.line));
         }
-        if header.unit == LengthUnit::Inch {
-            touches.iter_mut().for_each(|t| t.position = t.position.with_xyz_mm(t.position.xyz_mm().map(mm_from_inch)));
-        }
+    }
+    let unit = match &run.header {
+        _ if is_columns => LengthUnit::Mm,
+        Some(header) => header.unit,
+        // a head that is lost said what the others say, or what the postprocessor file lets the program write
+        None => units.first().filter(|u| units.iter().all(|v| v == *u)).copied().unwrap_or(post.log.unit),
+    };
+    if unit == LengthUnit::Inch {
+        touches.iter_mut().for_each(|t| t.position = t.position.with_xyz_mm(t.position.xyz_mm().map(mm_from_inch)));
     }
     let per_touch = post.log.columns.as_ref().map(|c| c.per_touch.clone()).unwrap_or_default();
     let parsed =

@@ -214,6 +214,9 @@ pub struct Provenance {
     pub study_sha256: String,
     /// When the data were measured, as the caller states it.
     pub data_date: String,
+    /// What spoke against this export, which `--force` wrote all the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forced: Vec<String>,
 }
 
 /// The whole file.

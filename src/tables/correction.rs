@@ -15,9 +15,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How much further an axis stands than it shows: coordinate relative to R's origin (mm or deg) and sense (+1 or -1) →
 /// mm or deg.
-pub type CoordinateError = Box<dyn Fn(f64, f64) -> f64>;
+pub type CoordinateError = std::rc::Rc<dyn Fn(f64, f64) -> f64>;
 
 /// An identified error of one axis's position, which depends on nothing but one axis's position and its sense.
+#[derive(Clone)]
 pub struct AxisShape {
     /// Name of the parameter.
     pub parameter: String,
@@ -59,7 +60,7 @@ pub struct LeftOut {
 }
 
 /// Corrections of a machine. Displacements in mm, tilts in deg.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Correction {
     /// Location and zero errors, by axis, place and component.
     pub terms: Vec<Term>,
@@ -374,7 +375,7 @@ impl Collector<'_> {
             unit: p.unit.clone(),
             axis: output,
             input,
-            error: Box::new(error),
+            error: std::rc::Rc::new(error),
         })
     }
 

@@ -60,8 +60,12 @@ pub fn found_with_held(machine: &Machine, planted: &Planted, held: &[&str], duri
     };
     let units: Vec<String> = planted.iter().map(|(e, n, _)| unit(e, n)).collect();
     let rows: Vec<_> = planted.iter().zip(&units).map(|((e, n, v), u)| (*n, *e, *v, u.as_str(), status(n))).collect();
-    let provenance =
-        Provenance { study: "study.toml".into(), study_sha256: "0123abcd".into(), data_date: "2026-11-20".into() };
+    let provenance = Provenance {
+        study: "study.toml".into(),
+        study_sha256: "0123abcd".into(),
+        data_date: "2026-11-20".into(),
+        forced: Vec::new(),
+    };
     let mut outcome = crate::export::outcome(&machine.name, &rows);
     // where the virtual machine states its errors
     outcome.reference_mm = machine.reference.pivot.into();

@@ -57,7 +57,12 @@ use std::collections::BTreeMap;
 type Parameters<'a> = &'a [(&'a str, &'a str, f64, &'a str, Status)];
 
 fn provenance() -> Provenance {
-    Provenance { study: "study.toml".into(), study_sha256: "0123abcd".into(), data_date: "2026-11-20".into() }
+    Provenance {
+        study: "study.toml".into(),
+        study_sha256: "0123abcd".into(),
+        data_date: "2026-11-20".into(),
+        forced: Vec::new(),
+    }
 }
 
 fn collect(name: &str, parameters: Parameters, active: Option<&Compensation>) -> Correction {
@@ -456,7 +461,8 @@ fn names_stay_inside_their_comments() {
     let mut machine = machine("swivel-head");
     machine.name = "bad */ int main(void) {} /* \"\\\n#include <x>\n(".into();
     let nasty = "*/ x (y)\nsetp evil.pin 1\r\nG0 X0".to_owned();
-    let provenance = Provenance { study: nasty.clone(), study_sha256: nasty.clone(), data_date: nasty };
+    let provenance =
+        Provenance { study: nasty.clone(), study_sha256: nasty.clone(), data_date: nasty, forced: Vec::new() };
     let fit = outcome(&machine.name, &HEAD);
     let (correction, _) =
         Correction::collect(&machine, &catalogue(), &fit, During { loaded: None, transformation: true }, provenance)

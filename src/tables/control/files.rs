@@ -9,8 +9,9 @@ use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, compile};
 use crate::tables::compensation::Grid;
 use crate::tables::correction::Correction;
 use crate::tables::linuxcnc::{head, one_line, render};
-use crate::units::{inch_from_mm, mm_from_inch};
+use crate::units::{Plain, inch_from_mm, mm_from_inch};
 use minijinja::{Value, context};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 const README: &str = include_str!("../templates/control/readme.txt.j2");
@@ -105,7 +106,16 @@ pub(super) fn write(
         .filter(|f| f.code == "tables::unverified")
         .map(|f| one_line(&f.message.replace(": not verified: ", ": ")))
         .collect();
-    let head = head(machine, correction);
+    // of several tables of the same values the one that is open widest
+    let by_width = |a: &&Vector3<f64>, b: &&Vector3<f64>| a.norm().total_cmp(&b.norm());
+    let opened = std::iter::once(first).chain(others.values()).filter_map(|f| f.opened_mm.as_ref()).max_by(by_width);
+    let mut head = head(machine, correction);
+    if opened.is_some() {
+        head.push(
+            "The old vectors did not close, the new ones do: touch off all work offsets again, see README.txt"
+                .to_owned(),
+        );
+    }
     let record = export.compensation.tables.clone();
     let grids = record.map(|r| r.grids).unwrap_or_default();
     let active = correction.active.as_ref().and_then(|a| a.tables.clone()).map(|t| t.grids).unwrap_or_default();
@@ -204,7 +214,12 @@ pub(super) fn write(
                 longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
                 shift => shift.map(|v| format!("{v:+.4}")).to_vec(), tool => correction.tool_length_mm.map(|v| format!("{v:+.4}")),
                 measured => correction.of_measurement.keys().cloned().collect::<Vec<_>>(),
-                step => format!("{}", tables.step_mm.get_ref()),
+                step => Plain(*match options.unit {
+                    LengthUnit::Mm => tables.step_mm.get_ref(),
+                    LengthUnit::Inch => tables.step_inch.get_ref(),
+                }).to_string(),
+                forced => correction.provenance.forced.iter().map(|l| one_line(l)).collect::<Vec<_>>(),
+                opened => opened.map(|v| v.map(|v| format!("{v:+.4}")).as_slice().to_vec()),
             }
         },
     )?;

@@ -62,6 +62,8 @@ pub struct Filled {
     pub vectors: Vec<(VectorForm, Vector3<f64>)>,
     /// The machine as this table describes it, in the terms of the machine's own description.
     pub seen: Seen,
+    /// By how much machine coordinates at rotary zero change, mm: the old vectors did not close, the new ones do.
+    pub opened_mm: Option<Vector3<f64>>,
 }
 
 impl Filled {
@@ -217,6 +219,7 @@ impl Question<'_> {
         // where the user's numbers put the points, against the description
         let mut off: BTreeMap<Point, Vector3<f64>> = BTreeMap::new();
         let mut turned: BTreeMap<Turn, Vector3<f64>> = BTreeMap::new();
+        let mut opened_mm = None;
         for form in in_order(self.kind.vector.iter(), |f| f) {
             let described = self.described(form, self.before);
             let old = self.old_vector(form, described);
@@ -249,10 +252,8 @@ impl Question<'_> {
                         .map(|v| self.old_vector(v, self.described(v, self.before)))
                         .sum();
                     if (sum + old).amax() > 2.5 * self.step_mm() {
-                        findings.push(Finding::warning(
-                            "tables::open_chain",
-                            format!("the old vectors do not close: {} is {:.4} {:.4} {:.4} mm off minus the sum of {}", form.id, (sum + old).x, (sum + old).y, (sum + old).z, form.close.iter().flatten().cloned().collect::<Vec<_>>().join(" and ")),
-                        ).help("the new ones close: machine coordinates at rotary zero change by that much, so check the work offsets"));
+                        opened_mm = Some(sum + old);
+                        findings.push(self.open_chain(form, sum + old));
                     }
                 }
             }
@@ -354,7 +355,24 @@ impl Question<'_> {
             vectors.push((form.clone(), held));
         }
         self.as_written(&vectors, &off, &turned, &mut seen);
-        (Filled { values, vectors, seen }, findings)
+        (Filled { values, vectors, seen, opened_mm }, findings)
+    }
+
+    /// Old vectors that do not close: the new ones do, and machine coordinates at rotary zero go by the gap.
+    fn open_chain(&self, form: &VectorForm, gap: Vector3<f64>) -> Finding {
+        let of = form.close.iter().flatten().cloned().collect::<Vec<_>>().join(" and ");
+        let says = format!(
+            "the old vectors do not close: {} is {:.4} {:.4} {:.4} mm off minus the sum of {of}",
+            form.id, gap.x, gap.y, gap.z
+        );
+        if gap.norm() > self.limits.mm {
+            return Finding::error("tables::open_chain", says).help(
+                "the new ones close: at rotary zero machine coordinates would change by that much. Is it this machine's backup, \
+                 complete, and does its builder keep a length there that belongs into the tool table? --force closes them all the same",
+            );
+        }
+        Finding::warning("tables::open_chain", says)
+            .help("the new ones close: machine coordinates at rotary zero change by that much, so touch off all work offsets again")
     }
 
     /// What the other set is off the description, and stays so.

@@ -17,11 +17,11 @@ use super::compensation::{Compensation, FORMAT, Mode, Tables as Record, Term, Ve
 use super::correction::{Correction, Limits, rounded};
 use super::kins::Errors;
 use super::lines::{self, Seen};
-use super::linuxcnc::{Left, program};
+use super::linuxcnc::{Left, force, program};
 use super::place::{Place, Spot, along};
 use super::restate::{kept_in_words, stated_at};
 use crate::axes::AxisName;
-use crate::diag::{Failure, Finding, Findings, Result, Severity};
+use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Machine, Side};
 use crate::post::tables::{Kind, LengthUnit, Tables, doubt};
 use backup::Old;
@@ -293,11 +293,9 @@ pub fn export(
     }
     let has_grids = grid_list.is_some();
     let grid_list = grid_list.unwrap_or_default();
+    let mut noted = correction.clone();
     if options.force {
-        for finding in findings.0.iter_mut().filter(|f| f.severity == Severity::Error) {
-            finding.severity = Severity::Warning;
-            finding.help = Some("exported because it was forced: move the machine slowly at first".to_owned());
-        }
+        force(&mut findings.0, &mut noted);
     }
     say_unverified(tables, kind, &filled, !grid_list.is_empty(), options, &mut findings);
     let lacking = filled.lacking(&options.old, spellings.first().copied());
@@ -397,7 +395,7 @@ pub fn export(
         stock: None,
         tables: Some(record),
         program: program(),
-        provenance: correction.provenance.clone(),
+        provenance: noted.provenance.clone(),
     };
     let mut export = Export {
         files: Vec::new(),
@@ -409,7 +407,7 @@ pub fn export(
         rest_um,
         longer_tool_um,
     };
-    files::write(machine, tables, kind, correction, options, (&filled, &others), &mut export, &mut findings)?;
+    files::write(machine, tables, kind, &noted, options, (&filled, &others), &mut export, &mut findings)?;
     Ok((export, findings))
 }
 

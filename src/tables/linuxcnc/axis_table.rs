@@ -100,7 +100,7 @@ mod tests {
             unit: "mm".to_owned(),
             axis,
             input: axis,
-            error: Box::new(error),
+            error: std::rc::Rc::new(error),
         }
     }
 

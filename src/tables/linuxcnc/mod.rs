@@ -14,7 +14,7 @@ pub mod work_offset;
 
 use super::compensation::{Compensation, Mode};
 use super::correction::{Correction, Limits, left_um};
-use crate::diag::{Failure, Finding, Findings, Result};
+use crate::diag::{Failure, Finding, Findings, Result, Severity};
 use crate::machine::Machine;
 use ini::UserIni;
 
@@ -115,13 +115,13 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
         return Err(Failure::new("tables::radius", format!("the radius is {} mm", options.radius_mm))
             .help("give the radius of the workpiece about the rotary axis, above 0"));
     }
-    for mut finding in correction.beyond(&options.limits) {
-        if options.force {
-            finding.severity = crate::diag::Severity::Warning;
-            finding.help = Some("exported because it was forced: move the machine slowly at first".to_owned());
-        }
-        findings.push(finding);
+    let mut correction = correction.clone();
+    let mut beyond = correction.beyond(&options.limits);
+    if options.force {
+        force(&mut beyond, &mut correction);
     }
+    findings.0.extend(beyond);
+    let correction = &correction;
     if let Some(active) = &correction.active {
         match active.check_belongs(machine, CONTROLLER) {
             Ok(more) => findings.0.extend(more.0),
@@ -205,10 +205,28 @@ pub(in crate::tables) fn one_line(text: &str) -> String {
 pub(in crate::tables) fn head(machine: &Machine, correction: &Correction) -> Vec<String> {
     let p = &correction.provenance;
     let or = |text: &str| if text.is_empty() { "not stated".to_owned() } else { one_line(text) };
-    vec![
+    let mut lines = vec![
         format!("Written by {} for machine {}.", program(), one_line(&machine.name)),
         format!("Study: {}", or(&p.study)),
         format!("Study sha256: {}", or(&p.study_sha256)),
         format!("Date of the data: {}", or(&p.data_date)),
-    ]
+    ];
+    // whoever loads it has not seen the screen
+    if !p.forced.is_empty() {
+        lines.push(format!("FORCED, {} spoke against it: README.txt says what", count(p.forced.len())));
+    }
+    lines
+}
+
+fn count(n: usize) -> String {
+    if n == 1 { "1 finding".to_owned() } else { format!("{n} findings") }
+}
+
+/// Turns what refuses an export into warnings, and notes it for the files.
+pub(in crate::tables) fn force(findings: &mut [Finding], correction: &mut Correction) {
+    for finding in findings.iter_mut().filter(|f| f.severity == Severity::Error) {
+        finding.severity = Severity::Warning;
+        finding.help = Some("exported because it was forced: move the machine slowly at first".to_owned());
+        correction.provenance.forced.push(finding.message.clone());
+    }
 }

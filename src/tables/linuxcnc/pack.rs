@@ -4,7 +4,7 @@ use super::axis_table::{self};
 use super::component;
 use super::ini::Joints;
 use super::stock::{self, Module};
-use super::{CONTROLLER, Export, Left, Options, Way, head, program, readme, render, work_offset};
+use super::{CONTROLLER, Export, Left, Options, Way, force, head, program, readme, render, work_offset};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result};
 use crate::machine::{Machine, Side};
@@ -54,17 +54,22 @@ pub(super) fn pack(
     let active = correction.active.as_ref();
     let old_table = |axis: AxisName| active.and_then(|a| a.stock.as_ref()?.axis_tables.get(&axis).cloned());
     let joint = |axis: AxisName| joints.numbers(axis).first().copied().unwrap_or(0);
+    let tables = axis_table::tables(machine, &correction.shapes, old_table, joint);
+    let mut noted = correction.clone();
+    let mut findings = old_tables(&tables, correction, options);
+    if options.force {
+        force(&mut findings.0, &mut noted);
+    }
     let mut packing = Packing {
         machine,
-        correction,
+        correction: &noted,
         options,
         joints,
         module: stock::module_of(machine),
-        tables: axis_table::tables(machine, &correction.shapes, old_table, joint),
+        tables,
         files: Vec::new(),
-        findings: Findings::default(),
+        findings,
     };
-    packing.check_old_tables();
     let component = packing.component()?;
     let stock = packing.stock()?;
     packing.tool_table()?;
@@ -72,6 +77,29 @@ pub(super) fn pack(
     packing.put("README.txt", text);
     let (files, findings) = packing.findings.finish(packing.files)?;
     Ok((Export { files, component, stock }, findings))
+}
+
+/// Tables or backlash of the user's own that ours would silently replace.
+fn old_tables(tables: &[(AxisName, AxisTable)], correction: &Correction, options: &Options) -> Findings {
+    let mut findings = Findings::default();
+    let Some(ini) = &options.ini else { return findings };
+    let active = correction.active.as_ref();
+    for (axis, table) in tables {
+        let ours = active.and_then(|a| a.stock.as_ref()).is_some_and(|s| s.axis_tables.contains_key(axis));
+        let old = ini.comp_file.get(&table.joint).map(|(file, _)| format!("COMP_FILE = {file}"));
+        let backlash = ini.backlash.get(&table.joint).map(|b| format!("BACKLASH = {b}"));
+        let Some(old) = old.filter(|_| !ours).or(backlash) else { continue };
+        let says = format!(
+            "{}: [JOINT_{}] {old} was in force while {axis} was measured, and the new table replaces it: add the old values to its lines by hand",
+            ini.name, table.joint
+        );
+        findings.push(
+            Finding::error("tables::replaces", says).help(
+                "add the old values to the lines of the new table by hand and use --force, or measure without them",
+            ),
+        );
+    }
+    findings
 }
 
 impl Packing<'_> {
@@ -90,30 +118,6 @@ impl Packing<'_> {
 
     fn active(&self, mode: Mode) -> Option<&Compensation> {
         self.correction.active.as_ref().filter(|a| a.mode == mode)
-    }
-
-    /// A table or backlash of the user's own that ours would silently replace.
-    fn check_old_tables(&mut self) {
-        let Some(ini) = &self.options.ini else { return };
-        let active = self.correction.active.as_ref();
-        for (axis, table) in &self.tables {
-            let ours = active.and_then(|a| a.stock.as_ref()).is_some_and(|s| s.axis_tables.contains_key(axis));
-            let old = ini.comp_file.get(&table.joint).map(|(file, _)| format!("COMP_FILE = {file}"));
-            let backlash = ini.backlash.get(&table.joint).map(|b| format!("BACKLASH = {b}"));
-            let Some(old) = old.filter(|_| !ours).or(backlash) else { continue };
-            let mut finding = Finding::error(
-                "tables::replaces",
-                format!(
-                    "{}: [JOINT_{}] {old} was in force while {axis} was measured, and the new table replaces it",
-                    ini.name, table.joint
-                ),
-            )
-            .help("add the old values to the lines of the new table by hand and use --force, or measure without them");
-            if self.options.force {
-                finding.severity = crate::diag::Severity::Warning;
-            }
-            self.findings.push(finding);
-        }
     }
 
     fn compensation(&self, mode: Mode, terms: Vec<Term>, stock: Option<Stock>) -> Compensation {

@@ -111,6 +111,7 @@ pub(super) fn text(packing: &Packing, by_component: &Way, by_stock: &Way) -> Res
         TEMPLATE,
         &context! {
             head => head(machine, correction),
+            forced => correction.provenance.forced.iter().map(|l| one_line(l)).collect::<Vec<_>>(),
             component => component::name(machine),
             coordinates => packing.joints.coordinates(),
             machine_sha256 => machine.sha256.clone(),
