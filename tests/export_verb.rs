@@ -306,7 +306,11 @@ fn after_a_bad_verdict_nothing_is_written_unless_forced() {
             .assert()
             .success()
             .stderr(predicate::str::contains(format!("the diagnosis is {verdict}")));
-        assert!(at.join("comp/axiscal.hal").exists());
+        // whoever loads them did not see the screen
+        for name in ["comp/README.txt", "comp/compensation.json"] {
+            assert!(text(at, name).contains(&format!("the diagnosis is {verdict}")), "{name}");
+        }
+        assert!(text(at, "comp/axiscal.hal").contains("FORCED, 1 finding spoke against it"));
     }
 }
 

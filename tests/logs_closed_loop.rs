@@ -275,3 +275,28 @@ fn every_controllers_log_gives_back_what_was_planted_to_its_resolution() {
         }
     }
 }
+
+/// A log whose head is lost is in the unit of the other heads in the file, or in that of the postprocessor file: in millimetres all of
+/// its touches would be far off.
+#[test]
+fn a_log_without_its_head_is_in_the_unit_of_its_control() {
+    let machine = machine("swivel-head");
+    let plan = generated(&machine, "head").plan;
+    let (raw, _) = simulate::run(&machine, &plan, &Scenario::flawless(), None).unwrap();
+    let record =
+        |t: &RawTouch| LogRecord { id: t.id.unwrap(), status: t.status, position: t.position, time_s: t.time_s };
+    let records: Vec<LogRecord> = raw.iter().map(record).collect();
+    for unit in [LengthUnit::Inch, LengthUnit::Mm] {
+        let post = with_format("fanuc", unit, 5);
+        let whole = post.log_text(&machine, &plan, &records);
+        let headless: String = whole.lines().filter(|l| !l.starts_with('H')).map(|l| format!("{l}\r\n")).collect();
+        for text in [headless.clone(), whole.clone() + &headless] {
+            let (read, findings) =
+                log::read(text.as_bytes(), "run.log", Writer::Controller(&post), &machine, &plan).unwrap();
+            assert!(read.touches.len() == plan.touches.len(), "{unit:?}: {:?}", findings.0);
+            for (touch, made) in read.touches.iter().zip(&raw) {
+                assert!((touch.position.xyz_mm() - made.position.xyz_mm()).norm() < 1e-3, "{unit:?}: {touch:?}");
+            }
+        }
+    }
+}

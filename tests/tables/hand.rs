@@ -177,6 +177,9 @@ fn the_sheets_by_hand_round_trip_only() {
 fn programmed(text: &str) -> Vec<(u32, f64)> {
     let unit = if text.lines().any(|l| l == "G20") { 25.4 } else { 1.0 };
     assert!(text.lines().filter(|l| ["G20", "G21"].contains(l)).count() == 1, "{text}");
+    // and leaves the control in the unit in which it was
+    let at = |line: &str| text.lines().position(|l| l == line).unwrap_or_else(|| panic!("{line}: {text}"));
+    assert!(at("#14=#4006") < at("G10 L52") && at("G11") < at("G#14") && at("G#14") < at("M30"));
     let lines = text.lines().skip_while(|l| *l != "G10 L52").skip(1).take_while(|l| *l != "G11");
     lines
         .map(|l| {

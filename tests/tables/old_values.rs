@@ -337,3 +337,73 @@ fn what_is_left_has_one_definition() {
     let stock = export.stock.left.iter().find(|l| l.parameter == "EB0A").unwrap();
     assert!((stock.left_um.unwrap() - by_hand).abs() < 1e-6, "{stock:?}");
 }
+
+/// Old vectors that do not close: the new ones do, and machine coordinates at rotary zero go by the gap. That stands in the files; above
+/// the limit it is refused, and where it is forced, that stands there too.
+#[test]
+fn vectors_that_do_not_close_are_said_where_they_are_loaded() {
+    let machine = machine("trunnion");
+    let sheet = tables("sinumerik");
+    let planted = vec![("location-a", "EY0A", 0.02)];
+    let backup_of = |gap: f64| {
+        format!(
+            "$MC_TRAFO5_BASE_TOOL_1[0]=0\n$MC_TRAFO5_BASE_TOOL_1[1]=0\n$MC_TRAFO5_BASE_TOOL_1[2]=-250\n\
+             $MC_TRAFO5_JOINT_OFFSET_PART_1[0]=0\n$MC_TRAFO5_JOINT_OFFSET_PART_1[1]=0\n$MC_TRAFO5_JOINT_OFFSET_PART_1[2]=0\n\
+             $MC_TRAFO5_PART_OFFSET_1[0]=0\n$MC_TRAFO5_PART_OFFSET_1[1]=0\n$MC_TRAFO5_PART_OFFSET_1[2]={}\n\
+             $MC_TRAFO5_AXIS1_1[0]=-1\n$MC_TRAFO5_AXIS1_1[1]=0\n$MC_TRAFO5_AXIS1_1[2]=0\n\
+             $MC_TRAFO5_AXIS2_1[0]=0\n$MC_TRAFO5_AXIS2_1[1]=0\n$MC_TRAFO5_AXIS2_1[2]=-1\n",
+            250.0 + gap
+        )
+    };
+    let export = |gap: f64, force: bool| {
+        let read = source("b.ini", backup_of(gap));
+        let old = backup::read(&read, &sheet.backup, &control::names(&machine, &sheet)).unwrap();
+        control::export(
+            &machine,
+            "sinumerik",
+            &sheet,
+            &correction(&machine, &planted, None),
+            &Options { old, force, ..accepting() },
+        )
+    };
+    let offsets = |e: &Export| {
+        let readme = text(e, "README.txt");
+        (readme.contains("at 0 stay right"), readme.contains("Touch off all work offsets again"))
+    };
+    let (closed, _) = export(0.0, false).unwrap();
+    assert_eq!(offsets(&closed), (true, false));
+    let (open, findings) = export(0.2, false).unwrap();
+    assert!(findings.0.iter().any(|f| f.code == "tables::open_chain"), "{findings:?}");
+    assert_eq!(offsets(&open), (false, true));
+    assert!(text(&open, "README.txt").contains("+0.2000"), "{}", text(&open, "README.txt"));
+    assert!(text(&open, "axiscal_trafo.ini").contains("; The old vectors did not close"));
+    let refused = export(202.67, false).unwrap_err();
+    let found = refused.0.iter().find(|f| f.code == "tables::open_chain").unwrap();
+    assert!(found.message.contains("202.6700 mm off") && found.help.as_ref().unwrap().contains("--force"), "{found:?}");
+    let (forced, _) = export(202.67, true).unwrap();
+    for (name, mark) in
+        [("README.txt", "FORCED: written with --force"), ("axiscal_trafo.ini", "; FORCED, 1 finding spoke against it")]
+    {
+        assert!(text(&forced, name).contains(mark), "{name}: {}", text(&forced, name));
+    }
+    assert_eq!(forced.compensation.provenance.forced.len(), 1);
+    assert!(!text(&open, "README.txt").contains("FORCED") && open.compensation.provenance.forced.is_empty());
+}
+
+/// What rounding leaves is that of the unit in which the values are written.
+#[test]
+fn the_step_of_an_inch_control_is_in_inches() {
+    let machine = machine("trunnion");
+    let planted = vec![("location-a", "EY0A", 0.02)];
+    for (control, unit, says) in [
+        ("fanuc", LengthUnit::Mm, "Rounding to 0.001 mm leaves"),
+        ("fanuc", LengthUnit::Inch, "Rounding to 0.0001 inch leaves"),
+        ("haas", LengthUnit::Inch, "Rounding to 0.0001 inch leaves"),
+    ] {
+        let options = Options { unit, ..accepting() };
+        let (export, _) =
+            control::export(&machine, control, &tables(control), &correction(&machine, &planted, None), &options)
+                .unwrap();
+        assert!(text(&export, "README.txt").contains(says), "{control}: {}", text(&export, "README.txt"));
+    }
+}
