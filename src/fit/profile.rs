@@ -128,6 +128,15 @@ pub fn intervals(
             }
         }
     }
+    // beside another shape a line may lead out of a range: nothing sets that end
+    for (i, ends) in &mut out.ends {
+        let u = &fit.model.unknowns[*i];
+        let name = u.name.split('@').next().unwrap_or_default();
+        let own = effects.iter().filter(|e| e.id == u.effect).flat_map(|e| &e.parameters);
+        if let Some((_, low, high)) = own.filter(|p| p.name == name).find_map(|p| p.shape) {
+            *ends = [ends[0].filter(|end| *end >= low), ends[1].filter(|end| *end <= high)];
+        }
+    }
     out
 }
 
@@ -162,7 +171,8 @@ pub fn without_prior(
     }
     let value = 0.5 * (from + to);
     let least = growth(value);
-    let falls = whole - profile.residual.norm_squared() - least;
+    // what the others would still gain, where they have not settled, they gain at any value: that says nothing of this one
+    let falls = whole - profile.residual.norm_squared() + growth(profile.values[profile.shape]) - least;
     let limit = GROWTH_95 * scale2(falls);
     let over = |at: f64| growth(at) - least > limit;
     let end = |mut inside: f64, limit: f64| -> f64 {

@@ -25,7 +25,8 @@ pub(super) fn observe(
     priors: &[Prior],
     weights: &[f64],
 ) -> (solve::Observability, f64) {
-    let clear = solve::observe_gram(gram).filter(|seen| seen.condition < CLEARLY_SEEN);
+    // beside large sizes of an effect with a shape what no nominal touch sees may look clear
+    let clear = solve::observe_gram(gram).filter(|seen| seen.condition < CLEARLY_SEEN && !has_shapes(model));
     let (seen, nominal) = match clear {
         // nothing is lost, nothing is held
         Some(seen) => (seen, None),
@@ -44,6 +45,11 @@ pub(super) fn observe(
     (seen, condition)
 }
 
+/// Has an effect of the model a shape parameter, searched for or held?
+fn has_shapes(model: &Model) -> bool {
+    model.unknowns.iter().any(|u| u.shape)
+}
+
 /// Rank and null directions at the nominal touches, with the Gram matrix there.
 fn observe_nominal(
     model: &Model,
@@ -54,14 +60,38 @@ fn observe_nominal(
     weights: Option<&[f64]>,
 ) -> (solve::Observability, DMatrix<f64>) {
     let nominal = model.prepare(&data.nominal);
-    let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (1e-3, 0.0));
-    if let Some(weights) = weights {
-        touches.set_weights(weights.to_vec());
-    }
-    let at = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
-    let gram = solve::Problem::normal(&touches, &at, true).gram;
-    let mut seen =
-        solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+    let at = |theta: &[f64]| {
+        let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (1e-3, 0.0));
+        if let Some(weights) = weights {
+            touches.set_weights(weights.to_vec());
+        }
+        (touches, DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i])))
+    };
+    let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
+    let (mut seen, gram) = if !has_shapes(model) {
+        let (touches, at) = at(theta);
+        let gram = solve::Problem::normal(&touches, &at, true).gram;
+        let seen =
+            solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+        (seen, gram)
+    } else {
+        // a shape needs the sizes of its effect to leave a trace; nothing else does, and beside them a tilt that no touch sees
+        // would leave one of second order
+        let of_shapes = |i: usize| {
+            let u = &model.unknowns[i];
+            !u.shape && model.unknowns.iter().any(|s| s.shape && s.effect == u.effect)
+        };
+        let bare: Vec<f64> = (0..theta.len()).map(|i| if of_shapes(i) { 0.0 } else { theta[i] }).collect();
+        let jacobian_at = |theta: &[f64]| {
+            let (touches, at) = at(theta);
+            solve::Problem::jacobian(&touches, &at)
+        };
+        let (mut jacobian, there) = (jacobian_at(&bare), jacobian_at(theta));
+        for c in shapes {
+            jacobian.set_column(c, &there.column(c));
+        }
+        (solve::observe(&jacobian), jacobian.tr_mul(&jacobian))
+    };
     seen.hold(held_first(model, free));
     (seen, gram)
 }

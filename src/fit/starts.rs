@@ -93,47 +93,75 @@ fn identify_started(
             }
         }
     }
-    let fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;
-    let Some((name, ends_of)) = shapes::out_of_range(&fit, catalogue, machine) else {
-        return best_minimum(fit, (machine, catalogue), effects, &held_settings);
-    };
-    // a first step too far: everything else settles while the shape stays where it began, and the search goes on from there
-    let mut fit = fit;
-    if let Some(&began) = starts.get(&name) {
-        let mut waiting = Settings { quick: true, ..held_settings.clone() };
-        hold(&mut waiting, &name, began);
-        let settled = identify_from(machine, catalogue, effects, fit.data, &waiting, starts)?;
-        let from = values(&settled);
-        fit = identify_from(machine, catalogue, effects, settled.data, &held_settings, &from)?;
-        if shapes::out_of_range(&fit, catalogue, machine).is_none() {
-            return Ok(fit);
-        }
+    let mut fit = identify_from(machine, catalogue, effects, data, &held_settings, starts)?;
+    let mut said = Vec::new();
+    // each may come out of its range twice: before and after another one is held
+    for _ in 0..2 * fit.model.unknowns.iter().filter(|u| u.shape).count() {
+        let Some(out) = shapes::out_of_range(&fit, catalogue, machine) else { break };
+        let of = OutOfRange { machine, catalogue, effects, settings, starts, out };
+        let (next, warning) = of.back_into_it(fit, &mut held_settings)?;
+        fit = next;
+        said.extend(warning);
     }
-    // a step too far says nothing of the side: the end that fits better
-    held_settings.held.push(name.clone());
-    let mut held_at = |end: f64| {
-        hold(&mut held_settings, &name, end);
-        identify_from(machine, catalogue, effects, fit.data.clone(), &held_settings, starts)
-    };
-    let [low, high] = [held_at(ends_of[0])?, held_at(ends_of[1])?];
-    // by one measure: the smaller scatter of visits hides less
-    let white = low.whitening(low.noise.tau_mm.min(high.noise.tau_mm));
-    // what the user says of it counts, too
-    let known = settings.knowledge.iter().find(|(word, _)| crate::symbols::same(word, &name)).map(|(_, k)| *k);
-    let against = |end: f64| match known {
-        Some(Knowledge::Prior { value, sigma }) => ((end - value) / sigma).powi(2),
-        _ => 0.0,
-    };
-    let lower = misfit(&low, &white) + against(ends_of[0]) <= misfit(&high, &white) + against(ends_of[1]);
-    let mut fit = if lower { low } else { high };
-    if let Some(Knowledge::Prior { value, sigma }) = known {
-        fit.outcome.warnings.push(format!(
-            "{name} ran out of its range in the search beside its prior of {value} ± {sigma}: touches and prior do not agree, or its range is too narrow; it stands at the end of its range that fits both better"
-        ));
-        return Ok(fit);
-    }
-    fit.outcome.warnings.push(format!("{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"));
+    let mut fit = best_minimum(fit, (machine, catalogue), effects, &held_settings)?;
+    fit.outcome.warnings.extend(said);
     Ok(fit)
+}
+
+/// A shape parameter that ran out of its range.
+struct OutOfRange<'a> {
+    machine: &'a Machine,
+    catalogue: &'a Catalogue,
+    effects: &'a [&'a Effect],
+    /// What the user says.
+    settings: &'a Settings,
+    starts: &'a BTreeMap<String, f64>,
+    /// Its name, and the ends of its range.
+    out: (String, [f64; 2]),
+}
+
+impl OutOfRange<'_> {
+    /// The fit with it in its range again, searched for from where it began or held at an end, and what is to be said of it.
+    fn back_into_it(&self, mut fit: Fit, held_settings: &mut Settings) -> Result<(Fit, Option<String>)> {
+        let Self { machine, catalogue, effects, settings, starts, out: (name, ends_of) } = self;
+        // a first step too far: everything else settles while the shape stays where it began, and the search goes on from there
+        if let Some(&began) = starts.get(name) {
+            let mut waiting = Settings { quick: true, ..held_settings.clone() };
+            hold(&mut waiting, name, began);
+            let settled = identify_from(machine, catalogue, effects, fit.data, &waiting, starts)?;
+            let from = values(&settled);
+            fit = identify_from(machine, catalogue, effects, settled.data, held_settings, &from)?;
+            if shapes::out_of_range(&fit, catalogue, machine).is_none_or(|(other, _)| other != *name) {
+                return Ok((fit, None));
+            }
+        }
+        // a step too far says nothing of the side: the end that fits better
+        held_settings.held.push(name.clone());
+        let mut held_at = |end: f64| {
+            hold(held_settings, name, end);
+            identify_from(machine, catalogue, effects, fit.data.clone(), held_settings, starts)
+        };
+        let [low, high] = [held_at(ends_of[0])?, held_at(ends_of[1])?];
+        // by one measure: the smaller scatter of visits hides less
+        let white = low.whitening(low.noise.tau_mm.min(high.noise.tau_mm));
+        // what the user says of it counts, too
+        let known = settings.knowledge.iter().find(|(word, _)| crate::symbols::same(word, name)).map(|(_, k)| *k);
+        let against = |end: f64| match known {
+            Some(Knowledge::Prior { value, sigma }) => ((end - value) / sigma).powi(2),
+            _ => 0.0,
+        };
+        let lower = misfit(&low, &white) + against(ends_of[0]) <= misfit(&high, &white) + against(ends_of[1]);
+        hold(held_settings, name, ends_of[usize::from(!lower)]);
+        let says = match known {
+            Some(Knowledge::Prior { value, sigma }) => format!(
+                "{name} ran out of its range in the search beside its prior of {value} ± {sigma}: touches and prior do not agree, or its range is too narrow; it stands at the end of its range that fits both better"
+            ),
+            _ => format!(
+                "{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"
+            ),
+        };
+        Ok((if lower { low } else { high }, Some(says)))
+    }
 }
 
 /// Holds a parameter, whatever the user said of it and by whatever spelling.
