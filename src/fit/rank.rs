@@ -81,12 +81,18 @@ fn observe_nominal(
             let u = &model.unknowns[i];
             !u.shape && model.unknowns.iter().any(|s| s.shape && s.effect == u.effect)
         };
-        let bare: Vec<f64> = (0..theta.len()).map(|i| if of_shapes(i) { 0.0 } else { theta[i] }).collect();
+        // a search that goes on from another one begins at its values: they are no errorless machine
+        let bare_at = |i: usize| {
+            let u = &model.unknowns[i];
+            if !u.shape && (of_shapes(i) || free.binary_search(&i).is_ok()) { u.start } else { theta[i] }
+        };
+        let bare: Vec<f64> = (0..theta.len()).map(bare_at).collect();
+        let sized: Vec<f64> = (0..theta.len()).map(|i| if of_shapes(i) { theta[i] } else { bare[i] }).collect();
         let jacobian_at = |theta: &[f64]| {
             let (touches, at) = at(theta);
             solve::Problem::jacobian(&touches, &at)
         };
-        let (mut jacobian, there) = (jacobian_at(&bare), jacobian_at(theta));
+        let (mut jacobian, there) = (jacobian_at(&bare), jacobian_at(&sized));
         for c in shapes {
             jacobian.set_column(c, &there.column(c));
         }
