@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 /// Fits a model to assembled data.
 ///
 /// # Errors
-/// As [`identify`].
+/// As [`identify`](super::identify).
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
     let mut starts = BTreeMap::new();
