@@ -102,7 +102,7 @@ pub fn intervals(
                     let all = profile.all_places(p);
                     let beyond = profile.beyond(&all, ends, of.1 * of.1 + by_chance(all.len()));
                     let at: Vec<f64> = beyond.iter().map(|b| b.0).collect();
-                    out.ends.insert(unknown, hull(ends, &at));
+                    also(&mut out.ends, unknown, hull(ends, &at));
                     let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
                     let tried = if beyond.is_empty() { 1 } else { all.len() };
                     if !beyond.is_empty() {
@@ -222,6 +222,11 @@ fn with_all((value, sigma, k): (f64, f64, f64), beside: impl Iterator<Item = ((f
         (low, high) = (low.min(at - sigma * k), high.max(at + sigma * k));
     }
     [Some(low), Some(high)]
+}
+
+/// Widens what is known of an unknown: beside each of several shapes it may be something else.
+fn also(out: &mut BTreeMap<usize, [Option<f64>; 2]>, unknown: usize, ends: [Option<f64>; 2]) {
+    out.entry(unknown).and_modify(|e| *e = both(*e, ends)).or_insert(ends);
 }
 
 /// An interval that holds two others; an end that is open stays so.
@@ -481,7 +486,7 @@ impl<'a> Profile<'a> {
                 h.others.get(r).filter(|_| room > 0.0).map(|of| (*of, room.sqrt().min(k)))
             });
             let ends = with_all((self.fit.theta[unknown], sigma, k), beside);
-            out.entry(unknown).and_modify(|e| *e = both(*e, ends)).or_insert(ends);
+            also(out, unknown, ends);
         }
     }
 
@@ -502,7 +507,7 @@ impl<'a> Profile<'a> {
                 let room = k * k + chance - (h.growth - lowest);
                 h.sizes.get(c).filter(|_| room > 0.0).map(|of| (*of, room.sqrt()))
             });
-            out.insert(unknown, with_all((self.values[i], sigma, k), beside));
+            also(out, unknown, with_all((self.values[i], sigma, k), beside));
         }
     }
 }

@@ -96,7 +96,8 @@ fn observe_nominal(
         for c in shapes {
             jacobian.set_column(c, &there.column(c));
         }
-        (solve::observe(&jacobian), jacobian.tr_mul(&jacobian))
+        let gram = jacobian.tr_mul(&jacobian);
+        (solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&jacobian)), gram)
     };
     seen.hold(held_first(model, free));
     (seen, gram)

@@ -94,9 +94,7 @@ fn old_tables(tables: &[(AxisName, AxisTable)], correction: &Correction, options
             ini.name, table.joint
         );
         findings.push(
-            Finding::error("tables::replaces", says).help(
-                "add the old values to the lines of the new table by hand and use --force, or measure without them",
-            ),
+            Finding::error("tables::replaces", says).help("--force writes it all the same; or measure without them"),
         );
     }
     findings
