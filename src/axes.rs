@@ -111,6 +111,12 @@ impl AxisMap {
         out
     }
 
+    /// Those of the linear axes.
+    #[must_use]
+    pub fn linear(&self) -> Self {
+        self.iter().filter(|(axis, _)| !axis.is_rotary()).fold(Self::default(), |out, (axis, mm)| out.with(axis, mm))
+    }
+
     /// A full position; axes that are not given stand at 0.
     #[must_use]
     pub fn position(&self) -> Position {

@@ -444,6 +444,28 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
     assert!(found.contains(&"check::not_run"), "{found:?}");
     // under the transformation words are of the workpiece's system
     let table = generated(&machine, "basic", true);
+    // what no variable shows: the first moves do
+    for (control, plan, line) in [
+        ("fanuc", &plain, "IF[#4LT0.01]GOTO"),
+        ("fanuc", &table, "IF[#4LT0.01]GOTO"),
+        ("haas", &plain, "IF[#4LT0.01]GOTO"),
+        ("heidenhain", &table, "FN 12: IF +Q1620 LT +0.01 GOTO LBL"),
+    ] {
+        let post = controller(control);
+        let text = post.program(&machine, &plan.plan, &plan.path).unwrap().text;
+        assert_eq!(text.matches(line).count(), 1, "{control}");
+        assert!(codes(&post, &machine, plan, &text).is_empty(), "{control}");
+        // it looks, and goes on whatever it sees
+        let blind = text.replacen(line, &line.replace("0.01", "9000.01"), 1);
+        let found = codes(&post, &machine, plan, &blind);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+    }
+    // where the control has the function, it is taken off
+    let off = variant("fanuc", "[settings]\ncancel = \"G40 G69 G80\\nG54.4 P0\"\n");
+    let text = off.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    assert!(codes(&off, &machine, &plain, &text.replacen("IF[#4LT0.01]", "IF[#4LT9000.]", 1)).is_empty());
+    let found = codes(&off, &machine, &plain, &text.replacen("G54.4 P0", "G54.4 P1", 1));
+    assert!(found.contains(&"check::not_run"), "{found:?}");
     for (control, line, instead) in [
         ("heidenhain", "FN 18: SYSREAD Q1620 = ID210 NR1 IDX0", "FN 0: Q1620 = +0"),
         ("sinumerik", "+ABS($P_ACTFRAME[Z,RT])", ""),

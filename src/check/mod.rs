@@ -24,6 +24,7 @@ mod runs;
 mod seconds;
 mod settings;
 mod sinumerik;
+mod skew;
 mod statements;
 mod touches;
 mod vm;

@@ -46,6 +46,9 @@ pub enum Start {
     Obstructed,
     /// A tool length acts that the program cannot take off without a move: it must see that and not move.
     LengthActs,
+    /// Something turns the program's coordinates against the axes that no variable shows: it must take it off, or see after its first
+    /// moves that the axes stand elsewhere, and probe nothing.
+    Skewed,
     /// A function that the user has left on acts on the program's coordinates: it must take it off, or see it and not move.
     Lasting(Lasting),
 }
@@ -85,6 +88,10 @@ pub trait Dialect: Clone + Send + Sync {
     /// What a user may have left on that acts on the coordinates of a program. `tcp`: under the control's own transformation.
     fn lasting(_tcp: bool) -> &'static [Lasting] {
         &[]
+    }
+    /// Something that no variable shows may turn the program's coordinates. `tcp`: under the control's own transformation.
+    fn may_be_skewed(_tcp: bool) -> bool {
+        false
     }
     /// The control before the program.
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self;

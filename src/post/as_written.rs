@@ -284,6 +284,8 @@ pub struct Write {
     pub rapid: Entry,
     /// Rotary axes move.
     pub rotary: Entry,
+    /// The first moves have brought X, Y and Z to a known place at the top of the lift: the program may look whether the axes stand there.
+    pub arrived: Option<Entry>,
     /// Positioning that stops when the probe triggers.
     pub protected: Entry,
     /// One touch.

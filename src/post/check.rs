@@ -380,12 +380,18 @@ impl Check<'_> {
             ("message", &write.message),
             ("end", &write.end),
         ];
-        for (name, entry) in entries.into_iter().chain(write.stop.as_ref().map(|entry| ("stop", entry))) {
+        for (name, entry) in entries
+            .into_iter()
+            .chain(write.stop.as_ref().map(|entry| ("stop", entry)))
+            .chain(write.arrived.as_ref().map(|entry| ("arrived", entry)))
+        {
             self.origin(&format!("write.{name}"), &entry.source, &entry.unverified, &entry.template.span());
             self.template(&mut env, name, &entry.template);
         }
         for (name, part) in &file.parts {
-            if entries.iter().any(|(taken, _)| taken == name) || ["stop", "log_file"].contains(&name.as_str()) {
+            if entries.iter().any(|(taken, _)| taken == name)
+                || ["stop", "arrived", "log_file"].contains(&name.as_str())
+            {
                 let message = format!("[parts.{name}] has the name of a template of [write]");
                 self.error(&part.template.span(), "post::part", message, "give it another name");
             }

@@ -33,8 +33,7 @@ impl Postprocessor {
         let opening = Opening::of(path, machine, writer.frame.is_tcp());
         let (first, rest) = (opening.steps.clone(), opening.rest.clone());
         writer.opening = opening;
-        writer.steps(&first)?;
-        writer.opened();
+        writer.open(&first)?;
         writer.steps(&rest)?;
         writer.end()?;
         writer.finish()
@@ -370,7 +369,7 @@ impl<'a> Writer<'a> {
 
     // ------------------------------------------------------------------------------------------------- steps
 
-    fn steps(&mut self, indices: &[usize]) -> Result<()> {
+    pub(super) fn steps(&mut self, indices: &[usize]) -> Result<()> {
         let path = self.path;
         for index in indices {
             self.index = *index;

@@ -191,6 +191,11 @@ impl Postprocessor {
         self.templates.get_template("stop").is_ok()
     }
 
+    /// A program looks whether its first moves have brought the axes to where it sent them.
+    pub fn looks_on_arrival(&self) -> bool {
+        self.templates.get_template("arrived").is_ok()
+    }
+
     /// All postprocessors that are built in.
     ///
     /// # Errors

@@ -92,11 +92,23 @@ impl Writer<'_> {
         self.render("stop", context! { says => stop.says.clone(), longer, origin_z })
     }
 
-    /// Remembers where the first moves have brought the machine.
-    pub(super) fn opened(&mut self) {
+    /// Writes the first moves. As soon as X, Y and Z are known, the rotary axes under a transformation still at 0, the program may look
+    /// whether the axes of the machine stand where its words have sent them: what no variable of the control tells shows there.
+    pub(super) fn open(&mut self, first: &[usize]) -> Result<()> {
+        let mut looked = !self.post.looks_on_arrival();
+        for step in first {
+            self.steps(std::slice::from_ref(step))?;
+            let stands = self.at.linear();
+            if !looked && [AxisName::X, AxisName::Y, AxisName::Z].into_iter().all(|a| stands.get(a).is_some()) {
+                looked = true;
+                let words = self.words(&stands)?;
+                self.render("arrived", context! { stands => words })?;
+            }
+        }
         if self.opening.lift.is_some() && self.path.start_near.is_none() {
             self.opening.place = Some(self.at);
         }
+        Ok(())
     }
 
     /// The way that the path gives from where the first moves end to where the present set-up begins; `None` where the

@@ -10,6 +10,7 @@ use crate::check::code::{Values, Var};
 use crate::check::run::{
     Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
+use crate::check::skew::Skew;
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -28,6 +29,8 @@ pub struct Heidenhain {
     shift: [f64; 6],
     /// Basic rotation of the preset, deg.
     rotation: f64,
+    /// A basic rotation in space (SPA, SPB).
+    skew: Skew,
     tilted: bool,
     tcpm: Tcpm,
     /// M126: rotary axes take the short way.
@@ -176,9 +179,11 @@ impl Heidenhain {
         if feed <= 0.0 {
             return Err(format!("the feed is {feed}"));
         }
+        let to = vm.target(&to)?;
+        self.skew.may_probe(&vm.at, &to, "a basic rotation in space (SPA, SPB)")?;
         Ok(Next::Probe(Probe {
             from: vm.at,
-            to: vm.target(&to)?,
+            to,
             feed,
             toward: true,
             known: vm.known,
@@ -233,7 +238,7 @@ impl Heidenhain {
             "210 NR1" => self.rotation,
             "210 NR2" => 0.0,
             "320" => CLOCK_S + vm.clock_s(1.0),
-            "240" => vm.at.get(axis()?),
+            "240" => axis().map(|axis| vm.at.get(axis) + self.skew.off(axis, &vm.at))?,
             "270" => {
                 let axis = axis()?;
                 vm.at.get(axis) - self.offset(axis)
@@ -258,6 +263,10 @@ impl Dialect for Heidenhain {
         if tcp { &[Lasting::Rotated] } else { &[] }
     }
 
+    fn may_be_skewed(tcp: bool) -> bool {
+        tcp
+    }
+
     fn begin(start: Start, post: &Postprocessor, _machine: &Machine) -> Self {
         let awkward = start == Start::Awkward;
         let third = start == Start::Third;
@@ -268,6 +277,7 @@ impl Dialect for Heidenhain {
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0], awkward),
             rotation: if start == Start::Lasting(Lasting::Rotated) { 1.5 } else { 0.0 },
+            skew: Skew::of(start),
             tilted: awkward,
             tcpm: if awkward || third { Tcpm::Found } else { Tcpm::Off },
             short_way: awkward,
@@ -281,6 +291,7 @@ impl Dialect for Heidenhain {
 
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
         let Some(head) = words.first() else { return Ok(Next::On) };
+        self.skew.reckon(&vm.at);
         match head.address {
             "L" => return self.linear(words, vm),
             "PROBE" => return self.probe(words, vm),

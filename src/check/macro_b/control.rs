@@ -14,6 +14,7 @@ use crate::check::code::{Values, Var};
 use crate::check::run::{
     Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
+use crate::check::skew::Skew;
 use crate::machine::Machine;
 use crate::post::{CallRule, Does, Postprocessor};
 use crate::units::mm_from_inch;
@@ -52,6 +53,8 @@ pub struct MacroB {
     mirrored: bool,
     /// What the user has left on.
     lasting: Option<Lasting>,
+    /// A workpiece setting error compensation (G54.4).
+    skew: Skew,
     /// Blocks before this place may not have been done yet.
     ahead: bool,
     /// mm/min
@@ -76,6 +79,13 @@ impl MacroB {
     fn mode(&mut self, tenth: i64, words: &[Spoken]) -> Result<(), String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         self.ahead |= tenth != 40;
+        if tenth == 544 {
+            if value("P") != Some(0.0) {
+                return Err("G54.4 is known with P0 only, which ends it".to_owned());
+            }
+            self.skew = Skew::None;
+            return Ok(());
+        }
         if let Some(ended) = lasting::ended_by(tenth, value("P"))? {
             self.lasting = self.lasting.filter(|acts| *acts != ended);
             return Ok(());
@@ -170,9 +180,11 @@ impl MacroB {
     /// A move that a signal ends, at the feed that acts.
     fn probe(&self, words: &[Spoken], vm: &mut Vm, alarm: Alarm) -> Result<Next, String> {
         let to = self.target(words, vm);
+        let to = vm.target(&to)?;
+        self.skew.may_probe(&vm.at, &to, "a workpiece setting error compensation (G54.4)")?;
         Ok(Next::Probe(Probe {
             from: vm.at,
-            to: vm.target(&to)?,
+            to,
             feed: self.feed,
             toward: true,
             known: vm.known,
@@ -221,7 +233,7 @@ impl MacroB {
         for word in words {
             let used = match word.address {
                 _ if self.builder.uses(word, words) => true,
-                "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 542 | 1540)),
+                "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 542 | 544 | 1540)),
                 "R" | "S" => false,
                 "H" => gs.iter().any(|g| matches!(g, 434 | 2340)),
                 "F" => moves,
@@ -252,6 +264,10 @@ impl Dialect for MacroB {
 
     fn lasting(_tcp: bool) -> &'static [Lasting] {
         lasting::ALL
+    }
+
+    fn may_be_skewed(_tcp: bool) -> bool {
+        true
     }
 
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
@@ -307,6 +323,7 @@ impl Dialect for MacroB {
                 Start::Lasting(what) => Some(what).filter(|what| lasting::may_act(*what, post)),
                 _ => None,
             },
+            skew: Skew::of(start),
             ahead: false,
             feed: 0.0,
             holds: 0.0,
@@ -323,6 +340,7 @@ impl Dialect for MacroB {
     }
 
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
+        self.skew.reckon(&vm.at);
         let numbers = |address: &'static str| words.iter().filter(move |w| w.address == address).map(|w| w.value);
         let tenth = |g: f64| {
             let t = (g * 10.0).round();

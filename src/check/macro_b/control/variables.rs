@@ -48,7 +48,7 @@ impl MacroB {
             4130 => self.system_p,
             5021..=5026 => {
                 let axis = self.axis(n - 5020)?;
-                self.shown(axis, vm.at.get(axis)) / self.unit(axis)
+                self.shown(axis, vm.at.get(axis) + self.skew.off(axis, &vm.at)) / self.unit(axis)
             }
             5041..=5046 => {
                 let axis = self.axis(n - 5040)?;
