@@ -329,4 +329,54 @@ fn each_block_may_have_a_time_constant_of_its_own() {
     }
     println!("{inside} of {told}");
     assert!(told >= 6 && inside * 10 >= told * 9, "{inside} of {told}");
+    // what the user knows of each, and it is true: the touches contradict none of it
+    for seed in 1..=3 {
+        let touches = touch(&machine, &full, &planted.clone().with_noise(0.5e-3, 0.0, seed), None);
+        let run = axiscal::model::data::Run { plan: &full, touches: &touches, mounting: None, started_s: None };
+        let of_one = "st@full/a".to_owned();
+        let settings = Settings {
+            knowledge: [(of_one.clone(), Knowledge::Prior { value: 0.6, sigma: 0.05 })].into(),
+            ..settings.clone()
+        };
+        let fit = axiscal::fit::identify(&machine, &catalogue, &[run], &settings).unwrap();
+        let said = fit.outcome.warnings.iter().find(|w| w.contains("contradict"));
+        assert_eq!(said, None);
+        let st = fit.outcome.parameters.iter().find(|p| p.name == of_one).unwrap();
+        assert!((st.value - 0.6).abs() < 0.15, "{st:?}");
+    }
+}
+
+/// What no touch sees stays unseen, however large something else is that turns or shifts the touches: of second order in both a tilt
+/// showed beside a pitch of a millimetre, and was called identified.
+#[test]
+fn what_is_unseen_stays_unseen_beside_something_large() {
+    for (name, program) in
+        [("swivel-head", "head"), ("swivel-head", "table"), ("trunnion", "basic"), ("double-head", "double-head")]
+    {
+        let machine = machine(name);
+        let plan = plan(&machine, program);
+        let rotary: Vec<String> =
+            machine.rotary().map(|a| format!("location-{}", a.name.to_string().to_lowercase())).collect();
+        let unseen = |pitch_um: f64, with: &[&str]| -> Vec<String> {
+            let scenario = Scenario::flawless().with_noise(1e-3, 0.0, 4);
+            let scenario = scenario
+                .with(&machine, "pitch-x", &[("EXXc", pitch_um), ("EXXs", 0.3 * pitch_um), ("pitch_X", 10.0)])
+                .unwrap();
+            let touches = touch(&machine, &plan, &scenario, None);
+            let model: Vec<&str> = rotary
+                .iter()
+                .map(String::as_str)
+                .chain(["block-setup", "pretravel"])
+                .chain(with.iter().copied())
+                .collect();
+            let fit = identify(&machine, &[(&plan, &touches)], &model);
+            let of_axes = fit.outcome.parameters.iter().filter(|p| p.effect.starts_with("location-"));
+            of_axes.filter(|p| p.status != Status::Identified).map(|p| p.name.clone()).collect()
+        };
+        let small = unseen(0.0, &[]);
+        let large = unseen(1000.0, &["pitch-x"]);
+        println!("{name} {program}: {small:?} {large:?}");
+        // a pitch may take something away, it shows nothing new
+        assert!(small.iter().all(|n| large.contains(n)), "{name} {program}: {small:?} {large:?}");
+    }
 }
