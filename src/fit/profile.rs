@@ -418,7 +418,11 @@ impl<'a> Profile<'a> {
                 let room = k * k + chance - (h.growth - lowest);
                 h.sizes.get(c).filter(|_| room > 0.0).map(|of| (*of, room.sqrt()))
             });
-            also(out, unknown, with_all((self.values[i], sigma, k), beside));
+            let ends = with_all((self.values[i], sigma, k), beside);
+            // what may be so many times its usual size on either side is not told
+            let far = shapes::CREDIBLE * self.effect.parameters[i].typical;
+            let told = ends.iter().flatten().all(|end| (end - self.values[i]).abs() <= far);
+            also(out, unknown, if told { ends } else { [None, None] });
         }
     }
 }
