@@ -63,37 +63,44 @@ pub(super) fn variant(alone: &Model, set: &Range<usize>, values: &[f64]) -> Vari
 }
 
 /// The best start for the parameters of an effect that is not in a fit: one for each block where it has a set of its own for each,
-/// none where it has no shape parameters.
+/// none where it has no shape parameters. `alike`: the search begins with the same shapes for every block.
 #[must_use]
-pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Vec<Start> {
+pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect, alike: bool) -> Vec<Start> {
     let shaped: Vec<usize> = (0..effect.parameters.len()).filter(|&i| effect.parameters[i].shape.is_some()).collect();
     if shaped.is_empty() {
         return Vec::new();
     }
     let alone = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
     let trials = Trials::of(&alone, &fit.data.observations);
-    let sets = alone.instances(0).iter().map(|&(first, count)| first..first + count);
-    sets.map(|set| start_of_a_set(fit, effect, &shaped, (&alone, &trials), &set)).collect()
+    let sets: Vec<Range<usize>> = alone.instances(0).iter().map(|&(first, count)| first..first + count).collect();
+    let together = if alike { sets.len().max(1) } else { 1 };
+    sets.chunks(together).flat_map(|sets| start_of_sets(fit, effect, &shaped, (&alone, &trials), sets)).collect()
 }
 
-fn start_of_a_set(
+/// The best start of some sets of an effect's parameters, which have the same shapes and sizes of their own.
+fn start_of_sets(
     fit: &Fit,
     effect: &Effect,
     shaped: &[usize],
     (alone, trials): (&Model, &Trials),
-    set: &Range<usize>,
-) -> Start {
+    sets: &[Range<usize>],
+) -> Vec<Start> {
     let linear = fit.linear(fit.noise.tau_mm);
     let n = fit.data.observations.len();
     let (jacobian, residual) = (linear.jacobian.rows(0, n).into_owned(), linear.residual.rows(0, n).into_owned());
     let covariance = uncertainty::free_covariance(fit);
     let sizes: Vec<usize> = (0..effect.parameters.len()).filter(|i| !shaped.contains(i)).collect();
     let whitening = fit.whitening(fit.noise.tau_mm);
-    let columns: Vec<usize> = sizes.iter().map(|i| set.start + i).collect();
+    let n_sizes = sets.len() * sizes.len();
     let does = |shapes: &[f64]| -> DMatrix<f64> {
         let mut values = vec![0.0; effect.parameters.len()];
         shaped.iter().zip(shapes).for_each(|(&i, v)| values[i] = *v);
-        let mut a = trials.columns(&variant(alone, set, &values)).values.select_columns(&columns);
+        let mut a = DMatrix::zeros(n, n_sizes);
+        for (k, set) in sets.iter().enumerate() {
+            let columns: Vec<usize> = sizes.iter().map(|i| set.start + i).collect();
+            let own = trials.columns(&variant(alone, set, &values)).values.select_columns(&columns);
+            a.columns_mut(k * sizes.len(), sizes.len()).copy_from(&own);
+        }
         whitening.apply(&mut a);
         a
     };
@@ -104,10 +111,10 @@ fn start_of_a_set(
         let gram = &raw - seen.tr_mul(&(&covariance * &seen));
         let slope = a.tr_mul(&residual);
         let scale = raw.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
-        let scaled = DMatrix::from_fn(sizes.len(), sizes.len(), |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+        let scaled = DMatrix::from_fn(n_sizes, n_sizes, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
         let rhs = slope.component_div(&scale);
         let eigen = scaled.symmetric_eigen();
-        let (mut gain, mut step) = (0.0, DVector::zeros(sizes.len()));
+        let (mut gain, mut step) = (0.0, DVector::zeros(n_sizes));
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             if *value > LEAST_OWN {
                 let along = vector.dot(&rhs);
@@ -122,7 +129,7 @@ fn start_of_a_set(
     // touches on a grid all but stand still in a wave that is as short as its steps: it then follows where each was made, its noise too,
     // with an amplitude as large as the wave is long
     let credible = |size: &DVector<f64>| {
-        sizes.iter().zip(size.iter()).all(|(&i, v)| v.abs() < CREDIBLE * effect.parameters[i].typical)
+        sizes.iter().cycle().zip(size.iter()).all(|(&i, v)| v.abs() < CREDIBLE * effect.parameters[i].typical)
     };
     let mut found = judge(&best);
     let mut usual = best.clone();
@@ -179,15 +186,17 @@ fn start_of_a_set(
         }
     }
     let (gain, size) = found;
-    let shown = gain > LEAST_GAIN * effect.parameters.len() as f64;
+    let shown = gain > LEAST_GAIN * (shaped.len() + n_sizes) as f64;
     let best = if shown { best } else { usual };
-    let mut values = vec![0.0; effect.parameters.len()];
-    shaped.iter().zip(&best).for_each(|(&i, v)| values[i] = *v);
-    if shown {
-        sizes.iter().zip(size.iter()).for_each(|(&i, v)| values[i] = *v);
-    }
-    let names = alone.unknowns[set.clone()].iter().map(|u| u.name.clone()).collect();
-    Start { names, values, gain, shown }
+    let start_of = |(k, set): (usize, &Range<usize>)| {
+        let mut values = vec![0.0; effect.parameters.len()];
+        shaped.iter().zip(&best).for_each(|(&i, v)| values[i] = *v);
+        if shown {
+            sizes.iter().enumerate().for_each(|(j, &i)| values[i] = size[k * sizes.len() + j]);
+        }
+        Start { names: alone.unknowns[set.clone()].iter().map(|u| u.name.clone()).collect(), values, gain, shown }
+    };
+    sets.iter().enumerate().map(start_of).collect()
 }
 
 /// Shape parameters at which something jumps, as the moment at which a block slips: there is no slope that a search could

@@ -16,20 +16,44 @@ use std::collections::BTreeMap;
 /// As [`identify`](super::identify).
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
+    let of_blocks = data.set_ups.len() > 1 && effects.iter().any(|e| e.per_block && has_shapes(e));
+    let alike =
+        if of_blocks { Some(from_starts(machine, catalogue, &effects, data.clone(), settings, true)?) } else { None };
+    let fit = from_starts(machine, catalogue, &effects, data, settings, false)?;
+    let Some(alike) = alike else { return Ok(fit) };
+    // by one measure: the smaller scatter of visits hides less
+    let white = fit.whitening(fit.noise.tau_mm.min(alike.noise.tau_mm));
+    Ok(if misfit(&alike, &white) < misfit(&fit, &white) { alike } else { fit })
+}
+
+fn has_shapes(effect: &Effect) -> bool {
+    effect.parameters.iter().any(|p| p.shape.is_some())
+}
+
+/// The fit from where each shape alone fits best, or, `alike`, from shapes that the sets of all blocks share: what changes slowly on
+/// every block is scatter of the visits to one block alone.
+fn from_starts(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    effects: &[&Effect],
+    data: Data,
+    settings: &Settings,
+    alike: bool,
+) -> Result<Fit> {
     let mut starts = BTreeMap::new();
-    let shaped = effects.iter().copied().filter(|e| e.parameters.iter().any(|p| p.shape.is_some()));
-    let unseen = look_for((machine, catalogue), shaped.collect(), &data, settings, &mut starts)?;
-    let fit = identify_started(machine, catalogue, &effects, data, settings, &starts)?;
+    let shaped = effects.iter().copied().filter(|e| has_shapes(e));
+    let unseen = look_for((machine, catalogue), shaped.collect(), &data, (settings, alike), &mut starts)?;
+    let fit = identify_started(machine, catalogue, effects, data, settings, &starts)?;
     // what an effect changes from one visit to the next is scatter of the visits to a fit without it, which then hardly sees it:
     // where less scatter is left beside it, that is what it is judged by
     let Some(unseen) = unseen.filter(|u| fit.noise.tau_mm < u.tau_mm) else { return Ok(fit) };
     let calm = Settings { visit_sigma_mm: Some(fit.noise.tau_mm), ..settings.clone() };
     let n_unseen = unseen.effects.len();
-    let still = look_for((machine, catalogue), unseen.effects, &fit.data, &calm, &mut starts)?;
+    let still = look_for((machine, catalogue), unseen.effects, &fit.data, (&calm, alike), &mut starts)?;
     if still.is_some_and(|s| s.effects.len() == n_unseen) {
         return Ok(fit);
     }
-    identify_started(machine, catalogue, &effects, fit.data, settings, &starts)
+    identify_started(machine, catalogue, effects, fit.data, settings, &starts)
 }
 
 /// Effects with shape parameters that the data does not show, and with which scatter of index visits, mm.
@@ -44,7 +68,7 @@ fn look_for<'e>(
     (machine, catalogue): (&Machine, &Catalogue),
     shaped: Vec<&'e Effect>,
     data: &Data,
-    settings: &Settings,
+    (settings, alike): (&Settings, bool),
     starts: &mut BTreeMap<String, f64>,
 ) -> Result<Option<Unseen<'e>>> {
     if shaped.is_empty() || data.observations.is_empty() {
@@ -55,7 +79,7 @@ fn look_for<'e>(
     let fit = identify_started(machine, catalogue, &others, data.clone(), &base, starts)?;
     let mut unseen = Unseen { effects: Vec::new(), tau_mm: fit.noise.tau_mm };
     for effect in shaped {
-        let found = shapes::start_shapes(&fit, machine, effect);
+        let found = shapes::start_shapes(&fit, machine, effect, alike);
         if found.iter().any(|s| !s.shown) {
             unseen.effects.push(effect);
         }
@@ -74,7 +98,7 @@ fn identify_started(
     starts: &BTreeMap<String, f64>,
 ) -> Result<Fit> {
     let mut held_settings = settings.clone();
-    for effect in effects.iter().filter(|e| e.parameters.iter().any(|p| p.shape.is_some())) {
+    for effect in effects.iter().filter(|e| has_shapes(e)) {
         let blocks: Vec<String> = data.set_ups.iter().map(|s| format!("@{}", s.label)).collect();
         for block in if effect.per_block { blocks } else { vec![String::new()] } {
             let named = |name: &str| format!("{name}{block}");
