@@ -453,17 +453,46 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
     ] {
         let post = controller(control);
         let text = post.program(&machine, &plan.plan, &plan.path).unwrap().text;
-        assert_eq!(text.matches(line).count(), 1, "{control}");
+        assert_eq!(text.matches(line).count(), 3, "{control}");
         assert!(codes(&post, &machine, plan, &text).is_empty(), "{control}");
         // it looks, and goes on whatever it sees
-        let blind = text.replacen(line, &line.replace("0.01", "9000.01"), 1);
+        let blind = text.replace(line, &line.replace("0.01", "9000.01"));
         let found = codes(&post, &machine, plan, &blind);
         assert!(found.contains(&"check::start"), "{control}: {found:?}");
     }
+    // a look from one place only, in one axis, of one sense, at the first set-up: each leaves something unseen, and is not written
+    let fanuc = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/postprocessors/fanuc.toml")).unwrap();
+    let (_, look) = fanuc.split_once("[write.arrived]\ntemplate = \"\"\"\n").unwrap();
+    let (look, _) = look.split_once("\"\"\"").unwrap();
+    let own = |look: &str| {
+        variant("fanuc", &format!("[write.arrived]\nsource = \"tried\"\ntemplate = \"\"\"\n{look}\"\"\"\n"))
+    };
+    for (what, from, to) in [
+        ("one axis", "{% for w in stands %}", "{% for w in stands if w.axis == \"Z\" %}"),
+        ("a sum with signs", "#4=#4+ABS[", "#4=#4+["),
+        ("half a millimetre", "\"0.01\"", "\"0.5\""),
+        ("the beginning only", "{{ settings.wait }}", "IF[#1GT1]GOTO{{ label }}\n{{ settings.wait }}"),
+    ] {
+        let changed = look.replacen(from, to, 1);
+        assert_ne!(changed, look, "{what}");
+        let post = own(&changed);
+        let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        let found = codes(&post, &machine, &plain, &text);
+        assert!(found.contains(&"check::start"), "{what}: {found:?}");
+    }
+    is_clean(&own(look), &machine, &plain);
+    // where it arrives, it has made no way when it is simply started again: it goes some way to see
+    let post = controller("fanuc");
+    let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let lines: Vec<&str> = text.lines().collect();
+    let looks: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].starts_with("IF[#4LT0.01]")).collect();
+    let once = [&lines[..looks[0] + 5], &lines[looks[2] + 7..], &[""]].concat().join("\n");
+    let found = codes(&post, &machine, &plain, &once);
+    assert!(found.contains(&"check::start"), "{found:?}");
     // where the control has the function, it is taken off
     let off = variant("fanuc", "[settings]\ncancel = \"G40 G69 G80\\nG54.4 P0\"\n");
     let text = off.program(&machine, &plain.plan, &plain.path).unwrap().text;
-    assert!(codes(&off, &machine, &plain, &text.replacen("IF[#4LT0.01]", "IF[#4LT9000.]", 1)).is_empty());
+    assert!(codes(&off, &machine, &plain, &text.replace("IF[#4LT0.01]", "IF[#4LT9000.]")).is_empty());
     let found = codes(&off, &machine, &plain, &text.replacen("G54.4 P0", "G54.4 P1", 1));
     assert!(found.contains(&"check::not_run"), "{found:?}");
     for (control, line, instead) in [

@@ -4,6 +4,7 @@
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
 use super::code::{Code, Piece, Statement, Values, Var, What, Word};
+use super::skew::Turn;
 use super::vm;
 use crate::axes::Position;
 use crate::machine::Machine;
@@ -48,7 +49,7 @@ pub enum Start {
     LengthActs,
     /// Something turns the program's coordinates against the axes that no variable shows: it must take it off, or see after its first
     /// moves that the axes stand elsewhere, and probe nothing.
-    Skewed,
+    Skewed(Turn),
     /// A function that the user has left on acts on the program's coordinates: it must take it off, or see it and not move.
     Lasting(Lasting),
 }

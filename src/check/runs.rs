@@ -2,6 +2,7 @@
 //! happen, once more from elsewhere with the control fresh, and from each set-up.
 
 mod otherwise;
+mod skewed;
 mod spindle;
 
 use super::blind;
@@ -245,9 +246,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let (on, off) = (setting("probe_on"), setting("probe_off"));
         findings.extend(runs.iter().filter_map(|run| spindle::searches_dead(run, on, off)));
         findings.dedup();
-        if D::may_be_skewed(self.tcp()) && runs.first().is_some_and(|run| run.fault.is_none()) {
-            let fault = self.told(1, Start::Skewed, elsewhere, None).fault;
-            findings.extend(fault.map(|fault| (fault.at, fault.says)));
+        if D::may_be_skewed(self.tcp()) && runs.iter().all(|run| run.fault.is_none()) {
+            findings.extend(self.skewed(elsewhere, &runs));
         }
         let refused = self.refused(beginning);
         findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));

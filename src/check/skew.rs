@@ -10,39 +10,59 @@ pub enum Skew {
     #[default]
     None,
     /// It acts, and nothing has moved.
-    Acts,
+    Acts(Turn),
     /// The axes agree with the words here.
-    From(Position),
+    From(Turn, Position),
+}
+
+/// A small turn of the coordinates about one of the linear axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// The way along this axis goes over,
+    pub of: AxisName,
+    /// to this one,
+    pub to: AxisName,
+    /// in the negative sense.
+    pub negative: bool,
+}
+
+impl Turn {
+    /// Both senses about each axis.
+    pub fn all() -> Vec<Self> {
+        use AxisName::{X, Y, Z};
+        let about = [(X, Y), (Y, Z), (Z, X)];
+        about.into_iter().flat_map(|(of, to)| [false, true].map(|negative| Self { of, to, negative })).collect()
+    }
 }
 
 impl Skew {
     /// A probing move that only asks whether the probe is closed is no longer, mm.
     const ASKING_MM: f64 = 0.1;
-    /// Some 0.1 deg.
-    const PER_MM: f64 = 0.002;
+    /// Some 0.02 deg.
+    const PER_MM: f64 = 0.0004;
 
     /// The state that a control begins in.
     pub fn of(start: Start) -> Self {
-        if start == Start::Skewed { Self::Acts } else { Self::None }
+        if let Start::Skewed(turn) = start { Self::Acts(turn) } else { Self::None }
     }
 
     /// Something is about to happen here.
     pub fn reckon(&mut self, at: &Position) {
-        if matches!(self, Self::Acts) {
-            *self = Self::From(*at);
+        if let Self::Acts(turn) = self {
+            *self = Self::From(*turn, *at);
         }
     }
 
-    /// How far an axis stands from where the words have sent it: the way that another one has made goes over to it, mm.
+    /// How far an axis stands from where the words have sent it, mm.
     pub fn off(self, axis: AxisName, at: &Position) -> f64 {
-        let Self::From(from) = self else { return 0.0 };
-        let other = match axis {
-            AxisName::X => AxisName::Y,
-            AxisName::Y => AxisName::Z,
-            AxisName::Z => AxisName::X,
-            _ => return 0.0,
-        };
-        (at.get(other) - from.get(other)) * Self::PER_MM
+        let Self::From(turn, from) = self else { return 0.0 };
+        let by = Self::PER_MM * if turn.negative { -1.0 } else { 1.0 };
+        let made = |a: AxisName| at.get(a) - from.get(a);
+        match axis {
+            a if a == turn.to => made(turn.of) * by,
+            a if a == turn.of => -made(turn.to) * by,
+            _ => 0.0,
+        }
     }
 
     /// # Errors

@@ -54,7 +54,7 @@ pub(super) struct Writer<'a> {
     pub(super) path: &'a Path,
     pub(super) frame: Frame<'a>,
     pub(super) axes: Vec<AxisName>,
-    text: String,
+    pub(super) text: String,
     findings: Findings,
     /// Step that is being written.
     pub(super) index: usize,
@@ -380,7 +380,7 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    fn step(&mut self, step: &Step) -> Result<()> {
+    pub(super) fn step(&mut self, step: &Step) -> Result<()> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
             Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),

@@ -101,14 +101,48 @@ impl Writer<'_> {
             let stands = self.at.linear();
             if !looked && [AxisName::X, AxisName::Y, AxisName::Z].into_iter().all(|a| stands.get(a).is_some()) {
                 looked = true;
-                let words = self.words(&stands)?;
-                self.render("arrived", context! { stands => words })?;
+                self.look_about()?;
             }
         }
         if self.opening.lift.is_some() && self.path.start_near.is_none() {
             self.opening.place = Some(self.at);
         }
         Ok(())
+    }
+
+    /// Looks where the lift stands at its top, further along each of the other linear axes, and goes back: a program that began just here
+    /// has made no way on which anything could show. Of two places one shows at least half of what turns the way between them.
+    fn look_about(&mut self) -> Result<()> {
+        /// An angle of 0.02 deg moves the end of it by some hundredths of a millimetre.
+        const WAY_MM: f64 = 100.0;
+        if !self.look()? {
+            return Ok(());
+        }
+        let begins = self.at.linear();
+        let across = |a: &&crate::machine::Axis| !a.name.is_rotary() && Some(a.name) != self.opening.lift;
+        let mut places = Vec::new();
+        for axis in self.machine.axes.iter().filter(across) {
+            let Some(at) = begins.get(axis.name) else { continue };
+            let [low, high] = axis.range;
+            let to = if high - at > at - low { (at + WAY_MM).min(high) } else { (at - WAY_MM).max(low) };
+            places.push((axis.name, at, to));
+        }
+        for (axis, _, to) in &places {
+            self.step(&Step::Rapid { to: AxisMap::default().with(*axis, *to) })?;
+            self.look()?;
+        }
+        for (axis, at, _) in places.iter().rev() {
+            self.step(&Step::Rapid { to: AxisMap::default().with(*axis, *at) })?;
+        }
+        Ok(())
+    }
+
+    /// Does this program look at all?
+    fn look(&mut self) -> Result<bool> {
+        let words = self.words(&self.at.linear())?;
+        let before = self.text.len();
+        self.render("arrived", context! { stands => words })?;
+        Ok(self.text.len() > before)
     }
 
     /// The way that the path gives from where the first moves end to where the present set-up begins; `None` where the

@@ -1,0 +1,32 @@
+//! Runs under something that turns the program's coordinates and that no variable shows.
+
+use super::Runs;
+use crate::axes::Position;
+use crate::check::explore::Told;
+use crate::check::run::{Dialect, Event, Happened, Start};
+use crate::check::skew::Turn;
+use rayon::prelude::*;
+use std::ops::Range;
+
+impl<D: Dialect> Runs<'_, D> {
+    /// Something turns the coordinates that no variable shows: begun elsewhere, and from where its own first moves lead, as one that is
+    /// simply started again.
+    pub(super) fn skewed(&self, elsewhere: Position, runs: &[Told]) -> Option<(Range<usize>, String)> {
+        const FIRST_MOVES: usize = 6;
+        let turns = Turn::all();
+        let of = |(run, told): (usize, &Told)| {
+            let leads = |h: &Happened| if let Event::Move { to, .. } = &h.event { Some(*to) } else { None };
+            let places: Vec<Position> =
+                told.trunk.iter().filter_map(leads).take(FIRST_MOVES).chain([elsewhere]).collect();
+            // a set-up with one turn, the next with the next; the whole with all
+            let some = if run == 0 { turns.clone() } else { vec![turns[run % turns.len()]] };
+            let from = told.from as usize;
+            let begins = some.into_iter().flat_map(move |turn| places.clone().into_iter().map(move |at| (turn, at)));
+            begins.map(move |(turn, at)| (from, turn, at))
+        };
+        let all: Vec<_> = runs.iter().enumerate().flat_map(of).collect();
+        let told = |(from, turn, at): &(usize, Turn, Position)| self.told(*from, Start::Skewed(*turn), *at, None);
+        let fault = all.par_iter().find_map_first(|begun| told(begun).fault)?;
+        Some((fault.at, fault.says))
+    }
+}
