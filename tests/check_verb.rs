@@ -85,13 +85,13 @@ fn exit_code_1_where_something_is_wrong() {
     with_plan(false)
         .assert()
         .code(1)
-        .stderr(predicate::str::contains("small.h:123:").and(predicate::str::contains("collision")))
+        .stderr(predicate::str::contains("small.h:126:").and(predicate::str::contains("collision")))
         .stdout(predicate::str::contains("do not run it"));
     let output = with_plan(true).assert().code(1).get_output().stdout.clone();
     let answer: serde_json::Value = serde_json::from_slice(&output).unwrap();
     assert_eq!((&answer["good"], &answer["format"]), (&false.into(), &"axiscal-check/1".into()));
     let findings = answer["findings"].as_array().unwrap();
-    assert!(findings.iter().any(|f| f["code"] == "check::collision" && f["line"] == 123), "{findings:#?}");
+    assert!(findings.iter().any(|f| f["code"] == "check::collision" && f["line"] == 126), "{findings:#?}");
     assert!(findings.iter().any(|f| f["code"] == "check::changed"));
 }
 
@@ -121,7 +121,7 @@ fn exit_code_2_where_it_cannot_be_said() {
     // what the grammar does not know, with its place
     let written = std::fs::read_to_string(path.join("small.h")).unwrap();
     edited(path, "small.h", "PLANE RESET STAY", "PLANE RESET TURN");
-    fails(&mut check(path, "heidenhain", "small.h"), "small.h:90:4: error: not understood");
+    fails(&mut check(path, "heidenhain", "small.h"), "small.h:93:4: error: not understood");
     std::fs::write(path.join("small.h"), &written).unwrap();
     // a mask is a part of the program
     edited(path, "SMALL_P.A", "%10.4LF", "%10.4lf");

@@ -227,12 +227,12 @@ fn a_held_shape_is_compared_and_has_a_range() {
         let fit = identify_with(&machine, &[(&full, &touches)], &model, with(Knowledge::Fixed(value)));
         fit.outcome.warnings.iter().any(|w| w.contains("contradict the held value of tau"))
     };
-    assert!(said(5.0) && said(0.05) && !said(0.5));
+    assert!(said(5.0) && said(0.06) && !said(0.5));
     for known in [Knowledge::Fixed(-1.0), Knowledge::Prior { value: 30.0, sigma: 1.0 }] {
         let run = axiscal::model::data::Run { plan: &full, touches: &touches, mounting: None, started_s: None };
         let catalogue = axiscal::model::catalogue::Catalogue::built_in().unwrap();
         let refused = axiscal::fit::identify(&machine, &catalogue, &[run], &with(known)).unwrap_err();
-        assert!(refused.0[0].message.contains("lies outside of its range, 0.02 to 20"), "{refused}");
+        assert!(refused.0[0].message.contains("lies outside of its range, 0.05 to 20"), "{refused}");
     }
 }
 

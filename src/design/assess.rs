@@ -172,7 +172,7 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
         .free
         .iter()
         .enumerate()
-        .filter(|(_, i)| alone.model.unknowns[**i].set_up.is_none())
+        .filter(|(_, i)| !alone.model.unknowns[**i].nuisance)
         .map(|(c, &i)| {
             let u = &alone.model.unknowns[i];
             let told = seen.unseen.iter().all(|v| v[c].abs() <= 1e-6);

@@ -26,6 +26,8 @@ pub(super) struct Results {
     columns: Vec<usize>,
     names: Vec<String>,
     typical: Vec<f64>,
+    /// Time constants and the like: no angle or edge tells one.
+    shape: Vec<bool>,
 }
 
 impl Results {
@@ -35,15 +37,17 @@ impl Results {
         let columns: Vec<usize> = (0..free.len()).filter(|&c| !unknown(c).nuisance).collect();
         let names = columns.iter().map(|&c| unknown(c).name.clone()).collect();
         let typical = columns.iter().map(|&c| unknown(c).typical).collect();
-        Self { columns, names, typical }
+        let shape = columns.iter().map(|&c| unknown(c).shape).collect();
+        Self { columns, names, typical, shape }
     }
 
-    /// The results' part of each null direction, in units of their typical sizes; `None` where it has none.
+    /// The results' part of each null direction, in units of their typical sizes; `None` where it has none, or shapes alone.
     pub fn directions(&self, seen: &Observability) -> Vec<Option<DVector<f64>>> {
         let of = |scaled: &DVector<f64>| {
             let own = self.columns.iter().zip(&self.typical).map(|(&c, typical)| scaled[c] / seen.scale[c] / typical);
             let own = DVector::from_iterator(self.columns.len(), own);
-            self.columns.iter().any(|&c| scaled[c].abs() > 1e-6).then_some(own)
+            let named = self.columns.iter().zip(&self.shape).any(|(&c, shape)| !shape && scaled[c].abs() > 1e-6);
+            named.then_some(own)
         };
         seen.unseen.iter().map(of).collect()
     }

@@ -31,17 +31,23 @@ const MOST_SIGNS: usize = 4;
 /// What is said of the shape parameters of a model; those that will not be told, and what is another beside another value, lose
 /// their uncertainty in `expected`.
 pub(super) fn shapes(task: &Task, view: &View, expected: &mut [Expected]) -> Vec<String> {
-    let shared = task.effects.iter().filter(|e| !e.per_block);
-    let shaped = shared.flat_map(|e| e.parameters.iter().filter_map(move |p| Some((*e, p, p.shape?))));
+    let shaped = task.effects.iter().flat_map(|e| e.parameters.iter().filter_map(move |p| Some((*e, p, p.shape?))));
+    // an effect of blocks has one for each
+    let is =
+        |u: &Unknown, e: &Effect, p: &Parameter| u.effect == e.id && u.name.split('@').next() == Some(p.name.as_str());
+    let each = shaped.flat_map(|(e, p, range)| {
+        (0..view.model.unknowns.len())
+            .filter(move |&i| is(&view.model.unknowns[i], e, p))
+            .map(move |i| (e, p, range, i))
+    });
     let mut out = Vec::new();
-    for (effect, p, (start, low, high)) in shaped {
-        let is = |u: &Unknown| u.effect == effect.id && u.name == p.name;
-        let Some(unknown) = view.model.unknowns.iter().position(is) else { continue };
+    for (effect, p, (start, low, high), unknown) in each {
+        let name = &view.model.unknowns[unknown].name;
         if !view.free.contains(&unknown) {
-            if !task.held.iter().any(|h| crate::symbols::same(h, &p.name)) {
+            if !task.held.iter().any(|h| crate::symbols::same(h, &p.name) || crate::symbols::same(h, name)) {
                 out.push(format!(
                     "{} ({}) will be found by trying every place between the touches: how well it will be told depends on how large the jump is, and the rest is what is expected where it is known to be {}",
-                    p.name,
+                    name,
                     effect.name,
                     with_unit(&significant(view.theta[unknown], DIGITS), &p.unit)
                 ));
@@ -50,14 +56,14 @@ pub(super) fn shapes(task: &Task, view: &View, expected: &mut [Expected]) -> Vec
         }
         let looked_at = format!(
             "{} ({}) is looked at where it is {} and {} has its typical sizes",
-            p.name,
+            name,
             effect.name,
             with_unit(&significant(start, DIGITS), &p.unit),
             effect.id
         );
-        let row = expected.iter().position(|x| x.effect == effect.id && x.name == p.name);
+        let row = expected.iter().position(|x| x.effect == effect.id && x.name == *name);
         let told = row.is_some_and(|r| expected[r].sigma.is_some());
-        let others = if told { others(task, view, effect, p, start) } else { Others::default() };
+        let others = if told { others(task, view, (effect, p, start), name) } else { Others::default() };
         let what = match (&others.values[..], others.open) {
             _ if !told => "there it leaves no trace, and of other values nothing is said here".to_owned(),
             ([], None) => "how well it will be told, and what goes with it, depends on both".to_owned(),
@@ -124,13 +130,16 @@ fn may_be_below(growth: f64, limit: f64) -> bool {
 }
 
 /// What an effect with its typical sizes at the start of a shape could be taken for.
-fn others(task: &Task, view: &View, effect: &Effect, p: &Parameter, start: f64) -> Others {
+/// `name`: of the unknown, one of a block where the effect has one for each.
+fn others(task: &Task, view: &View, (effect, p, start): (&Effect, &Parameter, f64), name: &str) -> Others {
     let model = Model::new(task.machine, &[effect], &view.data.set_ups, task.reference);
     let trials = Trials::of(&model, &view.data.nominal);
-    let shaped = || effect.parameters.iter().filter(|p| p.shape.is_some());
-    let starts: Vec<f64> = shaped().filter_map(|p| p.shape.map(|s| s.0)).collect();
-    let which = shaped().position(|q| q.name == p.name).unwrap_or(0);
-    let sizes: Vec<usize> = (0..model.n_unknowns()).filter(|&i| !model.unknowns[i].shape).collect();
+    let shaped: Vec<&Unknown> = model.unknowns.iter().filter(|u| u.shape).collect();
+    let starts: Vec<f64> = shaped.iter().map(|u| u.start).collect();
+    let which = shaped.iter().position(|u| u.name == name).unwrap_or(0);
+    let of = shaped.get(which).and_then(|u| u.set_up);
+    let sizes: Vec<usize> =
+        (0..model.n_unknowns()).filter(|&i| !model.unknowns[i].shape && model.unknowns[i].set_up == of).collect();
     let white = view.whitening();
     let does = |value: f64| -> DMatrix<f64> {
         let mut shapes = starts.clone();
@@ -141,8 +150,12 @@ fn others(task: &Task, view: &View, effect: &Effect, p: &Parameter, start: f64) 
         without_rounding(&mut columns);
         columns.resize_vertically(view.jacobian.nrows(), 0.0)
     };
-    let rest: Vec<usize> =
-        (0..view.free.len()).filter(|&c| view.model.unknowns[view.free[c]].effect != effect.id).collect();
+    let rest: Vec<usize> = (0..view.free.len())
+        .filter(|&c| {
+            let u = &view.model.unknowns[view.free[c]];
+            u.effect != effect.id || u.set_up != of
+        })
+        .collect();
     let jacobian = view.jacobian.select_columns(&rest);
     let base = Basis::new(&jacobian);
     let places: Vec<(f64, Basis)> = fine(p, view.n_touches(), &does)
@@ -241,11 +254,10 @@ pub(super) struct Moments<'a> {
 
 impl Moments<'_> {
     /// Puts each among the touches where its jump leaves most that the rest of the model cannot follow: behind the last touch it
-    /// would leave nothing. `jacobian`: whitened, of the free unknowns. Was there any?
-    pub fn put_where_they_show(&self, theta: &mut [f64], jacobian: &DMatrix<f64>) -> bool {
+    /// would leave nothing. `jacobian`: whitened, of the free unknowns.
+    pub fn put_where_they_show(&self, theta: &mut [f64], jacobian: &DMatrix<f64>) {
         /// Places that are tried.
         const MOST: usize = 60;
-        let mut any = false;
         for effect in self.task.effects.iter().filter(|e| !e.per_block) {
             for p in jumps_in_a_design(effect, self.data) {
                 let unknowns = &self.model.unknowns;
@@ -274,11 +286,9 @@ impl Moments<'_> {
                 let best = few.map(|v| (v, kept(v))).filter(|(_, kept)| kept.is_finite());
                 if let Some((value, _)) = best.max_by(|a, b| a.1.total_cmp(&b.1)) {
                     theta[i] = value;
-                    any = true;
                 }
             }
         }
-        any
     }
 }
 

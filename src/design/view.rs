@@ -7,7 +7,7 @@ use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
 use crate::fit::whitening::Whitening;
-use crate::fit::{design_jacobian, free_in_a_design};
+use crate::fit::{design_jacobian, free_in_a_design, jumps_in_a_design};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -254,17 +254,22 @@ impl View {
         let model = Model::new(task.machine, &task.effects, &data.set_ups, task.reference);
         let free = free_in_a_design(&model, &task.effects, &data, &task.held);
         let mut theta = model.start();
-        let jacobian_at = |theta: &[f64]| {
+        let jacobian_at = |theta: &[f64], noise: Noise| {
             whitening(&model, &data, theta, &free, noise, |t| {
                 let mut jacobian = design_jacobian(t, &model, &free);
                 t.whiten(&mut jacobian);
                 jacobian
             })
         };
-        let white = whitening(&model, &data, &theta, &free, noise, |t| t.whitening());
-        let moments = Moments { task, model: &model, data: &data, free: &free, white: &white };
-        let jacobian = jacobian_at(&theta);
-        let touched = if moments.put_where_they_show(&mut theta, &jacobian) { jacobian_at(&theta) } else { jacobian };
+        if task.effects.iter().any(|e| !e.per_block && !jumps_in_a_design(e, &data).is_empty()) {
+            // the same place whatever scatter the visits have
+            let probe = Noise { tau_mm: 0.0, ..noise };
+            let white = whitening(&model, &data, &theta, &free, probe, |t| t.whitening());
+            let jacobian = jacobian_at(&theta, probe);
+            Moments { task, model: &model, data: &data, free: &free, white: &white }
+                .put_where_they_show(&mut theta, &jacobian);
+        }
+        let touched = jacobian_at(&theta, noise);
         every_slope_is_a_number(&model, &data, &free, &touched)?;
         let n = touched.nrows();
         let mut jacobian = touched.resize_vertically(n + known.len(), 0.0);

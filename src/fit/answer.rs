@@ -139,7 +139,11 @@ pub(super) fn outcome(
                 moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
                 sigma_with_unmodelled: known
                     .zip(unmodelled.as_ref())
-                    .map(|(c, all)| (all.sigma[c] * all.sigma[c] + b_variance[c]).sqrt())
+                    .zip(sigma)
+                    // what counts beside the noise counts here, too: the other values of a shape, what is not seen
+                    .map(|((c, all), s)| {
+                        (all.sigma[c] * all.sigma[c] + (s * s - noise_variance(c)).max(b_variance[c])).sqrt()
+                    })
                     .filter(|s| s.is_finite()),
                 holds: known.zip(unmodelled.as_ref()).map_or_else(Vec::new, |(c, all)| all.holds[c].clone()),
                 status,
@@ -203,6 +207,9 @@ pub(super) fn outcome(
                 .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
                 .collect(),
             if shapes_told { Vec::new() } else { beside_a_shape_that_is_not_told(fit, &beside) },
+            much_else(fit, &beside, |i| runs_along(i) && fit.free.binary_search(&i).is_ok_and(|c| !untold(c)))
+                .into_iter()
+                .collect(),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
@@ -236,6 +243,22 @@ fn beside_a_shape_that_is_not_told(fit: &Fit, status: &[Status]) -> Vec<String> 
         })
     });
     says.collect()
+}
+
+/// What is not told only because a shape is not: leaving that effect out brings it back.
+fn much_else(fit: &Fit, status: &[Status], lost: impl Fn(usize) -> bool) -> Option<String> {
+    let unknowns = &fit.model.unknowns;
+    let names = |which: &dyn Fn(usize) -> bool| {
+        let all: Vec<&str> = (0..unknowns.len()).filter(|&i| which(i)).map(|i| unknowns[i].name.as_str()).collect();
+        all.join(", ")
+    };
+    let results = names(&|i| !unknowns[i].nuisance && lost(i));
+    let shapes = names(&|i| unknowns[i].shape && status[i] == Status::Undetermined);
+    (!results.is_empty()).then(|| {
+        format!(
+            "not told beside {shapes}: {results}. These touches do not tell {shapes}, and beside some of its values they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
+        )
+    })
 }
 
 /// That a shape parameter may as well have other values, in words.

@@ -55,6 +55,15 @@ fn by_chance(tried: usize) -> f64 {
     2.0 * (tried.max(1) as f64).ln()
 }
 
+/// Beside a shape that is not told something may be much else than beside the shape's value, and more than anybody expects of it: then
+/// it is not told either. `usual`: half of its interval beside the value alone.
+fn is_told(ends: [Option<f64>; 2], value: f64, usual: f64, typical: f64) -> bool {
+    const MUCH_ELSE: f64 = 2.0;
+    const TYPICAL: f64 = 5.0;
+    let most = (MUCH_ELSE * usual).max(TYPICAL * typical);
+    ends.iter().flatten().all(|end| (end - value).abs() <= most)
+}
+
 /// Some of the values that fit best, each with its χ²; those that are next to a better one are the same.
 fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
     const KEPT: usize = 12;
@@ -396,8 +405,10 @@ impl<'a> Profile<'a> {
                 let room = k * k + chance - h.growth;
                 h.others.get(r).filter(|_| room > 0.0).map(|of| (*of, room.sqrt().min(k)))
             });
-            let ends = with_all((self.fit.theta[unknown], sigma, k), beside);
-            also(out, unknown, ends);
+            let value = self.fit.theta[unknown];
+            let ends = with_all((value, sigma, k), beside);
+            let typical = self.fit.model.unknowns[unknown].typical;
+            also(out, unknown, if is_told(ends, value, k * sigma, typical) { ends } else { [None, None] });
         }
     }
 
@@ -418,11 +429,9 @@ impl<'a> Profile<'a> {
                 let room = k * k + chance - (h.growth - lowest);
                 h.sizes.get(c).filter(|_| room > 0.0).map(|of| (*of, room.sqrt()))
             });
-            let ends = with_all((self.values[i], sigma, k), beside);
-            // what may be so many times its usual size on either side is not told
-            let far = shapes::CREDIBLE * self.effect.parameters[i].typical;
-            let told = ends.iter().flatten().all(|end| (end - self.values[i]).abs() <= far);
-            also(out, unknown, if told { ends } else { [None, None] });
+            let (value, typical) = (self.values[i], self.effect.parameters[i].typical);
+            let ends = with_all((value, sigma, k), beside);
+            also(out, unknown, if is_told(ends, value, k * sigma, typical) { ends } else { [None, None] });
         }
     }
 }

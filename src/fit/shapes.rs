@@ -28,7 +28,7 @@ const MOST_OF_ALL: usize = 1_500_000;
 const LEAST_OWN: f64 = 1e-3;
 
 /// Shapes that nobody has listed count where their sizes are no more than so many times the typical ones.
-pub(super) const CREDIBLE: f64 = 50.0;
+const CREDIBLE: f64 = 50.0;
 
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
 const LEAST_GAIN: f64 = 9.0;
