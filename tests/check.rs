@@ -241,7 +241,7 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
         ("linuxcnc", "_axiscal_from> GT 1] *", "_axiscal_from> GT 9] *"),
         ("fanuc", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
         ("haas", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
-        ("heidenhain", "FN 11: IF +Q1600 GT +1 GOTO LBL 245", "FN 11: IF +Q1600 GT +9 GOTO LBL 245"),
+        ("heidenhain", "FN 11: IF +Q1600 GT +1 GOTO LBL 255", "FN 11: IF +Q1600 GT +9 GOTO LBL 255"),
     ] {
         let mut original = original(controller, None);
         original.plan.programs.clear();
