@@ -319,6 +319,36 @@ fn what_no_run_can_show_is_named_by_its_line_and_refused() {
 }
 
 #[test]
+fn a_jump_that_was_taken_out_is_named_before_what_follows_from_it() {
+    for controller in ["fanuc", "haas"] {
+        let original = original(controller, None);
+        let lines: Vec<&str> = original.text.split_inclusive('\n').collect();
+        let jumps: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].starts_with("IF[")).collect();
+        for taken in jumps.iter().step_by(jumps.len() / 12) {
+            let edited = [&lines[..*taken], &lines[taken + 1..]].concat().concat();
+            let (code, line, says) = original.finding(&edited);
+            let first = first_other_line(&original.text, &edited);
+            // a label or a remark is no statement
+            assert!(
+                code == "check::changed" && (first..first + 3).contains(&line),
+                "{controller} {first}: {line} {says}"
+            );
+            assert_eq!(original.codes(&edited)[0], "check::changed", "{controller} {first}");
+        }
+    }
+}
+
+#[test]
+fn a_word_that_is_not_known_is_said_before_what_goes_with_it() {
+    let original = original("fanuc", None);
+    for (block, expected) in [("M3 S500", "M3 is not known here"), ("G28 Z0.", "G28 is not known here")] {
+        let edited = with(&original.text, "M9", 1, &|l| format!("{l}{block}\n"));
+        let says = original.says(&edited);
+        assert!(says.iter().any(|s| s.contains(expected)), "{block}: {says:?}");
+    }
+}
+
+#[test]
 fn remarks_blanks_and_how_a_number_is_spelled_do_not_matter() {
     for (controller, edits) in [
         ("fanuc", &[("(TOUCH 1", "(TOUCH ONE"), ("GT1.]", "GT1.0]"), ("\n", "\r\n"), ("N640", "N99")][..]),

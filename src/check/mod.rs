@@ -30,7 +30,7 @@ mod touches;
 mod vm;
 mod world;
 
-use crate::diag::{Failure, Finding, Result, Source};
+use crate::diag::{Failure, Finding, Result, Severity, Source};
 use crate::machine::{Machine, Mounting};
 use crate::post::Postprocessor;
 use crate::program::plan::{ControllerFrame, Plan, Proof};
@@ -270,7 +270,11 @@ fn with_parts(
     findings.extend(begins(post, program, against.from.max(1), source));
     let proof = proof::proof(told.runs.iter().chain(&told.others).chain(&told.refused), program.statements());
     if let Some(plan) = against.plan {
-        findings.extend(as_written(plan, post, &proof, program, first.map(|t| &t.trunk), source));
+        match as_written(plan, post, &proof, program, first.map(|t| &t.trunk), source) {
+            // the edited line stands before all that follows from it
+            Some(changed) if changed.severity == Severity::Error => findings.insert(0, changed),
+            other => findings.extend(other),
+        }
     }
     let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
     Ok(Checked {

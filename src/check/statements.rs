@@ -8,7 +8,7 @@ use super::code::{Code, Statement, What};
 use super::proof::hex;
 use crate::program::plan::Proof;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Statements to a piece: two digits for each of them in the plan.
@@ -17,23 +17,23 @@ const PIECE: usize = 32;
 /// The digest of all statements, and two digits for what stands up to each of them. `points`: to this control a number with its
 /// decimal point is another than the one without.
 pub fn statements(code: &Code, points: bool) -> (String, Vec<String>) {
-    let targets = targets(code);
+    let mut ahead = Ahead::default();
     let mut all = Sha256::new();
     let mut digits = Vec::with_capacity(code.statements.len());
     let mut text = String::new();
     for (place, statement) in code.statements.iter().enumerate() {
         text.clear();
         // writing into a String cannot fail
-        if let Some(label) = label(&targets, place) {
+        if let Some(label) = ahead.label(place) {
             let _ = writeln!(text, "label {label}");
         }
-        write(&mut text, statement, &targets, points);
+        write(&mut text, place, statement, &mut ahead, points);
         all.update(text.as_bytes());
         let so_far = all.clone().finalize();
         digits.push(hex(so_far.get(..1).unwrap_or_default()));
     }
     // a jump to behind the last statement
-    if let Some(label) = label(&targets, code.statements.len()) {
+    if let Some(label) = ahead.label(code.statements.len()) {
         all.update(format!("label {label}"));
     }
     (hex(&all.finalize()), digits.chunks(PIECE).map(<[String]>::concat).collect())
@@ -53,25 +53,31 @@ pub fn first_other(written: &Proof, now: &Proof) -> Option<usize> {
     Some(if last { same.saturating_sub(1) } else { same })
 }
 
-/// The statements to which something jumps: they are known by their order, so that one statement more does not change the others.
-fn targets(code: &Code) -> Vec<usize> {
-    let of = |s: &Statement| match s.what {
-        What::Jump(to) | What::JumpUnless(_, to) | What::Call(to) => Some(to),
-        _ => None,
-    };
-    code.statements.iter().filter_map(of).collect::<BTreeSet<usize>>().into_iter().collect()
+/// Statements to which something jumps on, numbered as they are first named: what a statement is called then hangs on what stands before
+/// it alone, and a jump that lacks changes none of the jumps before it.
+#[derive(Default)]
+struct Ahead(BTreeMap<usize, usize>);
+
+impl Ahead {
+    fn name(&mut self, from: usize, to: usize) -> String {
+        if to <= from {
+            // what lies behind is known by its place
+            return format!("back {to}");
+        }
+        let next = self.0.len();
+        self.0.entry(to).or_insert(next).to_string()
+    }
+
+    fn label(&self, place: usize) -> Option<usize> {
+        self.0.get(&place).copied()
+    }
 }
 
-fn label(targets: &[usize], place: usize) -> Option<usize> {
-    targets.binary_search(&place).ok()
-}
-
-fn write(text: &mut String, statement: &Statement, targets: &[usize], points: bool) {
-    let to = |place: &usize| label(targets, *place).unwrap_or(usize::MAX);
+fn write(text: &mut String, place: usize, statement: &Statement, ahead: &mut Ahead, points: bool) {
     let _ = match &statement.what {
-        What::Jump(place) => writeln!(text, "jump {}", to(place)),
-        What::JumpUnless(condition, place) => writeln!(text, "unless {condition:?} jump {}", to(place)),
-        What::Call(place) => writeln!(text, "call {}", to(place)),
+        What::Jump(to) => writeln!(text, "jump {}", ahead.name(place, *to)),
+        What::JumpUnless(condition, to) => writeln!(text, "unless {condition:?} jump {}", ahead.name(place, *to)),
+        What::Call(to) => writeln!(text, "call {}", ahead.name(place, *to)),
         What::Block(words) if !points => {
             words.iter().for_each(|w| {
                 let _ = write!(text, "{} {:?} ", w.address, w.value);
@@ -132,6 +138,29 @@ mod tests {
         ] {
             assert_eq!(other(text, &text.replace(from, to)), Some(place), "{from} to {to}");
         }
+    }
+
+    #[test]
+    fn a_jump_that_lacks_is_named_where_it_stood() {
+        let post = Postprocessor::load_built_in_or_file("fanuc").unwrap().0;
+        let text = "G4 P1.\nIF[#1EQ1]GOTO20\nG4 P2.\nIF[#1EQ2]GOTO10\nG4 P3.\nIF[#1EQ3]GOTO20\nN10\nG4 P4.\nIF[#1EQ4]GOTO30\n\
+            N20\nG4 P5.\nN30\nG4 P6.\nIF[#1EQ5]GOTO10\n";
+        let read = |p: &str| proof(&macro_b::parse(&format!("%\nO9100\n{p}M30\n%\n"), &post).unwrap(), true);
+        let statements = read(text).statements.concat().len() / 2;
+        // a condition and its jump are two statements, a label is none
+        assert_eq!(statements, 17);
+        for (jump, place) in [
+            ("IF[#1EQ1]GOTO20\n", 1),
+            ("IF[#1EQ2]GOTO10\n", 4),
+            ("IF[#1EQ3]GOTO20\n", 7),
+            ("IF[#1EQ4]GOTO30\n", 10),
+            ("IF[#1EQ5]GOTO10\n", 14),
+        ] {
+            assert_eq!(first_other(&read(text), &read(&text.replace(jump, ""))), Some(place), "{jump}");
+        }
+        let back = text.replace("EQ5]GOTO10", "EQ5]GOTO20");
+        assert_eq!(first_other(&read(text), &read(&back)), Some(15), "to another label");
+        assert_eq!(first_other(&read(text), &read(&text.replace("N10\n", "N11\n").replace("GOTO10", "GOTO11"))), None);
     }
 
     #[test]

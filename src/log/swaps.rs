@@ -6,7 +6,7 @@ use crate::axes::{AxisName, Position};
 use crate::diag::Finding;
 use crate::machine::Machine;
 use crate::program::plan::PlanTouch;
-use crate::units::mm_from_inch;
+use crate::units::{inch_from_mm, mm_from_inch};
 use nalgebra::Vector3;
 
 /// A mistake: its name, what it says, what undoes it.
@@ -20,7 +20,7 @@ struct Mistake {
 /// What would put the touches that are far from their places where they belong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Supposed {
-    /// `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`: as the effect of gross mistakes calls its parameters.
+    /// `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`, `mm`: as the effect of gross mistakes calls its parameters.
     pub name: String,
     /// In words: "the sign of B were the other one".
     pub says: String,
@@ -142,6 +142,12 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
         says: "the numbers were inches".into(),
         help: "the head of a log says its unit, MM or INCH, as the program was written (unit in [log]): was the log written by it?",
         undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(mm_from_inch))),
+    });
+    all.push(Mistake {
+        name: "mm".to_owned(),
+        says: "the numbers were millimetres".into(),
+        help: "the head of a log says INCH, or `unit` of [log] does: was the log written by that program?",
+        undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(inch_from_mm))),
     });
     let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();
     for subset in 1u32..1 << axes.len() {

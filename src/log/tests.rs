@@ -208,10 +208,11 @@ fn simple_mistakes_are_named() {
     };
     as_csv(&|_| {}).unwrap();
     type Change<'a> = &'a dyn Fn(&mut Position);
-    let cases: [(Change, &str); 5] = [
+    let cases: [(Change, &str); 6] = [
         (&|p| p.0.swap(0, 2), "the columns X and Z were exchanged"),
         (&|p| p.0[0] = -p.0[0], "the sign of X were the other one"),
         (&|p| p.0[..3].iter_mut().for_each(|v| *v /= 25.4), "the numbers were inches"),
+        (&|p| p.0[..3].iter_mut().for_each(|v| *v *= 25.4), "the numbers were millimetres"),
         (&|p| p.0[1] += 100.0, "shifted by X 0.011 Y 100.000"),
         (&|p| p.0 = [p.0[2] * 3.0, 77.0 + p.0[1] * p.0[0], -p.0[0], 0.0, 0.0, 0.0], "another program or machine"),
     ];

@@ -144,6 +144,9 @@ pub struct Tables {
     pub grids: Vec<Grid>,
     /// How far the workpiece stands off in the control's coordinates, at the ball's place at zero, mm.
     pub workpiece_shift_mm: [f64; 3],
+    /// Entries that nobody has verified on a control, and why; `--accept-unverified` wrote them all the same.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub unverified: BTreeMap<String, String>,
 }
 
 /// A vector as it is written.

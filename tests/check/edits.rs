@@ -136,6 +136,17 @@ impl Original {
         }
     }
 
+    /// What is said of an edited text.
+    #[allow(dead_code)] // the example does not ask for it
+    pub fn says(&self, text: &str) -> Vec<String> {
+        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
+        let findings = match check(&self.machine, &self.post, &source("edited", text), &against) {
+            Err(failure) => failure.0,
+            Ok(checked) => checked.findings,
+        };
+        findings.into_iter().map(|f| f.message).collect()
+    }
+
     /// What an edited text is refused as changed for, or else its first finding: code, line from 1, what it says.
     #[allow(dead_code)] // the example does not ask for it
     pub fn finding(&self, text: &str) -> (&'static str, usize, String) {

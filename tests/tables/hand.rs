@@ -70,7 +70,7 @@ fn fanuc_by_hand() {
     let export = export(&machine, "fanuc", &planted, &accepting());
     let text = text(&export, "axiscal_parameters.txt");
     let (title, text) = text.split_once('\n').unwrap();
-    for word in ["%", "STUDY.TOML", "0123ABCD", "2026-11-20"] {
+    for word in ["%", "STUDY.TOML", "0123ABCD", "2026-11-20", "NOT VERIFIED, SEE README.TXT: FILE AXISCAL_G10.NC, "] {
         assert!(title.contains(word), "{title}");
     }
     let expected =
@@ -260,4 +260,27 @@ fn points_of_a_position_table_by_hand() {
     // the eleventh point is needed, a twelfth is not
     let without = lines.replace("$AN_CEC[0,10]=0.005\n", "");
     assert!(read(&without).unwrap_err().to_string().contains("$AN_CEC[0,10]"));
+}
+
+/// Whoever loads a file has not seen the screen: what is not verified is named in each of them.
+#[test]
+fn what_is_not_verified_is_named_in_every_file() {
+    for (control, name) in
+        [("fanuc", "trunnion"), ("sinumerik", "trunnion"), ("haas", "trunnion"), ("heidenhain", "swivel-head")]
+    {
+        let machine = machine(name);
+        let effect = if name == "trunnion" { ("location-a", "EY0A", 0.02) } else { ("location-b", "EX0B", 0.01) };
+        let export = export(&machine, control, &vec![effect], &accepting());
+        let unverified = &export.compensation.tables.as_ref().unwrap().unverified;
+        assert!(!unverified.is_empty(), "{control}");
+        for (file, _) in export.files.iter().filter(|(file, _)| file != "compensation.json") {
+            let held = self::text(&export, file).to_uppercase().replace('_', "-");
+            assert!(held.contains("NOT VERIFIED"), "{control} {file}");
+            for what in unverified.keys() {
+                assert!(held.contains(&what.to_uppercase().replace('_', "-")), "{control} {file}: {what}");
+            }
+        }
+        let record: serde_json::Value = serde_json::from_str(&self::text(&export, "compensation.json")).unwrap();
+        assert_eq!(record["tables"]["unverified"].as_object().unwrap().len(), unverified.len());
+    }
 }

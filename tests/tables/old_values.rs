@@ -178,7 +178,16 @@ fn old_settings_of_haas_are_added_to_and_restored() {
     let options = Options { old: other, ..accepting() };
     let refused =
         control::export(&machine, "haas", &sheet, &correction(&machine, &planted, None), &options).unwrap_err();
-    assert!(refused.0.iter().any(|f| f.code == "tables::other_place"), "{refused}");
+    let does = |refused: &axiscal::diag::Failure| {
+        let found = refused.0.iter().find(|f| f.code == "tables::other_place").unwrap_or_else(|| panic!("{refused}"));
+        found.help.as_ref().unwrap().split_once("--force ").unwrap().1.to_owned()
+    };
+    assert_eq!(does(&refused), "adds what was found to the old values all the same");
+    // touches on which the old values did not act
+    let mut given_as_axes = correction(&machine, &planted, None);
+    given_as_axes.transformation = false;
+    let refused = control::export(&machine, "haas", &sheet, &given_as_axes, &options).unwrap_err();
+    assert_eq!(does(&refused), "replaces the old values by the description with what was found all the same");
 }
 
 /// A backup that holds some of the numbers only: the missing ones are named, for each control.
@@ -229,7 +238,7 @@ fn a_sheet_of_the_other_unit_is_converted() {
         let first = crate::controls::export(&machine, control, &planted, &accepting());
         let restore = t.file[0].restore.clone().unwrap();
         let old = read_old(&machine, &t, &text(&first, &restore));
-        assert_eq!(old.unit(), Some(LengthUnit::Mm), "{control}");
+        assert_eq!(old.unit(old.values.keys(), LengthUnit::Inch), Some(LengthUnit::Mm), "{control}");
         let options = Options { old, unit: LengthUnit::Inch, ..accepting() };
         let (inches, findings) =
             control::export(&machine, control, &t, &correction(&machine, &planted, None), &options).unwrap();
@@ -305,6 +314,15 @@ fn old_values_go_back_as_they_were_given() {
     // one in inches, the others in millimetres: converted without the loss of a digit
     let mixed = metric.replace("M0.1234", "I0.0039");
     assert!(restored(&mixed, "restore_parameters.txt").contains("N19700Q1M0.099060;"));
+    // a letter that says no unit is in that of --unit, not in that of the others
+    let mixed = inches.replace("Q1I-9.8425", " P -249.9995");
+    let again = restored(&mixed, "restore_parameters.txt");
+    assert!(again.contains("N19702Q1M-249.9995;") && again.contains("N19700Q1M0.099060;"), "{again}");
+    let options = Options { old: read_old(&machine, &t, &mixed), ..accepting() };
+    let (_, findings) =
+        control::export(&machine, "fanuc", &t, &correction(&machine, &planted, None), &options).unwrap();
+    let found = findings.0.iter().find(|f| f.code == "tables::old_units").unwrap();
+    assert!(found.message.contains("N19700 is in inch (line 2 of the backup), others in mm"), "{found:?}");
 }
 
 /// Where none of the values is there, the example is one that is always written.
@@ -377,6 +395,11 @@ fn vectors_that_do_not_close_are_said_where_they_are_loaded() {
     assert_eq!(offsets(&open), (false, true));
     assert!(text(&open, "README.txt").contains("+0.2000"), "{}", text(&open, "README.txt"));
     assert!(text(&open, "axiscal_trafo.ini").contains("; The old vectors did not close"));
+    // the restoring file brings those back that are open
+    let back = text(&open, "restore_trafo.ini");
+    assert!(
+        back.contains("; The vectors of this file do not close") && !back.contains("did not close, the new ones do:")
+    );
     let refused = export(202.67, false).unwrap_err();
     let found = refused.0.iter().find(|f| f.code == "tables::open_chain").unwrap();
     assert!(found.message.contains("202.6700 mm off") && found.help.as_ref().unwrap().contains("--force"), "{found:?}");
@@ -386,6 +409,10 @@ fn vectors_that_do_not_close_are_said_where_they_are_loaded() {
     {
         assert!(text(&forced, name).contains(mark), "{name}: {}", text(&forced, name));
     }
+    let readme = text(&forced, "README.txt");
+    assert!(
+        readme.contains("FORCED, 1 finding spoke against it, see below") && !readme.contains("README.txt says what")
+    );
     assert_eq!(forced.compensation.provenance.forced.len(), 1);
     assert!(!text(&open, "README.txt").contains("FORCED") && open.compensation.provenance.forced.is_empty());
 }

@@ -114,6 +114,15 @@ impl MacroB {
         Ok(())
     }
 
+    /// An M function that is not known says so before a word that goes with it.
+    fn knows(&self, m: f64) -> Result<(), String> {
+        let known = [0.0, 5.0, 9.0, 30.0].contains(&m);
+        if known || self.builder.orients(m).is_some() || self.builder.waits(m) || self.builder.switches(m) {
+            return Ok(());
+        }
+        Err(format!("M{m} is not known here"))
+    }
+
     fn auxiliary(&mut self, m: f64, words: &[Spoken], vm: &mut Vm) -> Result<bool, String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         let whole = m.round() as i64;
@@ -364,8 +373,12 @@ impl Dialect for MacroB {
             return Err("no axis word stands with the move".to_owned());
         }
         if axes && motion.is_none() && !gs.iter().any(|g| matches!(g, 520 | 434 | 2340)) {
+            // a G word that is not known may be the one that would use them
+            let mut other = self.clone();
+            gs.iter().try_for_each(|g| other.mode(*g, words))?;
             return Err("axis words stand without a G word that uses them".to_owned());
         }
+        numbers("M").try_for_each(|m| self.knows(m))?;
         self.unused(words, &gs)?;
         let mut over = false;
         for m in numbers("M").collect::<Vec<_>>() {

@@ -52,7 +52,9 @@ struct Reader<'p> {
     /// Every number of a place or a feed is written with its decimal point: one without has lost it.
     always_mark: bool,
     code: Code,
-    labels: BTreeMap<u32, usize>,
+    /// Where each leads, and in which line it stands.
+    labels: BTreeMap<u32, (usize, usize)>,
+    lines: usize,
     jumps: Vec<(usize, u32, Range<usize>)>,
     percents: usize,
     number: bool,
@@ -62,6 +64,7 @@ struct Reader<'p> {
 impl Reader<'_> {
     fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
         let rest = line.text;
+        self.lines += 1;
         if rest.is_empty() {
             return Ok(());
         }
@@ -94,8 +97,8 @@ impl Reader<'_> {
         let mut rest = rest;
         if let Ok((after, digits)) = preceded(char('N'), digit1::<_, nom::error::Error<&str>>).parse(rest) {
             let label = self.label(line, rest, digits)?;
-            if self.labels.insert(label, self.code.statements.len()).is_some() {
-                return Err(line.fault(rest, format!("N{label} stands twice")));
+            if let Some((_, first)) = self.labels.insert(label, (self.code.statements.len(), self.lines)) {
+                return Err(line.fault(rest, format!("N{label} stands twice, first in line {first}")));
             }
             rest = blanks(after).map_err(|e| line.unread(&e, "a block"))?.0;
         }
@@ -165,9 +168,7 @@ impl Reader<'_> {
             .parse(after)
             .map_err(|e: Failed<'_>| line.unread(&e, "= and a value"))?;
         if matches!(variable, 3000 | 3006) {
-            let (left, body) = delimited(char('('), comment_text, char(')'))
-                .parse(after)
-                .map_err(|e: Failed<'_>| line.unread(&e, "a message in parentheses"))?;
+            let (left, body) = remark(line, after, "a message in parentheses")?;
             if value != Expr::Number(1.0) {
                 return Err(line.fault(rest, format!("#{variable} is known with the value 1 only")));
             }
@@ -221,10 +222,7 @@ impl Reader<'_> {
             if after.is_empty() {
                 return Ok(());
             }
-            let (next, _) = delimited(char('('), comment_text, char(')'))
-                .parse(after)
-                .map_err(|e: Failed<'_>| line.unread(&e, "a word, a comment or the block's end"))?;
-            rest = next;
+            rest = remark(line, after, "a word, a comment or the block's end")?.0;
         }
     }
 
@@ -244,7 +242,7 @@ impl Reader<'_> {
             return Err(Fault { at: end..end, says: "the program has no M30".to_owned() });
         }
         for (jump, label, at) in std::mem::take(&mut self.jumps) {
-            let Some(to) = self.labels.get(&label).copied() else {
+            let Some((to, _)) = self.labels.get(&label).copied() else {
                 return Err(Fault { at, says: format!("there is no N{label}") });
             };
             self.aim(jump, to);
@@ -260,6 +258,20 @@ fn sequence_number(line: &Line<'_>, rest: &str, digits: &str) -> Result<u32, Fau
 /// A remark or a message: no bracket, nothing that ends a program or a block for the control, and what its code has only.
 fn comment_text(input: &str) -> IResult<&str, &str> {
     take_till(|c: char| matches!(c, '(' | ')' | '%' | ';') || !matches!(c, '\t' | ' '..='~')).parse(input)
+}
+
+/// A remark or a message in its brackets; what it cannot hold is named.
+fn remark<'a>(line: &Line<'a>, input: &'a str, what: &str) -> Result<(&'a str, &'a str), Fault> {
+    delimited(char('('), comment_text, char(')')).parse(input).map_err(|e: Failed<'a>| {
+        let foreign = match &e {
+            nom::Err::Error(e) | nom::Err::Failure(e) if input.starts_with('(') => e.input,
+            _ => "",
+        };
+        match foreign.chars().next().filter(|c| !c.is_ascii()) {
+            Some(c) => line.fault(foreign, format!("{c:?} in a remark or message: it takes ASCII characters only")),
+            None => line.unread(&e, what),
+        }
+    })
 }
 
 /// How many places a field has at most, before and behind the point: Haas 96-8000 Rev AC, p. 116.
@@ -440,6 +452,18 @@ mod tests {
             }
         }
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        for (text, says) in [
+            ("%\nO1\nN7\nG4 P1\nN7\n", "N7 stands twice, first in line 3"),
+            ("%\nO1\n(Set-up 1 gepr\u{fc}ft)\n", "'ü' in a remark or message: it takes ASCII characters only"),
+            ("%\nO1\n#3006=1(gepr\u{fc}ft)\n", "'ü' in a remark or message: it takes ASCII characters only"),
+        ] {
+            let fault = read(text).unwrap_err();
+            assert_eq!(fault.says, says, "{text:?}");
+        }
     }
 
     #[test]

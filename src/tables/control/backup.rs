@@ -12,6 +12,8 @@ pub struct Old {
     pub values: BTreeMap<String, (f64, Option<LengthUnit>)>,
     /// The numbers as they were spelled: a restoring file brings back these digits and no others.
     pub texts: BTreeMap<String, String>,
+    /// In which lines they stand, from 1.
+    pub lines: BTreeMap<String, usize>,
     /// Names of values that the backup itself marks as assumed: a restoring file of an export without the control's own.
     pub assumed: BTreeSet<String>,
     /// What was chosen among several: which channel, which path.
@@ -19,12 +21,25 @@ pub struct Old {
 }
 
 impl Old {
-    /// The one unit of all lengths, where the backup says it.
+    /// The one unit of these lengths; without a word beside them they are in `ours`.
     #[must_use]
-    pub fn unit(&self) -> Option<LengthUnit> {
-        let mut units = self.values.values().filter_map(|(_, unit)| *unit);
+    pub fn unit<'n>(&self, lengths: impl Iterator<Item = &'n String>, ours: LengthUnit) -> Option<LengthUnit> {
+        let mut units = lengths.filter_map(|name| self.values.get(name)).map(|(_, unit)| unit.unwrap_or(ours));
         let first = units.next()?;
         units.all(|u| u == first).then_some(first)
+    }
+
+    /// Where a length stands that is not in `ours`, and in which unit.
+    #[must_use]
+    pub fn converted<'n>(&self, lengths: impl Iterator<Item = &'n String>, ours: LengthUnit) -> Option<String> {
+        let other = |name: &'n String| {
+            let unit = self.values.get(name)?.1.filter(|unit| *unit != ours)?;
+            Some((self.lines.get(name).copied().unwrap_or_default(), name, unit))
+        };
+        // the first of the file
+        let (line, name, unit) = lengths.filter_map(other).min_by_key(|(line, ..)| *line)?;
+        let place = if line == 0 { String::new() } else { format!(" (line {line} of the backup)") };
+        Some(format!("{name} is in {}{place}", unit.says()))
     }
 }
 
@@ -62,7 +77,7 @@ pub fn read_such_as(source: &Source, form: &BackupForm, wanted: &BTreeSet<String
     let mut section = None;
     // what is there for other channels or paths than the one that is written
     let mut others = Others::default();
-    for raw in text.split_inclusive('\n') {
+    for (raw, number) in text.split_inclusive('\n').zip(1_usize..) {
         let line = raw.trim_end_matches(['\n', '\r']);
         let span = at..at + line.len();
         at += raw.len();
@@ -105,6 +120,7 @@ pub fn read_such_as(source: &Source, form: &BackupForm, wanted: &BTreeSet<String
             }
             Read::Number(value) => {
                 old.texts.insert((*known).clone(), found.text);
+                old.lines.insert((*known).clone(), number);
                 let given = (value, found.unit);
                 if let Some(before) = old.values.insert((*known).clone(), given).filter(|b| *b != given) {
                     wrong(&mut findings, source, span, format!("{known} stands twice: {} and {value}", before.0));

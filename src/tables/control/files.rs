@@ -8,7 +8,7 @@ use crate::machine::Machine;
 use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, compile};
 use crate::tables::compensation::Grid;
 use crate::tables::correction::Correction;
-use crate::tables::linuxcnc::{head, one_line, render};
+use crate::tables::linuxcnc::{head, head_of_readme, one_line, render};
 use crate::units::{Plain, inch_from_mm, mm_from_inch};
 use minijinja::{Value, context};
 use nalgebra::Vector3;
@@ -46,7 +46,9 @@ fn entry(
     let show = |v: f64| digits(v * factor, decimals, tables.always_mark);
     let given = value.given.as_ref();
     let is_length = matches!(value.unit, "mm" | "inch");
-    let same_unit = |n: &&String| !is_length || old.values.get(*n).is_some_and(|(_, u)| u.is_none_or(|u| u == unit));
+    let same_unit = |n: &&String| {
+        !is_length || old.values.get(*n).is_some_and(|(_, u)| u.map_or(value.unit, LengthUnit::says) == unit.says())
+    };
     let old_text = match given.filter(same_unit).and_then(|n| old.texts.get(n)) {
         Some(text) => text.clone(),
         // units are mixed: nothing of what was given is lost in a digit that is cut off
@@ -104,18 +106,24 @@ pub(super) fn write(
         .0
         .iter()
         .filter(|f| f.code == "tables::unverified")
-        .map(|f| one_line(&f.message.replace(": not verified: ", ": ")))
+        .map(|f| one_line(&f.message.replace(super::NOT_VERIFIED, ": ")))
         .collect();
+    // for heads that have no room for the reasons
+    let doubted: Vec<String> = super::unverified_entries(findings).keys().map(|what| one_line(what)).collect();
     // of several tables of the same values the one that is open widest
     let by_width = |a: &&Vector3<f64>, b: &&Vector3<f64>| a.norm().total_cmp(&b.norm());
     let opened = std::iter::once(first).chain(others.values()).filter_map(|f| f.opened_mm.as_ref()).max_by(by_width);
-    let mut head = head(machine, correction);
-    if opened.is_some() {
-        head.push(
+    let head = head(machine, correction);
+    let head_of = |restore: bool| -> Vec<String> {
+        let says = if restore {
+            "The vectors of this file do not close, the new ones did: touch off all work offsets again, see README.txt"
+        } else {
             "The old vectors did not close, the new ones do: touch off all work offsets again, see README.txt"
-                .to_owned(),
-        );
-    }
+        };
+        head.iter().cloned().chain(opened.map(|_| says.to_owned())).collect()
+    };
+    let old_unit =
+        options.old.unit(std::iter::once(first).chain(others.values()).flat_map(Filled::given_lengths), options.unit);
     let record = export.compensation.tables.clone();
     let grids = record.map(|r| r.grids).unwrap_or_default();
     let active = correction.active.as_ref().and_then(|a| a.tables.clone()).map(|t| t.grids).unwrap_or_default();
@@ -127,7 +135,7 @@ pub(super) fn write(
     let grids_known = tables.grid.as_ref().is_some_and(|form| super::grids::known(form, &grids, &options.old));
     let common = |restore: bool, form: Option<&FileForm>| {
         let spelling = form.or(tables.file.first()).and_then(|f| f.spelling.as_deref());
-        let unit = options.old.unit().filter(|_| restore).unwrap_or(options.unit);
+        let unit = old_unit.filter(|_| restore).unwrap_or(options.unit);
         let filled = spelling.and_then(|s| others.get(s)).unwrap_or(first);
         let entries: Vec<Value> =
             filled.values.iter().filter_map(|v| entry(v, spelling, restore, unit, tables, &options.old)).collect();
@@ -136,9 +144,9 @@ pub(super) fn write(
         let of_grids = form.is_some_and(|f| f.grids);
         let known = if of_grids { grids_known } else { filled.known() };
         context! {
-            head => head.clone(), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
+            head => head_of(restore), kind => kind.name.clone(), machine => one_line(&machine.name), entries, grids => shown,
             axes => machine.rotary().map(|a| a.name.to_string()).collect::<Vec<_>>(),
-            unit => context! { name => unit.says(), letter }, restore, known, doubts => doubts.clone(),
+            unit => context! { name => unit.says(), letter }, restore, known, doubts => doubts.clone(), doubted => doubted.clone(),
         }
     };
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
@@ -204,11 +212,11 @@ pub(super) fn write(
         README,
         &context! {
             ..common(false, None), ..context! {
-                says => tables.says.clone(), worksheet => tables.worksheet, load, cannot => tables.cannot.clone(),
+                own_head => head_of_readme(head_of(false)), says => tables.says.clone(), worksheet => tables.worksheet, load, cannot => tables.cannot.clone(),
                 files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
                 variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
                 reads => tables.reads.is_some(),
-                restore_unit => options.old.unit().filter(|unit| *unit != options.unit).map(|unit| unit.says()), on_top,
+                restore_unit => old_unit.filter(|unit| *unit != options.unit).map(|unit| unit.says()), on_top,
                 left, omitted => not, in_grids, points, grids_known, radius => format!("{}", options.radius_mm),
                 rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
                 longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),

@@ -74,6 +74,11 @@ impl Filled {
         all(false) || (self.values.iter().any(|v| v.instead) && all(true))
     }
 
+    /// Names by which the user gave old lengths.
+    pub fn given_lengths(&self) -> impl Iterator<Item = &String> {
+        self.values.iter().filter(|v| matches!(v.unit, "mm" | "inch")).filter_map(|v| v.given.as_ref())
+    }
+
     /// Names of the values that a person would have to give so that all of a set are known: of the set of which some are, as the
     /// user's own are spelled.
     #[must_use]
@@ -113,7 +118,8 @@ pub struct Question<'a> {
     pub limits: Limits,
 }
 
-const OTHER_PLACE: &str = "are `origin`, `point` and `pivot` in machines.toml those of this machine, is it this machine's backup? --force adds the difference all the same";
+const OTHER_PLACE: &str =
+    "are `origin`, `point` and `pivot` in machines.toml those of this machine, is it this machine's backup?";
 
 /// How far the length of a direction may be off 1.
 const UNIT_LENGTH: f64 = 1e-3;
@@ -430,6 +436,15 @@ impl Question<'_> {
         }
     }
 
+    /// What `--force` would do with old values that are those of another machine.
+    fn forced(&self, help: &str) -> String {
+        let does = match self.replaced {
+            Some(_) => "replaces the old values by the description with what was found",
+            None => "adds what was found to the old values",
+        };
+        format!("{help} --force {does} all the same")
+    }
+
     /// Do the user's numbers of the other set describe the machine that was measured?
     fn compare_instead(&self, form: &VectorForm, off: Vector3<f64>, findings: &mut Findings) {
         if off.norm() > self.limits.mm {
@@ -438,7 +453,7 @@ impl Question<'_> {
                 form.to.map_or_else(|| form.id.clone(), |p| p.to_string()),
                 off.norm()
             );
-            findings.push(Finding::error("tables::other_place", says).help(OTHER_PLACE));
+            findings.push(Finding::error("tables::other_place", says).help(self.forced(OTHER_PLACE)));
         }
     }
 
@@ -462,7 +477,7 @@ impl Question<'_> {
                             across.norm()
                         ),
                     )
-                    .help(OTHER_PLACE),
+                    .help(self.forced(OTHER_PLACE)),
                 );
             }
         }
@@ -475,7 +490,7 @@ impl Question<'_> {
                         "tables::other_direction",
                         format!("the old values turn axis {} about a direction {angle:.3} deg from that of the machine's description", line.axis),
                     )
-                    .help("is `sense` in machines.toml right, is it this machine's backup? --force adds the difference all the same"),
+                    .help(self.forced("is `sense` in machines.toml right, is it this machine's backup?")),
                 );
             }
         }

@@ -263,7 +263,16 @@ pub fn export(
     }
     let old_grids = active.and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.grids);
     let unit_step = *tables.step_mm.get_ref();
-    if let Some(unit) = options.old.unit().filter(|u| *u != options.unit) {
+    let lengths = || all().flat_map(Filled::given_lengths);
+    let old_unit = options.old.unit(lengths(), options.unit);
+    if let (None, Some(one)) = (old_unit, options.old.converted(lengths(), options.unit)) {
+        let ours = options.unit.says();
+        let says = format!("the old lengths are in different units: {one}, others in {ours}");
+        findings.push(Finding::warning("tables::old_units", says).help(format!(
+            "they are converted, and all restored in {ours}: a control takes lengths in its own unit only, so is this backup one file of one control?"
+        )));
+    }
+    if let Some(unit) = old_unit.filter(|u| *u != options.unit) {
         let [theirs, ours] = [unit, options.unit].map(LengthUnit::says);
         let says = format!("the old lengths are in {theirs}: they are converted, and restored in {theirs}");
         findings
@@ -382,6 +391,7 @@ pub fn export(
         zero_deg: zero,
         grids: grid_list,
         workpiece_shift_mm: shift.into(),
+        unverified: unverified_entries(&findings),
     };
     let compensation = Compensation {
         format: FORMAT.to_owned(),
@@ -451,6 +461,16 @@ fn add_angles(
     out
 }
 
+/// What stands between an entry that nobody has verified and the reason.
+const NOT_VERIFIED: &str = ": not verified: ";
+
+/// Names of the entries that nobody has verified, and why.
+fn unverified_entries(findings: &Findings) -> BTreeMap<String, String> {
+    let unverified = findings.0.iter().filter(|f| f.code == "tables::unverified");
+    let parts = unverified.filter_map(|f| f.message.split_once(NOT_VERIFIED));
+    parts.map(|(what, why)| (what.to_owned(), why.to_owned())).collect()
+}
+
 /// Entries that nobody has verified: refused, or said.
 fn say_unverified(
     tables: &Tables,
@@ -482,7 +502,7 @@ fn say_unverified(
         add(format!("file {}", file.name), doubt(file.source.as_ref(), file.unverified.as_ref()));
     }
     for (what, why) in doubts {
-        let message = format!("{what}: not verified: {why}");
+        let message = format!("{what}{NOT_VERIFIED}{why}");
         findings.push(if options.accept_unverified {
             Finding::warning("tables::unverified", message)
                 .help("compare it with the control's manual and its own backup before you load it")

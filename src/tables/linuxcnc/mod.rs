@@ -218,6 +218,13 @@ pub(in crate::tables) fn head(machine: &Machine, correction: &Correction) -> Vec
     lines
 }
 
+/// The same lines in README.txt itself.
+pub(in crate::tables) fn head_of_readme(head: Vec<String>) -> Vec<String> {
+    let here =
+        |line: String| line.replace(": README.txt says what", ", see below").replace("see README.txt", "see below");
+    head.into_iter().map(here).collect()
+}
+
 fn count(n: usize) -> String {
     if n == 1 { "1 finding".to_owned() } else { format!("{n} findings") }
 }
