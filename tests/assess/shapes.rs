@@ -122,3 +122,34 @@ fn a_slope_that_is_no_number_is_refused() {
     let refused = assess(&request).unwrap_err().to_string();
     assert!(refused.contains("rb of effect root") && refused.contains("touch 1"), "{refused}");
 }
+
+/// An effect with a set of parameters for each block is expected like any other: a row for each, and what is said of its shape.
+#[test]
+fn what_each_block_does_by_itself_is_expected_too() {
+    const OWN: &str = "[[effect]]\nid = \"settling\"\nper = \"block\"\nat = \"block\"\nterms = [{ parameter = \"sz\", unit = \"um\", \
+                       dof = \"dz\", formula = \"1 - exp(-t/st)\", typical = 10 }]\nshape = [{ parameter = \"st\", unit = \"h\", \
+                       start = 0.5, min = 0.02, max = 10.0 }]\n";
+    let machine = common::machine("trunnion");
+    let mut catalogue = Catalogue::built_in().unwrap();
+    catalogue.add_file(&axiscal::diag::source("own.toml", OWN)).unwrap();
+    let model = ["location-a", "location-c", "block-setup", "pretravel", "settling"];
+    let request = Request {
+        task: task(&machine, &catalogue, &model),
+        runs: vec![plan(&machine, "full")],
+        names: vec!["full".to_owned()],
+        probe: NOISE,
+        acting_tau_mm: Some(0.0),
+    };
+    let expected = assess(&request).unwrap();
+    let of = |word: &str| expected.parameters.iter().filter(|p| p.name.starts_with(word)).count();
+    assert_eq!((of("sz@"), of("st@")), (4, 4), "{:?}", expected.parameters.iter().map(|p| &p.name).collect::<Vec<_>>());
+    assert!(expected.parameters.iter().all(|p| p.effect != "block-setup"));
+    for block in ["a", "b", "c", "f"] {
+        let says = format!("st@full/{block} (");
+        assert!(
+            expected.warnings.iter().any(|w| w.starts_with(&says) && w.contains("is looked at where it is 0.5 h")),
+            "{block}: {:?}",
+            expected.warnings
+        );
+    }
+}
