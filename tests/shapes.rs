@@ -252,6 +252,20 @@ fn a_slip_within_a_visit_is_found() {
     let found = parameter(&fit, "from_h");
     println!("{found:?} {}", fit.outcome.chi2_per_dof);
     assert!((found.value - 0.0302).abs() < 0.002, "{found:?}");
+    const HOURS: usize = 6;
+    // the fit without it takes good touches about it for strangers: they come back, and the moment is between the right ones
+    let machine = common::machine("swivel-head");
+    let full = plan(&machine, "full");
+    let slip = [("dx", 8.0), ("dy", -5.0), ("dz", 3.0), ("from_h", 0.7)];
+    for seed in 1..=6 {
+        let scenario = Scenario::flawless().with_noise(1e-3, 0.5e-3, seed).with(&machine, "block-slip", &slip).unwrap();
+        let touches = touch(&machine, &full, &scenario, None);
+        let fit = identify(&machine, &[(&full, &touches)], &model);
+        let found = parameter(&fit, "from_h");
+        println!("{seed}: {} {:?} {:?}", found.value, found.interval, fit.rejected);
+        let between = |t: f64| fit.data.observations.iter().filter(|o| (o.state[HOURS] > t) != (o.state[HOURS] > 0.7)).count();
+        assert!(fit.rejected.len() <= 1 && between(found.value) <= 3, "seed {seed}: {found:?} {:?}", fit.rejected);
+    }
 }
 
 /// A pitch that is there and too small to show may be any of its range: what goes with it is all that it may be beside any of them.

@@ -127,8 +127,54 @@ fn identify_started(
         fit = next;
         said.extend(warning);
     }
-    let mut fit = best_minimum(fit, (machine, catalogue), effects, &held_settings)?;
+    let fit = best_minimum(fit, (machine, catalogue), effects, &held_settings)?;
+    let mut fit = better_moments(fit, (machine, catalogue), effects, held_settings)?;
     fit.outcome.warnings.extend(said);
+    Ok(fit)
+}
+
+/// Moments of jumps were found beside a fit without the jump, which takes good touches about it for strangers: each is moved among the
+/// touches next to it, as long as that takes less against the touches, those included that are then rejected.
+fn better_moments(
+    mut fit: Fit,
+    (machine, catalogue): (&Machine, &Catalogue),
+    effects: &[&Effect],
+    mut settings: Settings,
+) -> Result<Fit> {
+    /// Stretches between touches on either side.
+    const REACH: usize = 5;
+    /// What a touch costs that is rejected: about where one is.
+    const REJECTED: f64 = 12.0;
+    /// A better place is better by more.
+    const SAME: f64 = 1e-6;
+    if settings.quick {
+        return Ok(fit);
+    }
+    for name in settings.jumps.clone() {
+        let Some(&Knowledge::Fixed(at)) = settings.knowledge.get(&name) else { continue };
+        let own = name.split('@').next().unwrap_or_default();
+        let Some(p) = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == own) else { continue };
+        let stretches = shapes::stretches_of_a_jump(p, &fit.data);
+        let Some(here) = stretches.iter().position(|s| s.ends[0] <= at && at <= s.ends[1]) else { continue };
+        let last = (here + REACH).min(stretches.len().saturating_sub(1));
+        let mut best: Option<(f64, f64)> = None;
+        for k in (here.saturating_sub(REACH)..=last).filter(|k| *k != here) {
+            let mut moved = Settings { quick: true, ..settings.clone() };
+            hold(&mut moved, &name, stretches[k].place);
+            let other = identify_from(machine, catalogue, effects, fit.data.clone(), &moved, &values(&fit))?;
+            let tau_mm = fit.noise.tau_mm.min(other.noise.tau_mm);
+            let cost = |f: &Fit| misfit(f, &f.whitening(tau_mm)) + REJECTED * f.rejected.len() as f64;
+            let gain = cost(&fit) - cost(&other);
+            if gain > SAME * cost(&fit) && best.is_none_or(|(most, _)| gain > most) {
+                best = Some((gain, stretches[k].place));
+            }
+        }
+        if let Some((_, place)) = best {
+            hold(&mut settings, &name, place);
+            let from = values(&fit);
+            fit = identify_from(machine, catalogue, effects, fit.data, &settings, &from)?;
+        }
+    }
     Ok(fit)
 }
 
