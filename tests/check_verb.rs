@@ -346,7 +346,9 @@ fn the_cause_stands_before_what_follows_from_it() {
         let answer: serde_json::Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
         let codes: Vec<&str> =
             answer["findings"].as_array().unwrap().iter().map(|f| f["code"].as_str().unwrap()).collect();
-        assert_eq!(codes[0], "check::not_run", "{codes:?}");
+        // with its plan the line that was edited is named before what the control says to it
+        let first: &[&str] = if plan.is_empty() { &["check::not_run"] } else { &["check::changed", "check::not_run"] };
+        assert!(codes.starts_with(first), "{codes:?}");
         assert!(!codes.contains(&"check::log"), "{codes:?}");
     }
 }
