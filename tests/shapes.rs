@@ -263,7 +263,8 @@ fn a_slip_within_a_visit_is_found() {
         let fit = identify(&machine, &[(&full, &touches)], &model);
         let found = parameter(&fit, "from_h");
         println!("{seed}: {} {:?} {:?}", found.value, found.interval, fit.rejected);
-        let between = |t: f64| fit.data.observations.iter().filter(|o| (o.state[HOURS] > t) != (o.state[HOURS] > 0.7)).count();
+        let between =
+            |t: f64| fit.data.observations.iter().filter(|o| (o.state[HOURS] > t) != (o.state[HOURS] > 0.7)).count();
         assert!(fit.rejected.len() <= 1 && between(found.value) <= 3, "seed {seed}: {found:?} {:?}", fit.rejected);
     }
 }
