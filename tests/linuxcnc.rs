@@ -1,7 +1,7 @@
 //! The emitted programs on a real LinuxCNC, black box: the binary, the rig in `tests/linuxcnc`, and files in between.
 //!
 //! Runs when AXISCAL_LINUXCNC is set (`./run-tests` installs LinuxCNC and sets it); says what it leaves out otherwise.
-//! AXISCAL_WARP sets how many times faster than real time LinuxCNC runs (10), AXISCAL_SEED repeats a drawn case.
+//! AXISCAL_WARP sets how many times faster than real time LinuxCNC runs (40), AXISCAL_SEED repeats a drawn case.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use rand::{RngExt, SeedableRng};
@@ -52,7 +52,7 @@ fn main() {
         .collect();
     if std::env::var_os("AXISCAL_LINUXCNC").is_none() {
         println!(
-            "\nleft out: {} tests on a real LinuxCNC. They take twenty minutes and need Debian's linuxcnc-uspace;",
+            "\nleft out: {} tests on a real LinuxCNC. They take eight minutes and need Debian's linuxcnc-uspace;",
             chosen.len()
         );
         println!("./run-tests installs it and runs them (AXISCAL_LINUXCNC=required cargo test --test linuxcnc)\n");
@@ -542,10 +542,10 @@ impl Job {
 
     /// Runs a program on LinuxCNC; `log` is the name that its log gets.
     ///
-    /// On a computer that is busy with other work LinuxCNC itself can lose a race after a probing move ("Queue is not
-    /// empty after probing"): such a run is no verdict on the program and is made again, nearer to real time.
+    /// Should LinuxCNC itself lose its race after a probing move ("Queue is not empty after probing", see
+    /// `linuxcnc/taskshim.c`), that is no verdict on the program: the run is made again, nearer to real time.
     fn run(&self, program: &str, log: &str, control: &Control) -> Check {
-        let warp: u32 = std::env::var("AXISCAL_WARP").ok().and_then(|w| w.parse().ok()).unwrap_or(10);
+        let warp: u32 = std::env::var("AXISCAL_WARP").ok().and_then(|w| w.parse().ok()).unwrap_or(40);
         let mut last = String::new();
         for warp in [warp, warp.div_ceil(2), warp.div_ceil(4)] {
             match self.run_at(program, log, control, warp) {

@@ -1,6 +1,6 @@
 //! The answer of a fit, put together: values with their doubt, what cannot be told, what a reader must not miss.
 
-use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
+use super::outcome::{Combination, FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::solve::Solution;
 use super::type_b::TypeB;
 use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
@@ -151,6 +151,9 @@ pub(super) fn outcome(
         })
         .collect();
     let beside: Vec<Status> = parameters.iter().map(|p| p.status).collect();
+    let is_lost = |i: usize| runs_along(i) && fit.free.binary_search(&i).is_ok_and(|c| !untold(c));
+    let lost: Vec<&str> =
+        (0..fit.theta.len()).filter(|&i| is_lost(i)).map(|i| fit.model.unknowns[i].name.as_str()).collect();
     let free_unknowns: Vec<&Unknown> = fit.free.iter().map(|&i| &fit.model.unknowns[i]).collect();
     let squares: f64 = fit.residual_mm.iter().zip(&fit.weight).map(|(r, w)| w * r * r).sum();
     let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
@@ -188,7 +191,12 @@ pub(super) fn outcome(
         chi2_per_dof,
         undetermined: statement::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
         parted_together: Vec::new(),
-        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED { Vec::new() } else { weak::weak(fit, effects) },
+        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {
+            Vec::new()
+        } else {
+            // how badly what is lost beside a shape is told, nobody knows: a warning names it
+            weak::weak(fit, effects).into_iter().filter(|c| !mostly(c, |name| lost.contains(name))).collect()
+        },
         correlations: weak::correlations(fit, |i| parameters[i].sigma.is_some()),
         parameters,
         priors: uncertainty::priors(fit),
@@ -207,9 +215,7 @@ pub(super) fn outcome(
                 .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
                 .collect(),
             if shapes_told { Vec::new() } else { beside_a_shape_that_is_not_told(fit, &beside) },
-            much_else(fit, &beside, |i| runs_along(i) && fit.free.binary_search(&i).is_ok_and(|c| !untold(c)))
-                .into_iter()
-                .collect(),
+            much_else(fit, &beside, is_lost).into_iter().collect(),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
@@ -259,6 +265,12 @@ fn much_else(fit: &Fit, status: &[Status], lost: impl Fn(usize) -> bool) -> Opti
             "not told beside {shapes}: {results}. These touches do not tell {shapes}, and beside some of its values they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
         )
     })
+}
+
+/// Does more than half of a combination consist of such parameters?
+fn mostly(combination: &Combination, of: impl Fn(&&str) -> bool) -> bool {
+    let share = combination.combination.iter().filter(|(name, _)| of(&name.as_str())).map(|(_, w)| w * w).sum::<f64>();
+    share > 0.5 * combination.combination.values().map(|w| w * w).sum::<f64>()
 }
 
 /// That a shape parameter may as well have other values, in words.

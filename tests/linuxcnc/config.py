@@ -72,7 +72,7 @@ def ini_sections(machine, *, kins, kins_args, servo_us, display):
         # without VERSION LinuxCNC asks, in a window, whether it may update the file
         "EMC": {"VERSION": "1.1", "MACHINE": machine.name, "DEBUG": "0"},
         "DISPLAY": {"DISPLAY": display, "INTRO_TIME": "0"},
-        "TASK": {"TASK": "milltask", "CYCLE_TIME": "0.001"},
+        "TASK": {"TASK": "milltask", "CYCLE_TIME": "0.0003"},    # of real time, which does not run faster
         "RS274NGC": {"PARAMETER_FILE": "rig.var"},
         "EMCMOT": {"EMCMOT": "motmod", "COMM_TIMEOUT": "1.0", "SERVO_PERIOD": str(servo_us * 1000)},
         "EMCIO": {"EMCIO": "io", "CYCLE_TIME": "0.05", "TOOL_TABLE": "rig.tbl"},

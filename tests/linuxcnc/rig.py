@@ -36,6 +36,7 @@ LINUXCNC_LOCK = "/tmp/linuxcnc.lock"             # LinuxCNC's own
 MARK = "AXISCAL_RIG_RUN"                         # in the environment of everything that the rig starts
 G54 = {"X": 12.345, "Y": -6.789, "Z": 3.21, "A": 1.25, "B": 0.75, "C": -2.5}
 G54_ROTATION = 3.0
+SHIMS = ("clockshim", "taskshim")                # preloaded where LinuxCNC runs faster than real time
 
 
 class RigFailed(Exception):
@@ -171,13 +172,14 @@ def install_component(source):
         f.write(f"{wanted} {digest(target)}\n")
 
 
-def build_shim(run):
-    out = os.path.join(run, "clockshim.so")
-    done = subprocess.run(["gcc", "-shared", "-fPIC", "-O2", "-o", out, os.path.join(HERE, "clockshim.c"), "-ldl"],
-                          capture_output=True, text=True, timeout=120)
-    if done.returncode:
-        raise RigFailed(f"clockshim.c does not compile\n{done.stderr}")
-    return out
+def build_shims(run):
+    with open(os.path.join(run, "hold"), "wb") as f:
+        f.write(bytes(4096))
+    for name in SHIMS:
+        source, out = os.path.join(HERE, f"{name}.c"), os.path.join(run, f"{name}.so")
+        done = subprocess.run(["gcc", "-shared", "-fPIC", "-O2", "-o", out, source, "-ldl"], capture_output=True, text=True, timeout=120)
+        if done.returncode:
+            raise RigFailed(f"{name}.c does not compile\n{done.stderr}")
 
 
 def environment_of(run, warp):
@@ -189,7 +191,8 @@ def environment_of(run, warp):
         # rtapi_app wants to drop root to someone
         env |= {"RTAPI_UID": str(pwd.getpwnam("nobody").pw_uid), "RTAPI_FIFO_PATH": os.path.join(run, "rt", "socket")}
         if warp > 1:
-            env |= {"LD_PRELOAD": os.path.join(run, "clockshim.so"), "CLOCKSHIM_WARP": str(warp)}
+            env |= {"LD_PRELOAD": " ".join(os.path.join(run, f"{name}.so") for name in SHIMS), "CLOCKSHIM_WARP": str(warp),
+                    "TASKSHIM_HOLD": os.path.join(run, "hold")}
     return env
 
 
@@ -275,7 +278,7 @@ def prepare(args, run):
     put("driver-in.json", json.dumps({"program": program, "timeout_s": args.timeout, "resume": args.resume, "mdi": args.mdi,
                                       "styli": world.styli(plan), "rig_pid": os.getpid()}))
     if args.warp > 1:
-        build_shim(run)
+        build_shims(run)
     return machine, {f for f in os.listdir(run)}
 
 

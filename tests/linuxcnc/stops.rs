@@ -59,7 +59,7 @@ impl Outcome {
 
 /// Runs the paper's `head` program, changed, on a machine with this scenario.
 fn run(change: impl Fn(String) -> String, scenario: &str) -> Outcome {
-    let warp: u32 = std::env::var("AXISCAL_WARP").ok().and_then(|w| w.parse().ok()).unwrap_or(10);
+    let warp: u32 = std::env::var("AXISCAL_WARP").ok().and_then(|w| w.parse().ok()).unwrap_or(40);
     let first = run_at(&change, scenario, warp);
     // LinuxCNC itself can lose a race on a busy computer: no verdict on the program
     if first.list("errors").contains("Queue is not empty after probing") {
