@@ -429,6 +429,17 @@ fn what_may_be_much_else_beside_an_untold_moment_is_not_told() {
         for name in lost.iter().filter(|n| !unseen.iter().any(|u| u == *n)) {
             assert!(said.is_some_and(|w| w.contains(name)), "{name}: {said:?}");
         }
+        // how badly that is told is not said: nobody knows
+        let named: Vec<&str> =
+            said.map(|w| w.split(&[':', '.'][..]).nth(1).unwrap().split(", ").collect()).unwrap_or_default();
+        let named: Vec<&str> = named.iter().map(|n| n.trim()).collect();
+        for weak in &fit.outcome.weak {
+            let of = |wanted: bool| -> f64 {
+                let all = weak.combination.iter().filter(|(n, _)| !wanted || named.contains(&n.as_str()));
+                all.map(|(_, w)| w * w).sum()
+            };
+            assert!(of(true) <= 0.5 * of(false), "{}", weak.says);
+        }
     }
 }
 
