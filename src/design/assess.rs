@@ -66,6 +66,16 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     observability.hold(held_first(&alone.model, &alone.free));
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
     let mut undetermined = statement::undetermined(&free, &task.effects, &observability.unseen, &observability);
+    // nothing has been fitted yet: no value fits best
+    for u in &mut undetermined {
+        let only = free.iter().find(|f| f.shape && u.combination.len() == 1 && u.combination.contains_key(&f.name));
+        if let Some(shape) = only {
+            u.says = format!(
+                "{} leaves no trace in these touches where its effect has its usual size: they will not tell it",
+                statement::meaning(shape, &task.effects)
+            );
+        }
+    }
     let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();

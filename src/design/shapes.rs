@@ -256,39 +256,54 @@ impl Moments<'_> {
     /// Puts each among the touches where its jump leaves most that the rest of the model cannot follow: behind the last touch it
     /// would leave nothing. `jacobian`: whitened, of the free unknowns.
     pub fn put_where_they_show(&self, theta: &mut [f64], jacobian: &DMatrix<f64>) {
-        /// Places that are tried.
-        const MOST: usize = 60;
-        for effect in self.task.effects.iter().filter(|e| !e.per_block) {
+        for effect in &self.task.effects {
             for p in jumps_in_a_design(effect, self.data) {
-                let unknowns = &self.model.unknowns;
-                let Some(i) = unknowns.iter().position(|u| u.effect == effect.id && u.name == p.name) else { continue };
-                let rest: Vec<usize> =
-                    (0..self.free.len()).filter(|&c| unknowns[self.free[c]].effect != effect.id).collect();
-                let rest = jacobian.select_columns(&rest);
-                if rest.iter().any(|x| !x.is_finite()) {
-                    continue;
-                }
-                let base = Basis::new(&rest);
-                let alone = Model::new(self.task.machine, &[effect], &self.data.set_ups, self.task.reference);
-                let trials = Trials::of(&alone, &self.data.nominal);
-                let shaped: Vec<&Parameter> = effect.parameters.iter().filter(|p| p.shape.is_some()).collect();
-                let sizes: Vec<usize> = (0..alone.n_unknowns()).filter(|&i| !alone.unknowns[i].shape).collect();
-                let typical = DVector::from_fn(sizes.len(), |k, _| alone.unknowns[sizes[k]].typical);
-                let kept = |value: f64| {
-                    let at = |q: &&Parameter| if q.name == p.name { value } else { q.shape.map_or(0.0, |s| s.0) };
-                    let shapes = shaped.iter().map(at).collect();
-                    let mut all = trials.columns(&Variant { effects: vec![0], shapes }).values.select_columns(&sizes);
-                    self.white.apply(&mut all);
-                    base.project(&(all * &typical).resize_vertically(jacobian.nrows(), 0.0)).norm()
-                };
-                let places = all_tried(p, self.data);
-                let few = places.iter().copied().step_by(places.len().div_ceil(MOST).max(1));
-                let best = few.map(|v| (v, kept(v))).filter(|(_, kept)| kept.is_finite());
-                if let Some((value, _)) = best.max_by(|a, b| a.1.total_cmp(&b.1)) {
-                    theta[i] = value;
+                // an effect of blocks has one for each
+                for i in 0..self.model.n_unknowns() {
+                    let u = &self.model.unknowns[i];
+                    if u.effect != effect.id || u.name.split('@').next() != Some(p.name.as_str()) {
+                        continue;
+                    }
+                    let rest: Vec<usize> = (0..self.free.len())
+                        .filter(|&c| {
+                            let other = &self.model.unknowns[self.free[c]];
+                            other.effect != effect.id || other.name.split('@').nth(1) != u.name.split('@').nth(1)
+                        })
+                        .collect();
+                    let rest = jacobian.select_columns(&rest);
+                    if rest.iter().any(|x| !x.is_finite()) {
+                        continue;
+                    }
+                    if let Some(value) = self.most_visible((effect, p), &u.name, &Basis::new(&rest), jacobian.nrows()) {
+                        theta[i] = value;
+                    }
                 }
             }
         }
+    }
+
+    /// The value of a parameter at which its jump leaves most beside everything else.
+    fn most_visible(&self, (effect, p): (&Effect, &Parameter), name: &str, base: &Basis, n_rows: usize) -> Option<f64> {
+        /// Places that are tried.
+        const MOST: usize = 60;
+        let alone = Model::new(self.task.machine, &[effect], &self.data.set_ups, self.task.reference);
+        let trials = Trials::of(&alone, &self.data.nominal);
+        let at = alone.unknowns.iter().position(|u| u.name == name)?;
+        let first = at / effect.parameters.len() * effect.parameters.len();
+        let own = first..first + effect.parameters.len();
+        let shaped: Vec<usize> = (0..alone.n_unknowns()).filter(|&i| alone.unknowns[i].shape).collect();
+        let sizes: Vec<usize> = own.filter(|&i| !alone.unknowns[i].shape).collect();
+        let typical = DVector::from_fn(sizes.len(), |k, _| alone.unknowns[sizes[k]].typical);
+        let kept = |value: f64| {
+            let shapes = shaped.iter().map(|&i| if i == at { value } else { alone.unknowns[i].start }).collect();
+            let mut all = trials.columns(&Variant { effects: vec![0], shapes }).values.select_columns(&sizes);
+            self.white.apply(&mut all);
+            base.project(&(all * &typical).resize_vertically(n_rows, 0.0)).norm()
+        };
+        let places = all_tried(p, self.data);
+        let few = places.iter().copied().step_by(places.len().div_ceil(MOST).max(1));
+        let best = few.map(|v| (v, kept(v))).filter(|(_, kept)| kept.is_finite());
+        best.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(value, _)| value)
     }
 }
 

@@ -261,7 +261,7 @@ impl View {
                 jacobian
             })
         };
-        if task.effects.iter().any(|e| !e.per_block && !jumps_in_a_design(e, &data).is_empty()) {
+        if task.effects.iter().any(|e| !jumps_in_a_design(e, &data).is_empty()) {
             // the same place whatever scatter the visits have
             let probe = Noise { tau_mm: 0.0, ..noise };
             let white = whitening(&model, &data, &theta, &free, probe, |t| t.whitening());

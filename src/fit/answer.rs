@@ -9,7 +9,7 @@ use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::Unknown;
 use crate::units::{significant, um_from_mm};
 use nalgebra::DVector;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A result further off than so many typical sizes is worth a warning by itself.
 const NOT_CREDIBLE: f64 = 300.0;
@@ -65,7 +65,7 @@ pub(super) fn outcome(
     };
     let intervals =
         if shapes_told { profile::intervals(fit, machine, effects, settings, &spread) } else { Default::default() };
-    let profile::Intervals { ends: intervals, other_values } = intervals;
+    let profile::Intervals { ends: intervals, other_values, lost_beside } = intervals;
     // sizes beside a shape that nobody knows
     let runs_along = |i: usize| !fit.model.unknowns[i].shape && intervals.get(&i) == Some(&[None, None]);
     // a time constant that may as well be endless is none that is told
@@ -215,7 +215,7 @@ pub(super) fn outcome(
                 .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
                 .collect(),
             if shapes_told { Vec::new() } else { beside_a_shape_that_is_not_told(fit, &beside) },
-            much_else(fit, &beside, is_lost).into_iter().collect(),
+            much_else(fit, &beside, &lost_beside, is_lost).into_iter().collect(),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
         ]
@@ -252,17 +252,26 @@ fn beside_a_shape_that_is_not_told(fit: &Fit, status: &[Status]) -> Vec<String> 
 }
 
 /// What is not told only because a shape is not: leaving that effect out brings it back.
-fn much_else(fit: &Fit, status: &[Status], lost: impl Fn(usize) -> bool) -> Option<String> {
+fn much_else(
+    fit: &Fit,
+    status: &[Status],
+    beside: &BTreeMap<usize, BTreeSet<usize>>,
+    lost: impl Fn(usize) -> bool,
+) -> Option<String> {
     let unknowns = &fit.model.unknowns;
     let names = |which: &dyn Fn(usize) -> bool| {
         let all: Vec<&str> = (0..unknowns.len()).filter(|&i| which(i)).map(|i| unknowns[i].name.as_str()).collect();
         all.join(", ")
     };
     let results = names(&|i| !unknowns[i].nuisance && lost(i));
-    let shapes = names(&|i| unknowns[i].shape && status[i] == Status::Undetermined);
+    let of_results = beside.iter().filter(|(i, _)| !unknowns[**i].nuisance && lost(**i));
+    let known: BTreeSet<usize> = of_results.flat_map(|(_, shapes)| shapes.iter().copied()).collect();
+    // what runs along with the end of a range does so with a shape that is held there
+    let untold = |i: usize| unknowns[i].shape && status[i] == Status::Undetermined;
+    let shapes = names(&|i| if known.is_empty() { untold(i) } else { known.contains(&i) });
     (!results.is_empty()).then(|| {
         format!(
-            "not told beside {shapes}: {results}. These touches do not tell {shapes}, and beside some of its values they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
+            "not told beside {shapes}: {results}. Beside some of its values, which these touches allow, they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
         )
     })
 }

@@ -19,7 +19,7 @@ pub use alone::without_prior;
 use ends::{also, hull, with_all};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Steps from the value to the end of its usual interval: a profile that goes up and down is followed to its first crossing.
@@ -38,6 +38,8 @@ const GROWTH_OF_A_JUMP: f64 = 7.35;
 const GROWTH_95: f64 = 3.841;
 /// Values at which χ² has grown by no more than so many times the limit may have a better one beside them.
 const NEARLY: f64 = 8.0;
+/// What moves by more than this share of its usual size along with something that leaves no trace leaves none either.
+const NO_TRACE: f64 = 0.01;
 /// So many places behind one that the touches contradict are looked at before the rest counts as contradicted.
 const LOOKED_AHEAD: usize = 40;
 
@@ -48,6 +50,35 @@ pub struct Intervals {
     pub ends: BTreeMap<usize, [Option<f64>; 2]>,
     /// Other values of a shape parameter, apart from its own, that fit about as well: nobody knows which it is.
     pub other_values: BTreeMap<usize, Vec<f64>>,
+    /// What may be much else beside some values of a shape, with those shapes.
+    pub lost_beside: BTreeMap<usize, BTreeSet<usize>>,
+}
+
+/// How far χ² may grow at a value of a shape before the touches contradict it.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    growth: f64,
+    /// Nothing beside that value is less sure than by so many standard uncertainties.
+    most: f64,
+}
+
+impl Room {
+    /// At one of so many values of which the best was taken, beside an interval of k standard uncertainties.
+    fn of_the_best(tried: usize) -> impl Fn(f64) -> Self {
+        let chance = by_chance(tried);
+        move |k| Self { growth: k * k + chance, most: f64::INFINITY }
+    }
+
+    /// At a moment at which something jumps.
+    fn of_a_jump(k: f64) -> Self {
+        Self { growth: GROWTH_OF_A_JUMP, most: k }
+    }
+
+    /// Standard uncertainties on either side where χ² has grown by so much; none where the touches contradict that value.
+    fn factor(self, growth: f64) -> Option<f64> {
+        let left = self.growth - growth;
+        (left > 0.0).then(|| left.sqrt().min(self.most))
+    }
 }
 
 /// The best of so many values is better by chance, as χ² falls.
@@ -106,7 +137,12 @@ pub fn intervals(
             }
             let Some(profile) = Profile::new(fit, (&model, &trials), effect, unknown) else { continue };
             if jumps {
-                out.ends.insert(unknown, profile.ends_of_a_jump(&shapes::stretches_of_a_jump(p, &fit.data)));
+                let stretches = shapes::stretches_of_a_jump(p, &fit.data, u.name.split('@').nth(1));
+                let (ends, places) = profile.ends_of_a_jump(&stretches);
+                out.ends.insert(unknown, ends);
+                // any of these moments may be it, and everything is as it is beside that one
+                profile.widen(&places, &Room::of_a_jump, spread, &mut out);
+                profile.widen_others(&places, &Room::of_a_jump, spread, &mut out);
                 continue;
             }
             // a shape that the touches do not tell may be any of those that were tried
@@ -121,7 +157,7 @@ pub fn intervals(
                     let tried = if beyond.is_empty() { 1 } else { all.len() };
                     if !beyond.is_empty() {
                         // another value altogether: then everything else may be otherwise, too
-                        profile.widen_others(&at, tried, spread, &mut out.ends);
+                        profile.widen_others(&at, &Room::of_the_best(tried), spread, &mut out);
                         out.other_values.insert(unknown, best_of(beyond));
                     }
                     places.extend(at);
@@ -132,11 +168,11 @@ pub fn intervals(
                     places.extend([low, high, fit.theta[unknown]]);
                     let n = places.len();
                     // any of them may be it, and everything else as it is beside that one
-                    profile.widen_others(&places, n, spread, &mut out.ends);
+                    profile.widen_others(&places, &Room::of_the_best(n), spread, &mut out);
                     (places, n)
                 }
             };
-            profile.widen(&places, tried, spread, &mut out.ends);
+            profile.widen(&places, &Room::of_the_best(tried), spread, &mut out);
             if !free {
                 profile.size_runs_along([low, high], spread, &mut out.ends);
             }
@@ -172,7 +208,8 @@ struct Profile<'a> {
     /// Its unknowns in that model; of an effect of blocks those of one.
     set: Range<usize>,
     effect: &'a Effect,
-    /// Place of the shape among the effect's parameters.
+    /// Index of the shape among the unknowns, and its place among the effect's parameters.
+    unknown: usize,
     shape: usize,
     /// Values of the effect's parameters at the solution.
     values: Vec<f64>,
@@ -222,12 +259,13 @@ impl<'a> Profile<'a> {
             alone,
             set,
             effect,
+            unknown,
             shape,
             values: places.iter().map(|&i| fit.theta[i]).collect(),
             unknowns: sizes.iter().map(|&i| places[i]).collect(),
             sizes,
             residual: linear.residual,
-            covariance: inverse(&others.tr_mul(&others)),
+            covariance: inverse(&others.tr_mul(&others)).inverse,
             rest: rest.iter().map(|&c| fit.free[c]).collect(),
             others,
             priors,
@@ -279,21 +317,34 @@ impl<'a> Profile<'a> {
         let (seen, along) = (self.others.tr_mul(&a), self.others.tr_mul(&y));
         let gram = a.tr_mul(&a) - seen.tr_mul(&(&self.covariance * &seen));
         let slope = a.tr_mul(&y) - seen.tr_mul(&(&self.covariance * &along));
-        let (inverse, whole) = (inverse(&gram), y.norm_squared() - along.dot(&(&self.covariance * &along)));
+        let whole = y.norm_squared() - along.dot(&(&self.covariance * &along));
+        let Inverse { inverse, lost } = inverse(&gram);
         let step = &inverse * &slope;
         let sizes = self.sizes.iter().enumerate();
         // what the others do while the sizes and they settle, and how far they scatter there
         let follow = &self.covariance * &seen;
         let moved = &follow * &step - &self.covariance * &along;
         let scatter = &follow * &inverse;
+        // a size that leaves no trace here may be anything, and so may what follows it
+        let typical = |c: usize| self.effect.parameters[self.sizes[c]].typical;
+        let free: Vec<DVector<f64>> = lost
+            .iter()
+            .map(|v| v / v.iter().enumerate().map(|(c, w)| w.abs() / typical(c)).fold(0.0, f64::max))
+            .collect();
+        let size_sigma = |c: usize| {
+            let is_lost = free.iter().any(|v| v[c].abs() > NO_TRACE * typical(c));
+            if is_lost { f64::INFINITY } else { inverse[(c, c)].max(0.0).sqrt() }
+        };
         let others = (0..self.rest.len()).map(|r| {
             let variance = self.covariance[(r, r)] + scatter.row(r).dot(&follow.row(r));
-            (self.fit.theta[self.rest[r]] + moved[r], variance.max(0.0).sqrt())
+            let along_with = free.iter().map(|v| (&follow.row(r) * v).x.abs()).fold(0.0, f64::max);
+            let is_lost = along_with > NO_TRACE * self.fit.model.unknowns[self.rest[r]].typical;
+            (self.fit.theta[self.rest[r]] + moved[r], if is_lost { f64::INFINITY } else { variance.max(0.0).sqrt() })
         });
         Held {
             others: others.collect(),
             growth: whole - slope.dot(&step) - self.residual.norm_squared(),
-            sizes: sizes.map(|(c, &i)| (self.values[i] - step[c], inverse[(c, c)].max(0.0).sqrt())).collect(),
+            sizes: sizes.map(|(c, &i)| (self.values[i] - step[c], size_sigma(c))).collect(),
         }
     }
 
@@ -330,17 +381,20 @@ impl<'a> Profile<'a> {
         [end(-1.0, range[0]), end(1.0, range[1])]
     }
 
-    /// The first and the last moment of a jump that the touches do not contradict; `stretches`: where it may be, in order.
-    fn ends_of_a_jump(&self, stretches: &[Stretch]) -> [Option<f64>; 2] {
+    /// The first and the last moment of a jump that the touches do not contradict, and a place in each stretch between them that they
+    /// do not; `stretches`: where it may be, in order.
+    fn ends_of_a_jump(&self, stretches: &[Stretch]) -> ([Option<f64>; 2], Vec<f64>) {
         let value = self.values[self.shape];
         let allowed = |at: &Stretch| self.held(at.place).growth < GROWTH_OF_A_JUMP;
         let here = stretches.iter().position(|s| s.ends[0] <= value && value <= s.ends[1]);
-        let Some(here) = here else { return [None, None] };
-        let end = |further: &mut dyn Iterator<Item = &Stretch>, side: usize| -> Option<f64> {
+        let Some(here) = here else { return ([None, None], Vec::new()) };
+        let mut places = vec![value];
+        let mut end = |further: &mut dyn Iterator<Item = &Stretch>, side: usize| -> Option<f64> {
             let (mut last, mut beyond) = (stretches[here].ends[side], 0);
             for stretch in further {
                 if allowed(stretch) {
                     (last, beyond) = (stretch.ends[side], 0);
+                    places.push(stretch.place);
                 } else {
                     beyond += 1;
                 }
@@ -351,7 +405,8 @@ impl<'a> Profile<'a> {
             // up to the last touch there is nothing that would speak against a jump behind it
             (beyond > 0).then_some(last)
         };
-        [end(&mut stretches[..here].iter().rev(), 0), end(&mut stretches[here + 1..].iter(), 1)]
+        let ends = [end(&mut stretches[..here].iter().rev(), 0), end(&mut stretches[here + 1..].iter(), 1)];
+        (ends, places)
     }
 
     /// Values of the shape over all of its range, near to each other; n of them where they are many.
@@ -393,45 +448,56 @@ impl<'a> Profile<'a> {
     fn widen_others(
         &self,
         places: &[f64],
-        tried: usize,
+        room: &dyn Fn(f64) -> Room,
         spread: &dyn Fn(usize) -> Option<(f64, f64)>,
-        out: &mut BTreeMap<usize, [Option<f64>; 2]>,
+        out: &mut Intervals,
     ) {
-        let chance = by_chance(tried);
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         for (r, &unknown) in self.rest.iter().enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
             let beside = held.iter().filter_map(|h| {
-                let room = k * k + chance - h.growth;
-                h.others.get(r).filter(|_| room > 0.0).map(|of| (*of, room.sqrt().min(k)))
+                let factor = room(k).factor(h.growth)?;
+                h.others.get(r).map(|of| (*of, factor.min(k)))
             });
             let value = self.fit.theta[unknown];
-            let ends = with_all((value, sigma, k), beside);
             let typical = self.fit.model.unknowns[unknown].typical;
-            also(out, unknown, if is_told(ends, value, k * sigma, typical) { ends } else { [None, None] });
+            self.found(unknown, with_all((value, sigma, k), beside), (value, k * sigma, typical), out);
         }
     }
 
-    /// Intervals of the sizes: all that each may be beside some places of the shape, of which the best of `tried` was taken.
+    /// Intervals of the sizes: all that each may be beside some places of the shape.
     fn widen(
         &self,
         places: &[f64],
-        tried: usize,
+        room: &dyn Fn(f64) -> Room,
         spread: &dyn Fn(usize) -> Option<(f64, f64)>,
-        out: &mut BTreeMap<usize, [Option<f64>; 2]>,
+        out: &mut Intervals,
     ) {
-        let chance = by_chance(tried);
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         let lowest = held.iter().map(|h| h.growth).fold(0.0, f64::min);
         for (c, (&i, &unknown)) in self.sizes.iter().zip(&self.unknowns).enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
             let beside = held.iter().filter_map(|h| {
-                let room = k * k + chance - (h.growth - lowest);
-                h.sizes.get(c).filter(|_| room > 0.0).map(|of| (*of, room.sqrt()))
+                let factor = room(k).factor(h.growth - lowest)?;
+                h.sizes.get(c).map(|of| (*of, factor))
             });
             let (value, typical) = (self.values[i], self.effect.parameters[i].typical);
-            let ends = with_all((value, sigma, k), beside);
-            also(out, unknown, if is_told(ends, value, k * sigma, typical) { ends } else { [None, None] });
+            self.found(unknown, with_all((value, sigma, k), beside), (value, k * sigma, typical), out);
+        }
+    }
+
+    /// The ends of an interval, or none where it may be much else.
+    fn found(
+        &self,
+        unknown: usize,
+        ends: [Option<f64>; 2],
+        (value, usual, typical): (f64, f64, f64),
+        out: &mut Intervals,
+    ) {
+        let told = is_told(ends, value, usual, typical);
+        also(&mut out.ends, unknown, if told { ends } else { [None, None] });
+        if !told {
+            out.lost_beside.entry(unknown).or_default().insert(self.unknown);
         }
     }
 }
@@ -474,8 +540,13 @@ struct Held {
     others: Vec<(f64, f64)>,
 }
 
-/// The inverse of a matrix of products; of what leaves no trace in it, none.
-fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
+/// The inverse of a matrix of products, without what leaves no trace in it, and the directions that leave none.
+struct Inverse {
+    inverse: DMatrix<f64>,
+    lost: Vec<DVector<f64>>,
+}
+
+fn inverse(gram: &DMatrix<f64>) -> Inverse {
     /// Smaller eigenvalues of the matrix scaled to ones on its diagonal are rounding.
     const LEAST: f64 = 1e-10;
     let scale = gram.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
@@ -484,5 +555,9 @@ fn inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
     let of = |v: f64| if v > LEAST { 1.0 / v } else { 0.0 };
     let inverse =
         &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(of)) * eigen.eigenvectors.transpose();
-    DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] / (scale[a] * scale[b]))
+    let lost = (0..n).filter(|&k| eigen.eigenvalues[k] <= LEAST);
+    Inverse {
+        inverse: DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] / (scale[a] * scale[b])),
+        lost: lost.map(|k| eigen.eigenvectors.column(k).component_div(&scale)).collect(),
+    }
 }

@@ -135,13 +135,16 @@ pub fn observe_plan(
 #[must_use]
 pub fn free_in_a_design(model: &Model, effects: &[&Effect], data: &Data, held: &[String]) -> Vec<usize> {
     let is_held = |name: &str| held.iter().any(|h| crate::symbols::same(h, name));
-    let jumps: Vec<&str> = effects
+    let jumps: Vec<(&str, &str)> = effects
         .iter()
-        .filter(|e| !e.per_block)
-        .flat_map(|e| jumps_in_a_design(e, data))
-        .map(|p| p.name.as_str())
+        .flat_map(|e| jumps_in_a_design(e, data).into_iter().map(|p| (e.id.as_str(), p.name.as_str())))
         .collect();
-    let of = |i: &usize| !is_held(&model.unknowns[*i].name) && !jumps.contains(&model.unknowns[*i].name.as_str());
+    // an effect of blocks has one for each
+    let own = |name: &'_ str| name.split('@').next().unwrap_or_default().to_owned();
+    let of = |i: &usize| {
+        let u = &model.unknowns[*i];
+        !is_held(&u.name) && !jumps.iter().any(|(effect, name)| u.effect == *effect && own(&u.name) == *name)
+    };
     (0..model.n_unknowns()).filter(of).collect()
 }
 

@@ -197,7 +197,16 @@ impl Search<'_> {
         if nominal.full() || nominal.rank == 0 {
             return nominal.clone();
         }
-        solve::observe_of_rank(&solve::Problem::jacobian(&self.touches, theta), nominal.rank)
+        let mut jacobian = solve::Problem::jacobian(&self.touches, theta);
+        // an unknown that left no trace at all has none of its own here either: scaled to one, what the sizes that a shape came to
+        // beside noise show of it would push out the weakest of what is seen
+        let alone = |v: &DVector<f64>| {
+            (v.amax() > 0.0 && v.iter().filter(|w| w.abs() > 1e-9 * v.amax()).count() == 1).then(|| v.iamax())
+        };
+        for c in nominal.unseen.iter().filter_map(alone) {
+            jacobian.column_mut(c).fill(0.0);
+        }
+        solve::observe_of_rank(&jacobian, nominal.rank)
     }
 
     /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do

@@ -247,11 +247,14 @@ pub(super) struct Stretch {
 }
 
 /// All stretches in which a jump may be, in order: from one touch to the next; where it is not known which of the parameter's values part
-/// touches, half-way to the next value that was tried.
-pub(super) fn stretches_of_a_jump(p: &Parameter, data: &Data) -> Vec<Stretch> {
+/// touches, half-way to the next value that was tried. `block`: the one whose touches alone show it.
+pub(super) fn stretches_of_a_jump(p: &Parameter, data: &Data, block: Option<&str>) -> Vec<Stretch> {
     let half_way = |w: &[f64]| 0.5 * (w[0] + w[1]);
     let mut all: Vec<f64> = match p.between {
-        Some(variable) => data.observations.iter().map(|o| o.state[variable]).collect(),
+        Some(variable) => {
+            let shows = |o: &&Observation| block.is_none_or(|block| data.set_ups[o.set_up].label == block);
+            data.observations.iter().filter(shows).map(|o| o.state[variable]).collect()
+        }
         None => all_tried(p, data),
     };
     all.retain(|v| v.is_finite());

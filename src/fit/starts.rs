@@ -134,7 +134,7 @@ fn identify_started(
 }
 
 /// Moments of jumps were found beside a fit without the jump, which takes good touches about it for strangers: each is moved among the
-/// touches next to it, as long as that takes less against the touches, those included that are then rejected.
+/// touches next to it that show it, as long as that takes less against the touches, those included that are then rejected.
 fn better_moments(
     mut fit: Fit,
     (machine, catalogue): (&Machine, &Catalogue),
@@ -143,6 +143,8 @@ fn better_moments(
 ) -> Result<Fit> {
     /// Stretches between touches on either side.
     const REACH: usize = 5;
+    /// Times that one is moved.
+    const MOST: usize = 4;
     /// What a touch costs that is rejected: about where one is.
     const REJECTED: f64 = 12.0;
     /// A better place is better by more.
@@ -151,25 +153,26 @@ fn better_moments(
         return Ok(fit);
     }
     for name in settings.jumps.clone() {
-        let Some(&Knowledge::Fixed(at)) = settings.knowledge.get(&name) else { continue };
-        let own = name.split('@').next().unwrap_or_default();
+        let (own, block) = name.split_once('@').map_or((name.as_str(), None), |(own, block)| (own, Some(block)));
         let Some(p) = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == own) else { continue };
-        let stretches = shapes::stretches_of_a_jump(p, &fit.data);
-        let Some(here) = stretches.iter().position(|s| s.ends[0] <= at && at <= s.ends[1]) else { continue };
-        let last = (here + REACH).min(stretches.len().saturating_sub(1));
-        let mut best: Option<(f64, f64)> = None;
-        for k in (here.saturating_sub(REACH)..=last).filter(|k| *k != here) {
-            let mut moved = Settings { quick: true, ..settings.clone() };
-            hold(&mut moved, &name, stretches[k].place);
-            let other = identify_from(machine, catalogue, effects, fit.data.clone(), &moved, &values(&fit))?;
-            let tau_mm = fit.noise.tau_mm.min(other.noise.tau_mm);
-            let cost = |f: &Fit| misfit(f, &f.whitening(tau_mm)) + REJECTED * f.rejected.len() as f64;
-            let gain = cost(&fit) - cost(&other);
-            if gain > SAME * cost(&fit) && best.is_none_or(|(most, _)| gain > most) {
-                best = Some((gain, stretches[k].place));
+        let stretches = shapes::stretches_of_a_jump(p, &fit.data, block);
+        for _ in 0..MOST {
+            let Some(&Knowledge::Fixed(at)) = settings.knowledge.get(&name) else { break };
+            let Some(here) = stretches.iter().position(|s| s.ends[0] <= at && at <= s.ends[1]) else { break };
+            let last = (here + REACH).min(stretches.len().saturating_sub(1));
+            let mut best: Option<(f64, f64)> = None;
+            for k in (here.saturating_sub(REACH)..=last).filter(|k| *k != here) {
+                let mut moved = Settings { quick: true, ..settings.clone() };
+                hold(&mut moved, &name, stretches[k].place);
+                let other = identify_from(machine, catalogue, effects, fit.data.clone(), &moved, &values(&fit))?;
+                let tau_mm = fit.noise.tau_mm.min(other.noise.tau_mm);
+                let cost = |f: &Fit| misfit(f, &f.whitening(tau_mm)) + REJECTED * f.rejected.len() as f64;
+                let gain = cost(&fit) - cost(&other);
+                if gain > SAME * cost(&fit) && best.is_none_or(|(most, _)| gain > most) {
+                    best = Some((gain, stretches[k].place));
+                }
             }
-        }
-        if let Some((_, place)) = best {
+            let Some((_, place)) = best else { break };
             hold(&mut settings, &name, place);
             let from = values(&fit);
             fit = identify_from(machine, catalogue, effects, fit.data, &settings, &from)?;

@@ -87,7 +87,7 @@ fn one(
         ([], _) => "a combination of many parameters leaves no trace in these touches".to_owned(),
         ([one], [(u, _)]) if u.shape && effects.iter().any(|e| e.id == u.effect) => format!(
             "{one} is not told: beside an effect that does not show clearly in these touches there is nothing to tell it by; it \
-             stands at the one of its usual values that fits best. More touches where that effect changes would tell it, or hold it at what is known"
+             stands at the one of its usual values that fits best. More touches where that effect changes would tell it; else hold it at what is known of the machine"
         ),
         ([one], _) => format!(
             "{one} leaves no trace in these touches: its value is not known, and stands at its start by convention"
