@@ -259,8 +259,7 @@ impl Moments<'_> {
         for effect in &self.task.effects {
             for p in jumps_in_a_design(effect, self.data) {
                 // an effect of blocks has one for each
-                for i in 0..self.model.n_unknowns() {
-                    let u = &self.model.unknowns[i];
+                for (i, u) in self.model.unknowns.iter().enumerate() {
                     if u.effect != effect.id || u.name.split('@').next() != Some(p.name.as_str()) {
                         continue;
                     }

@@ -337,7 +337,7 @@ impl<'a> Profile<'a> {
         };
         let others = (0..self.rest.len()).map(|r| {
             let variance = self.covariance[(r, r)] + scatter.row(r).dot(&follow.row(r));
-            let along_with = free.iter().map(|v| (&follow.row(r) * v).x.abs()).fold(0.0, f64::max);
+            let along_with = free.iter().map(|v| (follow.row(r) * v).x.abs()).fold(0.0, f64::max);
             let is_lost = along_with > NO_TRACE * self.fit.model.unknowns[self.rest[r]].typical;
             (self.fit.theta[self.rest[r]] + moved[r], if is_lost { f64::INFINITY } else { variance.max(0.0).sqrt() })
         });
