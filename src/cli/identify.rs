@@ -1,6 +1,6 @@
 //! `axiscal identify`: the fit of a study.
 
-use super::load::load_study;
+use super::load::{load_study, load_study_alone};
 use super::{Answer, Io};
 use crate::design;
 use crate::diag::{Failure, Result};
@@ -34,7 +34,7 @@ pub struct Args {
 /// # Errors
 /// When the study or a file that it names is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let loaded = load_study(&args.study, io)?;
+    let loaded = if args.quick { load_study_alone(&args.study, io)? } else { load_study(&args.study, io)? };
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
     settings.quick = args.quick;

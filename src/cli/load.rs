@@ -225,6 +225,19 @@ pub fn load_compensation(path: &Path, machine: &Machine) -> Result<Compensation>
 /// # Errors
 /// When a file is missing or unusable.
 pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
+    load(path, io, Catalogue::prepare)
+}
+
+/// The same for somebody who asks about the effects of the study alone.
+///
+/// # Errors
+/// When a file is missing or unusable.
+pub fn load_study_alone(path: &Path, io: &Io) -> Result<Loaded> {
+    load(path, io, |_, _| {})
+}
+
+/// `meanwhile` is called as soon as machine and catalogue are known.
+fn load(path: &Path, io: &Io, meanwhile: impl FnOnce(&Catalogue, &Machine)) -> Result<Loaded> {
     let text = files::read_text(path)?;
     let mut hash = Sha256::new();
     let mut data = Sha256::new();
@@ -244,6 +257,7 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
+    meanwhile(&catalogue, &machine);
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in &study.data {

@@ -100,8 +100,7 @@ pub(super) fn outcome(
             let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
             let factor = known.map(factor);
             let usual = sigma.zip(factor).map(|(s, k)| s * k);
-            // any moment between the ends may be it
-            let sigma = sigma.or(jump.map(|[low, high]| (high - low) / 12f64.sqrt()));
+            let sigma = sigma.or(jump.map(|ends| off_a_moment(fit.theta[i], ends)));
             // the ends are those of the noise's interval, with all else that is counted
             let interval = known.zip(factor).and_then(|(c, k)| {
                 let more = k * (b_variance[c] + moves[c] * moves[c]).sqrt();
@@ -251,6 +250,13 @@ fn beside_a_shape_that_is_not_told(fit: &Fit, status: &[Status]) -> Vec<String> 
     says.collect()
 }
 
+/// Standard uncertainty of the value of a moment while any moment between two ends may be it: a value at one end is off by more than
+/// one in their middle.
+fn off_a_moment(value: f64, [low, high]: [f64; 2]) -> f64 {
+    let [below, above] = [value - low, high - value];
+    ((below * below - below * above + above * above) / 3.0).max(0.0).sqrt()
+}
+
 /// What is not told only because a shape is not: leaving that effect out brings it back.
 fn much_else(
     fit: &Fit,
@@ -269,9 +275,14 @@ fn much_else(
     // what runs along with the end of a range does so with a shape that is held there
     let untold = |i: usize| unknowns[i].shape && status[i] == Status::Undetermined;
     let shapes = names(&|i| if known.is_empty() { untold(i) } else { known.contains(&i) });
+    // they are many, and all of one kind
+    let blocks = match (0..unknowns.len()).filter(|&i| unknowns[i].nuisance && lost(i)).count() {
+        0 => String::new(),
+        n => format!(", and {n} numbers of where the blocks stand"),
+    };
     (!results.is_empty()).then(|| {
         format!(
-            "not told beside {shapes}: {results}. Beside some of its values, which these touches allow, they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
+            "not told beside {shapes}: {results}{blocks}. Beside some of its values, which these touches allow, they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
         )
     })
 }

@@ -170,9 +170,8 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
     }
     let holds = (0..p).map(|_| Vec::new()).collect();
     let mut out = Unmodelled { sigma: DVector::zeros(p), holds, left_out };
-    for (j, u) in others.unknowns.iter().enumerate().filter(|(_, u)| !u.shape) {
-        if let Some(taken) = sums.taken_by(j, &fit.seen)
-            && let Some(c) = one_result(fit, &taken)
+    for (u, taken) in others.unknowns.iter().zip(sums.taken(&fit.seen)).filter(|(u, _)| !u.shape) {
+        if let Some(c) = taken.and_then(|taken| one_result(fit, &taken))
             && !out.holds[c].contains(&u.effect)
         {
             out.holds[c].push(u.effect.clone());
@@ -231,27 +230,28 @@ impl Sums {
         self.inner.gemm(1.0, &b_turned, b, 1.0);
     }
 
-    /// Where all that a column of B does goes, by unknown and in units of the noise; none where the touches show a part of it
+    /// Where all that each column of B does goes, by unknown and in units of the noise; none where the touches show a part of it
     /// that is more than the noise of one touch.
-    fn taken_by(&self, column: usize, seen: &super::solve::Observability) -> Option<DVector<f64>> {
+    fn taken(&self, seen: &super::solve::Observability) -> Vec<Option<DVector<f64>>> {
         /// Blocks that stand askew leave this share of what would be one number on straight ones.
         const SHARE: f64 = 1e-3;
-        let p = self.gram.nrows();
-        let whole = self.inner[(column, column)];
-        if whole <= 0.0 {
-            return None;
-        }
+        let (p, q) = self.cross.shape();
         let scaled = DMatrix::from_fn(p, p, |i, j| self.gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
-        let cross = self.cross.column(column).component_div(&seen.scale);
-        let x = if seen.full() {
-            scaled.cholesky()?.solve(&cross)
+        let cross = DMatrix::from_fn(p, q, |i, j| self.cross[(i, j)] / seen.scale[i]);
+        let solution = if seen.full() {
+            scaled.cholesky().map(|c| c.solve(&cross))
         } else {
-            let reduced = (seen.seen.tr_mul(&scaled) * &seen.seen).cholesky()?;
-            &seen.seen * reduced.solve(&seen.seen.tr_mul(&cross))
+            let reduced = (seen.seen.tr_mul(&scaled) * &seen.seen).cholesky();
+            reduced.map(|c| &seen.seen * c.solve(&seen.seen.tr_mul(&cross)))
         };
-        let left = whole - cross.dot(&x);
-        (left < 1.0 && left < SHARE * whole)
-            .then(|| DVector::from_fn(p, |i, _| x[i].abs() * self.gram[(i, i)].sqrt() / seen.scale[i]))
+        let Some(x) = solution else { return vec![None; q] };
+        let taken = |j: usize| {
+            let whole = self.inner[(j, j)];
+            let left = whole - cross.column(j).dot(&x.column(j));
+            (whole > 0.0 && left < 1.0 && left < SHARE * whole)
+                .then(|| DVector::from_fn(p, |i, _| x[(i, j)].abs() * self.gram[(i, i)].sqrt() / seen.scale[i]))
+        };
+        (0..q).map(taken).collect()
     }
 
     fn expected(mut self, seen: &super::solve::Observability) -> DVector<f64> {

@@ -6,7 +6,7 @@ use super::formula::Formula;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source, from_toml};
 use crate::machine::{Machine, Side};
-use std::sync::OnceLock;
+use std::sync::{Arc, LazyLock, OnceLock};
 
 /// The effects that are built in.
 pub const BUILT_IN: &str = include_str!("../../effects.toml");
@@ -153,10 +153,17 @@ impl Row {
 /// What begins a row.
 const HEAD: &str = "[[effect]]";
 
+/// The rows of the built-in file, each read at most once in a process.
+static ROWS: LazyLock<Arc<[Row]>> = LazyLock::new(|| {
+    let id = |text: &'static str| text.split('"').nth(1).unwrap_or_default();
+    let row = |text| Row { id: id(text), text, effect: OnceLock::new() };
+    BUILT_IN.split(HEAD).skip(1).map(row).collect()
+});
+
 /// All effects that exist.
 #[derive(Debug, Clone, Default)]
 pub struct Catalogue {
-    rows: Vec<Row>,
+    rows: Arc<[Row]>,
     own: Vec<Effect>,
 }
 
@@ -166,9 +173,18 @@ impl Catalogue {
     /// # Errors
     /// Never for a released program: a test reads the built-in file as a user's is read.
     pub fn built_in() -> Result<Self> {
-        let id = |text: &'static str| text.split('"').nth(1).unwrap_or_default();
-        let row = |text| Row { id: id(text), text, effect: OnceLock::new() };
-        Ok(Self { rows: BUILT_IN.split(HEAD).skip(1).map(row).collect(), own: Vec::new() })
+        Ok(Self { rows: Arc::clone(&ROWS), own: Vec::new() })
+    }
+
+    /// Begins to read and compile, on another thread, what any question to the whole catalogue will need for this machine:
+    /// that takes as long as reading a study's plans and logs, and is ready when they are.
+    pub fn prepare(&self, machine: &Machine) {
+        let (rows, machine) = (Arc::clone(&self.rows), machine.clone());
+        rayon::spawn(move || {
+            let applies = |e: &&Effect| e.applies_to(&machine) && !e.paper && !e.discrete;
+            let effects = rows.iter().filter_map(Row::effect).filter(applies);
+            effects.flat_map(|e| &e.terms).for_each(|term| term.formula.prepare());
+        });
     }
 
     /// Adds a user's effects.

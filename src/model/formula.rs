@@ -5,7 +5,8 @@
 
 use exmex::prelude::*;
 use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
-use std::sync::{Arc, OnceLock};
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
 pub const VARIABLES: [&str; 40] = [
@@ -114,6 +115,13 @@ struct Parts {
     partials: Vec<(usize, Option<Compiled>)>,
 }
 
+/// A text that is compiled at most once; `None` where it is no formula.
+type Once = Arc<OnceLock<Option<Arc<Parts>>>>;
+
+/// What is built in, by text and the names of the shape parameters that stand in it: a hundred different formulas stand in three hundred terms, and the
+/// expression crate takes a tenth of a millisecond for each.
+static BUILT_IN: LazyLock<Mutex<HashMap<(String, Vec<String>), Once>>> = LazyLock::new(Mutex::default);
+
 /// A formula, compiled when it is first used: a study takes a few of the many that are built in.
 #[derive(Debug, Clone)]
 pub struct Formula {
@@ -139,15 +147,34 @@ impl Formula {
         Ok(Self { parts, ..Self::unchecked(text, shapes) })
     }
 
-    /// A formula that is known to be good: nothing is parsed before it is used. A bad one has no value anywhere.
+    /// A built-in formula, known to be good: nothing is parsed before it is used, and never twice. A bad one has no value anywhere.
     pub(super) fn unchecked(text: &str, shapes: &[&str]) -> Self {
         let shapes = shapes.iter().map(|s| (*s).to_owned()).collect();
         Self { text: text.to_owned(), shapes, parts: OnceLock::new() }
     }
 
     fn parts(&self) -> Option<&Parts> {
-        let compiled = || compile(&self.text, &self.shapes.iter().map(String::as_str).collect::<Vec<_>>()).ok();
-        self.parts.get_or_init(|| compiled().map(Arc::new)).as_deref()
+        self.parts.get_or_init(|| self.once().get_or_init(|| self.compiled()).clone()).as_deref()
+    }
+
+    fn compiled(&self) -> Option<Arc<Parts>> {
+        compile(&self.text, &self.shapes.iter().map(String::as_str).collect::<Vec<_>>()).ok().map(Arc::new)
+    }
+
+    /// Where all formulas of this text are compiled together. The map is free again while one of them is.
+    fn once(&self) -> Once {
+        let words = || self.text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        // by their numbers in the effect: those that do not stand here leave their place empty
+        let own = |name: &String| if words().any(|word| word == name) { name.clone() } else { String::new() };
+        let mut shapes: Vec<String> = self.shapes.iter().map(own).collect();
+        shapes.truncate(shapes.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1));
+        let mut all = BUILT_IN.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(all.entry((self.text.clone(), shapes)).or_default())
+    }
+
+    /// Compiles it, if that has not been done.
+    pub(super) fn prepare(&self) {
+        self.parts();
     }
 
     /// The formula as it was written.
