@@ -403,3 +403,18 @@ fn warnings(
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_moment_at_an_end_is_twice_as_uncertain_as_one_in_the_middle() {
+        let off = |value| super::off_a_moment(value, [1.0, 1.6]);
+        assert!((off(1.3) - 0.6 / 12f64.sqrt()).abs() < 1e-12);
+        assert!((off(1.6) - 2.0 * off(1.3)).abs() < 1e-12);
+        // by numbers: the mean of squares over a thousand moments
+        let n = 1000;
+        let square = |k: usize| (1.1 - (1.0 + 0.6 * (k as f64 + 0.5) / n as f64)).powi(2);
+        let mean = (0..n).map(square).sum::<f64>() / n as f64;
+        assert!((off(1.1) - mean.sqrt()).abs() < 1e-6, "{} {}", off(1.1), mean.sqrt());
+    }
+}

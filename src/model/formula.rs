@@ -118,9 +118,12 @@ struct Parts {
 /// A text that is compiled at most once; `None` where it is no formula.
 type Once = Arc<OnceLock<Option<Arc<Parts>>>>;
 
-/// What is built in, by text and the names of the shape parameters that stand in it: a hundred different formulas stand in three hundred terms, and the
-/// expression crate takes a tenth of a millisecond for each.
-static BUILT_IN: LazyLock<Mutex<HashMap<(String, Vec<String>), Once>>> = LazyLock::new(Mutex::default);
+/// A text, and the names of the shape parameters that stand in it.
+type Key = (String, Vec<String>);
+
+/// What is built in: a hundred different formulas stand in three hundred terms, and the expression crate takes a tenth of a
+/// millisecond for each.
+static BUILT_IN: LazyLock<Mutex<HashMap<Key, Once>>> = LazyLock::new(Mutex::default);
 
 /// A formula, compiled when it is first used: a study takes a few of the many that are built in.
 #[derive(Debug, Clone)]
