@@ -23,7 +23,8 @@ const MUCH_WIDER: f64 = 1.5;
 /// Other values of a shape parameter that are named.
 const NAMED: usize = 3;
 
-/// With more touches a shape parameter is known so well that its doubt is the same on both sides.
+/// With more touches a shape parameter is known so well that its doubt is the same on both sides. A moment at which something jumps has no
+/// other than that of its profile.
 const MOST_PROFILED: usize = 20_000;
 
 /// The answer, and other values of shape parameters that fit about as well, by unknown.
@@ -63,8 +64,8 @@ pub(super) fn outcome(
         let c = fit.free.binary_search(&i).ok().filter(|&c| !untold(c))?;
         Some((noise_variance(c).sqrt(), factor(c)))
     };
-    let intervals =
-        if shapes_told { profile::intervals(fit, machine, effects, settings, &spread) } else { Default::default() };
+    let profiled = |u: &Unknown| shapes_told || !settings.quick && settings.jumps.contains(&u.name);
+    let intervals = profile::intervals(fit, machine, effects, settings, (&profiled, &spread));
     let profile::Intervals { ends: intervals, other_values, lost_beside } = intervals;
     // sizes beside a shape that nobody knows
     let runs_along = |i: usize| !fit.model.unknowns[i].shape && intervals.get(&i) == Some(&[None, None]);
@@ -85,7 +86,7 @@ pub(super) fn outcome(
         .map(|i| {
             let u = &fit.model.unknowns[i];
             let column = fit.free.binary_search(&i).ok();
-            let jumps = shapes_told && settings.jumps.contains(&u.name);
+            let jumps = settings.jumps.contains(&u.name);
             let jump = intervals.get(&i).filter(|_| jumps).and_then(|[low, high]| Some([(*low)?, (*high)?]));
             let status = match column {
                 None if jump.is_some() => Status::Identified,
@@ -213,7 +214,7 @@ pub(super) fn outcome(
                 .iter()
                 .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
                 .collect(),
-            if shapes_told { Vec::new() } else { beside_a_shape_that_is_not_told(fit, &beside) },
+            beside_a_shape_that_is_not_told(fit, &beside, settings.quick, profiled),
             much_else(fit, &beside, &lost_beside, is_lost).into_iter().collect(),
             type_b.iter().filter_map(|b| b.warning.clone()).collect(),
             unmodelled.map(|all| all.left_out).unwrap_or_default(),
@@ -230,16 +231,29 @@ fn uneven(value: f64, low: Option<f64>, high: Option<f64>, usual: Option<f64>) -
 }
 
 /// Without profiles sizes have the doubt that they have where the shape stands.
-fn beside_a_shape_that_is_not_told(fit: &Fit, status: &[Status]) -> Vec<String> {
+fn beside_a_shape_that_is_not_told(
+    fit: &Fit,
+    status: &[Status],
+    quick: bool,
+    profiled: impl Fn(&Unknown) -> bool,
+) -> Vec<String> {
     let unknowns = &fit.model.unknowns;
-    let untold = (0..unknowns.len()).filter(|&i| unknowns[i].shape && status[i] == Status::Undetermined);
+    let untold = (0..unknowns.len())
+        .filter(|&i| unknowns[i].shape && status[i] == Status::Undetermined && !profiled(&unknowns[i]));
+    let more = if quick {
+        "without --quick it is all that it may be".to_owned()
+    } else {
+        format!("beside its other values it is worked out for up to {MOST_PROFILED} touches only")
+    };
     let says = untold.filter_map(|i| {
         let u = &unknowns[i];
-        let size = |k: &usize| unknowns[*k].effect == u.effect && unknowns[*k].set_up == u.set_up && status[*k] == Status::Identified;
+        let size = |k: &usize| {
+            unknowns[*k].effect == u.effect && unknowns[*k].set_up == u.set_up && status[*k] == Status::Identified
+        };
         let sizes: Vec<&str> = (0..unknowns.len()).filter(size).map(|k| unknowns[k].name.as_str()).collect();
         (!sizes.is_empty()).then(|| {
             format!(
-                "{} is not told: the doubt of {} is what it is beside {} {}, and without --quick it is all that it may be",
+                "{} is not told: the doubt of {} is what it is beside {} {}, and {more}",
                 u.name,
                 sizes.join(", "),
                 significant(fit.theta[i], 4),

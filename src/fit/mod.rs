@@ -11,6 +11,7 @@ mod contradictions;
 mod digits;
 pub mod held_out;
 mod knowledge;
+mod minima;
 pub mod noise;
 pub mod normal;
 pub mod outcome;
@@ -73,6 +74,12 @@ pub struct Mask {
     pub reason: String,
 }
 
+impl Mask {
+    fn is_of(&self, o: &Observation) -> bool {
+        o.run == self.run && o.id == self.id
+    }
+}
+
 /// What a fit is asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Settings {
@@ -97,6 +104,8 @@ pub struct Settings {
     pub held: Vec<String>,
     /// Shape parameters at which something jumps, as a moment: the search holds each at the best of the places between touches.
     pub jumps: Vec<String>,
+    /// No touch is left out but those that the user takes out.
+    pub all_in: bool,
 }
 
 /// A fit with everything that later rooms need.
@@ -164,9 +173,15 @@ impl Fit {
 
     /// Calls `f` with the touches as a problem at the given τ, mm.
     pub fn with_touches<T>(&self, tau_mm: f64, f: impl FnOnce(&Touches) -> T) -> T {
-        let batch = self.model.prepare(&self.data.observations);
-        let noise = (self.noise.sigma_mm, tau_mm);
-        let mut touches = Touches::new(&batch, &self.data.visits, self.theta.clone(), &self.free, &self.priors, noise);
+        self.with_noise((self.noise.sigma_mm, tau_mm), f)
+    }
+
+    /// The same at a given scatter of touches and of visits, mm.
+    fn with_noise<T>(&self, noise_mm: (f64, f64), f: impl FnOnce(&Touches) -> T) -> T {
+        let held = |i: usize| self.free.binary_search(&i).is_err();
+        let batch = self.model.prepare_holding(&self.data.observations, &self.theta, &held);
+        let mut touches =
+            Touches::new(&batch, &self.data.visits, self.theta.clone(), &self.free, &self.priors, noise_mm);
         touches.set_weights(self.weight.clone());
         f(&touches)
     }
@@ -248,13 +263,10 @@ fn identify_from(
         stated_tau_mm: settings.visit_sigma_mm,
     };
     let first_noise = (known.rounding.added_to(settings.touch_sigma_mm.unwrap_or(known.declared_sigma_mm)), 0.0);
-    let batch = model.prepare(&data.observations);
+    let batch = model.prepare_holding(&data.observations, &theta, &|i| free.binary_search(&i).is_err());
     let start = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
     let mut touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &priors, first_noise);
-    let masked: Vec<bool> = {
-        let is = |m: &Mask, o: &Observation| o.run == m.run && o.id == m.id;
-        data.observations.iter().map(|o| settings.masked.iter().any(|m| is(m, o))).collect()
-    };
+    let masked: Vec<bool> = { data.observations.iter().map(|o| settings.masked.iter().any(|m| m.is_of(o))).collect() };
     if masked.contains(&true) {
         touches.set_weights(masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
     }
@@ -268,11 +280,12 @@ fn identify_from(
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     let solution = search.follow_bends(solution, &model, &free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
-    let solution = search.without_strangers(solution, 0.0);
+    let solution = if settings.all_in { solution } else { search.without_strangers(solution, 0.0) };
     let first_steps = solution.iterations;
     let (noise, solution) = search.settle(solution);
     let before = search.touches.weights().to_vec();
-    let mut solution = search.without_strangers(solution, noise.dof.unwrap_or(0.0));
+    let mut solution =
+        if settings.all_in { solution } else { search.without_strangers(solution, noise.dof.unwrap_or(0.0)) };
     let noise = if search.touches.weights() == before {
         noise
     } else {
@@ -297,8 +310,7 @@ fn identify_from(
     let mut rejected = search.reasons(&solution);
     let mut unknown_masks = Vec::new();
     for mask in &settings.masked {
-        let is = |o: &Observation| o.run == mask.run && o.id == mask.id;
-        match data.observations.iter().position(is) {
+        match data.observations.iter().position(|o| mask.is_of(o)) {
             Some(i) => {
                 rejected.insert(i, format!("taken out: {}", mask.reason));
             }

@@ -14,7 +14,7 @@ use super::shapes::{self, Stretch};
 use super::{Fit, Settings};
 use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Parameter};
-use crate::model::predict::Model;
+use crate::model::predict::{Model, Unknown};
 pub use alone::without_prior;
 use ends::{also, hull, with_all};
 use nalgebra::{DMatrix, DVector};
@@ -110,23 +110,24 @@ fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
 }
 
 /// 95 % intervals of shape parameters and of the sizes beside them, by index among the unknowns, in their units; an end is none
-/// where the touches set none within the range of the shape. `spread`: standard uncertainty and t-factor of a free unknown at
-/// the solution. `settings`: which shapes the search holds.
+/// where the touches set none within the range of the shape. `settings`: which shapes the search holds; `of`: which shapes are asked
+/// for; `spread`: standard uncertainty and t-factor of a free unknown at the solution.
 #[must_use]
 pub fn intervals(
     fit: &Fit,
     machine: &Machine,
     effects: &[&Effect],
     settings: &Settings,
-    spread: &dyn Fn(usize) -> Option<(f64, f64)>,
+    (of, spread): (&dyn Fn(&Unknown) -> bool, &dyn Fn(usize) -> Option<(f64, f64)>),
 ) -> Intervals {
     let mut out = Intervals::default();
-    for effect in effects.iter().filter(|e| e.parameters.iter().any(|p| p.shape.is_some())) {
+    let asked = |effect: &Effect| fit.model.unknowns.iter().any(|u| u.shape && u.effect == effect.id && of(u));
+    for effect in effects.iter().filter(|e| asked(e)) {
         let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
         let trials = Trials::of(&model, &fit.data.observations);
         // an effect of blocks has a set of parameters for each
         let all = model.unknowns.iter().zip(effect.parameters.iter().cycle());
-        for (u, p, (_, low, high)) in all.filter_map(|(u, p)| Some((u, p, p.shape?))) {
+        for (u, p, (_, low, high)) in all.filter(|(u, _)| of(u)).filter_map(|(u, p)| Some((u, p, p.shape?))) {
             let Some(unknown) = fit.model.unknowns.iter().position(|v| v.effect == u.effect && v.name == u.name) else {
                 continue;
             };
@@ -250,6 +251,8 @@ impl<'a> Profile<'a> {
         let n = fit.data.observations.len();
         let rest: Vec<usize> = (0..fit.free.len()).filter(|c| Some(*c) != here && !own.contains(c)).collect();
         let others = linear.jacobian.select_columns(&rest);
+        let products = others.tr_mul(&others);
+        let covariance = inverse(&products, &products.diagonal()).inverse;
         let n_priors = linear.jacobian.nrows() - n;
         let prior_rows = linear.jacobian.rows(n, n_priors);
         let priors = prior_rows.select_columns(&own);
@@ -265,7 +268,7 @@ impl<'a> Profile<'a> {
             unknowns: sizes.iter().map(|&i| places[i]).collect(),
             sizes,
             residual: linear.residual,
-            covariance: inverse(&others.tr_mul(&others)).inverse,
+            covariance,
             rest: rest.iter().map(|&c| fit.free[c]).collect(),
             others,
             priors,
@@ -314,16 +317,18 @@ impl<'a> Profile<'a> {
         let mut a = DMatrix::zeros(y.len(), columns.ncols());
         a.rows_mut(0, n).copy_from(&columns);
         a.rows_mut(n, n_priors).copy_from(&self.priors);
-        let (seen, along) = (self.others.tr_mul(&a), self.others.tr_mul(&y));
-        let gram = a.tr_mul(&a) - seen.tr_mul(&(&self.covariance * &seen));
-        let slope = a.tr_mul(&y) - seen.tr_mul(&(&self.covariance * &along));
-        let whole = y.norm_squared() - along.dot(&(&self.covariance * &along));
-        let Inverse { inverse, lost } = inverse(&gram);
+        let follow = &self.covariance * self.others.tr_mul(&a);
+        let followed = &self.covariance * self.others.tr_mul(&y);
+        // what the others cannot do, row by row: as a difference of products what is next to nothing would be rounding
+        let own = &a - &self.others * &follow;
+        let left = &y - &self.others * &followed;
+        let slope = own.tr_mul(&left);
+        let raw = DVector::from_iterator(a.ncols(), a.column_iter().map(|c| c.norm_squared()));
+        let Inverse { inverse, lost } = inverse(&own.tr_mul(&own), &raw);
         let step = &inverse * &slope;
         let sizes = self.sizes.iter().enumerate();
         // what the others do while the sizes and they settle, and how far they scatter there
-        let follow = &self.covariance * &seen;
-        let moved = &follow * &step - &self.covariance * &along;
+        let moved = &follow * &step - &followed;
         let scatter = &follow * &inverse;
         // a size that leaves no trace here may be anything, and so may what follows it
         let typical = |c: usize| self.effect.parameters[self.sizes[c]].typical;
@@ -343,7 +348,7 @@ impl<'a> Profile<'a> {
         });
         Held {
             others: others.collect(),
-            growth: whole - slope.dot(&step) - self.residual.norm_squared(),
+            growth: left.norm_squared() - slope.dot(&step) - self.residual.norm_squared(),
             sizes: sizes.map(|(c, &i)| (self.values[i] - step[c], size_sigma(c))).collect(),
         }
     }
@@ -546,10 +551,11 @@ struct Inverse {
     lost: Vec<DVector<f64>>,
 }
 
-fn inverse(gram: &DMatrix<f64>) -> Inverse {
-    /// Smaller eigenvalues of the matrix scaled to ones on its diagonal are rounding.
+/// `raw`: the squares by which it is scaled.
+fn inverse(gram: &DMatrix<f64>, raw: &DVector<f64>) -> Inverse {
+    /// Smaller eigenvalues of the scaled matrix are rounding.
     const LEAST: f64 = 1e-10;
-    let scale = gram.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
+    let scale = raw.map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
     let n = gram.nrows();
     let eigen = DMatrix::from_fn(n, n, |a, b| gram[(a, b)] / (scale[a] * scale[b])).symmetric_eigen();
     let of = |v: f64| if v > LEAST { 1.0 / v } else { 0.0 };

@@ -31,7 +31,7 @@ const LEAST_OWN: f64 = 1e-3;
 const CREDIBLE: f64 = 50.0;
 
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
-const LEAST_GAIN: f64 = 9.0;
+pub(super) const LEAST_GAIN: f64 = 9.0;
 
 /// Where to begin.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,13 +1,12 @@
-//! Where a fit with shape parameters begins, and which of several minima it takes.
+//! Where a fit with shape parameters begins.
 
-use super::shapes;
-use super::whitening::Whitening;
-use super::{Fit, Knowledge, Settings, effects_of, identify_from};
+use super::minima::{OutOfRange, against, best_minimum, better_moments};
+use super::shapes::{self, Start};
+use super::{Fit, Knowledge, Mask, Settings, effects_of, identify_from};
 use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect, Parameter};
 use crate::model::data::Data;
-use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
 /// Fits a model to assembled data.
@@ -21,9 +20,8 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
         if of_blocks { Some(from_starts(machine, catalogue, &effects, data.clone(), settings, true)?) } else { None };
     let fit = from_starts(machine, catalogue, &effects, data, settings, false)?;
     let Some(alike) = alike else { return Ok(fit) };
-    // by one measure: the smaller scatter of visits hides less
-    let white = fit.whitening(fit.noise.tau_mm.min(alike.noise.tau_mm));
-    Ok(if misfit(&alike, &white) < misfit(&fit, &white) { alike } else { fit })
+    let [apart, together] = against([&fit, &alike]);
+    Ok(if together < apart { alike } else { fit })
 }
 
 fn has_shapes(effect: &Effect) -> bool {
@@ -42,14 +40,16 @@ fn from_starts(
 ) -> Result<Fit> {
     let mut starts = BTreeMap::new();
     let shaped = effects.iter().copied().filter(|e| has_shapes(e));
-    let unseen = look_for((machine, catalogue), shaped.collect(), &data, (settings, alike), &mut starts)?;
+    let look = LookFor { machine, catalogue, data: &data, settings, alike };
+    let unseen = look.all(shaped.collect(), &mut starts)?;
     let fit = identify_started(machine, catalogue, effects, data, settings, &starts)?;
     // what an effect changes from one visit to the next is scatter of the visits to a fit without it, which then hardly sees it:
     // where less scatter is left beside it, that is what it is judged by
     let Some(unseen) = unseen.filter(|u| fit.noise.tau_mm < u.tau_mm) else { return Ok(fit) };
     let calm = Settings { visit_sigma_mm: Some(fit.noise.tau_mm), ..settings.clone() };
     let n_unseen = unseen.effects.len();
-    let still = look_for((machine, catalogue), unseen.effects, &fit.data, (&calm, alike), &mut starts)?;
+    let look = LookFor { machine, catalogue, data: &fit.data, settings: &calm, alike };
+    let still = look.all(unseen.effects, &mut starts)?;
     if still.is_some_and(|s| s.effects.len() == n_unseen) {
         return Ok(fit);
     }
@@ -62,30 +62,150 @@ struct Unseen<'e> {
     tau_mm: f64,
 }
 
-/// Where the search begins for effects with shape parameters, by name of the unknown, beside the fit of everything else; what
-/// the data does not show is handed back.
-fn look_for<'e>(
-    (machine, catalogue): (&Machine, &Catalogue),
-    shaped: Vec<&'e Effect>,
-    data: &Data,
-    (settings, alike): (&Settings, bool),
-    starts: &mut BTreeMap<String, f64>,
-) -> Result<Option<Unseen<'e>>> {
-    if shaped.is_empty() || data.observations.is_empty() {
-        return Ok(None);
-    }
-    let base = shapes::without(settings, &shaped);
-    let others = effects_of(&base.effects, catalogue, machine)?;
-    let fit = identify_started(machine, catalogue, &others, data.clone(), &base, starts)?;
-    let mut unseen = Unseen { effects: Vec::new(), tau_mm: fit.noise.tau_mm };
-    for effect in shaped {
-        let found = shapes::start_shapes(&fit, machine, effect, alike);
-        if found.iter().any(|s| !s.shown) {
-            unseen.effects.push(effect);
+/// Looks for where effects with shape parameters begin.
+struct LookFor<'a> {
+    machine: &'a Machine,
+    catalogue: &'a Catalogue,
+    data: &'a Data,
+    settings: &'a Settings,
+    /// The sets of all blocks share their shapes.
+    alike: bool,
+}
+
+/// Touches further off than this were made by no effect, mm.
+const GROSS_MM: f64 = 0.3;
+
+impl LookFor<'_> {
+    /// Where the search begins, by name of the unknown: first for what shows most, then for each of the rest beside it, at last for
+    /// each beside all others, because a jump that another one hides stands at the wrong moment. What the touches do not show is
+    /// handed back.
+    fn all<'e>(&self, shaped: Vec<&'e Effect>, starts: &mut BTreeMap<String, f64>) -> Result<Option<Unseen<'e>>> {
+        if shaped.is_empty() || self.data.observations.is_empty() {
+            return Ok(None);
         }
-        starts.extend(found.into_iter().flat_map(|s| s.names.into_iter().zip(s.values)));
+        let mut unseen = Unseen { effects: Vec::new(), tau_mm: 0.0 };
+        let (mut waiting, mut seen) = (shaped, Vec::new());
+        while !waiting.is_empty() {
+            let fit = self.without(&waiting, self.settings, starts)?;
+            let mut found: Vec<Vec<Start>> = waiting.iter().map(|e| self.starts_of(&fit, e)).collect();
+            let gain = |k: &usize| found[*k].iter().filter(|s| s.shown).map(|s| s.gain).sum::<f64>();
+            let most = (0..waiting.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|k| gain(k) > 0.0);
+            let next = match most {
+                Some(k) => Some((k, found.swap_remove(k))),
+                None => self.among_those_left_out(&fit, &waiting, starts)?,
+            };
+            let Some((k, of_it)) = next else {
+                unseen.effects.append(&mut waiting);
+                unseen.tau_mm = unseen.tau_mm.max(fit.noise.tau_mm);
+                found.into_iter().for_each(|of_it| take(of_it, starts));
+                break;
+            };
+            let effect = waiting.remove(k);
+            // of an effect of blocks some may not show it
+            if of_it.iter().any(|s| !s.shown) {
+                unseen.effects.push(effect);
+                unseen.tau_mm = unseen.tau_mm.max(fit.noise.tau_mm);
+            }
+            take(of_it, starts);
+            seen.push(effect);
+        }
+        self.again(&seen, &mut unseen, starts)?;
+        Ok(Some(unseen).filter(|u| !u.effects.is_empty()))
     }
-    Ok(Some(unseen).filter(|u| !u.effects.is_empty()))
+
+    /// Looks for each of several effects that are seen once more, beside all the others, until none of them moves.
+    fn again<'e>(
+        &self,
+        seen: &[&'e Effect],
+        unseen: &mut Unseen<'e>,
+        starts: &mut BTreeMap<String, f64>,
+    ) -> Result<()> {
+        /// Rounds at most.
+        const ROUNDS: usize = 3;
+        let never: Vec<&Effect> =
+            unseen.effects.iter().copied().filter(|e| !seen.iter().any(|s| s.id == e.id)).collect();
+        // the last one was looked for beside all others
+        let mut stay = 1;
+        for effect in seen.iter().cycle().take(ROUNDS * seen.len()) {
+            if stay >= seen.len() {
+                break;
+            }
+            let out: Vec<&Effect> = never.iter().chain([effect]).copied().collect();
+            let fit = self.without(&out, self.settings, starts)?;
+            let found = self.starts_of(&fit, effect);
+            let shapes = |s: &Start| -> Vec<(String, f64)> {
+                let all = s.names.iter().zip(&s.values).zip(&effect.parameters);
+                all.filter(|(_, p)| p.shape.is_some()).map(|((name, value), _)| (name.clone(), *value)).collect()
+            };
+            let moved = found.iter().any(|s| shapes(s).iter().any(|(name, value)| starts.get(name) != Some(value)));
+            // what showed only in place of another one
+            unseen.effects.retain(|e| e.id != effect.id);
+            if found.iter().any(|s| !s.shown) {
+                unseen.effects.push(effect);
+                unseen.tau_mm = unseen.tau_mm.max(fit.noise.tau_mm);
+            }
+            take(found, starts);
+            stay = if moved { 1 } else { stay + 1 };
+        }
+        Ok(())
+    }
+
+    /// An effect that only touches show which the fit without it leaves out, as the last ones of a run: it counts where the fit with it
+    /// misses so much less that it would show among all. Its place among those that wait, and where it begins.
+    fn among_those_left_out(
+        &self,
+        fit: &Fit,
+        waiting: &[&Effect],
+        starts: &BTreeMap<String, f64>,
+    ) -> Result<Option<(usize, Vec<Start>)>> {
+        let left_out = |i: &usize| !self.settings.masked.iter().any(|m| m.is_of(&fit.data.observations[*i]));
+        let mut all_in = Settings {
+            all_in: true,
+            touch_sigma_mm: Some(fit.noise.sigma_mm),
+            visit_sigma_mm: Some(fit.noise.tau_mm),
+            ..self.settings.clone()
+        };
+        let gross = |i: &usize| fit.residual_mm[*i].abs() > GROSS_MM;
+        let (far, near): (Vec<usize>, Vec<usize>) = fit.rejected.keys().copied().filter(left_out).partition(gross);
+        if near.is_empty() {
+            return Ok(None);
+        }
+        all_in.masked.extend(far.into_iter().map(|i| {
+            let o = &fit.data.observations[i];
+            Mask { run: o.run, id: o.id, reason: String::new() }
+        }));
+        let whole = self.without(waiting, &all_in, starts)?;
+        for (k, effect) in waiting.iter().enumerate() {
+            let found = self.starts_of(&whole, effect);
+            let sets = found.iter().filter(|s| s.shown).count();
+            if sets == 0 {
+                continue;
+            }
+            let others: Vec<&Effect> = waiting.iter().copied().filter(|e| e.id != effect.id).collect();
+            let mut with_it = starts.clone();
+            take(found.clone(), &mut with_it);
+            let [without, with] = against([fit, &self.without(&others, self.settings, &with_it)?]);
+            if without - with > shapes::LEAST_GAIN * (sets * effect.parameters.len()) as f64 {
+                return Ok(Some((k, found)));
+            }
+        }
+        Ok(None)
+    }
+
+    fn starts_of(&self, fit: &Fit, effect: &Effect) -> Vec<Start> {
+        shapes::start_shapes(fit, self.machine, effect, self.alike)
+    }
+
+    /// The fit of everything but some effects.
+    fn without(&self, out: &[&Effect], settings: &Settings, starts: &BTreeMap<String, f64>) -> Result<Fit> {
+        let base = shapes::without(settings, out);
+        let others = effects_of(&base.effects, self.catalogue, self.machine)?;
+        identify_started(self.machine, self.catalogue, &others, self.data.clone(), &base, starts)
+    }
+}
+
+fn take(found: Vec<Start>, starts: &mut BTreeMap<String, f64>) {
+    starts.extend(found.into_iter().flat_map(|s| s.names.into_iter().zip(s.values)));
 }
 
 /// Fits a model from given starts: where something jumps, and what runs out of its range, is held.
@@ -130,166 +250,5 @@ fn identify_started(
     let fit = best_minimum(fit, (machine, catalogue), effects, &held_settings)?;
     let mut fit = better_moments(fit, (machine, catalogue), effects, held_settings)?;
     fit.outcome.warnings.extend(said);
-    Ok(fit)
-}
-
-/// Moments of jumps were found beside a fit without the jump, which takes good touches about it for strangers: each is moved among the
-/// touches next to it that show it, as long as that takes less against the touches, those included that are then rejected.
-fn better_moments(
-    mut fit: Fit,
-    (machine, catalogue): (&Machine, &Catalogue),
-    effects: &[&Effect],
-    mut settings: Settings,
-) -> Result<Fit> {
-    /// Stretches between touches on either side.
-    const REACH: usize = 5;
-    /// Times that one is moved.
-    const MOST: usize = 4;
-    /// What a touch costs that is rejected: about where one is.
-    const REJECTED: f64 = 12.0;
-    /// A better place is better by more.
-    const SAME: f64 = 1e-6;
-    if settings.quick {
-        return Ok(fit);
-    }
-    for name in settings.jumps.clone() {
-        let (own, block) = name.split_once('@').map_or((name.as_str(), None), |(own, block)| (own, Some(block)));
-        let Some(p) = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == own) else { continue };
-        let stretches = shapes::stretches_of_a_jump(p, &fit.data, block);
-        for _ in 0..MOST {
-            let Some(&Knowledge::Fixed(at)) = settings.knowledge.get(&name) else { break };
-            let Some(here) = stretches.iter().position(|s| s.ends[0] <= at && at <= s.ends[1]) else { break };
-            let last = (here + REACH).min(stretches.len().saturating_sub(1));
-            let mut best: Option<(f64, f64)> = None;
-            for k in (here.saturating_sub(REACH)..=last).filter(|k| *k != here) {
-                let mut moved = Settings { quick: true, ..settings.clone() };
-                hold(&mut moved, &name, stretches[k].place);
-                let other = identify_from(machine, catalogue, effects, fit.data.clone(), &moved, &values(&fit))?;
-                let tau_mm = fit.noise.tau_mm.min(other.noise.tau_mm);
-                let cost = |f: &Fit| misfit(f, &f.whitening(tau_mm)) + REJECTED * f.rejected.len() as f64;
-                let gain = cost(&fit) - cost(&other);
-                if gain > SAME * cost(&fit) && best.is_none_or(|(most, _)| gain > most) {
-                    best = Some((gain, stretches[k].place));
-                }
-            }
-            let Some((_, place)) = best else { break };
-            hold(&mut settings, &name, place);
-            let from = values(&fit);
-            fit = identify_from(machine, catalogue, effects, fit.data, &settings, &from)?;
-        }
-    }
-    Ok(fit)
-}
-
-/// A shape parameter that ran out of its range.
-struct OutOfRange<'a> {
-    machine: &'a Machine,
-    catalogue: &'a Catalogue,
-    effects: &'a [&'a Effect],
-    /// What the user says.
-    settings: &'a Settings,
-    starts: &'a BTreeMap<String, f64>,
-    /// Its name, and the ends of its range.
-    out: (String, [f64; 2]),
-}
-
-impl OutOfRange<'_> {
-    /// The fit with it in its range again, searched for from where it began or held at an end, and what is to be said of it.
-    fn back_into_it(&self, mut fit: Fit, held_settings: &mut Settings) -> Result<(Fit, Option<String>)> {
-        let Self { machine, catalogue, effects, settings, starts, out: (name, ends_of) } = self;
-        // a first step too far: everything else settles while the shape stays where it began, and the search goes on from there
-        if let Some(&began) = starts.get(name) {
-            let mut waiting = Settings { quick: true, ..held_settings.clone() };
-            hold(&mut waiting, name, began);
-            let settled = identify_from(machine, catalogue, effects, fit.data, &waiting, starts)?;
-            let from = values(&settled);
-            fit = identify_from(machine, catalogue, effects, settled.data, held_settings, &from)?;
-            if shapes::out_of_range(&fit, catalogue, machine).is_none_or(|(other, _)| other != *name) {
-                return Ok((fit, None));
-            }
-        }
-        // a step too far says nothing of the side: the end that fits better
-        held_settings.held.push(name.clone());
-        let mut held_at = |end: f64| {
-            hold(held_settings, name, end);
-            identify_from(machine, catalogue, effects, fit.data.clone(), held_settings, starts)
-        };
-        let [low, high] = [held_at(ends_of[0])?, held_at(ends_of[1])?];
-        // by one measure: the smaller scatter of visits hides less
-        let white = low.whitening(low.noise.tau_mm.min(high.noise.tau_mm));
-        // what the user says of it counts, too
-        let known = settings.knowledge.iter().find(|(word, _)| crate::symbols::same(word, name)).map(|(_, k)| *k);
-        let against = |end: f64| match known {
-            Some(Knowledge::Prior { value, sigma }) => ((end - value) / sigma).powi(2),
-            _ => 0.0,
-        };
-        let lower = misfit(&low, &white) + against(ends_of[0]) <= misfit(&high, &white) + against(ends_of[1]);
-        hold(held_settings, name, ends_of[usize::from(!lower)]);
-        let says = match known {
-            Some(Knowledge::Prior { value, sigma }) => format!(
-                "{name} ran out of its range in the search beside its prior of {value} ± {sigma}: touches and prior do not agree, or its range is too narrow; it stands at the end of its range that fits both better"
-            ),
-            _ => format!(
-                "{name} ran out of its range in the search: these touches do not tell it, and it stands at the end of its range that fits better"
-            ),
-        };
-        Ok((if lower { low } else { high }, Some(says)))
-    }
-}
-
-/// Holds a parameter, whatever the user said of it and by whatever spelling.
-fn hold(settings: &mut Settings, name: &str, value: f64) {
-    settings.knowledge.retain(|word, _| !crate::symbols::same(word, name));
-    settings.knowledge.insert(name.to_owned(), Knowledge::Fixed(value));
-}
-
-/// Values of all unknowns by name.
-fn values(fit: &Fit) -> BTreeMap<String, f64> {
-    fit.model.unknowns.iter().zip(&fit.theta).map(|(u, v)| (u.name.clone(), *v)).collect()
-}
-
-/// What touches and priors have against a fit, by a given measure.
-fn misfit(fit: &Fit, white: &Whitening) -> f64 {
-    let mut residual = DMatrix::from_column_slice(fit.residual_mm.len(), 1, &fit.residual_mm);
-    white.apply(&mut residual);
-    let known = fit.priors.iter().map(|&(i, value, sigma)| ((fit.theta[i] - value) / sigma).powi(2));
-    residual.norm_squared() + known.sum::<f64>()
-}
-
-/// Of several values of a shape parameter that fit about as well, each with a minimum of its own, the fit with the lowest one:
-/// which of them the scan began at says little, because there everything else followed a straight line.
-fn best_minimum(
-    mut fit: Fit,
-    (machine, catalogue): (&Machine, &Catalogue),
-    effects: &[&Effect],
-    settings: &Settings,
-) -> Result<Fit> {
-    /// Going down from minimum to minimum comes to an end by itself; so many times is enough.
-    const MOST: usize = 4;
-    /// A lower one by less is the same one.
-    const SAME: f64 = 1e-6;
-    for _ in 0..MOST {
-        let mut best: Option<(f64, Fit)> = None;
-        let others = fit.other_values.iter().flat_map(|(i, all)| all.iter().map(move |v| (*i, *v)));
-        for (unknown, value) in others {
-            let quick = Settings { quick: true, ..settings.clone() };
-            let mut waiting = quick.clone();
-            hold(&mut waiting, &fit.model.unknowns[unknown].name, value);
-            let settled = identify_from(machine, catalogue, effects, fit.data.clone(), &waiting, &values(&fit))?;
-            let other = identify_from(machine, catalogue, effects, settled.data.clone(), &quick, &values(&settled))?;
-            if shapes::out_of_range(&other, catalogue, machine).is_some() {
-                continue;
-            }
-            // by one measure: the smaller scatter of visits hides less
-            let white = fit.whitening(fit.noise.tau_mm.min(other.noise.tau_mm));
-            let share = misfit(&other, &white) / misfit(&fit, &white);
-            if share < 1.0 - SAME && best.as_ref().is_none_or(|(least, _)| share < *least) {
-                best = Some((share, other));
-            }
-        }
-        let Some((_, lower)) = best else { break };
-        let from = values(&lower);
-        fit = identify_from(machine, catalogue, effects, lower.data, settings, &from)?;
-    }
     Ok(fit)
 }

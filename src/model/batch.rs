@@ -23,12 +23,12 @@ pub struct Batch<'a> {
     pose: Vec<u32>,
     /// Rotations of all rotary axes, workpiece side first, for each distinct pose.
     poses: Vec<Vec<Rigid>>,
-    /// Factors whose formula has neither a constant value nor a shape parameter: index in `active`.
+    /// Factors whose formula has neither a constant value nor a shape parameter that θ may change: index in `active`.
     varying: Vec<usize>,
     /// Their coefficients, touch by touch.
     coefficients: Vec<f64>,
-    /// Actives with a shape parameter: evaluated anew for each θ.
-    shaped: Vec<usize>,
+    /// Actives with a shape parameter: evaluated anew for each θ, those of one formula together.
+    shaped: Vec<Vec<usize>>,
     /// Places whose transform is another at every touch.
     moving: Vec<usize>,
     /// What the rows of each block hold.
@@ -177,19 +177,49 @@ impl Model {
     /// Prepares touches for many evaluations.
     #[must_use]
     pub fn prepare<'a>(&'a self, observations: &'a [Observation]) -> Batch<'a> {
+        self.prepare_holding(observations, &[], &|_| false)
+    }
+
+    /// The same where some unknowns stay at their values in θ: shape parameters among them count as numbers, and rows say
+    /// nothing of them.
+    #[must_use]
+    pub fn prepare_holding<'a>(
+        &'a self,
+        observations: &'a [Observation],
+        theta: &[f64],
+        held: &dyn Fn(usize) -> bool,
+    ) -> Batch<'a> {
         let mut batch = self.prepare_places(observations);
-        let is = |i: &usize, shape: bool| {
-            let f = &self.active[*i].term.formula;
-            f.constant().is_none() && f.has_shape() == shape
-        };
-        batch.varying = (0..self.active.len()).filter(|i| is(i, false)).collect();
-        batch.shaped = (0..self.active.len()).filter(|i| is(i, true)).collect();
+        let mut alike: HashMap<(&str, usize), usize> = HashMap::new();
+        for (i, a) in self.active.iter().enumerate().filter(|(_, a)| a.term.formula.constant().is_none()) {
+            let formula = &a.term.formula;
+            if (0..a.count).all(|shape| !formula.holds(shape) || held(a.first + shape)) {
+                batch.varying.push(i);
+                continue;
+            }
+            let group = *alike.entry((formula.text(), a.first)).or_insert(batch.shaped.len());
+            if group == batch.shaped.len() {
+                batch.shaped.push(Vec::new());
+            }
+            batch.shaped[group].push(i);
+        }
         batch.coefficients.reserve_exact(batch.varying.len() * observations.len());
         for o in observations {
+            let mut before: Option<(&str, usize, f64)> = None;
             for &i in &batch.varying {
                 let a = &self.active[i];
-                let here = a.set_up.is_none_or(|s| s == o.set_up);
-                batch.coefficients.push(if here { a.factor * a.term.formula.eval(&o.state, &[]) } else { 0.0 });
+                if a.set_up.is_some_and(|s| s != o.set_up) {
+                    batch.coefficients.push(0.0);
+                    continue;
+                }
+                // the components of one effect mostly go by one formula
+                let text = a.term.formula.text();
+                let value = before.filter(|b| (b.0, b.1) == (text, a.first)).map_or_else(
+                    || a.term.formula.eval(&o.state, theta.get(a.first..a.first + a.count).unwrap_or_default()),
+                    |b| b.2,
+                );
+                before = Some((text, a.first, value));
+                batch.coefficients.push(a.factor * value);
             }
         }
         batch
@@ -344,14 +374,16 @@ impl At<'_> {
                 if e.coefficient.is_nan() { scratch.coefficient[e.active as usize] } else { e.coefficient };
             row[e.at as usize] += scratch.gradient[e.slot as usize][e.component as usize] * coefficient;
         }
-        for &i in &self.batch.shaped {
-            let a = &model.active[i];
+        for group in &self.batch.shaped {
+            let a = &model.active[group[0]];
             let offset = match a.set_up {
                 Some(s) if s != o.set_up => continue,
                 Some(_) => model.layout.common.len(),
                 None => 0,
             };
-            let amount = scratch.gradient[a.slot][a.component] * self.theta[a.unknown] * a.factor;
+            let all = group.iter().map(|&i| &model.active[i]);
+            let amount: f64 =
+                all.map(|a| scratch.gradient[a.slot][a.component] * self.theta[a.unknown] * a.factor).sum();
             for (shape, derivative) in a.term.formula.partials(&o.state, &self.theta[a.first..a.first + a.count]) {
                 row[offset + model.layout.place(a.first + shape)] += amount * derivative;
             }
@@ -383,12 +415,14 @@ impl At<'_> {
             scratch.coefficient[i] = coefficient;
             scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * coefficient);
         }
-        for &i in &batch.shaped {
-            let a = &model.active[i];
-            if a.set_up.is_none_or(|s| s == o.set_up) {
-                let value = a.term.formula.eval(&o.state, &self.theta[a.first..a.first + a.count]);
-                scratch.coefficient[i] = a.factor * value;
-                scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * a.factor * value);
+        for group in &batch.shaped {
+            let first = &model.active[group[0]];
+            if first.set_up.is_none_or(|s| s == o.set_up) {
+                let value = first.term.formula.eval(&o.state, &self.theta[first.first..first.first + first.count]);
+                for (&i, a) in group.iter().map(|i| (i, &model.active[*i])) {
+                    scratch.coefficient[i] = a.factor * value;
+                    scratch.displacement[a.slot].add(a.component, self.theta[a.unknown] * a.factor * value);
+                }
             }
         }
         for &i in &batch.moving {

@@ -313,6 +313,7 @@ impl Study {
             quick: false,
             held: Vec::new(),
             jumps: Vec::new(),
+            all_in: false,
         }
     }
 

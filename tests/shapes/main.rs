@@ -2,9 +2,12 @@
 //! nothing.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
+#[path = "../common/mod.rs"]
 mod common;
+mod jumps;
+
 use axiscal::fit::Knowledge;
-use axiscal::fit::outcome::{Parameter, Status};
+use axiscal::fit::outcome::Status;
 use axiscal::fit::{Fit, Settings};
 use axiscal::simulate::Scenario;
 use common::*;
@@ -99,50 +102,6 @@ fn a_prior_on_a_shape_is_contradicted_by_what_the_touches_say_alone() {
     }
 }
 
-/// The moment of a jump is told by the touches like anything else: between which two, and by more where the jump is small. Where nothing
-/// jumps there is no moment.
-#[test]
-fn the_moment_of_a_jump_has_its_interval() {
-    let machine = machine("swivel-head");
-    let full = plan(&machine, "full");
-    let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
-    let (mut widths, mut inside, mut told) = (Vec::new(), 0, 0);
-    for size in [10.0, 1.5] {
-        let mut width = 0.0;
-        for seed in 1..=6 {
-            let hour = 0.3 + 0.13 * f64::from(seed as u32);
-            let slip = [("dx", size), ("dy", -0.7 * size), ("dz", 0.9 * size), ("from_h", hour)];
-            let scenario =
-                Scenario::flawless().with_noise(1e-3, 0.0, seed).with(&machine, "block-slip", &slip).unwrap();
-            let touches = touch(&machine, &full, &scenario, None);
-            let fit = identify(&machine, &[(&full, &touches)], &model);
-            let p = parameter(&fit, "from_h");
-            println!("{size} {hour}: {p:?}");
-            let Some([Some(low), Some(high)]) = p.interval else {
-                assert_eq!((p.status, p.sigma), (Status::Undetermined, None), "{p:?}");
-                continue;
-            };
-            assert_eq!(p.status, Status::Identified);
-            assert!(low <= p.value && p.value <= high && p.sigma.unwrap() < p.expanded.unwrap(), "{p:?}");
-            told += 1;
-            inside += i32::from((low..=high).contains(&hour));
-            width += high - low;
-        }
-        widths.push(width);
-    }
-    assert!(told >= 10 && inside >= told - 1, "{inside} of {told}");
-    assert!(widths[0] < 0.8 * widths[1], "{widths:?}");
-    // nothing jumps
-    let touches = touch(&machine, &full, &Scenario::flawless().with_noise(1e-3, 0.0, 9), None);
-    let fit = identify(&machine, &[(&full, &touches)], &model);
-    let p = parameter(&fit, "from_h");
-    assert_ne!(p.status, Status::Identified, "{p:?}");
-    // what the user holds stays held
-    let held = Settings { knowledge: [("from_h".to_owned(), Knowledge::Fixed(0.5))].into(), ..Settings::default() };
-    let fit = identify_with(&machine, &[(&full, &touches)], &model, held);
-    assert_eq!((parameter(&fit, "from_h").status, parameter(&fit, "from_h").value), (Status::Fixed, 0.5));
-}
-
 /// A drift that is even all along is a warm-up without an end: its time constant runs out of its range, nobody is told one, and
 /// no size beside it is sure.
 #[test]
@@ -233,39 +192,6 @@ fn a_held_shape_is_compared_and_has_a_range() {
         let catalogue = axiscal::model::catalogue::Catalogue::built_in().unwrap();
         let refused = axiscal::fit::identify(&machine, &catalogue, &[run], &with(known)).unwrap_err();
         assert!(refused.0[0].message.contains("lies outside of its range, 0.05 to 20"), "{refused}");
-    }
-}
-
-/// A slip in the middle of a long visit: tried between visits only it was taken for no slip at all.
-#[test]
-fn a_slip_within_a_visit_is_found() {
-    let machine = machine("swivel-head");
-    let plans = [plan(&machine, "head"), plan(&machine, "table")];
-    let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
-    let slip = [("dx", 2.5), ("dy", -8.9), ("dz", -3.9), ("from_h", 0.0302)];
-    let scenario = Scenario::flawless().with_noise(1e-3, 0.0, 7).with(&machine, "block-slip", &slip).unwrap();
-    let touches = [
-        touch(&machine, &plans[0], &scenario, None),
-        touch(&machine, &plans[1], &Scenario::flawless().with_noise(1e-3, 0.0, 8), None),
-    ];
-    let fit = identify(&machine, &[(&plans[0], &touches[0]), (&plans[1], &touches[1])], &model);
-    let found = parameter(&fit, "from_h");
-    println!("{found:?} {}", fit.outcome.chi2_per_dof);
-    assert!((found.value - 0.0302).abs() < 0.002, "{found:?}");
-    const HOURS: usize = 6;
-    // the fit without it takes good touches about it for strangers: they come back, and the moment is between the right ones
-    let machine = common::machine("swivel-head");
-    let full = plan(&machine, "full");
-    let slip = [("dx", 8.0), ("dy", -5.0), ("dz", 3.0), ("from_h", 0.7)];
-    for seed in 1..=6 {
-        let scenario = Scenario::flawless().with_noise(1e-3, 0.5e-3, seed).with(&machine, "block-slip", &slip).unwrap();
-        let touches = touch(&machine, &full, &scenario, None);
-        let fit = identify(&machine, &[(&full, &touches)], &model);
-        let found = parameter(&fit, "from_h");
-        println!("{seed}: {} {:?} {:?}", found.value, found.interval, fit.rejected);
-        let between =
-            |t: f64| fit.data.observations.iter().filter(|o| (o.state[HOURS] > t) != (o.state[HOURS] > 0.7)).count();
-        assert!(fit.rejected.len() <= 1 && between(found.value) <= 3, "seed {seed}: {found:?} {:?}", fit.rejected);
     }
 }
 
@@ -396,53 +322,6 @@ fn what_is_unseen_stays_unseen_beside_something_large() {
     }
 }
 
-/// A slip that never came, in the model of the paper's plan: beside a moment before the first faces that would see it, it may be anything,
-/// and so may the place of C. Nothing of that is called told, and it is said what brings it back.
-#[test]
-fn what_may_be_much_else_beside_an_untold_moment_is_not_told() {
-    let machine = machine("swivel-head");
-    let plans = [plan(&machine, "head"), plan(&machine, "table")];
-    let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
-    for seed in 1..=4 {
-        let made: Vec<_> = plans
-            .iter()
-            .zip([0, 100])
-            .map(|(plan, more)| {
-                touch(&machine, plan, &Scenario::flawless().with_noise(1e-3, 0.7e-3, seed + more), None)
-            })
-            .collect();
-        let settings = Settings { touch_sigma_mm: Some(1e-3), visit_sigma_mm: Some(0.7e-3), ..Settings::default() };
-        let fit = identify_with(&machine, &[(&plans[0], &made[0]), (&plans[1], &made[1])], &model, settings);
-        let mut lost = Vec::new();
-        for p in fit.outcome.parameters.iter().filter(|p| p.status == Status::Identified) {
-            let most = if p.effect == "block-slip" { 1000.0 } else { 0.2 };
-            assert!(p.effect == "block-setup" || p.expanded.unwrap() < most, "{p:?}");
-        }
-        for p in &fit.outcome.parameters {
-            if p.status == Status::Undetermined && p.effect != "block-setup" && p.name != "from_h" {
-                lost.push(p.name.as_str());
-            }
-        }
-        println!("{seed}: {lost:?}");
-        let unseen: Vec<&String> = fit.outcome.undetermined.iter().flat_map(|u| u.combination.keys()).collect();
-        let said = fit.outcome.warnings.iter().find(|w| w.starts_with("not told beside from_h: "));
-        for name in lost.iter().filter(|n| !unseen.iter().any(|u| u == *n)) {
-            assert!(said.is_some_and(|w| w.contains(name)), "{name}: {said:?}");
-        }
-        // how badly that is told is not said: nobody knows
-        let named: Vec<&str> =
-            said.map(|w| w.split(&[':', '.'][..]).nth(1).unwrap().split(", ").collect()).unwrap_or_default();
-        let named: Vec<&str> = named.iter().map(|n| n.trim()).collect();
-        for weak in &fit.outcome.weak {
-            let of = |wanted: bool| -> f64 {
-                let all = weak.combination.iter().filter(|(n, _)| !wanted || named.contains(&n.as_str()));
-                all.map(|(_, w)| w * w).sum()
-            };
-            assert!(of(true) <= 0.5 * of(false), "{}", weak.says);
-        }
-    }
-}
-
 /// The uncertainty with unmodelled effects is never below the one without, whatever a shape does to the first.
 #[test]
 fn unmodelled_effects_make_nothing_surer() {
@@ -494,44 +373,4 @@ fn the_second_figure_is_the_same_beside_an_untold_shape() {
     };
     println!("{:?} {:?}", weak(&free), weak(&held));
     assert!(weak(&held).iter().all(|names| weak(&free).contains(names)));
-}
-
-/// The sizes of a slip may be all that they are beside any moment that the touches allow: early ones, after which few touches of a face
-/// were made before, and late ones, which some faces do not see at all.
-#[test]
-fn sizes_of_a_slip_are_no_surer_than_its_moment() {
-    let machine = machine("swivel-head");
-    let full = plan(&machine, "full");
-    let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
-    for (from_h, seeds) in [(0.03, 1..=10), (0.06, 1..=10), (1.49, 1..=6)] {
-        let (mut inside, mut told, mut of_blocks, mut blocks) = (0, 0, 0, 0);
-        for seed in seeds {
-            let slip = [("dx", 8.0), ("dy", -5.0), ("from_h", from_h)];
-            let scenario =
-                Scenario::flawless().with_noise(1e-3, 0.5e-3, seed).with(&machine, "block-slip", &slip).unwrap();
-            let touches = touch(&machine, &full, &scenario, None);
-            let fit = identify(&machine, &[(&full, &touches)], &model);
-            let holds = |p: &Parameter, truth: f64| {
-                let e = p.expanded.unwrap();
-                let [low, high] = p.interval.unwrap_or([Some(p.value - e), Some(p.value + e)]);
-                low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high)
-            };
-            for (name, truth) in [("dx", 8.0), ("dy", -5.0), ("dz", 0.0)] {
-                let p = parameter(&fit, name);
-                if p.status == Status::Identified {
-                    told += 1;
-                    inside += usize::from(holds(p, truth));
-                }
-            }
-            for p in
-                fit.outcome.parameters.iter().filter(|p| p.effect == "block-setup" && p.status == Status::Identified)
-            {
-                blocks += 1;
-                of_blocks += usize::from(holds(p, 0.0));
-            }
-        }
-        println!("{from_h}: {inside} of {told} sizes, {of_blocks} of {blocks} set-ups");
-        assert!(inside * 100 >= told * 87 && of_blocks * 100 >= blocks * 90, "{from_h}");
-        assert!(from_h > 1.0 || told > 20, "{from_h}: {told} told");
-    }
 }
