@@ -59,6 +59,18 @@ id = "own-trigger"
 at = "trigger"
 terms = [ { parameter = "r1", unit = "um", dof = "r", formula = "mod(10*nx + 1.3, 3) + floor(3*ny + 0.5) + tan(nz/2) + asin(nx/2)*acos(ny/2) + atan(nz)" } ]
 [[effect]]
+id = "own-bent-block"
+at = "block"
+terms = [
+  { parameter = "u1", unit = "um", dof = "dx", formula = "sin(X/40 + Z/70)" },
+  { parameter = "u2", unit = "um", dof = "dz", formula = "Y/100*cos(C/2)" },
+  { parameter = "u3", unit = "urad", dof = "ry", formula = "step(X - 20)" },
+]
+[[effect]]
+id = "own-late"
+at = "trigger"
+terms = [ { parameter = "v1", unit = "um", dof = "r", formula = "1 + sin(X/50 - Y/30)*Z/100" } ]
+[[effect]]
 id = "own-reading"
 at = "reading"
 terms = [
@@ -165,7 +177,7 @@ fn a_users_effect_is_planted_as_it_is_predicted() {
         }
     }
     println!("{n_planted} plantings of own effects; left at most {worst:e} mm");
-    assert!(does.len() == 9 && does.values().all(|mm| *mm > 1e-4), "{does:?}");
+    assert!(does.len() == 11 && does.values().all(|mm| *mm > 1e-4), "{does:?}");
 }
 
 #[test]

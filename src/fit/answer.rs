@@ -1,6 +1,7 @@
 //! The answer of a fit, put together: values with their doubt, what cannot be told, what a reader must not miss.
 
 use super::outcome::{Combination, FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
+use super::shapes::NOT_CREDIBLE;
 use super::solve::Solution;
 use super::type_b::TypeB;
 use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
@@ -10,9 +11,6 @@ use crate::model::predict::Unknown;
 use crate::units::{significant, um_from_mm};
 use nalgebra::DVector;
 use std::collections::{BTreeMap, BTreeSet};
-
-/// A result further off than so many typical sizes is worth a warning by itself.
-const NOT_CREDIBLE: f64 = 300.0;
 
 /// Sides of an interval that differ from the usual one by more than a twentieth are shown.
 const UNEVEN: f64 = 1.05;

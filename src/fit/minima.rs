@@ -5,6 +5,7 @@ use super::{Fit, Knowledge, Settings, identify_from};
 use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::predict::Unknown;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
@@ -38,6 +39,9 @@ pub(super) fn better_moments(
                 let mut moved = Settings { quick: true, ..settings.clone() };
                 hold(&mut moved, &name, stretches[k].place);
                 let other = identify_from(machine, catalogue, effects, fit.data.clone(), &moved, &values(&fit))?;
+                if shapes::out_of_range(&other, catalogue, machine).is_some() {
+                    continue;
+                }
                 let [here, there] = against([&fit, &other]);
                 let gain = here - there;
                 if gain > SAME * here && best.is_none_or(|(most, _)| gain > most) {
@@ -47,7 +51,12 @@ pub(super) fn better_moments(
             let Some((_, place)) = best else { break };
             hold(&mut settings, &name, place);
             let from = values(&fit);
-            fit = identify_from(machine, catalogue, effects, fit.data, &settings, &from)?;
+            let next = identify_from(machine, catalogue, effects, fit.data.clone(), &settings, &from)?;
+            if shapes::out_of_range(&next, catalogue, machine).is_some() {
+                hold(&mut settings, &name, at);
+                break;
+            }
+            fit = next;
         }
     }
     Ok(fit)
@@ -114,9 +123,23 @@ fn hold(settings: &mut Settings, name: &str, value: f64) {
     settings.knowledge.insert(name.to_owned(), Knowledge::Fixed(value));
 }
 
-/// Values of all unknowns by name.
-pub(super) fn values(fit: &Fit) -> BTreeMap<String, f64> {
-    fit.model.unknowns.iter().zip(&fit.theta).map(|(u, v)| (u.name.clone(), *v)).collect()
+/// Values of all unknowns by name, to begin at. A shape that leaves no trace stands where it is because the sizes of its effect began at
+/// none: beside what noise made of them it would run anywhere.
+fn values(fit: &Fit) -> BTreeMap<String, f64> {
+    /// A share of a combination that is rounding.
+    const NONE: f64 = 1e-6;
+    let unknowns = &fit.model.unknowns;
+    let stands = |i: usize| {
+        let column = fit.free.binary_search(&i).ok().filter(|_| unknowns[i].shape);
+        column.is_some_and(|c| fit.observability.unseen.iter().any(|v| v[c].abs() > NONE))
+    };
+    let still: Vec<(&str, Option<usize>)> =
+        (0..unknowns.len()).filter(|&i| stands(i)).map(|i| (unknowns[i].effect.as_str(), unknowns[i].set_up)).collect();
+    let begins = |(u, value): (&Unknown, &f64)| {
+        let of_it = !u.shape && still.contains(&(u.effect.as_str(), u.set_up));
+        (u.name.clone(), if of_it { u.start } else { *value })
+    };
+    unknowns.iter().zip(&fit.theta).map(begins).collect()
 }
 
 /// What touches and priors have against each of two fits, by one measure: the smaller noise of the two hides less.
@@ -165,7 +188,11 @@ pub(super) fn best_minimum(
         }
         let Some((_, lower)) = best else { break };
         let from = values(&lower);
-        fit = identify_from(machine, catalogue, effects, lower.data, settings, &from)?;
+        let next = identify_from(machine, catalogue, effects, lower.data, settings, &from)?;
+        if shapes::out_of_range(&next, catalogue, machine).is_some() {
+            break;
+        }
+        fit = next;
     }
     Ok(fit)
 }

@@ -8,7 +8,6 @@
 
 mod alone;
 mod ends;
-mod trace;
 
 use super::candidates::Trials;
 use super::shapes::{self, Stretch};
@@ -22,8 +21,6 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::OnceLock;
-use trace::{FAINT, Inverse, Nominal, inverse};
 
 /// Steps from the value to the end of its usual interval: a profile that goes up and down is followed to its first crossing.
 const STEPS: f64 = 4.0;
@@ -234,8 +231,6 @@ struct Profile<'a> {
     prior_of_shape: DVector<f64>,
     /// What the effect does at the solution.
     now: DVector<f64>,
-    /// What tells which sizes leave a trace.
-    nominal: OnceLock<Nominal<'a>>,
 }
 
 impl<'a> Profile<'a> {
@@ -257,7 +252,7 @@ impl<'a> Profile<'a> {
         let rest: Vec<usize> = (0..fit.free.len()).filter(|c| Some(*c) != here && !own.contains(c)).collect();
         let others = linear.jacobian.select_columns(&rest);
         let products = others.tr_mul(&others);
-        let covariance = inverse(&products, &products.diagonal(), None).inverse;
+        let covariance = inverse(&products, &products.diagonal()).inverse;
         let n_priors = linear.jacobian.nrows() - n;
         let prior_rows = linear.jacobian.rows(n, n_priors);
         let priors = prior_rows.select_columns(&own);
@@ -279,7 +274,6 @@ impl<'a> Profile<'a> {
             priors,
             prior_of_shape,
             now: DVector::zeros(0),
-            nominal: OnceLock::new(),
         };
         out.now = out.does(out.values[shape]).1;
         Some(out)
@@ -307,10 +301,6 @@ impl<'a> Profile<'a> {
         (all.select_columns(&self.sizes), does)
     }
 
-    fn nominal(&self) -> &Nominal<'a> {
-        self.nominal.get_or_init(|| Nominal::of(self))
-    }
-
     /// What χ² and the sizes are while the shape is held at a value.
     fn held(&self, at: f64) -> Held {
         let (columns, does) = self.does(at);
@@ -335,13 +325,21 @@ impl<'a> Profile<'a> {
         let slope = own.tr_mul(&left);
         let raw = DVector::from_iterator(a.ncols(), a.column_iter().map(|c| c.norm_squared()));
         let gram = own.tr_mul(&own);
-        let mut settled = inverse(&gram, &raw, None);
-        if settled.least < FAINT {
-            // a machine with errors shows a little of what leaves no trace on an errorless one, and any size would go
-            settled = inverse(&gram, &raw, Some(&self.nominal().products(self, at)));
-        }
-        let Inverse { inverse, lost, .. } = settled;
-        let step = &inverse * &slope;
+        // what leaves hardly a trace here would fit with any size, of metres: nobody believes that
+        let limit = |c: usize| {
+            let i = self.sizes[c];
+            shapes::CREDIBLE * self.effect.parameters[i].typical.max(self.values[i].abs())
+        };
+        let belief = DVector::from_fn(self.sizes.len(), |c, _| limit(c).powi(-2));
+        let value = DVector::from_fn(self.sizes.len(), |c, _| self.values[self.sizes[c]]);
+        let believed = |size: &DVector<f64>| size.component_mul(&belief).dot(size);
+        let Inverse { lost, .. } = inverse(&gram, &raw);
+        let inverse = inverse(&(&gram + DMatrix::from_diagonal(&belief)), &raw).inverse;
+        let step = &inverse * (&slope + belief.component_mul(&value));
+        let grows = left.norm_squared() - 2.0 * slope.dot(&step) + step.dot(&(&gram * &step))
+            - self.residual.norm_squared()
+            + believed(&(&value - &step))
+            - believed(&value);
         let sizes = self.sizes.iter().enumerate();
         // what the others do while the sizes and they settle, and how far they scatter there
         let moved = &follow * &step - &followed;
@@ -364,7 +362,7 @@ impl<'a> Profile<'a> {
         });
         Held {
             others: others.collect(),
-            growth: left.norm_squared() - slope.dot(&step) - self.residual.norm_squared(),
+            growth: grows,
             sizes: sizes.map(|(c, &i)| (self.values[i] - step[c], size_sigma(c))).collect(),
         }
     }
@@ -559,4 +557,30 @@ struct Held {
     sizes: Vec<(f64, f64)>,
     /// The same of every other free unknown.
     others: Vec<(f64, f64)>,
+}
+
+/// The inverse of a matrix of products, without what leaves no trace in it, and the directions that leave none.
+struct Inverse {
+    inverse: DMatrix<f64>,
+    lost: Vec<DVector<f64>>,
+}
+
+/// `raw`: the squares by which it is scaled.
+fn inverse(gram: &DMatrix<f64>, raw: &DVector<f64>) -> Inverse {
+    /// Smaller eigenvalues of the scaled matrix are rounding.
+    const LEAST: f64 = 1e-10;
+    let scale = raw.map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
+    let n = gram.nrows();
+    if n == 0 {
+        return Inverse { inverse: gram.clone(), lost: Vec::new() };
+    }
+    let eigen = DMatrix::from_fn(n, n, |a, b| gram[(a, b)] / (scale[a] * scale[b])).symmetric_eigen();
+    let of = |v: f64| if v > LEAST { 1.0 / v } else { 0.0 };
+    let inverse =
+        &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(of)) * eigen.eigenvectors.transpose();
+    let lost = (0..n).filter(|&k| eigen.eigenvalues[k] <= LEAST);
+    Inverse {
+        inverse: DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] / (scale[a] * scale[b])),
+        lost: lost.map(|k| eigen.eigenvectors.column(k).component_div(&scale)).collect(),
+    }
 }

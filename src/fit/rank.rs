@@ -59,75 +59,48 @@ fn observe_nominal(
     priors: &[Prior],
     weights: Option<&[f64]>,
 ) -> (solve::Observability, DMatrix<f64>) {
+    let nominal = model.prepare(&data.nominal);
+    let at = |theta: &[f64]| {
+        let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (1e-3, 0.0));
+        if let Some(weights) = weights {
+            touches.set_weights(weights.to_vec());
+        }
+        (touches, DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i])))
+    };
+    let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
     let (mut seen, gram) = if !has_shapes(model) {
-        at_nominal(model, data, theta, free, priors, weights, |touches, at| {
-            let gram = solve::Problem::normal(touches, at, true).gram;
-            let seen =
-                solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(touches, at)));
-            (seen, gram)
-        })
+        let (touches, at) = at(theta);
+        let gram = solve::Problem::normal(&touches, &at, true).gram;
+        let seen =
+            solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+        (seen, gram)
     } else {
-        let jacobian = nominal_jacobian(model, data, theta, free, priors, weights);
+        // a shape needs the sizes of its effect to leave a trace; nothing else does, and beside them a tilt that no touch sees
+        // would leave one of second order
+        let of_shapes = |i: usize| {
+            let u = &model.unknowns[i];
+            !u.shape && model.unknowns.iter().any(|s| s.shape && s.effect == u.effect)
+        };
+        // a search that goes on from another one begins at its values: they are no errorless machine
+        let bare_at = |i: usize| {
+            let u = &model.unknowns[i];
+            if !u.shape && (of_shapes(i) || free.binary_search(&i).is_ok()) { u.start } else { theta[i] }
+        };
+        let bare: Vec<f64> = (0..theta.len()).map(bare_at).collect();
+        let sized: Vec<f64> = (0..theta.len()).map(|i| if of_shapes(i) { theta[i] } else { bare[i] }).collect();
+        let jacobian_at = |theta: &[f64]| {
+            let (touches, at) = at(theta);
+            solve::Problem::jacobian(&touches, &at)
+        };
+        let (mut jacobian, there) = (jacobian_at(&bare), jacobian_at(&sized));
+        for c in shapes {
+            jacobian.set_column(c, &there.column(c));
+        }
         let gram = jacobian.tr_mul(&jacobian);
         (solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&jacobian)), gram)
     };
     seen.hold(held_first(model, free));
     (seen, gram)
-}
-
-/// Standard deviation of a touch in a nominal Jacobian, mm: ranks do not depend on it.
-pub(super) const NOMINAL_SIGMA_MM: f64 = 1e-3;
-
-/// Calls `f` with the nominal touches as a problem, and the free unknowns in θ.
-fn at_nominal<T>(
-    model: &Model,
-    data: &Data,
-    theta: &[f64],
-    free: &[usize],
-    priors: &[Prior],
-    weights: Option<&[f64]>,
-    f: impl FnOnce(&Touches, &DVector<f64>) -> T,
-) -> T {
-    let nominal = model.prepare(&data.nominal);
-    let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (NOMINAL_SIGMA_MM, 0.0));
-    if let Some(weights) = weights {
-        touches.set_weights(weights.to_vec());
-    }
-    f(&touches, &DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i])))
-}
-
-/// Jacobian of the nominal touches and the priors of a model with shape parameters, at an errorless machine. A shape needs the sizes of
-/// its effect to leave a trace; nothing else does, and beside them a tilt that no touch sees would leave one of second order.
-pub(super) fn nominal_jacobian(
-    model: &Model,
-    data: &Data,
-    theta: &[f64],
-    free: &[usize],
-    priors: &[Prior],
-    weights: Option<&[f64]>,
-) -> DMatrix<f64> {
-    let of_shapes = |i: usize| {
-        let u = &model.unknowns[i];
-        !u.shape && model.unknowns.iter().any(|s| s.shape && s.effect == u.effect)
-    };
-    // a search that goes on from another one begins at its values: they are no errorless machine
-    let bare_at = |i: usize| {
-        let u = &model.unknowns[i];
-        if !u.shape && (of_shapes(i) || free.binary_search(&i).is_ok()) { u.start } else { theta[i] }
-    };
-    let bare: Vec<f64> = (0..theta.len()).map(bare_at).collect();
-    let sized: Vec<f64> = (0..theta.len()).map(|i| if of_shapes(i) { theta[i] } else { bare[i] }).collect();
-    let at =
-        |theta: &[f64]| at_nominal(model, data, theta, free, priors, weights, |t, at| solve::Problem::jacobian(t, at));
-    let mut jacobian = at(&bare);
-    let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
-    if !shapes.is_empty() {
-        let there = at(&sized);
-        for c in shapes {
-            jacobian.set_column(c, &there.column(c));
-        }
-    }
-    jacobian
 }
 
 /// Free columns in the order in which they are held where a combination leaves no trace: results before set-ups, which stand

@@ -28,7 +28,10 @@ const MOST_OF_ALL: usize = 1_500_000;
 const LEAST_OWN: f64 = 1e-3;
 
 /// Shapes that nobody has listed count where their sizes are no more than so many times the typical ones.
-const CREDIBLE: f64 = 50.0;
+pub(super) const CREDIBLE: f64 = 50.0;
+
+/// A size further off than so many typical ones is no machine's.
+pub(super) const NOT_CREDIBLE: f64 = 300.0;
 
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
 pub(super) const LEAST_GAIN: f64 = 9.0;
@@ -186,7 +189,9 @@ fn start_of_sets(
         }
     }
     let (gain, size) = found;
-    let shown = gain > LEAST_GAIN * (shaped.len() + n_sizes) as f64;
+    let credible = |(&i, v): (&usize, &f64)| v.abs() < NOT_CREDIBLE * effect.parameters[i].typical;
+    let shown =
+        gain > LEAST_GAIN * (shaped.len() + n_sizes) as f64 && sizes.iter().cycle().zip(size.iter()).all(credible);
     let best = if shown { best } else { usual };
     let start_of = |(k, set): (usize, &Range<usize>)| {
         let mut values = vec![0.0; effect.parameters.len()];

@@ -58,18 +58,19 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
     let steady = bench.terms.during(&ready.state, &mapping.joints(&ready.start));
     let scatter = bench.dice.visit_mm(ready.visit);
     let (block, half) = real_block(bench, ready, &steady);
-    let ball_in_block = |s: f64| -> Vec3 {
-        let joints = mapping.joints(&commanded(ready, s));
-        let moved;
-        let shifts = if bench.terms.steady() {
-            &steady
-        } else {
-            moved = bench.terms.at(&steady, &ready.state, &joints);
-            &moved
-        };
-        let place = bench.chain.place(&joints, shifts, ready.n_links, ready.stylus);
+    let ball_in = |block: &Rigid, joints: &Position, shifts: &Shifts| -> Vec3 {
+        let place = bench.chain.place(joints, shifts, ready.n_links, ready.stylus);
         let ball = plus(place.ball, 1.0, scatter);
         block.inward(place.carrier.inward(ball))
+    };
+    let ball_in_block = |s: f64| -> Vec3 {
+        let joints = mapping.joints(&commanded(ready, s));
+        if bench.terms.steady() {
+            return ball_in(&block, &joints, &steady);
+        }
+        // what goes with the axes' places may move the block, too
+        let shifts = bench.terms.at(&steady, &ready.state, &joints);
+        ball_in(&real_block(bench, ready, &shifts).0, &joints, &shifts)
     };
     let straight = bench.terms.steady() && mapping.is_affine();
     let (at, normal, faces) = match first_contact(&ball_in_block, straight, half, ready.ball_radius_mm) {
@@ -79,7 +80,8 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
     };
     // the probe triggers that much later on the commanded line
     let way = norm(way_of(ready));
-    let late = steady.late + bench.dice.late_mm(ready.id);
+    let late = late_mm(bench, ready, &steady, |late| mapping.joints(&commanded(ready, at + late / way)))
+        + bench.dice.late_mm(ready.id);
     let trigger = at + late / way;
     if trigger > 1.0 {
         return log(ready.end, Status::Miss, Some(Remark::Missed));
@@ -92,6 +94,16 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
         None
     };
     log(commanded(ready, trigger), Status::Hit, remark)
+}
+
+/// How late the trigger comes, mm; `joints`: where the axes stand when it is that late.
+fn late_mm(bench: &Bench<'_>, ready: &Ready, steady: &Shifts, joints: impl Fn(f64) -> Position) -> f64 {
+    /// It hardly depends on where the axes stand: each round is some ten thousand times nearer.
+    const ROUNDS: usize = 3;
+    if bench.terms.steady() {
+        return steady.late;
+    }
+    (0..ROUNDS).fold(steady.late, |late, _| bench.terms.at(steady, &ready.state, &joints(late)).late)
 }
 
 /// The commanded linear way, mm.
