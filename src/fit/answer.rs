@@ -80,6 +80,19 @@ pub(super) fn outcome(
         let far = |end: Option<f64>| end.is_none_or(|end| (end - fit.theta[i]).abs() > FAR * usual);
         !other_values.is_empty() && intervals.get(&i).is_some_and(|ends| ends.iter().any(|end| far(*end)))
     };
+    // where a shape is not told, a set with a size that no machine has says nothing of its other sizes either
+    let sets_of = |which: &dyn Fn(usize) -> bool| -> BTreeSet<(&str, Option<usize>)> {
+        let all = (0..fit.theta.len()).filter(|&i| which(i)).map(|i| &fit.model.unknowns[i]);
+        all.map(|u| (u.effect.as_str(), u.set_up)).collect()
+    };
+    let far = sets_of(&|i| !fit.model.unknowns[i].nuisance && !fit.model.unknowns[i].shape && is_far(fit, i));
+    let told = |i: usize| fit.free.binary_search(&i).is_ok_and(|c| !untold(c)) || intervals.contains_key(&i);
+    let adrift = sets_of(&|i| fit.model.unknowns[i].shape && !told(i));
+    let nowhere = |i: usize| {
+        let u = &fit.model.unknowns[i];
+        let set = (u.effect.as_str(), u.set_up);
+        far.contains(&set) && adrift.contains(&set)
+    };
     let parameters: Vec<Parameter> = (0..fit.theta.len())
         .map(|i| {
             let u = &fit.model.unknowns[i];
@@ -90,7 +103,9 @@ pub(super) fn outcome(
                 None if jump.is_some() => Status::Identified,
                 None if jumps || settings.held.contains(&u.name) => Status::Undetermined,
                 None => Status::Fixed,
-                Some(c) if untold(c) || runs_along(i) || open(i).is_some() || goes_with(c) => Status::Undetermined,
+                Some(c) if untold(c) || runs_along(i) || open(i).is_some() || goes_with(c) || nowhere(i) => {
+                    Status::Undetermined
+                }
                 // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
                 Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
                 _ => Status::Identified,
@@ -164,7 +179,7 @@ pub(super) fn outcome(
         let o = &fit.data.observations[i];
         Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
     });
-    let outcome = Outcome {
+    let mut outcome = Outcome {
         format: FORMAT.into(),
         machine: machine.name.clone(),
         effects: settings.effects.clone(),
@@ -219,7 +234,26 @@ pub(super) fn outcome(
         ]
         .concat(),
     };
+    outcome.warnings.extend(unnamed(&outcome));
     (outcome, other_values)
+}
+
+/// Is a value further off than any machine's?
+fn is_far(fit: &Fit, i: usize) -> bool {
+    fit.theta[i].abs() > NOT_CREDIBLE * fit.model.unknowns[i].typical
+}
+
+/// What is not told and stands in no other sentence.
+fn unnamed(outcome: &Outcome) -> Option<String> {
+    let said = |name: &str| {
+        let word = |c: char| !(c.is_alphanumeric() || c == '_');
+        outcome.undetermined.iter().any(|u| u.combination.contains_key(name))
+            || outcome.warnings.iter().any(|w| w.split(word).any(|w| w == name))
+    };
+    let of = |p: &&Parameter| p.status == Status::Undetermined && !p.name.contains('@') && !said(&p.name);
+    let names: Vec<&str> = outcome.parameters.iter().filter(of).map(|p| p.name.as_str()).collect();
+    (!names.is_empty())
+        .then(|| format!("not told: {}. Beside what these touches do not tell they may be much else", names.join(", ")))
 }
 
 /// Is an interval other than the value and so many standard uncertainties on either side, by more than a twentieth?
@@ -343,11 +377,8 @@ fn warnings(
         }
     }
     out.extend(fit.data.temperature_says.clone());
-    let far = |i: &usize| {
-        let u = &fit.model.unknowns[*i];
-        !u.shape && !u.nuisance && fit.theta[*i].abs() > NOT_CREDIBLE * u.typical
-    };
-    for &i in fit.free.iter().filter(|i| far(i)) {
+    let far = |i: usize| !fit.model.unknowns[i].shape && !fit.model.unknowns[i].nuisance && is_far(fit, i);
+    for &i in fit.free.iter().filter(|&&i| far(i)) {
         out.push(format!(
             "{} is more than {NOT_CREDIBLE} times its usual size: no machine is like that; is the plan, a unit or a sign wrong, or does a combination of the model leave hardly a trace?",
             fit.model.unknowns[i].name

@@ -66,16 +66,21 @@ pub(super) fn variant(alone: &Model, set: &Range<usize>, values: &[f64]) -> Vari
 }
 
 /// The best start for the parameters of an effect that is not in a fit: one for each block where it has a set of its own for each,
-/// none where it has no shape parameters. `alike`: the search begins with the same shapes for every block.
+/// none where it has no shape parameters. `alike`: the search begins with the same shapes for every block; `only`: that of one block,
+/// by its label.
 #[must_use]
-pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect, alike: bool) -> Vec<Start> {
+pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect, (alike, only): (bool, Option<&str>)) -> Vec<Start> {
     let shaped: Vec<usize> = (0..effect.parameters.len()).filter(|&i| effect.parameters[i].shape.is_some()).collect();
     if shaped.is_empty() {
         return Vec::new();
     }
     let alone = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
     let trials = Trials::of(&alone, &fit.data.observations);
-    let sets: Vec<Range<usize>> = alone.instances(0).iter().map(|&(first, count)| first..first + count).collect();
+    let is_of = |set: &Range<usize>| {
+        only.is_none_or(|label| alone.unknowns[set.start].name.split_once('@').is_some_and(|(_, of)| of == label))
+    };
+    let all = alone.instances(0).iter().map(|&(first, count)| first..first + count);
+    let sets: Vec<Range<usize>> = all.filter(is_of).collect();
     let together = if alike { sets.len().max(1) } else { 1 };
     sets.chunks(together).flat_map(|sets| start_of_sets(fit, effect, &shaped, (&alone, &trials), sets)).collect()
 }

@@ -1,6 +1,6 @@
 //! Where a fit with shape parameters begins.
 
-use super::minima::{OutOfRange, against, best_minimum, better_moments};
+use super::minima::{OutOfRange, against, best_minimum, better_moments, hold};
 use super::shapes::{self, Start};
 use super::{Fit, Knowledge, Mask, Settings, effects_of, identify_from};
 use crate::diag::Result;
@@ -39,26 +39,40 @@ fn from_starts(
     alike: bool,
 ) -> Result<Fit> {
     let mut starts = BTreeMap::new();
-    let shaped = effects.iter().copied().filter(|e| has_shapes(e));
     let look = LookFor { machine, catalogue, data: &data, settings, alike };
+    let shaped = effects.iter().copied().filter(|e| has_shapes(e)).flat_map(|e| look.parts_of(e));
     let unseen = look.all(shaped.collect(), &mut starts)?;
     let fit = identify_started(machine, catalogue, effects, data, settings, &starts)?;
     // what an effect changes from one visit to the next is scatter of the visits to a fit without it, which then hardly sees it:
     // where less scatter is left beside it, that is what it is judged by
     let Some(unseen) = unseen.filter(|u| fit.noise.tau_mm < u.tau_mm) else { return Ok(fit) };
     let calm = Settings { visit_sigma_mm: Some(fit.noise.tau_mm), ..settings.clone() };
-    let n_unseen = unseen.effects.len();
+    let n_unseen = unseen.parts.len();
     let look = LookFor { machine, catalogue, data: &fit.data, settings: &calm, alike };
-    let still = look.all(unseen.effects, &mut starts)?;
-    if still.is_some_and(|s| s.effects.len() == n_unseen) {
+    let still = look.all(unseen.parts, &mut starts)?;
+    if still.is_some_and(|s| s.parts.len() == n_unseen) {
         return Ok(fit);
     }
     identify_started(machine, catalogue, effects, fit.data, settings, &starts)
 }
 
-/// Effects with shape parameters that the data does not show, and with which scatter of index visits, mm.
+/// An effect with shape parameters, or the part of it that is one block's.
+#[derive(Debug, Clone)]
+struct Part<'e> {
+    effect: &'e Effect,
+    /// The block's label, where each has parameters of its own.
+    block: Option<String>,
+}
+
+impl PartialEq for Part<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.id == other.effect.id && self.block == other.block
+    }
+}
+
+/// What the data does not show, and with which scatter of index visits, mm.
 struct Unseen<'e> {
-    effects: Vec<&'e Effect>,
+    parts: Vec<Part<'e>>,
     tau_mm: f64,
 }
 
@@ -76,18 +90,25 @@ struct LookFor<'a> {
 const GROSS_MM: f64 = 0.3;
 
 impl LookFor<'_> {
+    fn parts_of<'e>(&self, effect: &'e Effect) -> Vec<Part<'e>> {
+        if !effect.per_block || self.alike {
+            return vec![Part { effect, block: None }];
+        }
+        self.data.set_ups.iter().map(|s| Part { effect, block: Some(s.label.to_string()) }).collect()
+    }
+
     /// Where the search begins, by name of the unknown: first for what shows most, then for each of the rest beside it, at last for
     /// each beside all others, because a jump that another one hides stands at the wrong moment. What the touches do not show is
     /// handed back.
-    fn all<'e>(&self, shaped: Vec<&'e Effect>, starts: &mut BTreeMap<String, f64>) -> Result<Option<Unseen<'e>>> {
+    fn all<'e>(&self, shaped: Vec<Part<'e>>, starts: &mut BTreeMap<String, f64>) -> Result<Option<Unseen<'e>>> {
         if shaped.is_empty() || self.data.observations.is_empty() {
             return Ok(None);
         }
-        let mut unseen = Unseen { effects: Vec::new(), tau_mm: 0.0 };
         let (mut waiting, mut seen) = (shaped, Vec::new());
+        let mut tau_mm = 0.0;
         while !waiting.is_empty() {
             let fit = self.without(&waiting, self.settings, starts)?;
-            let mut found: Vec<Vec<Start>> = waiting.iter().map(|e| self.starts_of(&fit, e)).collect();
+            let mut found: Vec<Vec<Start>> = waiting.iter().map(|part| self.starts_of(&fit, part)).collect();
             let gain = |k: &usize| found[*k].iter().filter(|s| s.shown).map(|s| s.gain).sum::<f64>();
             let most = (0..waiting.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).filter(|k| gain(k) > 0.0);
             let next = match most {
@@ -95,53 +116,41 @@ impl LookFor<'_> {
                 None => self.among_those_left_out(&fit, &waiting, starts)?,
             };
             let Some((k, of_it)) = next else {
-                unseen.effects.append(&mut waiting);
-                unseen.tau_mm = unseen.tau_mm.max(fit.noise.tau_mm);
+                tau_mm = fit.noise.tau_mm;
                 found.into_iter().for_each(|of_it| take(of_it, starts));
                 break;
             };
-            let effect = waiting.remove(k);
-            // of an effect of blocks some may not show it
-            if of_it.iter().any(|s| !s.shown) {
-                unseen.effects.push(effect);
-                unseen.tau_mm = unseen.tau_mm.max(fit.noise.tau_mm);
-            }
             take(of_it, starts);
-            seen.push(effect);
+            seen.push(waiting.remove(k));
         }
+        let mut unseen = Unseen { parts: waiting, tau_mm };
         self.again(&seen, &mut unseen, starts)?;
-        Ok(Some(unseen).filter(|u| !u.effects.is_empty()))
+        Ok(Some(unseen).filter(|u| !u.parts.is_empty()))
     }
 
-    /// Looks for each of several effects that are seen once more, beside all the others, until none of them moves.
-    fn again<'e>(
-        &self,
-        seen: &[&'e Effect],
-        unseen: &mut Unseen<'e>,
-        starts: &mut BTreeMap<String, f64>,
-    ) -> Result<()> {
+    /// Looks for each of several that are seen once more, beside all the others, until none of them moves.
+    fn again<'e>(&self, seen: &[Part<'e>], unseen: &mut Unseen<'e>, starts: &mut BTreeMap<String, f64>) -> Result<()> {
         /// Rounds at most.
         const ROUNDS: usize = 3;
-        let never: Vec<&Effect> =
-            unseen.effects.iter().copied().filter(|e| !seen.iter().any(|s| s.id == e.id)).collect();
+        let never = unseen.parts.clone();
         // the last one was looked for beside all others
         let mut stay = 1;
-        for effect in seen.iter().cycle().take(ROUNDS * seen.len()) {
+        for part in seen.iter().cycle().take(ROUNDS * seen.len()) {
             if stay >= seen.len() {
                 break;
             }
-            let out: Vec<&Effect> = never.iter().chain([effect]).copied().collect();
+            let out: Vec<Part> = never.iter().chain([part]).cloned().collect();
             let fit = self.without(&out, self.settings, starts)?;
-            let found = self.starts_of(&fit, effect);
+            let found = self.starts_of(&fit, part);
             let shapes = |s: &Start| -> Vec<(String, f64)> {
-                let all = s.names.iter().zip(&s.values).zip(&effect.parameters);
+                let all = s.names.iter().zip(&s.values).zip(&part.effect.parameters);
                 all.filter(|(_, p)| p.shape.is_some()).map(|((name, value), _)| (name.clone(), *value)).collect()
             };
             let moved = found.iter().any(|s| shapes(s).iter().any(|(name, value)| starts.get(name) != Some(value)));
             // what showed only in place of another one
-            unseen.effects.retain(|e| e.id != effect.id);
+            unseen.parts.retain(|p| p != part);
             if found.iter().any(|s| !s.shown) {
-                unseen.effects.push(effect);
+                unseen.parts.push(part.clone());
                 unseen.tau_mm = unseen.tau_mm.max(fit.noise.tau_mm);
             }
             take(found, starts);
@@ -150,12 +159,12 @@ impl LookFor<'_> {
         Ok(())
     }
 
-    /// An effect that only touches show which the fit without it leaves out, as the last ones of a run: it counts where the fit with it
+    /// What only touches show which the fit without it leaves out, as the last ones of a run: it counts where the fit with it
     /// misses so much less that it would show among all. Its place among those that wait, and where it begins.
     fn among_those_left_out(
         &self,
         fit: &Fit,
-        waiting: &[&Effect],
+        waiting: &[Part],
         starts: &BTreeMap<String, f64>,
     ) -> Result<Option<(usize, Vec<Start>)>> {
         let left_out = |i: &usize| !self.settings.masked.iter().any(|m| m.is_of(&fit.data.observations[*i]));
@@ -175,30 +184,37 @@ impl LookFor<'_> {
             Mask { run: o.run, id: o.id, reason: String::new() }
         }));
         let whole = self.without(waiting, &all_in, starts)?;
-        for (k, effect) in waiting.iter().enumerate() {
-            let found = self.starts_of(&whole, effect);
+        for (k, part) in waiting.iter().enumerate() {
+            let found = self.starts_of(&whole, part);
             let sets = found.iter().filter(|s| s.shown).count();
             if sets == 0 {
                 continue;
             }
-            let others: Vec<&Effect> = waiting.iter().copied().filter(|e| e.id != effect.id).collect();
+            let others: Vec<Part> = waiting.iter().filter(|p| *p != part).cloned().collect();
             let mut with_it = starts.clone();
             take(found.clone(), &mut with_it);
             let [without, with] = against([fit, &self.without(&others, self.settings, &with_it)?]);
-            if without - with > shapes::LEAST_GAIN * (sets * effect.parameters.len()) as f64 {
+            if without - with > shapes::LEAST_GAIN * (sets * part.effect.parameters.len()) as f64 {
                 return Ok(Some((k, found)));
             }
         }
         Ok(None)
     }
 
-    fn starts_of(&self, fit: &Fit, effect: &Effect) -> Vec<Start> {
-        shapes::start_shapes(fit, self.machine, effect, self.alike)
+    fn starts_of(&self, fit: &Fit, part: &Part) -> Vec<Start> {
+        shapes::start_shapes(fit, self.machine, part.effect, (self.alike, part.block.as_deref()))
     }
 
-    /// The fit of everything but some effects.
-    fn without(&self, out: &[&Effect], settings: &Settings, starts: &BTreeMap<String, f64>) -> Result<Fit> {
-        let base = shapes::without(settings, out);
+    /// The fit of everything but some effects, or parts of them.
+    fn without(&self, out: &[Part], settings: &Settings, starts: &BTreeMap<String, f64>) -> Result<Fit> {
+        let whole = |part: &&Part| self.parts_of(part.effect).iter().all(|p| out.contains(p));
+        let effects: Vec<&Effect> = out.iter().filter(whole).map(|part| part.effect).collect();
+        let mut base = shapes::without(settings, &effects);
+        for (part, block) in out.iter().filter(|part| !whole(part)).filter_map(|p| Some((p, p.block.as_ref()?))) {
+            for p in &part.effect.parameters {
+                hold(&mut base, &format!("{}@{block}", p.name), p.shape.map_or(0.0, |(start, _, _)| start));
+            }
+        }
         let others = effects_of(&base.effects, self.catalogue, self.machine)?;
         identify_started(self.machine, self.catalogue, &others, self.data.clone(), &base, starts)
     }

@@ -79,8 +79,11 @@ fn one(
         };
         members.push(format!("the set-up of {of} ({})", words.join(", ")));
     }
+    let is_shape = |name: &String| physical.iter().any(|(u, _)| u.shape && u.name == *name);
     let convention = match &held[..] {
+        [one] if is_shape(one) => format!("by convention {one} stays where the search for it began"),
         [one] => format!("by convention {one} counts as 0"),
+        _ if held.iter().any(is_shape) => format!("by convention {} stay where the search began", join(&held)),
         _ => format!("by convention {} count as 0", join(&held)),
     };
     let says = match (&members[..], &physical[..]) {
