@@ -65,9 +65,16 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
     let mut out = vec![None; unknowns.len()];
     let mut findings = Vec::new();
     for (word, known) in words {
-        let matches: Vec<usize> = (0..unknowns.len())
-            .filter(|&i| crate::symbols::same(&unknowns[i].name, word) || unknowns[i].alias.as_deref() == Some(word))
-            .collect();
+        // as it is written before any other spelling: a user's effect may have a name that differs in its capitals only
+        let exact = unknowns.iter().position(|u| u.name == *word);
+        let meant = |i: &usize| {
+            let u = &unknowns[*i];
+            exact.map_or_else(
+                || crate::symbols::same(&u.name, word) || u.alias.as_deref() == Some(word),
+                |exact| exact == *i,
+            )
+        };
+        let matches: Vec<usize> = (0..unknowns.len()).filter(meant).collect();
         match matches[..] {
             [i] => out[i] = Some(*known),
             _ => {

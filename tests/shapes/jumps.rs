@@ -6,8 +6,10 @@ use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::fit::outcome::{Parameter, Status};
 use axiscal::fit::{Knowledge, Settings};
+use axiscal::log::Touch;
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::Run;
+use axiscal::program::plan::PlanTouch;
 use axiscal::simulate::{self, Scenario};
 
 /// The moment of a jump is told by the touches like anything else: between which two, and by more where the jump is small. Where nothing
@@ -141,7 +143,7 @@ fn sizes_of_a_slip_are_no_surer_than_its_moment() {
     let machine = machine("swivel-head");
     let full = plan(&machine, "full");
     let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
-    for (from_h, seeds) in [(0.03, 1..=10), (0.06, 1..=10), (1.49, 1..=6)] {
+    for (from_h, seeds) in [(0.03, 1..=20), (0.06, 1..=20), (1.49, 1..=6)] {
         let (mut inside, mut told, mut of_blocks, mut blocks) = (0, 0, 0, 0);
         for seed in seeds {
             let slip = [("dx", 8.0), ("dy", -5.0), ("from_h", from_h)];
@@ -165,7 +167,7 @@ fn sizes_of_a_slip_are_no_surer_than_its_moment() {
         }
         println!("{from_h}: {inside} of {told} sizes, {of_blocks} of {blocks} set-ups");
         assert!(inside * 100 >= told * 87 && of_blocks * 100 >= blocks * 90, "{from_h}");
-        assert!(from_h > 1.0 || told > 20, "{from_h}: {told} told");
+        assert!(from_h > 1.0 || told >= 54, "{from_h}: {told} told");
     }
 }
 
@@ -252,21 +254,104 @@ fn strangers_are_not_taken_for_a_slip() {
         let scenario = Scenario::flawless().with_noise(1e-3, 0.5e-3, seed);
         let mut touches = touch(&machine, &full, &scenario, None);
         let n = touches.len();
-        // towards the probe, as dirt is
         for (back, off_mm) in [(1, 0.03), (17, 0.2), (40, 0.012)] {
-            let (of, way) = (&full.touches[n - back], [AxisName::X, AxisName::Y, AxisName::Z]);
-            let way = way.map(|axis| (axis, of.start.get(axis).unwrap() - of.end.get(axis).unwrap()));
-            let length = way.iter().map(|(_, d)| d * d).sum::<f64>().sqrt();
-            for (axis, d) in way {
-                let at = &mut touches[n - back].position;
-                at.set(axis, at.get(axis) + off_mm * d / length);
-            }
+            lift(&mut touches[n - back], &full.touches[n - back], off_mm);
         }
         let fit = identify(&machine, &[(&full, &touches)], &model);
         let p = parameter(&fit, "from_h");
         println!("{seed}: {p:?} {:?}", fit.rejected);
         assert_ne!(p.status, Status::Identified, "{p:?}");
         assert!((n - 1..n).chain([n - 17, n - 40]).all(|i| fit.rejected.contains_key(&i)), "{:?}", fit.rejected);
+    }
+}
+
+/// A small plan whose last touches are chips: a slip of hundredths of a radian would explain them, and nobody is told one.
+#[test]
+fn a_slip_that_no_machine_has_is_not_told() {
+    let machine = machine("swivel-head");
+    let plans = [plan(&machine, "head"), plan(&machine, "table")];
+    let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
+    for seed in 1..=6 {
+        let made = |k: usize| {
+            let scenario = Scenario::flawless().with_noise(1e-3, 0.5e-3, seed + 100 * k as u64);
+            touch(&machine, &plans[k], &scenario, None)
+        };
+        let (first, mut second) = (made(0), made(1));
+        let n = second.len();
+        for (back, off_mm) in [(1, 0.31), (3, 0.05), (6, 0.22)] {
+            lift(&mut second[n - back], &plans[1].touches[n - back], off_mm);
+        }
+        let fit = identify(&machine, &[(&plans[0], &first), (&plans[1], &second)], &model);
+        for p in fit.outcome.parameters.iter().filter(|p| p.effect == "block-slip") {
+            println!("{seed}: {p:?}");
+            assert!(p.status != Status::Identified || p.value.abs() < 100.0, "{p:?}");
+        }
+    }
+}
+
+/// A slip, and a warm-up in the model that never was: its time constant stays where it stands, and nothing runs away with it. In 18 of 74
+/// such runs the fit did not end, with location errors of metres.
+#[test]
+fn what_does_not_show_stays_where_it_stands_beside_a_jump() {
+    let machine = machine("swivel-head");
+    let full = plan(&machine, "full");
+    let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip", "warm-up"];
+    let slip = [("dx", 8.0), ("dy", -5.0), ("dz", 3.0), ("from_h", 0.7)];
+    let (mut inside, mut all) = (0, 0);
+    for seed in 1..=8 {
+        let scenario = Scenario::flawless().with_noise(1e-3, 0.5e-3, seed).with(&machine, "block-slip", &slip).unwrap();
+        let touches = touch(&machine, &full, &scenario, None);
+        let fit = identify(&machine, &[(&full, &touches)], &model);
+        let tau = parameter(&fit, "tau");
+        println!("{seed}: {tau:?}");
+        assert!(fit.outcome.converged && (0.05..=20.0).contains(&tau.value), "{tau:?}");
+        assert_eq!(tau.status, Status::Undetermined, "{tau:?}");
+        for (name, truth) in slip {
+            let p = parameter(&fit, name);
+            assert_eq!(p.status, Status::Identified, "{p:?}");
+            all += 1;
+            inside += usize::from(holds(p, truth));
+        }
+        for p in fit.outcome.parameters.iter().filter(|p| p.effect.starts_with("location")) {
+            assert!(p.status != Status::Identified || p.value.abs() < 0.02, "{p:?}");
+        }
+    }
+    assert!(inside * 10 >= all * 9, "{inside} of {all}");
+}
+
+/// Four blocks that slip, each at its own moment: looked for beside a fit that had none of the others, the smallest stood at the wrong moment
+/// in 5 of 6 runs, and good touches of its block were left out.
+#[test]
+fn each_block_may_slip_at_a_moment_of_its_own() {
+    const OWN: &str = "[[effect]]\nid = \"slip-each\"\nper = \"block\"\nat = \"block\"\nterms = [{ parameter = \"ex\", unit = \"um\", dof = \"dx\", \
+                       formula = \"step(t - each_h)\", typical = 8 }, { parameter = \"ez\", unit = \"um\", dof = \"dz\", formula = \
+                       \"step(t - each_h)\", typical = 8 }]\nshape = [{ parameter = \"each_h\", unit = \"h\", start = 0.5, min = 0.0, max = 100.0, \
+                       between = \"t\" }]\n";
+    let machine = machine("swivel-head");
+    let full = plan(&machine, "full");
+    let mut catalogue = Catalogue::built_in().unwrap();
+    catalogue.add_file(&source("own.toml", OWN)).unwrap();
+    let slips = [("a", 8.0, -6.0, 0.4), ("b", -7.0, 5.0, 0.9), ("f", 10.0, 5.0, 0.6), ("g", 0.0, 8.0, 1.1)];
+    let mut text = "effects_file = [\"own.toml\"]\n[effects.slip-each]\n".to_owned();
+    for (block, ex, ez, hour) in slips {
+        text += &format!(
+            "\"ex@full/{block}\" = {ex:?}\n\"ez@full/{block}\" = {ez:?}\n\"each_h@full/{block}\" = {hour:?}\n"
+        );
+    }
+    let open = |name: &str| Ok(source(name, OWN));
+    let (planted, _) = simulate::scenario::parse_with(&source("s.toml", &text), &machine, &open).unwrap();
+    let effects = ["location-b", "location-c", "block-setup", "pretravel", "slip-each"].map(str::to_owned).to_vec();
+    for seed in 1..=2 {
+        let touches = touch(&machine, &full, &planted.clone().with_noise(1e-3, 0.5e-3, seed), None);
+        let run = Run { plan: &full, touches: &touches, mounting: None, started_s: None };
+        let settings = Settings { effects: effects.clone(), ..Settings::default() };
+        let fit = axiscal::fit::identify(&machine, &catalogue, &[run], &settings).unwrap();
+        assert!(fit.rejected.len() <= 1, "{:?}", fit.rejected);
+        for (block, .., hour) in slips {
+            let p = parameter(&fit, &format!("each_h@full/{block}"));
+            println!("{seed} {hour}: {p:?}");
+            assert!(p.status == Status::Identified && holds(p, hour), "{p:?}");
+        }
     }
 }
 
@@ -290,6 +375,16 @@ fn quickly_a_moment_is_not_told() {
     let fit = identify_with(&machine, &[(&full, &touches)], &model, stated);
     assert_eq!((parameter(&fit, "from_h").status, parameter(&fit, "from_h").value), (Status::Fixed, 0.4));
     assert!(fit.outcome.warnings.iter().all(|w| !w.contains("from_h")), "{:?}", fit.outcome.warnings);
+}
+
+/// Moves a touch towards the probe, as dirt does.
+fn lift(touch: &mut Touch, of: &PlanTouch, off_mm: f64) {
+    let way = [AxisName::X, AxisName::Y, AxisName::Z];
+    let way = way.map(|axis| (axis, of.start.get(axis).unwrap() - of.end.get(axis).unwrap()));
+    let length = way.iter().map(|(_, d)| d * d).sum::<f64>().sqrt();
+    for (axis, d) in way {
+        touch.position.set(axis, touch.position.get(axis) + off_mm * d / length);
+    }
 }
 
 /// Does what is said of a parameter hold a value?
