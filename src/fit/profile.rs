@@ -109,6 +109,9 @@ fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
     out
 }
 
+/// Standard uncertainty and t-factor of a free unknown, by its index among all.
+type Spread<'a> = dyn Fn(usize) -> Option<(f64, f64)> + 'a;
+
 /// 95 % intervals of shape parameters and of the sizes beside them, by index among the unknowns, in their units; an end is none
 /// where the touches set none within the range of the shape. `settings`: which shapes the search holds; `of`: which shapes are asked
 /// for; `spread`: standard uncertainty and t-factor of a free unknown at the solution.
@@ -118,7 +121,7 @@ pub fn intervals(
     machine: &Machine,
     effects: &[&Effect],
     settings: &Settings,
-    (of, spread): (&dyn Fn(&Unknown) -> bool, &dyn Fn(usize) -> Option<(f64, f64)>),
+    (of, spread): (&dyn Fn(&Unknown) -> bool, &Spread),
 ) -> Intervals {
     let mut out = Intervals::default();
     let asked = |effect: &Effect| fit.model.unknowns.iter().any(|u| u.shape && u.effect == effect.id && of(u));
@@ -398,13 +401,7 @@ impl<'a> Profile<'a> {
     }
 
     /// Intervals of everything else that is told, beside values of the shape that fit as well.
-    fn widen_others(
-        &self,
-        places: &[f64],
-        room: &dyn Fn(f64) -> Room,
-        spread: &dyn Fn(usize) -> Option<(f64, f64)>,
-        out: &mut Intervals,
-    ) {
+    fn widen_others(&self, places: &[f64], room: &dyn Fn(f64) -> Room, spread: &Spread, out: &mut Intervals) {
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         for (r, &unknown) in self.rest.iter().enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
@@ -419,13 +416,7 @@ impl<'a> Profile<'a> {
     }
 
     /// Intervals of the sizes: all that each may be beside some places of the shape.
-    fn widen(
-        &self,
-        places: &[f64],
-        room: &dyn Fn(f64) -> Room,
-        spread: &dyn Fn(usize) -> Option<(f64, f64)>,
-        out: &mut Intervals,
-    ) {
+    fn widen(&self, places: &[f64], room: &dyn Fn(f64) -> Room, spread: &Spread, out: &mut Intervals) {
         let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
         let lowest = held.iter().map(|h| h.growth).fold(0.0, f64::min);
         for (c, (&i, &unknown)) in self.sizes.iter().zip(&self.unknowns).enumerate() {
@@ -458,12 +449,7 @@ impl<'a> Profile<'a> {
 impl Profile<'_> {
     /// Sizes that run away along with a shape that is held at an end of its range: how large they are is what the end was chosen to
     /// be, and no interval holds that.
-    fn size_runs_along(
-        &self,
-        [low, high]: [f64; 2],
-        spread: &dyn Fn(usize) -> Option<(f64, f64)>,
-        out: &mut BTreeMap<usize, [Option<f64>; 2]>,
-    ) {
+    fn size_runs_along(&self, [low, high]: [f64; 2], spread: &Spread, out: &mut BTreeMap<usize, [Option<f64>; 2]>) {
         /// The range would end so much earlier.
         const SHARE: f64 = 0.2;
         let value = self.values[self.shape];
