@@ -187,7 +187,7 @@ terms = [
 shape = [{ parameter = "ut", unit = "h", start = 0.5, min = 0.0, max = 100.0, between = "t" }]
 "#;
 
-/// Two effects that jump, the smaller one behind the larger: looked for beside a fit without either, both stood at the larger one in 7 of
+/// Two effects that jump, the smaller one behind the larger: looked for beside a fit without either, both stood at the larger one in 8 of
 /// 12 runs.
 #[test]
 fn each_of_two_jumps_is_found_at_its_own_moment() {
