@@ -97,8 +97,8 @@ impl Problem {
     }
 }
 
-/// Rank on the nominal touches, fit and covariance, as `identify` does them, without what it does around them: the same
-/// work as the peers do. White noise of [`SIGMA_MM`].
+/// Rank, fit and covariance, as `identify` does them (the rank on the nominal touches where the sums at the start leave a doubt
+/// of it), without what it does around them: the work that the peers do. White noise of [`SIGMA_MM`].
 pub fn solve(model: &Model, data: &Data) -> Solution {
     let solution = try_solve(model, data).expect("every unknown is seen");
     assert!(solution.converged, "{}", solution.stopped);
@@ -109,12 +109,16 @@ pub fn solve(model: &Model, data: &Data) -> Solution {
 pub fn try_solve(model: &Model, data: &Data) -> Option<Solution> {
     let free: Vec<usize> = (0..model.n_unknowns()).collect();
     let start = DVector::from_vec(model.start());
-    let nominal = model.prepare(&data.nominal);
-    let touches = |batch| Touches::new(batch, &data.visits, model.start(), &free, &[], (SIGMA_MM, 0.0));
-    let gram = touches(&nominal).normal(&start, true).gram;
-    let seen = solve::observe_gram(&gram)?;
+    let noise = (SIGMA_MM, 0.0);
     let batch = model.prepare(&data.observations);
-    Some(solve::minimise(&touches(&batch), start, &seen))
+    let touches = Touches::new(&batch, &data.visits, model.start(), &free, &[], noise);
+    let first = touches.normal(&start, true);
+    let seen = solve::observe_clearly(&first.gram).or_else(|| {
+        let nominal = model.prepare(&data.nominal);
+        let touches = Touches::new(&nominal, &data.visits, model.start(), &free, &[], noise);
+        solve::observe_gram(&touches.normal(&start, true).gram)
+    })?;
+    Some(solve::minimise_from(&touches, start, &seen, Some(first)))
 }
 
 /// The machine of all benchmarks.

@@ -194,6 +194,9 @@ pub fn load_machines(path: Option<&Path>, io: &Io) -> Result<Vec<Machine>> {
 /// # Errors
 /// When there is none of that name; the message lists those that exist.
 pub fn load_machine(name: &str, path: Option<&Path>, io: &Io) -> Result<Machine> {
+    if let (None, Some(machine)) = (path, machine::built_in(name)?) {
+        return Ok(machine);
+    }
     let machines = load_machines(path, io)?;
     let names: Vec<String> = machines.iter().map(|m| m.name.clone()).collect();
     machines.into_iter().find(|m| m.name == name).ok_or_else(|| {

@@ -225,7 +225,7 @@ pub fn load_compensation(path: &Path, machine: &Machine) -> Result<Compensation>
 /// # Errors
 /// When a file is missing or unusable.
 pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
-    load(path, io, Catalogue::prepare)
+    load(path, io, true)
 }
 
 /// The same for somebody who asks about the effects of the study alone.
@@ -233,12 +233,15 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
 /// # Errors
 /// When a file is missing or unusable.
 pub fn load_study_alone(path: &Path, io: &Io) -> Result<Loaded> {
-    load(path, io, |_, _| {})
+    load(path, io, false)
 }
 
-/// `meanwhile` is called as soon as machine and catalogue are known.
-fn load(path: &Path, io: &Io, meanwhile: impl FnOnce(&Catalogue, &Machine)) -> Result<Loaded> {
+/// `whole`: the whole catalogue will be asked for; another thread begins to read it.
+fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let text = files::read_text(path)?;
+    if whole {
+        Catalogue::read_ahead();
+    }
     let mut hash = Sha256::new();
     let mut data = Sha256::new();
     hash.update(text.as_bytes());
@@ -257,7 +260,9 @@ fn load(path: &Path, io: &Io, meanwhile: impl FnOnce(&Catalogue, &Machine)) -> R
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
-    meanwhile(&catalogue, &machine);
+    if whole {
+        catalogue.prepare(&machine);
+    }
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in &study.data {

@@ -118,6 +118,11 @@ pub fn main() -> ExitCode {
         Err(e) => e.exit(),
     };
     let io = Io::new(cli.json);
+    // a fit waits for nobody but its own parts: this thread works with the others instead of beside them, so that no more run
+    // than there are processors. Nobody can have made a pool before: if one stood, it would stay
+    if matches!(&cli.verb, Verb::Identify(args) if !args.quick) {
+        let _ = rayon::ThreadPoolBuilder::new().use_current_thread().build_global();
+    }
     io.finish(dispatch(cli.verb, &io))
 }
 

@@ -39,8 +39,18 @@ pub(super) fn outcome(
     let p = fit.free.len();
     let by_visits = uncertainty::visit_variance(fit);
     let shapes_told = !settings.quick && n <= MOST_PROFILED;
-    let unmodelled = (!settings.quick && n <= uncertainty::MOST_UNMODELLED)
-        .then(|| uncertainty::with_unmodelled(fit, machine, catalogue));
+    let many = n > uncertainty::MOST_UNMODELLED;
+    let (unmodelled, (held_out_rms_um, weak)) = if settings.quick {
+        (None, (None, Vec::new()))
+    } else {
+        rayon::join(
+            || (!many).then(|| uncertainty::with_unmodelled(fit, machine, catalogue)),
+            || {
+                let weak = if many { Vec::new() } else { weak::weak(fit, effects) };
+                (held_out::by_visit(fit).map(|h| h.rms_um), weak)
+            },
+        )
+    };
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
     // what the scatter of the priors makes of it
     let prior_variance = |c: usize| {
@@ -193,7 +203,7 @@ pub(super) fn outcome(
         dof: fit.dof,
         condition,
         rms_um: um_from_mm((squares / n_used.max(1) as f64).sqrt()),
-        held_out_rms_um: if settings.quick { None } else { held_out::by_visit(fit).map(|h| h.rms_um) },
+        held_out_rms_um,
         noise_um: um_from_mm(fit.noise.sigma_mm),
         noise_source: fit.noise.source.into(),
         noise_dof: fit.noise.dof,
@@ -204,12 +214,8 @@ pub(super) fn outcome(
         chi2_per_dof,
         undetermined: statement::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
         parted_together: Vec::new(),
-        weak: if settings.quick || n > uncertainty::MOST_UNMODELLED {
-            Vec::new()
-        } else {
-            // how badly what is lost beside a shape is told, nobody knows: a warning names it
-            weak::weak(fit, effects).into_iter().filter(|c| !mostly(c, |name| lost.contains(name))).collect()
-        },
+        // how badly what is lost beside a shape is told, nobody knows: a warning names it
+        weak: weak.into_iter().filter(|c| !mostly(c, |name| lost.contains(name))).collect(),
         correlations: weak::correlations(fit, |i| parameters[i].sigma.is_some()),
         parameters,
         priors: uncertainty::priors(fit),

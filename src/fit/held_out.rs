@@ -219,14 +219,17 @@ impl Part<'_> {
         let mut step = -factor.solve(&gradient);
         own.iter().for_each(|&c| step[c] = 0.0);
         let limit = LARGEST_VARIANCE * fit.noise.sigma_mm.powi(2);
-        let each = self.group.iter().zip(self.jacobian.row_iter());
-        each.map(|(&i, row)| {
-            let mut row = row.transpose().component_div(scale);
-            own.iter().for_each(|&c| row[c] = 0.0);
-            let variance = row.dot(&factor.solve(&row));
-            (variance < limit).then(|| fit.residual_mm[i] + row.dot(&step))
-        })
-        .collect()
+        let mut rows = self.jacobian.transpose();
+        for (c, mut of_unknown) in rows.row_iter_mut().enumerate() {
+            of_unknown *= if own.contains(&c) { 0.0 } else { 1.0 / scale[c] };
+        }
+        let predicted = rows.tr_mul(&step);
+        // the variance of a prediction is the square of L⁻¹·row
+        if !factor.l_dirty().solve_lower_triangular_mut(&mut rows) {
+            return vec![None; self.group.len()];
+        }
+        let each = self.group.iter().zip(rows.column_iter()).zip(predicted.iter());
+        each.map(|((&i, row), by)| (row.norm_squared() < limit).then(|| fit.residual_mm[i] + by)).collect()
     }
 
     /// Takes off what `own` unknowns can explain of the errors; their number.

@@ -64,9 +64,12 @@ pub(super) fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Res
 pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>) -> Result<Vec<Option<Knowledge>>> {
     let mut out = vec![None; unknowns.len()];
     let mut findings = Vec::new();
-    for (word, known) in words {
-        // as it is written before any other spelling: a user's effect may have a name that differs in its capitals only
-        let exact = unknowns.iter().position(|u| u.name == *word);
+    // as it is written before any other spelling: a user's effect may have a name that differs in its capitals only. What is said
+    // by the exact name comes last, and stays
+    let exact = |word: &String| unknowns.iter().position(|u| u.name == *word);
+    let (by_name, spelled): (Vec<_>, Vec<_>) = words.iter().partition(|(word, _)| exact(word).is_some());
+    for (word, known) in spelled.into_iter().chain(by_name) {
+        let exact = exact(word);
         let meant = |i: &usize| {
             let u = &unknowns[*i];
             exact.map_or_else(

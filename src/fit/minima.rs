@@ -117,9 +117,8 @@ impl OutOfRange<'_> {
     }
 }
 
-/// Holds a parameter, whatever the user said of it and by whatever spelling.
+/// Holds a parameter, whatever the user said of it: its exact name goes before any other spelling.
 pub(super) fn hold(settings: &mut Settings, name: &str, value: f64) {
-    settings.knowledge.retain(|word, _| !crate::symbols::same(word, name));
     settings.knowledge.insert(name.to_owned(), Knowledge::Fixed(value));
 }
 

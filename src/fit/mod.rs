@@ -45,7 +45,6 @@ use noise::{Known, Noise};
 use normal::{Prior, Touches};
 use outcome::Outcome;
 use search::Search;
-use snoop::Snoop;
 use std::collections::BTreeMap;
 use whitening::Whitening;
 
@@ -275,8 +274,16 @@ fn identify_from(
         rank::observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
     let moving =
         effects.iter().any(|e| e.terms.iter().any(|t| t.formula.variables().iter().any(|v| MOVING.contains(v))));
-    let mut search =
-        Search { data: &data, observability: observability.clone(), touches, masked, known, moving, beyond: None };
+    let mut search = Search {
+        data: &data,
+        observability: observability.clone(),
+        touches,
+        masked,
+        known,
+        moving,
+        beyond: None,
+        judged: None,
+    };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     let solution = search.follow_bends(solution, &model, &free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
@@ -296,13 +303,6 @@ fn identify_from(
     solution = search.follow_bends(solution, &model, &free);
     solution.iterations += first_steps;
     let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
-    let snoop = Snoop::new(
-        &search.touches,
-        &solution.theta,
-        &solution.covariance,
-        (solution.chi2, dof),
-        noise.dof.unwrap_or(0.0),
-    );
     for (column, &i) in free.iter().enumerate() {
         theta[i] = solution.theta[column];
     }
@@ -328,7 +328,7 @@ fn identify_from(
             covariance[(i, j)] = solution.covariance[(a, b)];
         }
     }
-    let mut studentised = snoop.studentised();
+    let mut studentised = search.judge(&solution, noise.dof.unwrap_or(0.0)).studentised();
     // a touch that is not used stands by how far it is off what the others say
     let scale2 = search.scale2(&solution, 0.0);
     for &i in rejected.keys() {

@@ -79,6 +79,12 @@ impl<'a> Touches<'a> {
         (self.sigma_mm, self.tau_mm)
     }
 
+    /// What is known of unknowns without the touches.
+    #[must_use]
+    pub fn priors(&self) -> &[Prior] {
+        self.priors
+    }
+
     /// Weights of the touches.
     #[must_use]
     pub fn weights(&self) -> &[f64] {
@@ -104,7 +110,15 @@ impl<'a> Touches<'a> {
             let mut scratch = self.batch.scratch();
             range.clone().map(|i| at.gap(i, &mut scratch)).collect()
         };
-        self.chunks.par_iter().map(each).collect::<Vec<_>>().concat()
+        self.each_chunk(each).concat()
+    }
+
+    /// Something of each part of the touches, in their order. One part is no work for threads: starting them takes as long.
+    fn each_chunk<T: Send>(&self, of: impl Fn(&Range<usize>) -> T + Sync) -> Vec<T> {
+        match self.chunks.as_slice() {
+            [only] => vec![of(only)],
+            many => many.par_iter().map(&of).collect(),
+        }
     }
 
     /// Outward normal of a touch in R.
@@ -451,7 +465,7 @@ impl Problem for Touches<'_> {
     fn normal(&self, free: &DVector<f64>, with_gram: bool) -> Normal {
         let theta = self.full(free);
         let at = self.batch.at(&theta);
-        let parts: Vec<Partial> = self.chunks.par_iter().map(|range| self.accumulate(&at, range, with_gram)).collect();
+        let parts = self.each_chunk(|range| self.accumulate(&at, range, with_gram));
         let p = free.len();
         let column_of = self.columns();
         let layout = self.batch.model().layout();

@@ -9,10 +9,6 @@ use crate::model::data::Data;
 use crate::model::predict::Model;
 use nalgebra::{DMatrix, DVector};
 
-/// Condition up to which the touches as they were made show the rank that the nominal ones have: the two Jacobians differ
-/// by what errors and set-ups of some tenths of a millimetre make of levers of some hundred.
-const CLEARLY_SEEN: f64 = 300.0;
-
 /// Rank and null directions, and the condition where the unknowns are least correlated. From the Gram matrix of the
 /// touches as they were made where that is beyond doubt, else from the nominal touches: errors of the machine itself
 /// must not make a combination look seen.
@@ -26,7 +22,7 @@ pub(super) fn observe(
     weights: &[f64],
 ) -> (solve::Observability, f64) {
     // beside large sizes of an effect with a shape what no nominal touch sees may look clear
-    let clear = solve::observe_gram(gram).filter(|seen| seen.condition < CLEARLY_SEEN && !has_shapes(model));
+    let clear = solve::observe_clearly(gram).filter(|_| !has_shapes(model));
     let (seen, nominal) = match clear {
         // nothing is lost, nothing is held
         Some(seen) => (seen, None),

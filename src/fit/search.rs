@@ -41,6 +41,17 @@ pub(super) struct Search<'a> {
     pub moving: bool,
     /// As [`super::Fit::strangers_beyond`].
     pub beyond: Option<usize>,
+    /// What the touches said of each other last.
+    pub judged: Option<Judged>,
+}
+
+/// What the touches say of each other at a solution, and where that was: the same question is not answered twice.
+pub(super) struct Judged {
+    theta: DVector<f64>,
+    weights: Vec<f64>,
+    noise_mm: (f64, f64),
+    noise_dof: f64,
+    snoop: Snoop,
 }
 
 impl Search<'_> {
@@ -100,8 +111,7 @@ impl Search<'_> {
         const NONE: f64 = 0.01;
         let mut noise = noise::estimate(&self.samples(&solution), &self.known, None);
         for _ in 0..ROUNDS {
-            self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
-            solution = self.refit_here(solution.theta);
+            solution = self.with_noise(solution, &noise);
             // what the fit follows between visits depends on how much they are taken to scatter
             if !self.moving || noise.visit_source != "revisits" {
                 break;
@@ -115,10 +125,46 @@ impl Search<'_> {
         let (sigma_mm, tau_mm) = self.touches.noise_mm();
         if (sigma_mm, tau_mm) != (noise.sigma_mm, noise.tau_mm) {
             // what is answered belongs to the noise that is answered
-            self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
-            solution = self.refit_here(solution.theta);
+            solution = self.with_noise(solution, &noise);
         }
         (noise, solution)
+    }
+
+    /// The solution with another noise.
+    fn with_noise(&mut self, mut solution: solve::Solution, noise: &noise::Noise) -> solve::Solution {
+        let before = self.touches.noise_mm();
+        self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
+        if !solution.converged || before.1 > 0.0 || noise.tau_mm > 0.0 || !self.touches.priors().is_empty() {
+            return self.refit_here(solution.theta);
+        }
+        // all weights change alike: the minimum stays where it is
+        let by = (noise.sigma_mm / before.0).powi(2);
+        solution.chi2 /= by;
+        solution.covariance *= by;
+        solution.iterations = 0;
+        solution
+    }
+
+    /// What the touches say of each other at a solution; `noise_dof` is that of σ.
+    pub fn judge(&mut self, solution: &solve::Solution, noise_dof: f64) -> &Snoop {
+        let known = self.judged.take().filter(|j| {
+            j.noise_dof == noise_dof
+                && j.noise_mm == self.touches.noise_mm()
+                && j.theta == solution.theta
+                && j.weights == self.touches.weights()
+        });
+        let judged = known.unwrap_or_else(|| {
+            let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
+            let (chi2, covariance) = (solution.chi2, &solution.covariance);
+            Judged {
+                theta: solution.theta.clone(),
+                weights: self.touches.weights().to_vec(),
+                noise_mm: self.touches.noise_mm(),
+                noise_dof,
+                snoop: Snoop::new(&self.touches, &solution.theta, covariance, (chi2, dof), noise_dof),
+            }
+        });
+        &self.judged.insert(judged).snoop
     }
 
     fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
@@ -215,12 +261,8 @@ impl Search<'_> {
         let n = self.data.observations.len();
         let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
         let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
-        let judge = |search: &Self, s: &solve::Solution| {
-            let dof = solve::Problem::n_rows(&search.touches).saturating_sub(search.observability.rank);
-            Snoop::new(&search.touches, &s.theta, &s.covariance, (s.chi2, dof), noise_dof)
-        };
         self.beyond = None;
-        let first = judge(self, &solution).dropped();
+        let first = self.judge(&solution, noise_dof).dropped();
         if first.is_empty() && self.scale2(&solution, noise_dof) < GROSS2 {
             return solution;
         }
@@ -251,7 +293,7 @@ impl Search<'_> {
             let scale2 = self.scale2(&solution, noise_dof);
             let back: Vec<usize> =
                 out.iter().copied().filter(|&i| snoop::belongs(self.off(&solution, i, scale2).1)).collect();
-            let more: Vec<usize> = judge(self, &solution).dropped();
+            let more: Vec<usize> = self.judge(&solution, noise_dof).dropped();
             if back.is_empty() && (more.is_empty() || out.len() >= most) {
                 break;
             }

@@ -8,14 +8,15 @@ use super::{Fit, Knowledge};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::{Model, Unknown};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Matrix3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// With more touches the whole catalogue would take longer than everything else together.
 pub(super) const MOST_UNMODELLED: usize = 20_000;
 
 /// Touches whose columns of the whole catalogue are held at once.
-const UNMODELLED_AT_ONCE: usize = 256;
+const UNMODELLED_AT_ONCE: usize = 128;
 
 /// Variance of each free unknown that goes back to the scatter of visits.
 pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
@@ -218,16 +219,20 @@ struct Sums {
     gram: DMatrix<f64>,
     /// JᵀB
     cross: DMatrix<f64>,
-    /// BᵀB
+    /// BᵀB, its lower triangle
     inner: DMatrix<f64>,
 }
 
 impl Sums {
     fn add(&mut self, jacobian: &DMatrix<f64>, b: &DMatrix<f64>) {
-        let (turned, b_turned) = (jacobian.transpose(), b.transpose());
-        self.gram.gemm(1.0, &turned, jacobian, 1.0);
-        self.cross.gemm(1.0, &turned, b, 1.0);
-        self.inner.gemm(1.0, &b_turned, b, 1.0);
+        let turned = turned(jacobian);
+        rayon::join(
+            || {
+                self.gram.gemm(1.0, &turned, jacobian, 1.0);
+                self.cross.gemm(1.0, &turned, b, 1.0);
+            },
+            || add_lower_square(&mut self.inner, b),
+        );
     }
 
     /// Where all that each column of B does goes, by unknown and in units of the noise; none where the touches show a part of it
@@ -261,7 +266,11 @@ impl Sums {
             // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
             self.inner.fill_diagonal_added();
             let Some(cholesky) = self.inner.cholesky() else { return unknown() };
-            self.gram -= &self.cross * cholesky.solve(&self.cross.transpose());
+            let mut half = self.cross.transpose();
+            if !cholesky.l_dirty().solve_lower_triangular_mut(&mut half) {
+                return unknown();
+            }
+            self.gram.gemm(-1.0, &half.transpose(), &half, 1.0);
         }
         let scaled = DMatrix::from_fn(p, p, |i, j| self.gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
         let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
@@ -269,6 +278,24 @@ impl Sums {
         let full = if seen.full() { inverse } else { &seen.seen * inverse * seen.seen.transpose() };
         DVector::from_fn(p, |i, _| full[(i, i)].max(0.0).sqrt() / seen.scale[i])
     }
+}
+
+/// A matrix seen by its rows, without a copy.
+fn turned(a: &DMatrix<f64>) -> DMatrixView<'_, f64, nalgebra::Dyn, nalgebra::Dyn> {
+    DMatrixView::from_slice_with_strides(a.as_slice(), a.ncols(), a.nrows(), a.nrows(), 1)
+}
+
+/// Adds BᵀB to the lower triangle of a matrix; what stands above it means nothing.
+fn add_lower_square(into: &mut DMatrix<f64>, b: &DMatrix<f64>) {
+    /// Columns of the product that are made together.
+    const BLOCK: usize = 64;
+    let q = b.ncols();
+    let turned = turned(b);
+    into.as_mut_slice().par_chunks_mut((q * BLOCK).max(1)).enumerate().for_each(|(k, part)| {
+        let (from, n) = (k * BLOCK, part.len() / q);
+        let mut part = DMatrixViewMut::from_slice(part, q, n);
+        part.rows_mut(from, q - from).gemm(1.0, &turned.rows(from, q - from), &b.columns(from, n), 1.0);
+    });
 }
 
 trait AddToDiagonal {

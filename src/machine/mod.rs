@@ -11,11 +11,26 @@ mod check_parts;
 pub use check::load;
 
 use crate::axes::{AxisMap, AxisName, Position};
+use crate::diag::{Result, source};
 use crate::geometry::{Transform, apply, rotation_about, translation};
 use nalgebra::{Unit, Vector3};
 
 /// The machines that are built in.
 pub const BUILT_IN: &str = include_str!("../../machines.toml");
+
+/// One machine of those that are built in; the tables of the others are not read. `None`: none of them is called so.
+///
+/// # Errors
+/// Never for a released program: a test reads each.
+pub fn built_in(name: &str) -> Result<Option<Machine>> {
+    const HEAD: &str = "[[machine]]";
+    let mut tables = BUILT_IN.split(HEAD);
+    let head = tables.next().unwrap_or_default();
+    let called = |table: &&str| table.split('"').nth(1) == Some(name);
+    let Some(table) = tables.find(called) else { return Ok(None) };
+    let text = source("machines.toml (built in)", format!("{head}{HEAD}{table}"));
+    Ok(load(&text)?.0.pop())
+}
 
 /// Where an axis stands in the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -233,6 +248,22 @@ pub struct Machine {
 /// Styli whose lengths and balls differ by less are taken for one, mm.
 pub const SAME_STYLUS_MM: f64 = 1e-6;
 
+/// Where the linear axes stand for each place of the ball in a carrier's frame, the rotary axes in one pose; mm.
+#[derive(Debug, Clone, Copy)]
+pub struct BallPlaces {
+    at_zero: Vector3<f64>,
+    /// Of the ball's way per way of X, Y and Z.
+    inverse: nalgebra::Matrix3<f64>,
+}
+
+impl BallPlaces {
+    /// X, Y and Z at which an errorless machine holds the ball there.
+    #[must_use]
+    pub fn linear_for(&self, ball: &Vector3<f64>) -> Vector3<f64> {
+        self.inverse * (ball - self.at_zero)
+    }
+}
+
 impl Machine {
     /// An axis by letter.
     #[must_use]
@@ -294,12 +325,17 @@ impl Machine {
         ball: &Vector3<f64>,
         length_mm: f64,
     ) -> Option<Position> {
-        let at_zero = pose.with_xyz_mm(Vector3::zeros());
-        let p0 = self.ball_in(carrier, &at_zero, length_mm);
+        let places = self.ball_places(carrier, pose, length_mm)?;
+        Some(pose.with_xyz_mm(places.linear_for(ball)))
+    }
+
+    /// The same for many places of the ball with the rotary axes in one pose.
+    #[must_use]
+    pub fn ball_places(&self, carrier: Carrier, pose: &Position, length_mm: f64) -> Option<BallPlaces> {
+        let at_zero = self.ball_in(carrier, &pose.with_xyz_mm(Vector3::zeros()), length_mm);
         let columns = [Vector3::x(), Vector3::y(), Vector3::z()]
-            .map(|unit| self.ball_in(carrier, &pose.with_xyz_mm(unit), length_mm) - p0);
-        let inverse = nalgebra::Matrix3::from_columns(&columns).try_inverse()?;
-        Some(pose.with_xyz_mm(inverse * (ball - p0)))
+            .map(|unit| self.ball_in(carrier, &pose.with_xyz_mm(unit), length_mm) - at_zero);
+        Some(BallPlaces { at_zero, inverse: nalgebra::Matrix3::from_columns(&columns).try_inverse()? })
     }
 
     /// A mounting by name. `NAME#2`, `NAME#3` … are the same blocks put up once more.

@@ -176,13 +176,24 @@ impl Catalogue {
         Ok(Self { rows: Arc::clone(&ROWS), own: Vec::new() })
     }
 
+    /// Begins to read the built-in rows on another thread, for who will need them all.
+    pub fn read_ahead() {
+        let rows = Arc::clone(&ROWS);
+        rayon::spawn(move || {
+            // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
+            for row in rows.iter().rev() {
+                row.effect();
+            }
+        });
+    }
+
     /// Begins to read and compile, on another thread, what any question to the whole catalogue will need for this machine:
     /// that takes as long as reading a study's plans and logs, and is ready when they are.
     pub fn prepare(&self, machine: &Machine) {
         let (rows, machine) = (Arc::clone(&self.rows), machine.clone());
         rayon::spawn(move || {
             let applies = |e: &&Effect| e.applies_to(&machine) && !e.paper && !e.discrete;
-            let effects = rows.iter().filter_map(Row::effect).filter(applies);
+            let effects = rows.iter().rev().filter_map(Row::effect).filter(applies);
             effects.flat_map(|e| &e.terms).for_each(|term| term.formula.prepare());
         });
     }

@@ -1,6 +1,7 @@
 //! From plans and touches to observations: what the model needs to know of each touch, and which touches it cannot use.
 
 use super::formula::{State, VARIABLES, slot};
+use super::poses::LastPose;
 use super::predict::{Observation, SetUp};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
@@ -106,6 +107,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut clock_s = 0.0;
     let mut first_touch_s: Option<f64> = None;
     let mut visits = Visits::default();
+    // as made and as planned: an axis that came to a little beside its pose would else push the other out at every touch
+    let (mut made, mut planned_at) = (LastPose::default(), LastPose::default());
     let (temperatures, temperature_says) = super::temperatures::of_runs(runs);
     data.temperature_says = temperature_says;
     for (index, run) in runs.iter().enumerate() {
@@ -167,11 +170,12 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let normal = Vector3::from(planned.normal).normalize();
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
             let ball_radius = planned.ball_radius_mm.unwrap_or(run.plan.ball_radius_mm);
-            let ideal = machine
-                .linear_for_ball(carrier, &planned.pose.position(), &(point + normal * ball_radius), length_mm)
+            let ball = point + normal * ball_radius;
+            let ideal = planned_at
+                .linear_for_ball(machine, carrier, &planned.pose.position(), &ball, length_mm)
                 .unwrap_or(touch.position);
             // the rotary axes stand where the control says they stand; a log without them means the plan's pose
-            let at = |position: Position| Observation {
+            let at = |position: Position, poses: &mut LastPose| Observation {
                 run: index,
                 id: touch.id,
                 set_up,
@@ -193,9 +197,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     before: &before.earlier,
                     length_mm,
                 }
-                .state(),
+                .state(poses),
             };
-            let observation = at(touch.position);
+            let observation = at(touch.position, &mut made);
             data.origins.push(Origin {
                 line: touch.line,
                 stage: planned.stage.to_string(),
@@ -203,7 +207,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 face: planned.face.to_string(),
             });
             // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
-            data.nominal.push(at(ideal));
+            data.nominal.push(at(ideal, &mut planned_at));
             data.repeats.push(repeat_group(&data, run.plan, planned, index));
             let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));
             data.visits.push(visit);
@@ -329,7 +333,7 @@ struct Circumstances<'a> {
 }
 
 impl Circumstances<'_> {
-    fn state(&self) -> State {
+    fn state(&self, poses: &mut LastPose) -> State {
         let c = self;
         let mut state = [0.0; VARIABLES.len()];
         for name in AxisName::ALL {
@@ -346,12 +350,12 @@ impl Circumstances<'_> {
         state[slot::LENGTHS + 1] = c.machine.tool.length_mm;
         let mut put = |from: usize, v: Vector3<f64>| state[from..from + 3].copy_from_slice(v.as_slice());
         let normal = Vector3::from(c.planned.normal).normalize();
-        let in_r = c.machine.carrier_frame(c.carrier, c.at).rotation * normal;
-        let into_tool = c.machine.tool_frame(c.at).rotation.inverse();
+        let turned = poses.turned(c.machine, c.carrier, c.at);
+        let in_r = turned.to_r * normal;
         let into_probe = nalgebra::Rotation3::from_axis_angle(&c.machine.tool.direction, -spindle);
         put(slot::NORMAL_IN_R, in_r);
-        put(slot::NORMAL_IN_PROBE, into_probe * (into_tool * in_r));
-        put(slot::GRAVITY, into_tool * -Vector3::z());
+        put(slot::NORMAL_IN_PROBE, into_probe * (turned.into_tool * in_r));
+        put(slot::GRAVITY, turned.into_tool * -Vector3::z());
         put(slot::NORMAL_OF_BLOCK, normal);
         put(slot::POINT, c.planned.point.into());
         put(slot::OUTWARD, outward(c.machine, c.carrier, &c.block.centre.into()));

@@ -68,28 +68,33 @@ pub const LONGEST: usize = 4000;
 #[derive(Clone, Debug)]
 pub struct Words;
 
+/// Made once: the expression crate asks for them several times for each formula.
+static WORDS: LazyLock<Vec<Operator<'static, f64>>> = LazyLock::new(|| {
+    let kept = ["+", "-", "*", "/", "^"];
+    let mut ops: Vec<Operator<'static, f64>> = FloatOpsFactory::<f64>::make()
+        .into_iter()
+        .filter(|op| kept.contains(&op.repr()) || FUNCTIONS.contains(&op.repr()) || op.repr() == "PI")
+        .collect();
+    let has = |ops: &[Operator<'static, f64>], word: &str| ops.iter().any(|op| op.repr() == word);
+    if !has(&ops, "sign") {
+        ops.push(Operator::make_unary("sign", |x: f64| if x == 0.0 { 0.0 } else { x.signum() }));
+    }
+    if !has(&ops, "step") {
+        ops.push(Operator::make_unary("step", |x: f64| if x >= 0.0 { 1.0 } else { 0.0 }));
+    }
+    if !has(&ops, "mod") {
+        ops.push(Operator::make_bin(
+            "mod",
+            BinOp { apply: |a: f64, b: f64| a - b * (a / b).floor(), prio: 4, is_commutative: false },
+        ));
+    }
+    ops.push(Operator::make_constant("pi", std::f64::consts::PI));
+    ops
+});
+
 impl MakeOperators<f64> for Words {
     fn make<'a>() -> Vec<Operator<'a, f64>> {
-        let kept = ["+", "-", "*", "/", "^"];
-        let mut ops: Vec<Operator<'a, f64>> = FloatOpsFactory::<f64>::make()
-            .into_iter()
-            .filter(|op| kept.contains(&op.repr()) || FUNCTIONS.contains(&op.repr()) || op.repr() == "PI")
-            .collect();
-        let has = |ops: &[Operator<'a, f64>], word: &str| ops.iter().any(|op| op.repr() == word);
-        if !has(&ops, "sign") {
-            ops.push(Operator::make_unary("sign", |x: f64| if x == 0.0 { 0.0 } else { x.signum() }));
-        }
-        if !has(&ops, "step") {
-            ops.push(Operator::make_unary("step", |x: f64| if x >= 0.0 { 1.0 } else { 0.0 }));
-        }
-        if !has(&ops, "mod") {
-            ops.push(Operator::make_bin(
-                "mod",
-                BinOp { apply: |a: f64, b: f64| a - b * (a / b).floor(), prio: 4, is_commutative: false },
-            ));
-        }
-        ops.push(Operator::make_constant("pi", std::f64::consts::PI));
-        ops
+        WORDS.clone()
     }
 }
 
@@ -111,8 +116,33 @@ struct Parts {
     constant: Option<f64>,
     /// `None` for a bare number.
     value: Option<Compiled>,
-    /// One per shape parameter that stands in it; `None` where the crate cannot differentiate (`floor`, `step`, …).
-    partials: Vec<(usize, Option<Compiled>)>,
+    /// One per shape parameter that stands in it.
+    partials: Vec<Partial>,
+}
+
+/// The derivative with respect to a shape parameter, made when somebody asks for it: that takes longer than the formula itself, and
+/// effects of no size need none.
+#[derive(Debug, Clone)]
+struct Partial {
+    /// Which of the effect's parameters.
+    shape: usize,
+    /// Which of the expression's variables.
+    at: usize,
+    /// `None` where the crate cannot differentiate (`floor`, `step`, …).
+    compiled: OnceLock<Option<Compiled>>,
+}
+
+impl Partial {
+    fn compiled(&self, (expression, origins): &Compiled) -> Option<&Compiled> {
+        let make = || {
+            let partial = expression.clone().partial(self.at).ok()?;
+            // its variables are some of the formula's
+            let of_name = |name: &String| expression.var_names().iter().position(|own| own == name).map(|i| origins[i]);
+            let origins = partial.var_names().iter().map(of_name).collect::<Option<Vec<_>>>()?;
+            Some((partial, origins))
+        };
+        self.compiled.get_or_init(make).as_ref()
+    }
 }
 
 /// A text that is compiled at most once; `None` where it is no formula.
@@ -201,7 +231,7 @@ impl Formula {
     /// Does this parameter of the effect stand inside?
     #[must_use]
     pub fn holds(&self, shape: usize) -> bool {
-        self.parts().is_some_and(|p| p.partials.iter().any(|(s, _)| *s == shape))
+        self.parts().is_some_and(|p| p.partials.iter().any(|p| p.shape == shape))
     }
 
     /// The state variables that it uses.
@@ -222,12 +252,35 @@ impl Formula {
         }
     }
 
+    /// Values at many states. Touches of one pose mostly follow one another: where the variables are those of the state before,
+    /// so is the value.
+    pub fn eval_each<'s>(&self, states: impl Iterator<Item = &'s State>, shapes: &[f64]) -> Vec<f64> {
+        let Some((expression, origins)) = self.parts().filter(|p| p.constant.is_none()).and_then(|p| p.value.as_ref())
+        else {
+            return states.map(|state| self.eval(state, shapes)).collect();
+        };
+        let mut before: Option<([f64; MOST_VARIABLES], f64)> = None;
+        let value = |state: &State| {
+            let values = variables(origins, state, shapes);
+            let value = match before {
+                Some((last, value)) if last.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits()) => value,
+                _ => expression.eval(&values[..origins.len()]).unwrap_or(f64::NAN),
+            };
+            before = Some((values, value));
+            value
+        };
+        states.map(value).collect()
+    }
+
     /// Derivatives with respect to the shape parameters that stand inside: (which, value).
     pub fn partials<'a>(&'a self, state: &'a State, shapes: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        let partials = self.parts().map_or(&[][..], |p| &p.partials);
-        partials.iter().map(move |(shape, partial)| {
-            let value = partial.as_ref().map(|p| evaluate(p, state, shapes)).filter(|v| v.is_finite());
-            (*shape, value.unwrap_or_else(|| self.difference(*shape, state, shapes)))
+        let parts = self.parts();
+        let partials = parts.map_or(&[][..], |p| &p.partials);
+        let formula = parts.and_then(|p| p.value.as_ref());
+        partials.iter().map(move |partial| {
+            let compiled = formula.and_then(|f| partial.compiled(f));
+            let value = compiled.map(|p| evaluate(p, state, shapes)).filter(|v| v.is_finite());
+            (partial.shape, value.unwrap_or_else(|| self.difference(partial.shape, state, shapes)))
         })
     }
 
@@ -251,16 +304,11 @@ fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     let expression =
         Expression::parse(&plain).map_err(|_| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
     let origins = origins(&expression, shapes)?;
-    let mut partials = Vec::new();
-    for (at, origin) in origins.iter().enumerate() {
-        if let Origin::Shape(shape) = origin {
-            let partial = expression.clone().partial(at).ok().and_then(|p| {
-                let o = self::origins(&p, shapes).ok()?;
-                Some((p, o))
-            });
-            partials.push((*shape, partial));
-        }
-    }
+    let partial = |(at, origin): (usize, &Origin)| match origin {
+        Origin::Shape(shape) => Some(Partial { shape: *shape, at, compiled: OnceLock::new() }),
+        Origin::State(_) => None,
+    };
+    let partials = origins.iter().enumerate().filter_map(partial).collect();
     let constant = if origins.is_empty() { expression.eval(&[]).ok() } else { None };
     Ok(Parts { constant, value: Some((expression, origins)), partials })
 }
@@ -322,22 +370,28 @@ fn known_functions(text: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
-    // formulas are short: their variables fit on the stack
-    let mut values = [0.0; 32];
+/// Variables of a formula at most: they fit on the stack.
+const MOST_VARIABLES: usize = 32;
+
+fn variables(origins: &[Origin], state: &State, shapes: &[f64]) -> [f64; MOST_VARIABLES] {
+    let mut values = [0.0; MOST_VARIABLES];
     for (value, origin) in values.iter_mut().zip(origins) {
         *value = match origin {
             Origin::State(i) => state[*i],
             Origin::Shape(i) => shapes.get(*i).copied().unwrap_or(f64::NAN),
         };
     }
-    expression.eval(&values[..origins.len().min(32)]).unwrap_or(f64::NAN)
+    values
+}
+
+fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
+    expression.eval(&variables(origins, state, shapes)[..origins.len()]).unwrap_or(f64::NAN)
 }
 
 fn origins(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
     let names = expression.var_names();
-    if names.len() > 32 {
-        return Err("a formula has more than 32 variables".to_owned());
+    if names.len() > MOST_VARIABLES {
+        return Err(format!("a formula has more than {MOST_VARIABLES} variables"));
     }
     names
         .iter()

@@ -8,6 +8,8 @@ pub mod data;
 mod digits;
 pub mod formula;
 pub mod mistake;
+mod placed;
+mod poses;
 pub mod predict;
 mod temperatures;
 pub mod traces;

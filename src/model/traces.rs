@@ -49,7 +49,7 @@ impl<'a> Traces<'a> {
             formulas.filter(|f| f.constant().is_none() && !f.has_shape()).map(|f| (f.text(), f)).collect();
         let plain = plain
             .into_par_iter()
-            .map(|(text, formula)| (text, observations.iter().map(|o| formula.eval(&o.state, &[])).collect()))
+            .map(|(text, formula)| (text, formula.eval_each(observations.iter().map(|o| &o.state), &[])))
             .collect();
         Self { batch, slope, plain }
     }
@@ -78,9 +78,10 @@ impl<'a> Traces<'a> {
                 Some(values) => values,
                 // all terms of one block's effect belong to that block: the other touches are not looked at
                 None => shaped.entry(formula.text()).or_insert_with(|| {
-                    let here = |o: &Observation| active.set_up.is_none_or(|own| own == o.set_up);
-                    let value = |o: &Observation| if here(o) { formula.eval(&o.state, shapes) } else { 0.0 };
-                    self.batch.observations().iter().map(value).collect()
+                    let all = || self.batch.observations().iter();
+                    let here = |o: &&Observation| active.set_up.is_none_or(|own| own == o.set_up);
+                    let mut own = formula.eval_each(all().filter(here).map(|o| &o.state), shapes).into_iter();
+                    all().map(|o| if here(&o) { own.next().unwrap_or_default() } else { 0.0 }).collect()
                 }),
             };
             self.add(column, active, slope.iter().zip(coefficient).map(|(s, c)| s * c));

@@ -2,6 +2,17 @@ use crate::axes::AxisName;
 use crate::diag::source;
 
 #[test]
+fn each_built_in_machine_is_the_same_by_its_own_table() {
+    let (machines, _) = super::load(&source("machines.toml", crate::machine::BUILT_IN)).unwrap();
+    assert!(machines.len() > 3);
+    for machine in machines {
+        let alone = crate::machine::built_in(&machine.name).unwrap().unwrap();
+        assert_eq!(format!("{alone:?}"), format!("{machine:?}"));
+    }
+    assert!(crate::machine::built_in("nobody").unwrap().is_none());
+}
+
+#[test]
 fn the_built_in_machines_are_good() {
     let (machines, findings) = super::load(&source("machines.toml", crate::machine::BUILT_IN)).unwrap();
     assert_eq!(machines.len(), 4);
