@@ -8,7 +8,7 @@ use super::{Fit, Knowledge};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::{Model, Unknown};
-use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Matrix3};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -225,7 +225,7 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, jacobian: &DMatrix<f64>, b: &DMatrix<f64>) {
-        let turned = turned(jacobian);
+        let turned = jacobian.transpose();
         rayon::join(
             || {
                 self.gram.gemm(1.0, &turned, jacobian, 1.0);
@@ -280,17 +280,12 @@ impl Sums {
     }
 }
 
-/// A matrix seen by its rows, without a copy.
-fn turned(a: &DMatrix<f64>) -> DMatrixView<'_, f64, nalgebra::Dyn, nalgebra::Dyn> {
-    DMatrixView::from_slice_with_strides(a.as_slice(), a.ncols(), a.nrows(), a.nrows(), 1)
-}
-
 /// Adds BᵀB to the lower triangle of a matrix; what stands above it means nothing.
 fn add_lower_square(into: &mut DMatrix<f64>, b: &DMatrix<f64>) {
     /// Columns of the product that are made together.
     const BLOCK: usize = 64;
     let q = b.ncols();
-    let turned = turned(b);
+    let turned = b.transpose();
     into.as_mut_slice().par_chunks_mut((q * BLOCK).max(1)).enumerate().for_each(|(k, part)| {
         let (from, n) = (k * BLOCK, part.len() / q);
         let mut part = DMatrixViewMut::from_slice(part, q, n);
