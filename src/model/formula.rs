@@ -110,6 +110,15 @@ enum Origin {
     Shape(usize),
 }
 
+impl Origin {
+    fn value(self, state: &State, shapes: &[f64]) -> f64 {
+        match self {
+            Self::State(i) => state[i],
+            Self::Shape(i) => shapes.get(i).copied().unwrap_or(f64::NAN),
+        }
+    }
+}
+
 /// What a formula is once it is compiled.
 #[derive(Debug, Clone)]
 struct Parts {
@@ -259,14 +268,17 @@ impl Formula {
         else {
             return states.map(|state| self.eval(state, shapes)).collect();
         };
-        let mut before: Option<([f64; MOST_VARIABLES], f64)> = None;
+        let mut before = [0.0_f64; MOST_VARIABLES];
+        let (before, mut last) = (&mut before[..origins.len()], None);
         let value = |state: &State| {
-            let values = variables(origins, state, shapes);
-            let value = match before {
-                Some((last, value)) if last.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits()) => value,
-                _ => expression.eval(&values[..origins.len()]).unwrap_or(f64::NAN),
-            };
-            before = Some((values, value));
+            let mut same = true;
+            for (before, origin) in before.iter_mut().zip(origins) {
+                let value = origin.value(state, shapes);
+                same &= before.to_bits() == value.to_bits();
+                *before = value;
+            }
+            let value = last.filter(|_| same).unwrap_or_else(|| expression.eval(before).unwrap_or(f64::NAN));
+            last = Some(value);
             value
         };
         states.map(value).collect()
@@ -373,19 +385,12 @@ fn known_functions(text: &str) -> Result<(), String> {
 /// Variables of a formula at most: they fit on the stack.
 const MOST_VARIABLES: usize = 32;
 
-fn variables(origins: &[Origin], state: &State, shapes: &[f64]) -> [f64; MOST_VARIABLES] {
+fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
     let mut values = [0.0; MOST_VARIABLES];
     for (value, origin) in values.iter_mut().zip(origins) {
-        *value = match origin {
-            Origin::State(i) => state[*i],
-            Origin::Shape(i) => shapes.get(*i).copied().unwrap_or(f64::NAN),
-        };
+        *value = origin.value(state, shapes);
     }
-    values
-}
-
-fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
-    expression.eval(&variables(origins, state, shapes)[..origins.len()]).unwrap_or(f64::NAN)
+    expression.eval(&values[..origins.len()]).unwrap_or(f64::NAN)
 }
 
 fn origins(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
@@ -421,6 +426,26 @@ mod tests {
         let mut state = [0.0; VARIABLES.len()];
         state[VARIABLES.iter().position(|v| *v == name).unwrap()] = value;
         state
+    }
+
+    #[test]
+    fn many_values_are_those_of_each() {
+        let formula = Formula::parse("atan2(B, -1) * exp(-t / tau)", &["tau"]).unwrap();
+        // 0 and -0 are two angles to atan2; the same state comes again, and later
+        let states: Vec<State> = [(0.0, 1.0), (0.0, 1.0), (-0.0, 1.0), (-0.0, 2.0), (0.5, 2.0), (0.0, 1.0)]
+            .map(|(b, t)| {
+                let mut state = at("B", b);
+                state[slot::HOURS] = t;
+                state
+            })
+            .to_vec();
+        let each: Vec<u64> = states.iter().map(|s| formula.eval(s, &[3.0]).to_bits()).collect();
+        let all: Vec<u64> = formula.eval_each(states.iter(), &[3.0]).into_iter().map(f64::to_bits).collect();
+        assert_eq!(all, each);
+        assert_ne!(each[1], each[2]);
+        // a bare number, and a shape that nobody gave
+        assert_eq!(Formula::parse("2", &[]).unwrap().eval_each(states.iter(), &[]), [2.0; 6]);
+        assert!(formula.eval_each(states.iter(), &[]).iter().all(|v| v.is_nan()));
     }
 
     #[test]
