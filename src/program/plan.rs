@@ -212,9 +212,12 @@ impl Plan {
     /// # Errors
     /// When the text is not JSON of this form, or a touch contradicts itself.
     pub fn parse(source: &Source) -> Result<(Self, Findings)> {
-        let plan: Self = serde_json::from_str(source.inner()).map_err(|e| {
-            from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
-        })?;
+        let by_the_library = || {
+            serde_json::from_str(source.inner()).map_err(|e| {
+                from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
+            })
+        };
+        let plan: Self = super::plan_lines::read(source.inner()).map_or_else(by_the_library, Ok)?;
         let mut findings = Findings::default();
         if plan.format != FORMAT {
             findings.push(
