@@ -25,18 +25,23 @@ pub(super) fn read(text: &str) -> Option<Plan> {
     let begin = text.find(BEGIN)? + BEGIN.len();
     let end = begin + text[begin..].find(END)?;
     let lines: Vec<&str> = text[begin..end].strip_prefix('\n')?.split('\n').collect();
-    let (last, others) = lines.split_last()?;
-    let touch = |line: &&str| self::touch(line.strip_suffix(',')?);
-    let mut touches: Vec<PlanTouch> = if others.len() < FEW {
-        let mut out = Vec::with_capacity(lines.len());
-        for line in others {
+    let n = lines.len();
+    let touch = |(i, line): (usize, &&str)| {
+        let line = if i + 1 < n { line.strip_suffix(',')? } else { line };
+        self::touch(line)
+    };
+    let touches = if n < FEW || rayon::current_num_threads() < 2 {
+        let mut out = Vec::with_capacity(n);
+        for line in lines.iter().enumerate() {
             out.push(touch(line)?);
         }
         out
     } else {
-        others.par_iter().map(touch).collect::<Option<_>>()?
+        // each straight into its place: they are larger than their lines
+        let mut read = Vec::new();
+        lines.par_iter().enumerate().map(touch).collect_into_vec(&mut read);
+        read.into_iter().collect::<Option<Vec<PlanTouch>>>()?
     };
-    touches.push(self::touch(last)?);
     let frame = format!("{}{}", &text[..begin], &text[end + END.len() - 1..]);
     let plan: Plan = serde_json::from_str(&frame).ok()?;
     plan.touches.is_empty().then_some(Plan { touches, ..plan })
@@ -120,10 +125,19 @@ impl Cursor<'_> {
 
     /// How many digits stand here (no more than there is room for), and what they make of a value.
     fn digits(&mut self, mut value: u64, room: usize) -> Option<(usize, u64)> {
-        let count = self.rest.iter().position(|b| !b.is_ascii_digit()).filter(|n| *n <= room)?;
-        let (digits, rest) = self.rest.split_at(count);
-        digits.iter().for_each(|b| value = value * 10 + u64::from(b - b'0'));
-        self.rest = rest;
+        let mut count = 0;
+        loop {
+            let digit = self.rest.get(count)?.wrapping_sub(b'0');
+            if digit > 9 {
+                break;
+            }
+            if count == room {
+                return None;
+            }
+            value = value * 10 + u64::from(digit);
+            count += 1;
+        }
+        self.rest = &self.rest[count..];
         Some((count, value))
     }
 
