@@ -134,7 +134,9 @@ impl Search<'_> {
     fn with_noise(&mut self, mut solution: solve::Solution, noise: &noise::Noise) -> solve::Solution {
         let before = self.touches.noise_mm();
         self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
-        if !solution.converged || before.1 > 0.0 || noise.tau_mm > 0.0 || !self.touches.priors().is_empty() {
+        // where a gauge was followed along its bend, the covariance is not yet that of where it led
+        let stays = solution.converged && self.observability.full() && self.touches.priors().is_empty();
+        if !stays || before.1 > 0.0 || noise.tau_mm > 0.0 {
             return self.refit_here(solution.theta);
         }
         // all weights change alike: the minimum stays where it is
