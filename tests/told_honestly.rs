@@ -194,3 +194,56 @@ fn runs_that_disagree_are_named_as_runs() {
     assert_eq!(found.depends[0].by, "run", "{}", found.says);
     assert!(axiscal::diagnose::words::at_the_machine(&found).contains("between the runs"), "{}", found.says);
 }
+
+/// What is answered is the minimum of the noise that is answered, however the fit came to it: solved again from elsewhere, with that
+/// noise, the same values, covariance and chi-square come out.
+#[test]
+fn the_answer_belongs_to_its_noise() {
+    let mut other_than_declared = 0;
+    for (name, program, touch_um, visit_um, stated_tau_mm, chips) in [
+        ("swivel-head", "full", 2.5, 0.0, Some(0.0), 0),
+        ("swivel-head", "full", 0.6, 0.0, Some(0.0), 3),
+        ("swivel-head", "full", 1.0, 0.8, None, 2),
+        ("trunnion", "full", 3.0, 0.0, Some(0.0), 2),
+        ("double-head", "full", 2.0, 0.0, Some(0.0), 0),
+        ("swivel-head", "head", 2.0, 0.0, Some(0.0), 2),
+        ("trunnion", "basic", 1.0, 0.5, None, 1),
+    ] {
+        let machine = machine(name);
+        let plan = plan(&machine, program);
+        let text = format!("seed = 11\n[noise]\ntouch_um = {touch_um:?}\nvisit_um = {visit_um:?}\n");
+        let mut touches = touch(&machine, &plan, &scenario(&machine, &text), None);
+        for k in 0..chips {
+            let n = touches.len();
+            touches[17 + k * n / 4].position.0[..3].iter_mut().for_each(|at| *at += 0.2);
+        }
+        let axes = machine.axes.iter().filter(|a| a.name.is_rotary());
+        let mut effects: Vec<String> = axes.map(|a| format!("location-{}", a.name).to_lowercase()).collect();
+        effects.extend(["block-setup", "pretravel"].map(str::to_owned));
+        let settings = Settings { effects, visit_sigma_mm: stated_tau_mm, ..Settings::default() };
+        let fit = fitted(&machine, &plan, &touches, &settings);
+        let case = format!("{name} {program} {touch_um}");
+        assert!(fit.rejected.len() >= chips, "{case}: {:?}", fit.rejected);
+        other_than_declared += usize::from((fit.noise.sigma_mm / 1e-3).ln().abs() > 0.3 && fit.observability.full());
+        let theta = fit.free_theta();
+        let sigma = |c: usize| fit.covariance[(fit.free[c], fit.free[c])].sqrt();
+        let held = |c: usize| fit.observability.held.contains(&c);
+        let mut start = theta.clone();
+        for c in (0..start.len()).filter(|c| !held(*c)) {
+            start[c] += 20.0 * sigma(c) * if c % 2 == 0 { 1.0 } else { -1.0 };
+        }
+        let again = fit.with_touches(fit.noise.tau_mm, |t| fit::solve::minimise(t, start, &fit.observability));
+        assert!(again.converged && again.iterations > 0, "{case}: {}", again.stopped);
+        assert!((again.chi2 / fit.chi2 - 1.0).abs() < 1e-9, "{case}: {} {}", again.chi2, fit.chi2);
+        for a in (0..theta.len()).filter(|c| !held(*c)) {
+            let off = (again.theta[a] - theta[a]).abs() / sigma(a);
+            assert!(off < 1e-6, "{case}: {} is {off} standard uncertainties off", fit.model.unknowns[fit.free[a]].name);
+            for b in (0..theta.len()).filter(|c| !held(*c)) {
+                let off =
+                    (again.covariance[(a, b)] - fit.covariance[(fit.free[a], fit.free[b])]) / (sigma(a) * sigma(b));
+                assert!(off.abs() < 1e-6, "{case}: covariance of {a} and {b} is {off} off");
+            }
+        }
+    }
+    assert!(other_than_declared >= 3, "{other_than_declared} cases whose noise was not the declared one");
+}
