@@ -247,3 +247,58 @@ fn the_answer_belongs_to_its_noise() {
     }
     assert!(other_than_declared >= 3, "{other_than_declared} cases whose noise was not the declared one");
 }
+
+/// A stated scatter of index visits that revisited poses contradict is used, and said to be contradicted; one that chance allows is not.
+#[test]
+fn a_stated_scatter_of_visits_is_held_against_the_revisits() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let text = "seed = 5\n[noise]\ntouch_um = 1.0\nvisit_um = 0.5\n";
+    let touches = touch(&machine, &plan, &scenario(&machine, text), None);
+    for (stated_um, contradicted) in [(5.0, true), (0.0, true), (0.35, false), (0.5, false), (0.7, false)] {
+        let settings = Settings { visit_sigma_mm: Some(1e-3 * stated_um), ..settings(&machine, &[]) };
+        let fit = fitted(&machine, &plan, &touches, &settings);
+        assert_eq!((fit.noise.tau_mm, fit.noise.visit_source), (1e-3 * stated_um, "study"));
+        let said = fit.outcome.warnings.iter().any(|w| w.contains("visit_um") && w.contains("no chance makes that"));
+        assert_eq!(said, contradicted, "{stated_um}: {:?}", fit.outcome.warnings);
+    }
+}
+
+/// What an axis does goes with where it stands when the probe triggers: without noise its errors come back beside a pre-travel, too.
+#[test]
+fn errors_along_an_axis_come_back_beside_a_pretravel() {
+    for (name, effect, planted) in [
+        ("swivel-head", "pitch-x", vec![("pitch_X", 10.0), ("EXXc", 2.0), ("EXXs", -1.5)]),
+        ("swivel-head", "scale-x", vec![("EXX", 15.0)]),
+        ("trunnion", "straightness-xy", vec![("EXY2", 8.0)]),
+        ("trunnion", "squareness-xy", vec![("EC0Y", 16.0)]),
+    ] {
+        let machine = machine(name);
+        let plan = plan(&machine, "full");
+        let mut text = format!("[effects.pretravel]\npretravel = 0.005\n[effects.{effect}]\n");
+        planted.iter().for_each(|(p, v)| text += &format!("{p} = {v:?}\n"));
+        let touches = touch(&machine, &plan, &scenario(&machine, &text), None);
+        let fit = fitted(&machine, &plan, &touches, &settings(&machine, &[effect]));
+        for (p, v) in planted.iter().chain(&[("pretravel", 0.005)]) {
+            let found = value(&fit, p);
+            assert!((found - v).abs() < 1e-10 * v.abs().max(1.0), "{name} {effect}: {p} is {found}, planted {v}");
+        }
+    }
+}
+
+/// Each value of a shape is tried once: where it begins and the same place of a grid, in another rounding, are no two values, of which
+/// the one beside the other could be taken for a minimum of its own.
+#[test]
+fn no_value_of_a_shape_is_tried_twice() {
+    let machine = machine("swivel-head");
+    let mut catalogue = Catalogue::built_in().unwrap();
+    let own = "[[effect]]\nid = \"two\"\nat = \"base\"\n\
+        terms = [{ parameter = \"ta\", unit = \"um\", dof = \"dz\", formula = \"exp(-t/t2)\" }]\n\
+        shape = [{ parameter = \"t2\", unit = \"h\", start = 0.1, min = 0.01, max = 10 }]\n";
+    catalogue.add_file(&axiscal::diag::source("two.toml", own)).unwrap();
+    let p = &catalogue.get("two", &machine).unwrap().parameters[1];
+    let does = |at: f64| nalgebra::DMatrix::from_fn(300, 1, |i, _| (-0.005 * i as f64 / at).exp());
+    let values = fit::fine(p, 300, &does);
+    assert!(values.len() > 24 && values.iter().any(|v| (v - 0.1).abs() < 1e-9));
+    assert!(values.windows(2).all(|w| w[1] - w[0] > 1e-6 * w[1]), "{values:?}");
+}

@@ -7,7 +7,7 @@ use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
 use crate::fit::whitening::Whitening;
-use crate::fit::{design_jacobian, free_in_a_design, jumps_in_a_design};
+use crate::fit::{design_jacobian, every_formula_has_a_value, free_in_a_design, jumps_in_a_design, scan};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -251,6 +251,8 @@ impl View {
             return Err(Failure::new("assess::no_touches", "the plan has no touch that this machine can make")
                 .help("is it a plan for this machine, and does it touch any block?"));
         }
+        // one that is no number would make every slope none. No touch of a plan carries a temperature: built-in ones may wait for it
+        every_formula_has_a_value(task.effects.iter().copied().filter(|e| !e.built_in), &data.nominal)?;
         let model = Model::new(task.machine, &task.effects, &data.set_ups, task.reference);
         let free = free_in_a_design(&model, &task.effects, &data, &task.held);
         let mut theta = model.start();
@@ -315,7 +317,6 @@ impl View {
             let mut plain = scaled(&all.values, &own, &all.unknowns);
             let mut whitened = self.whitened(&plain);
             let start = effect.parameters.iter().find_map(|p| p.shape.map(|s| s.0));
-            let scan: &[f64] = effect.parameters.iter().find(|p| !p.scan.is_empty()).map_or(&[], |p| &p.scan);
             let mut shape = start;
             if let Some(shapes) = given.and_then(|value| shapes_at(effect, value)) {
                 let (data, places) = (&self.data, &self.data.nominal);
@@ -325,9 +326,20 @@ impl View {
                 whitened = self.whitened(&plain);
                 shape = *given;
             } else if self.kept(&whitened) < KEPT {
-                let step = scan.len().div_ceil(MOST_SHAPES).max(1);
+                let scanned = effect.parameters.iter().find(|p| !p.scan.is_empty());
                 let mut best = KEPT;
-                for &value in scan.iter().step_by(step) {
+                // the usual values; where none of them shows it, as in a plan that is over before the first of them, the plan's own
+                let usual = scanned.map_or_else(Vec::new, |p| p.scan.clone());
+                let own = scanned.filter(|p| p.between.is_some()).and_then(|p| scan(p, &self.data)).unwrap_or_default();
+                let few = |all: Vec<f64>| {
+                    let step = all.len().div_ceil(MOST_SHAPES).max(1);
+                    all.into_iter().step_by(step).collect::<Vec<f64>>()
+                };
+                let (usual, own) = (few(usual), few(own));
+                for (k, &value) in usual.iter().chain(&own).enumerate() {
+                    if k == usual.len() && best > KEPT {
+                        break;
+                    }
                     let at = columns(
                         task.machine,
                         &[effect],

@@ -436,6 +436,7 @@ fn warnings(
         ));
     }
     out.extend(fit.noise.contradiction());
+    out.extend(fit.noise.contradiction_of_visits());
     out.extend(fit.noise.coarse());
     let contradictions = contradictions::contradictions(fit, machine, effects, settings);
     // what is stated wrongly is no fault of the model

@@ -5,8 +5,7 @@ use super::candidates::without_value;
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
-use crate::model::data::Data;
-use crate::model::predict::{Model, Unknown};
+use crate::model::predict::{Model, Observation, Unknown};
 use std::collections::BTreeMap;
 
 /// The effects of a model, in order.
@@ -50,9 +49,15 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
 }
 
 /// A formula that gives no number at a touch would spoil the whole fit: say which, and where.
-pub(super) fn every_formula_has_a_value(effects: &[&Effect], data: &Data) -> Result<()> {
+///
+/// # Errors
+/// Names each such formula with its first touch.
+pub fn every_formula_has_a_value<'e>(
+    effects: impl IntoIterator<Item = &'e Effect>,
+    observations: &[Observation],
+) -> Result<()> {
     let mut findings = Vec::new();
-    for bad in effects.iter().flat_map(|e| without_value(e, &data.observations)) {
+    for bad in effects.into_iter().flat_map(|e| without_value(e, observations)) {
         findings.push(Finding::error("model::no_value", bad.says()).help(
             "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
         ));

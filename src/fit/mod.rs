@@ -30,7 +30,7 @@ pub mod uncertainty;
 mod weak;
 pub mod whitening;
 
-pub use knowledge::effects_of;
+pub use knowledge::{effects_of, every_formula_has_a_value};
 pub use rank::{design_jacobian, free_in_a_design, held_first, jumps_in_a_design, observe_plan};
 pub use shapes::{all_tried, around, between, fine, scan, start_shapes};
 pub use starts::identify_data;
@@ -234,7 +234,7 @@ fn identify_from(
     let model = Model::new(machine, effects, &data.set_ups, reference);
     let knowledge = knowledge::resolve(&model.unknowns, &settings.knowledge)?;
     knowledge::within_range(&model, &knowledge, effects)?;
-    knowledge::every_formula_has_a_value(effects, &data)?;
+    knowledge::every_formula_has_a_value(effects.iter().copied(), &data.observations)?;
     knowledge::stated_at_the_pivot(&model, &knowledge, machine)?;
     let mut theta = model.start();
     for (value, u) in theta.iter_mut().zip(&model.unknowns) {

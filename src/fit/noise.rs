@@ -5,13 +5,17 @@
 
 use super::digits::Rounding;
 use super::quantiles;
-use super::revisits::{Followed, revisits};
+use super::revisits::{Followed, Revisits, revisits};
 use crate::units::um_from_mm;
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Fewer degrees of freedom than this say too little: their 95 % interval for σ spans more than a factor of two.
 const LEAST_REPEATS: usize = 8;
+
+/// What chance makes so seldom contradicts what is stated, if it is off by more than this factor.
+const LEVEL: f64 = 1e-3;
+const TENTH: f64 = 1.1;
 
 /// Fewer contrasts than this say too little about visits.
 const LEAST_REVISITS: usize = 6;
@@ -41,6 +45,9 @@ pub struct Noise {
     pub repeats: Option<(f64, f64)>,
     /// σ as the user states it, mm, where the repeats contradict it and are taken in its place.
     pub contradicted_mm: Option<f64>,
+    /// What revisited poses say of τ where they contradict what the user states: the stated one, the one that they show, mm, and its
+    /// degrees of freedom. What is stated is used all the same.
+    pub visits_contradict: Option<(f64, f64, f64)>,
     /// There are repeats enough, and they agree as far as the digits of the log go: they say nothing of the noise.
     pub repeats_agree: bool,
     /// The part of σ that the digits of the log make, mm.
@@ -124,6 +131,12 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         None => fixed(known.declared_tau_mm, "declared"),
     };
     let repeats = from_repeats.map(|found| (found, dof as f64));
+    let visits_contradict = known.stated_tau_mm.filter(|_| enough).and_then(|stated| {
+        let (found, found_dof, _) = revisits.solve(sigma_mm);
+        // what changes between the visits and is no noise makes them scatter, too
+        let off = contradicts_visits(&revisits, (sigma_mm, sigma_dof), (found, stated), later_mm.is_some());
+        off.then_some((stated, found, found_dof))
+    });
     Noise {
         sigma_mm,
         source,
@@ -135,16 +148,30 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         later_mm,
         repeats,
         contradicted_mm,
+        visits_contradict,
         repeats_agree,
         rounding_mm: rounding.sigma_mm(),
     }
 }
 
+/// Do revisited poses contradict a stated τ, by the measure of [`contradicts`]? `changes`: something else does between visits, so that
+/// they can only scatter too much.
+fn contradicts_visits(
+    revisits: &Revisits,
+    (sigma_mm, sigma_dof): (f64, Option<f64>),
+    (found_mm, stated_mm): (f64, f64),
+    changes: bool,
+) -> bool {
+    let (ratio, k) = revisits.beside(sigma_mm, stated_mm);
+    let below = ChiSquared::new(k as f64).map_or(0.5, |d| d.cdf(ratio * k as f64));
+    let too_little = ratio > chi2_limit(k, sigma_dof) && !changes;
+    let too_much = below < 0.5 * LEVEL;
+    (too_little || too_much) && (found_mm - stated_mm).abs() > (TENTH - 1.0) * found_mm.max(stated_mm)
+}
+
 /// Do repeats contradict a stated standard deviation? They lie on one side of it further than chance makes once in a
 /// thousand (both sides together), and by more than a tenth: less is no matter to anyone.
 fn contradicts(found_mm: f64, dof: usize, stated_mm: f64) -> bool {
-    const LEVEL: f64 = 1e-3;
-    const TENTH: f64 = 1.1;
     let ratio = found_mm / stated_mm;
     let chi2 = ratio * ratio * dof as f64;
     let below = ChiSquared::new(dof as f64).map_or(0.5, |d| d.cdf(chi2));
@@ -241,6 +268,20 @@ impl Noise {
              degrees of freedom): no chance makes that, and the repeats are used; take touch_um out, or find out what has changed",
             um_from_mm(stated),
             um_from_mm(found)
+        ))
+    }
+
+    /// What the study states of the visits' scatter and the log contradicts, in words.
+    #[must_use]
+    pub fn contradiction_of_visits(&self) -> Option<String> {
+        let (stated, found, dof) = self.visits_contradict?;
+        Some(format!(
+            "the study states a scatter of index visits of {:.2} um ([noise] visit_um), and the revisited poses of these touches say {:.2} um \
+             ({} of freedom): no chance makes that. What is stated is used, and the uncertainties are those of it; take visit_um out, \
+             or find out what has changed",
+            um_from_mm(stated),
+            um_from_mm(found),
+            degrees(dof)
         ))
     }
 

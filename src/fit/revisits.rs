@@ -148,6 +148,13 @@ impl Revisits {
         self.within.1 += (n - points.len()).saturating_sub(n_contrasts);
     }
 
+    /// How much the contrasts scatter over what a τ makes of them (mean square 1 where it is the true one), and their number.
+    pub fn beside(&self, sigma_mm: f64, tau_mm: f64) -> (f64, usize) {
+        let variance = |c: &Contrast| sigma_mm * sigma_mm + tau_mm * tau_mm * c.lambda;
+        let k = self.contrasts.len();
+        (self.contrasts.iter().map(|c| (c.square + c.followed) / variance(c)).sum::<f64>() / k.max(1) as f64, k)
+    }
+
     /// τ, its degrees of freedom and its 90 % upper bound, mm.
     pub fn solve(&self, sigma_mm: f64) -> (f64, f64, f64) {
         let k = self.contrasts.len() as f64;

@@ -9,8 +9,12 @@ use crate::units::significant;
 use nalgebra::DVector;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Weights below this are not worth a word.
-const WORTH_NAMING: f64 = 0.05;
+/// Weights below this are not worth a word: what a sentence leaves out leaves a trace, and so much of that of its parts is not more
+/// than their rounding to three digits.
+const WORTH_NAMING: f64 = 1e-3;
+
+/// Weights below this are named last: a sentence begins with what makes most of it.
+const SMALL: f64 = 0.05;
 
 /// The null directions (scaled, unit norm) in words; `unknowns` are the free ones in the same order, `seen` says how they are
 /// scaled and which are held, `effects` are the model's.
@@ -37,11 +41,15 @@ fn one(
     seen: &Observability,
 ) -> Undetermined {
     let scale = &seen.scale;
-    let held: Vec<String> =
-        seen.held.iter().filter(|&&c| direction[c].abs() > 1e-6).map(|&c| unknowns[c].name.clone()).collect();
     // a part below this is the rounding of the null directions
     const LEAST: f64 = 1e-6;
-    let members_at: Vec<usize> = (0..unknowns.len()).filter(|&i| direction[i].abs() > WORTH_NAMING).collect();
+    let held: Vec<String> =
+        seen.held.iter().filter(|&&c| direction[c].abs() > LEAST).map(|&c| unknowns[c].name.clone()).collect();
+    // what counts as 0 by convention is named, however small its part
+    let named = |i: usize| direction[i].abs() > if seen.held.contains(&i) { LEAST } else { WORTH_NAMING };
+    let is_small = |i: &usize| direction[*i].abs() < SMALL;
+    let (small, large): (Vec<usize>, Vec<usize>) = (0..unknowns.len()).filter(|&i| named(i)).partition(is_small);
+    let members_at = [large, small].concat();
     let alone = others.iter().all(|v| members_at.iter().all(|&i| v[i].abs() <= LEAST));
     // a sum of two is seen although both stand in another direction where that one leaves the sum as it is
     let still = |v: &&DVector<f64>| match members_at[..] {
@@ -51,7 +59,7 @@ fn one(
     let one_number = alone || others.iter().all(still);
     let mut combination = BTreeMap::new();
     for (u, weight) in unknowns.iter().zip(direction.iter()) {
-        if weight.abs() > 1e-6 {
+        if weight.abs() > LEAST {
             combination.insert(u.name.clone(), (weight * 1e6).round() / 1e6);
         }
     }
@@ -59,8 +67,8 @@ fn one(
     let mut physical: Vec<(&Unknown, f64)> = Vec::new();
     let mut blocks: BTreeSet<String> = BTreeSet::new();
     let mut block_words: BTreeSet<String> = BTreeSet::new();
-    let named = unknowns.iter().zip(direction.iter().zip(scale.iter())).filter(|(_, (w, _))| w.abs() > WORTH_NAMING);
-    for (u, (weight, scale)) in named {
+    for &i in &members_at {
+        let (u, weight, scale) = (unknowns[i], direction[i], scale[i]);
         match u.name.split_once('@').filter(|_| u.nuisance) {
             Some((word, block)) => {
                 blocks.insert(block.to_owned());

@@ -111,7 +111,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
                 gains.push(format!("shows {}", listed(&x.shows)));
             }
             if x.parts > 0 {
-                gains.push(format!("parts {} pairs", x.parts));
+                gains.push(format!("parts {} pair{}", x.parts, if x.parts == 1 { "" } else { "s" }));
             }
             *out += &format!("  +{} {}: {}\n", time(x.time_s), x.says, gains.join(", "));
         }

@@ -63,13 +63,15 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
         let ball = plus(place.ball, 1.0, scatter);
         block.inward(place.carrier.inward(ball))
     };
+    let way = norm(way_of(ready));
     let ball_in_block = |s: f64| -> Vec3 {
         let joints = mapping.joints(&commanded(ready, s));
         if bench.terms.steady() {
             return ball_in(&block, &joints, &steady);
         }
-        // what goes with the axes' places may move the block, too
-        let shifts = bench.terms.at(&steady, &ready.state, &joints);
+        // the stylus bends until the probe triggers, and the errors are those of where the axes stand then. What goes with the
+        // axes' places may move the block, too
+        let shifts = at_trigger(bench, ready, &steady, |late| mapping.joints(&commanded(ready, s + late / way)));
         ball_in(&real_block(bench, ready, &shifts).0, &joints, &shifts)
     };
     let straight = bench.terms.steady() && mapping.is_affine();
@@ -79,9 +81,8 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
         Contact::Already(depth) => return log(ready.start, Status::Miss, Some(Remark::Already(depth))),
     };
     // the probe triggers that much later on the commanded line
-    let way = norm(way_of(ready));
-    let late = late_mm(bench, ready, &steady, |late| mapping.joints(&commanded(ready, at + late / way)))
-        + bench.dice.late_mm(ready.id);
+    let shifts = at_trigger(bench, ready, &steady, |late| mapping.joints(&commanded(ready, at + late / way)));
+    let late = shifts.late + bench.dice.late_mm(ready.id);
     let trigger = at + late / way;
     if trigger > 1.0 {
         return log(ready.end, Status::Miss, Some(Remark::Missed));
@@ -96,14 +97,22 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
     log(commanded(ready, trigger), Status::Hit, remark)
 }
 
-/// How late the trigger comes, mm; `joints`: where the axes stand when it is that late.
-fn late_mm(bench: &Bench<'_>, ready: &Ready, steady: &Shifts, joints: impl Fn(f64) -> Position) -> f64 {
-    /// It hardly depends on where the axes stand: each round is some ten thousand times nearer.
+/// What is wrong where the axes stand when the probe triggers; `joints`: where they stand when it is so late, mm.
+fn at_trigger(bench: &Bench<'_>, ready: &Ready, steady: &Shifts, joints: impl Fn(f64) -> Position) -> Shifts {
+    /// How late it comes hardly depends on where the axes stand: each round is some ten thousand times nearer.
     const ROUNDS: usize = 3;
+    let mut shifts = *steady;
     if bench.terms.steady() {
-        return steady.late;
+        return shifts;
     }
-    (0..ROUNDS).fold(steady.late, |late, _| bench.terms.at(steady, &ready.state, &joints(late)).late)
+    for _ in 0..ROUNDS {
+        let late = shifts.late;
+        shifts = bench.terms.at(steady, &ready.state, &joints(late));
+        if shifts.late == late {
+            break;
+        }
+    }
+    shifts
 }
 
 /// The commanded linear way, mm.

@@ -2,8 +2,10 @@
 
 use super::{DEFAULT, NOISE, common, plan, task};
 use axiscal::design::record::Assessment;
-use axiscal::design::{Request, assess};
+use axiscal::design::{Planned, Request, assess};
+use axiscal::diag::source;
 use axiscal::model::catalogue::Catalogue;
+use axiscal::program;
 
 /// What is expected of a time constant, and of the sizes that go with it, is what the fit then says of typical ones: looked at
 /// where the effect has no size, nothing told it, and the sizes were as sure as if it were known.
@@ -152,4 +154,62 @@ fn what_each_block_does_by_itself_is_expected_too() {
             expected.warnings
         );
     }
+}
+
+/// A plan that is over within three minutes shows blocks that slip in its midst: the usual moments all come later.
+#[test]
+fn a_jump_shows_in_a_short_plan() {
+    const SMALL: &str = r#"
+format = "axiscal-programs/1"
+name = "small"
+machine = "trunnion"
+says = "few touches"
+mounting = "table"
+faces_in = "machine"
+[[grid]]
+name = "one"
+u = [0.0]
+v = [0.0]
+[[stage]]
+name = "s"
+[[stage.setup]]
+pose = { A = 0.0, C = [0.0, 90.0] }
+touch = [ { faces = ["+X","-X","+Y","-Y","+Z"], grid = "one" } ]
+"#;
+    let machine = common::machine("trunnion");
+    let catalogue = Catalogue::built_in().unwrap();
+    let spec = program::load(&source("small.toml", SMALL)).unwrap().0;
+    let made = program::generate(&machine, &spec, &program::Options::default()).unwrap().0;
+    let request = Request {
+        task: task(&machine, &catalogue, &["location-a", "location-c", "block-setup", "pretravel"]),
+        runs: vec![Planned::new(made.plan)],
+        names: vec!["small".to_owned()],
+        probe: NOISE,
+        acting_tau_mm: Some(0.0),
+    };
+    let slips = assess(&request).unwrap().effects.into_iter().find(|e| e.effect == "block-slip").unwrap();
+    assert!(slips.visible && slips.typical_um > 1.0, "{slips:?}");
+}
+
+/// A formula without a value is named itself, and not whatever else is in the model.
+#[test]
+fn a_formula_without_a_value_is_named_before_the_first_touch() {
+    const OWN: &str = r#"
+[[effect]]
+id = "div"
+at = "tool"
+terms = [ { parameter = "dv", unit = "um", dof = "dz", formula = "1/sin(B)", typical = 10 } ]
+"#;
+    let machine = common::machine("swivel-head");
+    let mut catalogue = Catalogue::built_in().unwrap();
+    catalogue.add_file(&source("div.toml", OWN)).unwrap();
+    let request = Request {
+        task: task(&machine, &catalogue, &["location-b", "block-setup", "pretravel", "div"]),
+        runs: vec![plan(&machine, "head")],
+        names: vec!["head".to_owned()],
+        probe: NOISE,
+        acting_tau_mm: Some(0.0),
+    };
+    let said = assess(&request).unwrap_err().to_string();
+    assert!(said.contains("1/sin(B)") && said.contains("div") && said.contains("touch 1"), "{said}");
 }
