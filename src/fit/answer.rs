@@ -424,8 +424,13 @@ fn warnings(
     let share = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
     if let Some(found) = fit.strangers_beyond {
         out.push(format!(
-            "a robust fit finds {found} of {n} touches ({:.1} %) that do not belong to the rest, and without them the others still do not agree: only {n_out} are left out (removal stops at {:.0} %), and the values and their uncertainties are not to be trusted; look for dirt, a loose block or stylus, or an effect that the model lacks",
+            "a robust fit finds {found} of {n} touches ({:.1} %) that do not belong to the rest, and without them the others still do not agree: {} left out (removal stops at {:.0} %), and the values and their uncertainties are not to be trusted; look for dirt, a loose block or stylus, or an effect that the model lacks",
             share(found),
+            match n_out {
+                0 => "none is".into(),
+                1 => "only 1 is".into(),
+                n => format!("only {n} are"),
+            },
             100.0 * snoop::MOST_SHARE
         ));
     } else if n_out as f64 > snoop::MOST_SHARE * n as f64 {

@@ -43,7 +43,7 @@ impl Rejection {
             );
         }
         format!(
-            "{:+.1} um off what the other touches say ({:.1} standard deviations): a chip, a drop or a double touch?",
+            "{:+.1} um off what the other touches say ({:.1} standard deviations of their scatter): a chip, a drop or a double touch?",
             um_from_mm(self.off_mm),
             self.standardised.abs()
         )

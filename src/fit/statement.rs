@@ -204,6 +204,7 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
         Place::Tool if effect.id == "tip-eccentricity" => format!("the tip's offset {component}"),
         // several components of one effect are told apart by where they point
         _ if effect.parameters.iter().filter(|p| p.shape.is_none()).count() > 1
+            && effect.terms.iter().any(|t| t.component != term.component)
             && !matches!(term.place, Place::Trigger | Place::Reading) =>
         {
             format!("{} {component}", the(&effect.name))

@@ -116,13 +116,15 @@ pub struct ParameterAsWritten {
 }
 
 /// What the user states about the noise.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseAsWritten {
     /// Standard deviation of a touch, µm.
-    pub touch_um: Option<f64>,
+    #[schemars(with = "Option<f64>")]
+    pub touch_um: Option<Spanned<f64>>,
     /// Standard deviation of each component of the displacement of an index visit, µm.
-    pub visit_um: Option<f64>,
+    #[schemars(with = "Option<f64>")]
+    pub visit_um: Option<Spanned<f64>>,
 }
 
 /// A checked study. Paths are as written: relative to the study.
@@ -247,20 +249,22 @@ impl Study {
                 ),
             }
         }
-        let touch_sigma_mm = w.noise.touch_um.map(crate::units::mm_from_um);
+        let mm = |um: &Option<Spanned<f64>>| um.as_ref().map(|um| crate::units::mm_from_um(*um.get_ref()));
+        let place = |um: &Option<Spanned<f64>>| um.as_ref().map_or(0..0, Spanned::span);
+        let touch_sigma_mm = mm(&w.noise.touch_um);
         if touch_sigma_mm.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
             findings.push(
                 Finding::error("study::noise", "touch_um is not a number greater than 0")
                     .help("the standard deviation of one touch in um")
-                    .at(source, 0..0),
+                    .at(source, place(&w.noise.touch_um)),
             );
         }
-        let visit_sigma_mm = w.noise.visit_um.map(crate::units::mm_from_um);
+        let visit_sigma_mm = mm(&w.noise.visit_um);
         if visit_sigma_mm.is_some_and(|s| !(s.is_finite() && s >= 0.0)) {
             findings.push(
                 Finding::error("study::noise", "visit_um is not a number, 0 or greater")
                     .help("the standard deviation of the ball's place from one index to the next in um")
-                    .at(source, 0..0),
+                    .at(source, place(&w.noise.visit_um)),
             );
         }
         for (name, sigma) in &w.uncertainty {
@@ -432,5 +436,9 @@ mod tests {
         let failure = Study::parse(&source("s.toml", text)).unwrap_err();
         assert!(failure.0[0].place().unwrap().starts_with("s.toml:8:"), "{:?}", failure.0[0].place());
         assert!(Study::parse(&source("s.toml", "machine = ")).is_err());
+        let noise = "machine = \"m\"\n[[data]]\nplan=\"p\"\nlog=\"l\"\ncontroller=\"csv\"\n[model]\neffects=[\"location-b\"]\n[noise]\ntouch_um = -1\nvisit_um = nan\n";
+        let failure = Study::parse(&source("s.toml", noise)).unwrap_err();
+        let places: Vec<_> = failure.0.iter().map(|f| f.place().unwrap()).collect();
+        assert_eq!(places, ["s.toml:9:12", "s.toml:10:12"]);
     }
 }
