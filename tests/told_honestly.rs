@@ -264,6 +264,78 @@ fn a_stated_scatter_of_visits_is_held_against_the_revisits() {
     }
 }
 
+/// A drift that the model lacks makes revisited poses scatter, and chi-square beside such a scatter is what it should be: the scatter
+/// itself is the finding. With the drift in the model, or without one, nothing is said.
+#[test]
+fn an_effect_that_hides_in_the_scatter_of_visits_is_said() {
+    for (name, program) in [("trunnion", "full"), ("swivel-head", "full")] {
+        let machine = machine(name);
+        let plan = plan(&machine, program);
+        for (drift_um_per_h, more, hides) in
+            [(8.0, &[][..], true), (8.0, &["drift-linear"][..], false), (0.0, &[][..], false)]
+        {
+            let drift = format!("[effects.drift-linear]\nvz = {drift_um_per_h:?}\n");
+            let text = format!("seed = 6\n[noise]\ntouch_um = 1.0\nvisit_um = 0.5\n{drift}");
+            let touches = touch(&machine, &plan, &scenario(&machine, &text), None);
+            let fit = fitted(&machine, &plan, &touches, &settings(&machine, more));
+            let said = fit.outcome.warnings.iter().any(|w| w.contains("index visits scatter by"));
+            assert_eq!(said, hides, "{name} {more:?}: {:?} {:?}", fit.noise, fit.outcome.warnings);
+        }
+    }
+}
+
+/// Hours count from the first touch that was made, in whatever order a study lists its runs.
+#[test]
+fn runs_may_be_listed_in_any_order() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let at = |seed: u64, started_s: f64| {
+        let text = format!(
+            "seed = {seed}\n[noise]\ntouch_um = 1.0\n[time]\nstarted_s = {started_s:?}\n[effects.drift-linear]\nvz = 6.0\n"
+        );
+        touch(&machine, &plan, &scenario(&machine, &text), None)
+    };
+    let (first, second) = (at(4, 0.0), at(5, 9000.0));
+    let run = |touches, mounting, started_s| Run {
+        plan: &plan,
+        touches,
+        mounting: Some(mounting),
+        started_s: Some(started_s),
+    };
+    let (a, b) = (|| run(&first, "a", 0.0), || run(&second, "b", 9000.0));
+    let settings = settings(&machine, &["drift-linear"]);
+    let catalogue = Catalogue::built_in().unwrap();
+    let [listed, turned] =
+        [[a(), b()], [b(), a()]].map(|runs| fit::identify(&machine, &catalogue, &runs, &settings).unwrap());
+    for p in &listed.outcome.parameters {
+        let other = turned.outcome.parameters.iter().find(|q| q.name == p.name).unwrap();
+        assert_eq!(p.status, other.status, "{}", p.name);
+        let off = (p.value - other.value).abs();
+        assert!(off < 1e-4 * p.sigma.unwrap_or(f64::INFINITY), "{}: {} {}", p.name, p.value, other.value);
+    }
+    let drift = value(&turned, "vz");
+    assert!((drift - 6.0).abs() < 2.0, "{drift}");
+}
+
+/// Whatever displaces a block does so in its carrier's frame: components add, and a slip beside tilted blocks comes back exactly.
+#[test]
+fn a_slip_comes_back_beside_blocks_that_stand_askew() {
+    let machine = machine("trunnion");
+    let plan = plan(&machine, "full");
+    let slip =
+        [("dx", 30.0), ("dy", -20.0), ("dz", 15.0), ("rx", 300.0), ("ry", -200.0), ("rz", 150.0), ("from_h", 0.7)];
+    let mut scenario = Scenario::flawless().with(&machine, "block-slip", &slip).unwrap();
+    for block in &plan.blocks {
+        scenario = scenario.with_block(&plan.mounting, &block.name, [0.1, -0.08, 0.05], [8e-4, -5e-4, 7e-4]);
+    }
+    let touches = touch(&machine, &plan, &scenario, None);
+    let fit = fitted(&machine, &plan, &touches, &settings(&machine, &["block-slip"]));
+    for (p, v) in &slip[..6] {
+        let found = value(&fit, p);
+        assert!((found - v).abs() < 1e-7 * v.abs(), "{p} is {found}, planted {v}");
+    }
+}
+
 /// What an axis does goes with where it stands when the probe triggers: without noise its errors come back beside a pre-travel, too.
 #[test]
 fn errors_along_an_axis_come_back_beside_a_pretravel() {

@@ -112,8 +112,7 @@ fn run(
     let edited = edit(&loaded, &text)?;
     let history_path = history_path(&args.study);
     let mut history = read_history(&history_path)?.unwrap_or_default();
-    let fit_of =
-        |loaded: &Loaded| fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings());
+    let fit_of = |loaded: &Loaded| loaded.fit(&loaded.settings());
     let before = fit_of(&loaded)?;
     history.push(step(&loaded, &before));
     let (study, _) = crate::study::Study::parse(&source(args.study.display().to_string(), edited.clone()))?;
@@ -184,7 +183,7 @@ pub fn history(args: &HistoryArgs, io: &Io) -> Result<Answer> {
     let current =
         history.steps.last().is_some_and(|s| s.effects == loaded.study.effects && s.data_sha256 == loaded.data_sha256);
     if !current {
-        let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
+        let fit = loaded.fit(&loaded.settings())?;
         history.push(step(&loaded, &fit));
     }
     let other = history.on_other_data(&loaded.data_sha256);

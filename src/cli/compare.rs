@@ -5,7 +5,7 @@ use super::{Answer, Io};
 use crate::compare::Lead;
 use crate::diag::Result;
 use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
-use crate::{compare, files, fit, report};
+use crate::{compare, files, report};
 use std::path::PathBuf;
 
 /// Arguments of `compare`.
@@ -35,7 +35,7 @@ pub(super) fn leads(found: &Diagnosis) -> Vec<Lead> {
 /// When the study or a file that it names is unusable, or the CSV cannot be written.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
+    let fit = loaded.fit(&loaded.settings())?;
     let mut settings = loaded.settings();
     settings.quick = true;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };

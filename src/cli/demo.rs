@@ -161,7 +161,7 @@ fn prepare(out: &Path) -> Result<()> {
 
 fn look(study: &Path, io: &Io) -> Result<Fit> {
     let loaded = load_study(study, io)?;
-    fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())
+    loaded.fit(&loaded.settings())
 }
 
 /// RMS of the readings at the check points, µm: only the blocks' places and the probe are solved for.
@@ -170,7 +170,7 @@ fn readings(out: &Path, when: &str, io: &Io) -> Result<f64> {
     let mut settings = loaded.settings();
     settings.quick = true;
     settings.effects.retain(|id| loaded.catalogue.get(id, &loaded.machine).is_some_and(|e| e.nuisance));
-    Ok(fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?.outcome.rms_um)
+    Ok(loaded.fit(&settings)?.outcome.rms_um)
 }
 
 fn brief(fit: &Fit) -> fit::outcome::Outcome {

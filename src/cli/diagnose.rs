@@ -4,7 +4,6 @@ use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
 use crate::diagnose::{Options, Subject, Verdict, diagnose};
-use crate::fit;
 use std::path::PathBuf;
 
 /// Arguments of `diagnose`.
@@ -28,7 +27,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
     settings.quick = true;
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let fit = loaded.fit(&settings)?;
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
     let planned = loaded.planned();
     let options = Options { at_most: args.at_most.max(1), planned: Some(&planned), ..Options::default() };

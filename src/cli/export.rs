@@ -6,7 +6,7 @@ use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::diagnose::{self, Subject, Verdict};
 use crate::files;
 use crate::fit::outcome::Undetermined;
-use crate::fit::{self, Fit, Settings};
+use crate::fit::{Fit, Settings};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::post::tables::{LengthUnit, Tables};
@@ -94,7 +94,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let loaded = load_study(&args.study, io)?;
     let settings = loaded.settings();
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let fit = loaded.fit(&settings)?;
     let active = loaded.active()?;
     free_folder(&args.out, &loaded)?;
     let all_acts =

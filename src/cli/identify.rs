@@ -23,8 +23,7 @@ pub struct Args {
     /// With the covariance matrix of the results (--json)
     #[arg(long)]
     pub covariance: bool,
-    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations; and without the intervals of
-    /// time constants and pitches
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, held-out errors
     #[arg(long)]
     pub quick: bool,
 }
@@ -37,9 +36,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = if args.quick { load_study_alone(&args.study, io)? } else { load_study(&args.study, io)? };
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
-    settings.quick = args.quick;
-    let mut fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
-    if !settings.quick {
+    settings.bare = args.quick;
+    let mut fit = loaded.fit(&settings)?;
+    if !args.quick {
         design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
     }
     if args.covariance {

@@ -51,6 +51,19 @@ pub struct LoadedRun {
 }
 
 impl Loaded {
+    /// The fit of the study; what is wrong with a word of the study has its place.
+    ///
+    /// # Errors
+    /// When the model or the touches are unusable.
+    pub fn fit(&self, settings: &Settings) -> Result<Fit> {
+        fit::identify(&self.machine, &self.catalogue, &self.runs(), settings).map_err(|failure| match files::read_text(
+            &self.path,
+        ) {
+            Ok(text) => placed(failure, &source(self.path.display().to_string(), text)),
+            Err(_) => failure,
+        })
+    }
+
     /// The runs as the fit takes them.
     #[must_use]
     pub fn runs(&self) -> Vec<Run<'_>> {
@@ -267,9 +280,9 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in &study.data {
         let plan_path = folder.join(&entry.plan);
-        let (plan, plan_digest) = load_plan_and_digest(&plan_path, &machine, io)?;
+        let (plan, plan_digest) = at_the_name(load_plan_and_digest(&plan_path, &machine, io), &entry.plan, &src)?;
         let log_path = folder.join(&entry.log);
-        let bytes = files::read_bytes(&log_path)?;
+        let bytes = at_the_name(files::read_bytes(&log_path), &entry.log, &src)?;
         let digest = Sha256::digest(&bytes).to_vec();
         if let Some((first, _)) = seen.iter().find(|(_, d)| *d == digest) {
             io.report(&[Finding::warning(
@@ -280,7 +293,7 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
         }
         seen.push((log_path.clone(), digest.clone()));
         if let Some(path) = &entry.compensation {
-            let active = load_compensation(&folder.join(path), &machine)?;
+            let active = at_the_name(load_compensation(&folder.join(path), &machine), path, &src)?;
             let idle = does_not_act(&active, &machine, &plan);
             let beside = if idle.is_some() { None } else { beside_the_axis(&active, &machine, &plan) };
             io.report(&idle.into_iter().chain(beside).collect::<Vec<_>>());
@@ -290,7 +303,8 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
             data.update(part);
         }
         let controller = controller_path(&entry.controller, &folder);
-        let mut touches = read_log(&bytes, &log_path, (&controller, entry.run), &machine, &plan, io)?;
+        let read = read_log(&bytes, &log_path, (&controller, entry.run), &machine, &plan, io);
+        let mut touches = at_the_name(read, &entry.controller, &src)?;
         if controller != "csv" {
             on_the_study_clock(&mut touches, &plan, entry.started_s);
         }
@@ -324,23 +338,26 @@ fn at_the_name<T>(result: Result<T>, name: &str, study: &Source) -> Result<T> {
 
 /// Findings that name a word of the study get its place.
 fn located<T>(result: Result<T>, study: &Source) -> Result<T> {
-    result.map_err(|Failure(findings)| {
-        let text = study.inner();
-        let place = |f: &Finding| {
-            let quoted = f.message.split('"').nth(1)?;
-            let at = text.rfind(&format!("\"{quoted}\""))?;
-            Some(at..at + quoted.len() + 2)
-        };
-        Failure(
-            findings
-                .into_iter()
-                .map(|f| match place(&f) {
-                    Some(span) if f.source.is_none() => f.at(study, span),
-                    _ => f,
-                })
-                .collect(),
-        )
-    })
+    result.map_err(|failure| placed(failure, study))
+}
+
+fn placed(Failure(findings): Failure, study: &Source) -> Failure {
+    let text = study.inner();
+    let place = |f: &Finding| {
+        let word = f.message.split('"').nth(1)?;
+        let as_value = text.rfind(&format!("\"{word}\"")).map(|at| at..at + word.len() + 2);
+        // or as a key
+        as_value.or_else(|| {
+            let before = ["parameters.", "\n"];
+            let key = |b: &&str| text.find(&format!("{b}{word}")).map(|at| at + b.len());
+            before.iter().find_map(key).map(|at| at..at + word.len())
+        })
+    };
+    let at_its_place = |f: Finding| match place(&f) {
+        Some(span) if f.source.is_none() => f.at(study, span),
+        _ => f,
+    };
+    Failure(findings.into_iter().map(at_its_place).collect())
 }
 
 /// A controller is a name, or a postprocessor file relative to the study.

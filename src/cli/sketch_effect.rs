@@ -6,7 +6,6 @@ use super::{Answer, Io};
 use crate::diag::{Result, source};
 use crate::diagnose::{Subject, sketch::sketch};
 use crate::files;
-use crate::fit;
 use crate::model::catalogue::Catalogue;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -29,7 +28,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
     settings.quick = true;
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let fit = loaded.fit(&settings)?;
     let name = args.out.display().to_string();
     let before = if args.out.exists() { files::read_text(&args.out)? } else { String::new() };
     // what stands in the file must be readable: its ids are taken, whether or not the study names the file

@@ -225,7 +225,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
 
 fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
     let loaded = load_study(study, &io.inner())?;
-    let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &loaded.settings())?;
+    let fit = loaded.fit(&loaded.settings())?;
     Ok((loaded, fit))
 }
 

@@ -5,7 +5,7 @@ use super::{Answer, Io};
 use crate::compare::verify::{Figures, Question, Verdict, verify};
 use crate::diag::{Failure, Result};
 use crate::diagnose::{self, Options, Subject, diagnose};
-use crate::fit::{self, Fit, Settings};
+use crate::fit::{Fit, Settings};
 use crate::program::plan::ControllerFrame;
 use crate::report;
 use crate::units::um_from_mm;
@@ -40,7 +40,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let question = if before.active()? == after.active()? { Question::Change } else { Question::Compensation };
     can_show(&after, question)?;
-    let fitted = |l: &Loaded| fit::identify(&l.machine, &l.catalogue, &l.runs(), &l.settings());
+    let fitted = |l: &Loaded| l.fit(&l.settings());
     let (first, second) = (fitted(&before)?, fitted(&after)?);
     let same_plans = before.runs.len() == after.runs.len()
         && before.runs.iter().zip(&after.runs).all(|(b, a)| {
@@ -119,7 +119,7 @@ fn figures(loaded: &Loaded, fit: &Fit) -> Result<Figures> {
     } else {
         let settings =
             Settings { effects, knowledge: BTreeMap::new(), type_b: BTreeMap::new(), quick: true, ..loaded.settings() };
-        let bare = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+        let bare = loaded.fit(&settings)?;
         (bare.outcome.rms_um, bare.dof)
     };
     Ok(Figures {

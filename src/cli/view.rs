@@ -8,7 +8,7 @@ use crate::compare::rungs::{Kind, Ladder, Rung, climb};
 use crate::compare::{Comparison, compare};
 use crate::diag::Result;
 use crate::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose, with_effects};
-use crate::fit::{self, Fit, Settings};
+use crate::fit::{Fit, Settings};
 use crate::tables::Correction;
 use crate::tables::compensation::{Compensation, Provenance};
 use crate::view::{Material, RunFiles, View, gather};
@@ -38,7 +38,7 @@ pub struct Worked {
 /// When the study cannot be fitted.
 pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
     let settings = loaded.settings();
-    let mut fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), &settings)?;
+    let mut fit = loaded.fit(&settings)?;
     design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
     let diagnosis = {
         let quick = Settings { quick: true, ..settings.clone() };

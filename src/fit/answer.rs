@@ -40,7 +40,7 @@ pub(super) fn outcome(
     let by_visits = uncertainty::visit_variance(fit);
     let shapes_told = !settings.quick && n <= MOST_PROFILED;
     let many = n > uncertainty::MOST_UNMODELLED;
-    let (unmodelled, (held_out_rms_um, weak)) = if settings.quick {
+    let (unmodelled, (held_out_rms_um, weak)) = if settings.quick || settings.bare {
         (None, (None, Vec::new()))
     } else {
         rayon::join(
@@ -279,7 +279,7 @@ fn beside_a_shape_that_is_not_told(
     let untold = (0..unknowns.len())
         .filter(|&i| unknowns[i].shape && status[i] == Status::Undetermined && !profiled(&unknowns[i]));
     let more = if quick {
-        "without --quick it is all that it may be".to_owned()
+        "`axiscal identify` works out all that it may be".to_owned()
     } else {
         format!("beside its other values it is worked out for up to {MOST_PROFILED} touches only")
     };
@@ -442,6 +442,7 @@ fn warnings(
     }
     out.extend(fit.noise.contradiction());
     out.extend(fit.noise.contradiction_of_visits());
+    out.extend(fit.noise.visits_beyond());
     out.extend(fit.noise.coarse());
     let contradictions = contradictions::contradictions(fit, machine, effects, settings);
     // what is stated wrongly is no fault of the model

@@ -101,7 +101,7 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
         };
         if bad {
             findings.push(
-                Finding::error("model::knowledge", format!("what is said of {word} is not usable"))
+                Finding::error("model::knowledge", format!("what is said of {word:?} is not usable"))
                     .help("write numbers below 1e6 in size, in the parameter's unit, and a sigma greater than 0"),
             );
         }

@@ -97,7 +97,10 @@ pub struct Settings {
     pub type_b: BTreeMap<String, f64>,
     /// Touches that are not to be used.
     pub masked: Vec<Mask>,
-    /// Without the figures that need the whole catalogue (uncertainty with unmodelled effects, type B rows).
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, held-out errors.
+    pub bare: bool,
+    /// For trial fits: as `bare`, and without the intervals of shape parameters. What hangs on a shape that is not told may then be
+    /// called identified.
     pub quick: bool,
     /// Shape parameters that the search holds at an end of their range: nobody knows them.
     pub held: Vec<String>,

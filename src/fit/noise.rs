@@ -17,6 +17,10 @@ const LEAST_REPEATS: usize = 8;
 const LEVEL: f64 = 1e-3;
 const TENTH: f64 = 1.1;
 
+/// Index visits that scatter by so many times what the axes declare hold something else, if chance makes it as seldom. A
+/// declared repeatability is a rough figure: less is no matter.
+const BEYOND: f64 = 2.0;
+
 /// Fewer contrasts than this say too little about visits.
 const LEAST_REVISITS: usize = 6;
 
@@ -48,6 +52,9 @@ pub struct Noise {
     /// What revisited poses say of τ where they contradict what the user states: the stated one, the one that they show, mm, and its
     /// degrees of freedom. What is stated is used all the same.
     pub visits_contradict: Option<(f64, f64, f64)>,
+    /// The axes' declared indexing repeatability, mm, where revisited poses scatter by far more: τ, which is used, then holds what
+    /// changes between the visits, and χ² cannot show it.
+    pub visits_beyond_mm: Option<f64>,
     /// There are repeats enough, and they agree as far as the digits of the log go: they say nothing of the noise.
     pub repeats_agree: bool,
     /// The part of σ that the digits of the log make, mm.
@@ -137,6 +144,10 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         let off = contradicts_visits(&revisits, (sigma_mm, sigma_dof), (found, stated), later_mm.is_some());
         off.then_some((stated, found, found_dof))
     });
+    let visits_beyond_mm = Some(known.declared_tau_mm).filter(|declared| {
+        let (ratio, k) = revisits.beside(sigma_mm, *declared);
+        visit_source == "revisits" && *declared > 0.0 && tau_mm > BEYOND * declared && ratio > chi2_limit(k, sigma_dof)
+    });
     Noise {
         sigma_mm,
         source,
@@ -149,6 +160,7 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         repeats,
         contradicted_mm,
         visits_contradict,
+        visits_beyond_mm,
         repeats_agree,
         rounding_mm: rounding.sigma_mm(),
     }
@@ -282,6 +294,21 @@ impl Noise {
             um_from_mm(stated),
             um_from_mm(found),
             degrees(dof)
+        ))
+    }
+
+    /// What else the scatter of index visits holds, in words.
+    #[must_use]
+    pub fn visits_beyond(&self) -> Option<String> {
+        let declared = self.visits_beyond_mm?;
+        Some(format!(
+            "index visits scatter by {:.2} um (revisited poses, {} of freedom), and the axes declare an indexing repeatability of {:.2} um: \
+             what changes between the visits and the model lacks (drift, warming up, a slip) counts as scatter here, chi2/dof does not show \
+             it, and values may be off by more than their uncertainties; see what `axiscal diagnose` finds, or declare what the axes repeat \
+             to (indexing_repeatability_um in machines.toml)",
+            um_from_mm(self.tau_mm),
+            degrees(self.visit_dof.unwrap_or(0.0)),
+            um_from_mm(declared)
         ))
     }
 

@@ -89,7 +89,7 @@ pub(super) fn type_b(
             findings.push(
                 Finding::error(
                     "model::type_b_in_model",
-                    format!("{word} is in the model: it cannot be a type B row too"),
+                    format!("{word:?} is in the model: it cannot be a type B row too"),
                 )
                 .help("give it a prior under [model.parameters], or take its effect out of the model"),
             );
@@ -107,7 +107,7 @@ pub(super) fn type_b(
         }
         if (owner.is_some() || is_thermometer) && !is_size {
             findings.push(
-                Finding::error("model::type_b", format!("uncertainty of {word} is {sigma}"))
+                Finding::error("model::type_b", format!("uncertainty of {word:?} is {sigma}"))
                     .help("write a positive number in the parameter's unit"),
             );
             continue;
@@ -121,7 +121,7 @@ pub(super) fn type_b(
         };
         if let Some(bad) = without_value(effect, &fit.data.observations).first() {
             findings.push(
-                Finding::error("model::no_value", format!("{word} cannot be a type B row: {}", bad.says()))
+                Finding::error("model::no_value", format!("{word:?} cannot be a type B row: {}", bad.says()))
                     .help("write the formula so that it holds at every touch"),
             );
             continue;

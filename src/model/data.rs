@@ -106,6 +106,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut data = Data::default();
     let mut clock_s = 0.0;
     let mut first_touch_s: Option<f64> = None;
+    let mut earliest_h = 0.0;
     let mut visits = Visits::default();
     // as made and as planned: an axis that came to a little beside its pose would else push the other out at every touch
     let (mut made, mut planned_at) = (LastPose::default(), LastPose::default());
@@ -136,6 +137,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let time_s = touch.time_s.unwrap_or_else(|| started + planned.time_s.unwrap_or(0.0));
             clock_s = f64::max(clock_s, time_s);
             let t = hours_from_s(time_s - *first_touch_s.get_or_insert(time_s));
+            earliest_h = f64::min(earliest_h, t);
             senses(&mut last_sense, planned, previous);
             before.next(planned);
             previous = Some(planned);
@@ -213,6 +215,10 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             data.visits.push(visit);
             data.observations.push(observation);
         }
+    }
+    if earliest_h < 0.0 {
+        // the runs are not listed in the order in which they were made: hours count from the first touch all the same
+        data.observations.iter_mut().chain(&mut data.nominal).for_each(|o| o.state[slot::HOURS] -= earliest_h);
     }
     data
 }

@@ -38,8 +38,10 @@ pub fn choose(specs: Vec<ProgramSpec>, name: &str, machine: &Machine) -> Result<
     let mut names: Vec<String> = specs.iter().map(|s| s.name.clone()).collect();
     names.dedup();
     if !specs.iter().any(|s| s.name == name) {
-        return Err(Failure::new("program::unknown", format!("no program is called {name:?}"))
-            .help(format!("there are: {}; a file of your own goes with --program FILE.toml", names.join(", "))));
+        return Err(Failure::new("program::unknown", format!("no program is called {name:?}")).help(format!(
+            "there are: {}; a program of your own is a file: `axiscal generate --program FILE.toml` makes its plan",
+            names.join(", ")
+        )));
     }
     let for_it: Vec<String> = specs_for(machine, &specs);
     let named: Vec<ProgramSpec> = specs.into_iter().filter(|s| s.name == name).collect();

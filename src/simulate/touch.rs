@@ -138,13 +138,15 @@ fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Vec3
         let outward = bench.chain.outward_from_centre(ready.n_links, ready.centre);
         frame = Rigid::shift(plus(ready.centre, shifts.block_outward, outward));
     }
-    if shifts.block != [0.0; 6] {
-        frame = frame.then(&Rigid::error(&shifts.block, [0.0; 3]));
-    }
+    // whatever moves a block moves it in its carrier's frame: components add (docs/method.md)
+    let mut six = shifts.block;
     if let Some(wrong) = &ready.wrong {
         let ([x, y, z], [a, b, c]) = (wrong.shift_mm, wrong.tilt_rad);
-        frame = frame.then(&Rigid::error(&[x, y, z, a, b, c], [0.0; 3]));
+        six.iter_mut().zip([x, y, z, a, b, c]).for_each(|(sum, own)| *sum += own);
         half = plus(half, 0.5, wrong.size_mm);
+    }
+    if six != [0.0; 6] {
+        frame = frame.then(&Rigid::error(&six, [0.0; 3]));
     }
     (frame, half)
 }

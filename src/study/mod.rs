@@ -18,6 +18,12 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use toml::Spanned;
 
+/// No probe and no axis scatters by less or more, um.
+const USABLE_UM: std::ops::RangeInclusive<f64> = 1e-9..=1e6;
+
+/// A prior that is surer than this, in its parameter's unit, is a held value.
+const SUREST: f64 = 1e-12;
+
 /// The study as written.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -233,7 +239,7 @@ impl Study {
             let p = spanned.get_ref();
             let known = match (p.value, p.fixed, p.sigma) {
                 (Some(value), true, None) if value.is_finite() => Some(Knowledge::Fixed(value)),
-                (Some(value), false, Some(sigma)) if value.is_finite() && sigma.is_finite() && sigma > 0.0 => {
+                (Some(value), false, Some(sigma)) if value.is_finite() && (SUREST..f64::MAX).contains(&sigma) => {
                     Some(Knowledge::Prior { value, sigma })
                 }
                 _ => None,
@@ -244,7 +250,7 @@ impl Study {
                 }
                 None => findings.push(
                     Finding::error("study::parameter", format!("what is said of {name} is not usable"))
-                        .help("write value and fixed = true, or value and sigma (greater than 0)")
+                        .help("write value and fixed = true, or value and sigma (1e-12 or more, in its unit)")
                         .at(source, spanned.span()),
                 ),
             }
@@ -252,18 +258,19 @@ impl Study {
         let mm = |um: &Option<Spanned<f64>>| um.as_ref().map(|um| crate::units::mm_from_um(*um.get_ref()));
         let place = |um: &Option<Spanned<f64>>| um.as_ref().map_or(0..0, Spanned::span);
         let touch_sigma_mm = mm(&w.noise.touch_um);
-        if touch_sigma_mm.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+        let usable = |um: &Spanned<f64>| USABLE_UM.contains(um.get_ref());
+        if w.noise.touch_um.as_ref().is_some_and(|um| !usable(um)) {
             findings.push(
-                Finding::error("study::noise", "touch_um is not a number greater than 0")
-                    .help("the standard deviation of one touch in um")
+                Finding::error("study::noise", "touch_um is no usable number")
+                    .help("the standard deviation of one touch in um: greater than 0, between 1e-9 and 1e6")
                     .at(source, place(&w.noise.touch_um)),
             );
         }
         let visit_sigma_mm = mm(&w.noise.visit_um);
-        if visit_sigma_mm.is_some_and(|s| !(s.is_finite() && s >= 0.0)) {
+        if w.noise.visit_um.as_ref().is_some_and(|um| *um.get_ref() != 0.0 && !usable(um)) {
             findings.push(
-                Finding::error("study::noise", "visit_um is not a number, 0 or greater")
-                    .help("the standard deviation of the ball's place from one index to the next in um")
+                Finding::error("study::noise", "visit_um is no usable number")
+                    .help("the standard deviation of the ball's place from one index to the next in um: 0, or between 1e-9 and 1e6")
                     .at(source, place(&w.noise.visit_um)),
             );
         }
@@ -314,6 +321,7 @@ impl Study {
             reference: None,
             type_b: self.type_b.clone(),
             masked: self.masked.clone(),
+            bare: false,
             quick: false,
             held: Vec::new(),
             jumps: Vec::new(),

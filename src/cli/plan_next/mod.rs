@@ -12,7 +12,7 @@ use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{Room, View};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::diagnose::{self, Subject, Verdict, diagnose};
-use crate::fit::{self, Fit, Settings, effects_of};
+use crate::fit::{Fit, Settings, effects_of};
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::post::Postprocessor;
 use crate::search::apart::SEEN;
@@ -79,7 +79,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let named = effects_of(&args.effects, &loaded.catalogue, &loaded.machine)?;
     let look = |settings: &Settings| -> Result<(Fit, diagnose::Diagnosis)> {
-        let fit = fit::identify(&loaded.machine, &loaded.catalogue, &loaded.runs(), settings)?;
+        let fit = loaded.fit(settings)?;
         let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings, fit: &fit };
         // which mistake made touches miss is asked of the plans
         let planned = if fit.data.mostly_missed() { loaded.planned() } else { Vec::new() };
