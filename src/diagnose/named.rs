@@ -60,7 +60,7 @@ pub fn missing<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Ve
         fit.model.unknowns.iter().any(|u| u.effect == e.id)
             || (!e.per_block && e.parameters.iter().any(|p| fit.model.unknowns.iter().any(|u| u.name == p.name)))
     };
-    catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.discrete && !held(e)).collect()
+    catalogue.acting_on(machine).filter(|e| !held(e)).collect()
 }
 
 /// Index of the scanned shape among an effect's shape parameters, with the values.

@@ -11,6 +11,7 @@ use crate::model::predict::{Model, Unknown};
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// With more touches the whole catalogue would take longer than everything else together.
 pub(super) const MOST_UNMODELLED: usize = 20_000;
@@ -135,7 +136,7 @@ fn shown(fit: &Fit, which: &[usize]) -> f64 {
 #[must_use]
 pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
     let held = |e: &Effect| e.parameters.iter().any(|p| unknowns.iter().any(|u| u.effect == e.id || u.name == p.name));
-    catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.discrete && !held(e)).collect()
+    catalogue.acting_on(machine).filter(|e| !held(e)).collect()
 }
 
 /// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size (not the
@@ -150,18 +151,26 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
     let theta = fit.free_theta();
     let (p, q) = (fit.free.len(), typical.len());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
-    // part by part: the columns of the whole catalogue at all touches would be many times the touches themselves
+    // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many times
+    // the touches themselves
     fit.with_touches(fit.noise.tau_mm, |touches| {
-        for part in touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)) {
+        let columns = |part: &Range<usize>| {
             let rows: Vec<usize> = part.clone().collect();
             let mut jacobian = touches.unwhitened_of(&theta, &rows).1;
             touches.whiten_of(&rows, &mut jacobian);
-            let mut b = columns_of(&others, &fit.data.observations[part]);
+            let mut b = columns_of(&others, &fit.data.observations[part.clone()]);
             for (mut column, size) in b.column_iter_mut().zip(&typical) {
                 column *= *size;
             }
             touches.whiten_of(&rows, &mut b);
-            sums.add(&jacobian, &b);
+            (jacobian, b)
+        };
+        let parts: Vec<Range<usize>> =
+            touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)).collect();
+        for some in parts.chunks(rayon::current_num_threads()) {
+            let made: Vec<_> = some.par_iter().map(columns).collect();
+            // in their order, so that the sums are the same on any number of processors
+            made.iter().for_each(|(jacobian, b)| sums.add(jacobian, b));
         }
     });
     for (unknown, _, sigma) in &fit.priors {
@@ -169,17 +178,16 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
             sums.gram[(c, c)] += sigma.powi(-2);
         }
     }
-    let holds = (0..p).map(|_| Vec::new()).collect();
-    let mut out = Unmodelled { sigma: DVector::zeros(p), holds, left_out };
-    for (u, taken) in others.unknowns.iter().zip(sums.taken(&fit.seen)).filter(|(u, _)| !u.shape) {
+    let (taken, sigma) = rayon::join(|| sums.taken(&fit.seen), || sums.expected(&fit.seen));
+    let mut holds: Vec<Vec<String>> = (0..p).map(|_| Vec::new()).collect();
+    for (u, taken) in others.unknowns.iter().zip(taken).filter(|(u, _)| !u.shape) {
         if let Some(c) = taken.and_then(|taken| one_result(fit, &taken))
-            && !out.holds[c].contains(&u.effect)
+            && !holds[c].contains(&u.effect)
         {
-            out.holds[c].push(u.effect.clone());
+            holds[c].push(u.effect.clone());
         }
     }
-    out.sigma = sums.expected(&fit.seen);
-    out
+    Unmodelled { sigma, holds, left_out }
 }
 
 /// What effects outside of the model may do to a fit.
@@ -259,20 +267,22 @@ impl Sums {
         (0..q).map(taken).collect()
     }
 
-    fn expected(mut self, seen: &super::solve::Observability) -> DVector<f64> {
+    fn expected(&self, seen: &super::solve::Observability) -> DVector<f64> {
         let p = self.gram.nrows();
         let unknown = || DVector::from_element(p, f64::NAN);
+        let mut gram = self.gram.clone();
         if self.inner.nrows() > 0 {
             // a parameter of typical size 1 with a prior of 1: θ̂ moves by −C·Jᵀ(I + BBᵀ)⁻¹…, which is a noise of I + BBᵀ
-            self.inner.fill_diagonal_added();
-            let Some(cholesky) = self.inner.cholesky() else { return unknown() };
+            let mut inner = self.inner.clone();
+            inner.fill_diagonal_added();
+            let Some(cholesky) = inner.cholesky() else { return unknown() };
             let mut half = self.cross.transpose();
             if !cholesky.l_dirty().solve_lower_triangular_mut(&mut half) {
                 return unknown();
             }
-            self.gram.gemm(-1.0, &half.transpose(), &half, 1.0);
+            gram.gemm(-1.0, &half.transpose(), &half, 1.0);
         }
-        let scaled = DMatrix::from_fn(p, p, |i, j| self.gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
+        let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
         let reduced = if seen.full() { scaled } else { seen.seen.tr_mul(&scaled) * &seen.seen };
         let Some(inverse) = reduced.cholesky().map(|c| c.inverse()) else { return unknown() };
         let full = if seen.full() { inverse } else { &seen.seen * inverse * seen.seen.transpose() };

@@ -120,6 +120,12 @@ impl Effect {
         self.needs.iter().all(here) && !self.unless.iter().any(here)
     }
 
+    /// True when it may act on a machine beside any model: it applies, and is no set of the paper's and no hypothesis.
+    #[must_use]
+    pub fn acts_on(&self, machine: &Machine) -> bool {
+        !self.paper && !self.discrete && self.applies_to(machine)
+    }
+
     /// True when no machine can have both: rows of one id must differ so.
     pub(super) fn excludes(&self, other: &Self) -> bool {
         let shared = |a: &[AxisName], b: &[AxisName]| a.iter().any(|name| b.contains(name));
@@ -140,6 +146,47 @@ struct Row {
     effect: OnceLock<Option<Effect>>,
 }
 
+/// What the first lines of a row tell before it is read.
+struct Glance {
+    /// A set of the paper, or a hypothesis.
+    apart: bool,
+    side: Option<Side>,
+    /// The axes whose errors it holds, and those that it needs besides.
+    axes: Vec<AxisName>,
+}
+
+impl Glance {
+    fn of(row: &Row) -> Self {
+        let head = row.text.split("terms = [").next().unwrap_or_default();
+        let value = |key: &str| head.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "));
+        // `at = "B"` is an axis, `at = "base"` is none; `needs = ["B", "C"]`
+        let words = ["at", "needs"].iter().filter_map(|key| value(key)).flat_map(|words| words.split('"'));
+        let axis = |word: &str| {
+            Some(word).filter(|word| word.len() == 1).and_then(|word| AxisName::from_letter(word.chars().next()?))
+        };
+        Self {
+            apart: ["paper", "discrete"].iter().any(|key| value(key) == Some("true")),
+            side: match value("side") {
+                Some("\"tool\"") => Some(Side::Tool),
+                Some("\"workpiece\"") => Some(Side::Workpiece),
+                _ => None,
+            },
+            axes: words.filter_map(axis).collect(),
+        }
+    }
+
+    /// False where it is not among the effects that act on a machine.
+    fn may_act_on(&self, machine: &Machine) -> bool {
+        let has = |name: &AxisName| machine.axis(*name).is_some_and(|a| self.side.is_none_or(|side| a.side == side));
+        !self.apart && self.axes.iter().all(has)
+    }
+
+    /// True where it is probably among them for any machine.
+    fn is_of_any_machine(&self) -> bool {
+        !self.apart && self.side.is_none() && !self.axes.iter().any(|name| name.is_rotary())
+    }
+}
+
 impl Row {
     fn effect(&self) -> Option<&Effect> {
         let read = || {
@@ -147,6 +194,11 @@ impl Row {
             read(&source, true, &|_| false).ok().and_then(|(effects, _)| effects.into_iter().next())
         };
         self.effect.get_or_init(read).as_ref()
+    }
+
+    /// The effect, where it may act on a machine beside any model.
+    fn acting_on(&self, machine: &Machine) -> Option<&Effect> {
+        if Glance::of(self).may_act_on(machine) { self.effect().filter(|e| e.acts_on(machine)) } else { None }
     }
 }
 
@@ -176,12 +228,13 @@ impl Catalogue {
         Ok(Self { rows: Arc::clone(&ROWS), own: Vec::new() })
     }
 
-    /// Begins to read the built-in rows on another thread, for who will need them all.
+    /// Begins to read, on another thread, the built-in rows that any machine has, for who will need them all: which machine it is
+    /// will be known when they are read.
     pub fn read_ahead() {
         let rows = Arc::clone(&ROWS);
         rayon::spawn(move || {
             // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
-            for row in rows.iter().rev() {
+            for row in rows.iter().rev().filter(|row| Glance::of(row).is_of_any_machine()) {
                 row.effect();
             }
         });
@@ -192,8 +245,7 @@ impl Catalogue {
     pub fn prepare(&self, machine: &Machine) {
         let (rows, machine) = (Arc::clone(&self.rows), machine.clone());
         rayon::spawn(move || {
-            let applies = |e: &&Effect| e.applies_to(&machine) && !e.paper && !e.discrete;
-            let effects = rows.iter().rev().filter_map(Row::effect).filter(applies);
+            let effects = rows.iter().rev().filter_map(|row| row.acting_on(&machine));
             effects.flat_map(|e| &e.terms).for_each(|term| term.formula.prepare());
         });
     }
@@ -209,6 +261,12 @@ impl Catalogue {
         })?;
         self.own.extend(fresh);
         Ok(findings)
+    }
+
+    /// The effects that may act on a machine beside any model, built-in ones first: those that apply to it but the paper's sets
+    /// and hypotheses. Rows that cannot be among them are not read for it.
+    pub fn acting_on(&self, machine: &Machine) -> impl Iterator<Item = &Effect> {
+        self.rows.iter().filter_map(|row| row.acting_on(machine)).chain(self.own.iter().filter(|e| e.acts_on(machine)))
     }
 
     /// All effects, built-in ones first.
@@ -266,6 +324,14 @@ mod tests {
         let ids = |c: &Catalogue| c.iter().map(|e| e.id.clone()).collect::<Vec<_>>();
         assert_eq!(ids(&lazy), ids(&catalogue));
         assert!(lazy.rows.iter().all(|row| row.effect().is_some_and(|e| e.id == row.id)));
+        // and none that acts on a machine is passed over at a glance
+        for machine in crate::machine::load(&source("machines.toml", crate::machine::BUILT_IN)).unwrap().0 {
+            let acting = |c: &Catalogue| c.acting_on(&machine).map(|e| e.id.clone()).collect::<Vec<_>>();
+            assert_eq!(acting(&lazy), acting(&catalogue), "{}", machine.name);
+            let passed_over = lazy.rows.iter().filter(|row| !Glance::of(row).may_act_on(&machine)).count();
+            let others = catalogue.iter().filter(|e| !e.acts_on(&machine)).count();
+            assert!(passed_over > 20 && passed_over <= others, "{passed_over} of {others}");
+        }
         for e in catalogue.iter() {
             let said = [&e.name, &e.says, &e.look, &e.mends, &e.family];
             assert!(said.iter().all(|text| !text.is_empty()), "{}", e.id);

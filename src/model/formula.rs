@@ -3,6 +3,7 @@
 //! The expression crate does the parsing and differentiation; this module fixes the words that a formula may use
 //! (docs/guide/effects.md) and turns a mistake into a sentence that names it.
 
+use super::spelling::{bare_number, known_functions, numbered, plain_numbers};
 use exmex::prelude::*;
 use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
 use std::collections::HashMap;
@@ -100,9 +101,6 @@ impl MakeOperators<f64> for Words {
 
 type Expression = FlatEx<f64, Words>;
 
-/// An expression with the origins of its variables.
-type Compiled = (Expression, Vec<Origin>);
-
 /// Where the value of a variable of an expression comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Origin {
@@ -119,50 +117,63 @@ impl Origin {
     }
 }
 
-/// What a formula is once it is compiled.
-#[derive(Debug, Clone)]
-struct Parts {
-    constant: Option<f64>,
-    /// `None` for a bare number.
-    value: Option<Compiled>,
-    /// One per shape parameter that stands in it.
-    partials: Vec<Partial>,
+/// An expression as the crate has it. It is large (twenty kilobytes, whatever stands in it): one is made for all formulas that
+/// differ in the names of their variables only.
+#[derive(Debug)]
+struct Shared {
+    expression: Expression,
+    /// By variable.
+    derivatives: Vec<OnceLock<Option<Derivative>>>,
 }
 
-/// The derivative with respect to a shape parameter, made when somebody asks for it: that takes longer than the formula itself, and
-/// effects of no size need none.
-#[derive(Debug, Clone)]
-struct Partial {
-    /// Which of the effect's parameters.
-    shape: usize,
-    /// Which of the expression's variables.
-    at: usize,
-    /// `None` where the crate cannot differentiate (`floor`, `step`, …).
-    compiled: OnceLock<Option<Compiled>>,
+/// A derivative, and which of the expression's variables its own are.
+#[derive(Debug)]
+struct Derivative {
+    expression: Expression,
+    variables: Vec<usize>,
 }
 
-impl Partial {
-    fn compiled(&self, (expression, origins): &Compiled) -> Option<&Compiled> {
+impl Shared {
+    fn parse(text: &str) -> Option<Arc<Self>> {
+        let expression = Expression::parse(text).ok()?;
+        let derivatives = expression.var_names().iter().map(|_| OnceLock::new()).collect();
+        Some(Arc::new(Self { expression, derivatives }))
+    }
+
+    /// The derivative with respect to one of its variables, made when somebody asks for it: that takes longer than the formula
+    /// itself, and effects of no size need none. `None` where the crate cannot differentiate (`floor`, `step`, …).
+    fn derivative(&self, at: usize) -> Option<&Derivative> {
         let make = || {
-            let partial = expression.clone().partial(self.at).ok()?;
-            // its variables are some of the formula's
-            let of_name = |name: &String| expression.var_names().iter().position(|own| own == name).map(|i| origins[i]);
-            let origins = partial.var_names().iter().map(of_name).collect::<Option<Vec<_>>>()?;
-            Some((partial, origins))
+            let expression = self.expression.clone().partial(at).ok()?;
+            let of_name = |name: &String| self.expression.var_names().iter().position(|own| own == name);
+            let variables = expression.var_names().iter().map(of_name).collect::<Option<Vec<_>>>()?;
+            Some(Derivative { expression, variables })
         };
-        self.compiled.get_or_init(make).as_ref()
+        self.derivatives.get(at)?.get_or_init(make).as_ref()
+    }
+}
+
+/// What a formula is once it is compiled.
+#[derive(Debug)]
+enum Parts {
+    Constant(f64),
+    /// An expression with the origins of its variables.
+    Expression(Arc<Shared>, Vec<Origin>),
+}
+
+impl Parts {
+    fn of(shared: Arc<Shared>, origins: Vec<Origin>) -> Self {
+        let constant = if origins.is_empty() { shared.expression.eval(&[]).ok() } else { None };
+        constant.map_or(Self::Expression(shared, origins), Self::Constant)
     }
 }
 
 /// A text that is compiled at most once; `None` where it is no formula.
-type Once = Arc<OnceLock<Option<Arc<Parts>>>>;
+type Once = Arc<OnceLock<Option<Arc<Shared>>>>;
 
-/// A text, and the names of the shape parameters that stand in it.
-type Key = (String, Vec<String>);
-
-/// What is built in: a hundred different formulas stand in three hundred terms, and the expression crate takes a tenth of a
-/// millisecond for each.
-static BUILT_IN: LazyLock<Mutex<HashMap<Key, Once>>> = LazyLock::new(Mutex::default);
+/// What is built in, by its text with its variables numbered: some thirty expressions stand in three hundred terms, and the crate
+/// takes a tenth of a millisecond for each.
+static BUILT_IN: LazyLock<Mutex<HashMap<String, Once>>> = LazyLock::new(Mutex::default);
 
 /// A formula, compiled when it is first used: a study takes a few of the many that are built in.
 #[derive(Debug, Clone)]
@@ -196,22 +207,24 @@ impl Formula {
     }
 
     fn parts(&self) -> Option<&Parts> {
-        self.parts.get_or_init(|| self.once().get_or_init(|| self.compiled()).clone()).as_deref()
+        self.parts.get_or_init(|| self.compiled().map(Arc::new)).as_deref()
     }
 
-    fn compiled(&self) -> Option<Arc<Parts>> {
-        compile(&self.text, &self.shapes.iter().map(String::as_str).collect::<Vec<_>>()).ok().map(Arc::new)
-    }
-
-    /// Where all formulas of this text are compiled together. The map is free again while one of them is.
-    fn once(&self) -> Once {
-        let words = || self.text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
-        // by their numbers in the effect: those that do not stand here leave their place empty
-        let own = |name: &String| if words().any(|word| word == name) { name.clone() } else { String::new() };
-        let mut shapes: Vec<String> = self.shapes.iter().map(own).collect();
-        shapes.truncate(shapes.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1));
-        let mut all = BUILT_IN.lock().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(all.entry((self.text.clone(), shapes)).or_default())
+    /// Of a built-in formula, whose expression is shared. The map is free again while one of them is compiled.
+    fn compiled(&self) -> Option<Parts> {
+        if let Some(constant) = bare_number(&self.text) {
+            return Some(Parts::Constant(constant));
+        }
+        // a parameter of the effect goes before a variable of the same name
+        let origin = |word: &str| {
+            let shape = self.shapes.iter().position(|s| s == word).map(Origin::Shape);
+            shape.or_else(|| VARIABLES.iter().position(|v| *v == word).map(Origin::State))
+        };
+        let (text, origins) = numbered(&self.text, origin)?;
+        let once = Arc::clone(BUILT_IN.lock().unwrap_or_else(PoisonError::into_inner).entry(text.clone()).or_default());
+        let shared = once.get_or_init(|| Shared::parse(&text)).clone()?;
+        // a word that is none of them would stand among the variables
+        (shared.expression.var_names().len() == origins.len()).then(|| Parts::of(shared, origins))
     }
 
     /// Compiles it, if that has not been done.
@@ -228,44 +241,47 @@ impl Formula {
     /// Its value where it uses no variable.
     #[must_use]
     pub fn constant(&self) -> Option<f64> {
-        self.parts().and_then(|p| p.constant)
+        if let Some(Parts::Constant(constant)) = self.parts() { Some(*constant) } else { None }
+    }
+
+    /// Where its variables come from; none for a number, or where it is no formula.
+    fn origins(&self) -> &[Origin] {
+        if let Some(Parts::Expression(_, origins)) = self.parts() { origins } else { &[] }
     }
 
     /// True when a parameter of the effect stands inside.
     #[must_use]
     pub fn has_shape(&self) -> bool {
-        self.parts().is_some_and(|p| !p.partials.is_empty())
+        self.origins().iter().any(|o| matches!(o, Origin::Shape(_)))
     }
 
     /// Does this parameter of the effect stand inside?
     #[must_use]
     pub fn holds(&self, shape: usize) -> bool {
-        self.parts().is_some_and(|p| p.partials.iter().any(|p| p.shape == shape))
+        self.origins().contains(&Origin::Shape(shape))
     }
 
     /// The state variables that it uses.
     #[must_use]
     pub fn variables(&self) -> Vec<&'static str> {
-        let origins = self.parts().and_then(|p| p.value.as_ref()).map_or(&[][..], |value| &value.1);
-        origins.iter().filter_map(|o| if let Origin::State(i) = o { Some(VARIABLES[*i]) } else { None }).collect()
+        let name = |o: &Origin| if let Origin::State(i) = o { Some(VARIABLES[*i]) } else { None };
+        self.origins().iter().filter_map(name).collect()
     }
 
     /// Value at a state; `shapes` are the parameters' values in their own units.
     #[must_use]
     pub fn eval(&self, state: &State, shapes: &[f64]) -> f64 {
-        let Some(parts) = self.parts() else { return f64::NAN };
-        match (parts.constant, &parts.value) {
-            (Some(constant), _) => constant,
-            (None, Some(value)) => evaluate(value, state, shapes),
-            (None, None) => f64::NAN,
+        match self.parts() {
+            Some(Parts::Constant(constant)) => *constant,
+            Some(Parts::Expression(shared, origins)) => evaluate(&shared.expression, origins.iter(), state, shapes),
+            None => f64::NAN,
         }
     }
 
     /// Values at many states. Touches of one pose mostly follow one another: where the variables are those of the state before,
     /// so is the value.
     pub fn eval_each<'s>(&self, states: impl Iterator<Item = &'s State>, shapes: &[f64]) -> Vec<f64> {
-        let Some((expression, origins)) = self.parts().filter(|p| p.constant.is_none()).and_then(|p| p.value.as_ref())
-        else {
+        let Some(Parts::Expression(shared, origins)) = self.parts() else {
             return states.map(|state| self.eval(state, shapes)).collect();
         };
         let mut before = [0.0_f64; MOST_VARIABLES];
@@ -277,7 +293,7 @@ impl Formula {
                 same &= before.to_bits() == value.to_bits();
                 *before = value;
             }
-            let value = last.filter(|_| same).unwrap_or_else(|| expression.eval(before).unwrap_or(f64::NAN));
+            let value = last.filter(|_| same).unwrap_or_else(|| shared.expression.eval(before).unwrap_or(f64::NAN));
             last = Some(value);
             value
         };
@@ -286,14 +302,18 @@ impl Formula {
 
     /// Derivatives with respect to the shape parameters that stand inside: (which, value).
     pub fn partials<'a>(&'a self, state: &'a State, shapes: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        let parts = self.parts();
-        let partials = parts.map_or(&[][..], |p| &p.partials);
-        let formula = parts.and_then(|p| p.value.as_ref());
-        partials.iter().map(move |partial| {
-            let compiled = formula.and_then(|f| partial.compiled(f));
-            let value = compiled.map(|p| evaluate(p, state, shapes)).filter(|v| v.is_finite());
-            (partial.shape, value.unwrap_or_else(|| self.difference(partial.shape, state, shapes)))
+        let of_shape =
+            |(at, origin): (usize, &Origin)| if let Origin::Shape(k) = origin { Some((at, *k)) } else { None };
+        self.origins().iter().enumerate().filter_map(of_shape).map(move |(at, shape)| {
+            let value = self.derivative(at, state, shapes).filter(|v| v.is_finite());
+            (shape, value.unwrap_or_else(|| self.difference(shape, state, shapes)))
         })
+    }
+
+    fn derivative(&self, at: usize, state: &State, shapes: &[f64]) -> Option<f64> {
+        let Some(Parts::Expression(shared, origins)) = self.parts() else { return None };
+        let of = shared.derivative(at)?;
+        Some(evaluate(&of.expression, of.variables.iter().map(|i| &origins[*i]), state, shapes))
     }
 
     fn difference(&self, shape: usize, state: &State, shapes: &[f64]) -> f64 {
@@ -309,88 +329,30 @@ impl Formula {
 fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     // most terms of a usual model are bare numbers, and the expression crate takes a tenth of a millisecond for each
     if let Some(constant) = bare_number(text) {
-        return Ok(Parts { constant: Some(constant), value: None, partials: Vec::new() });
+        return Ok(Parts::Constant(constant));
     }
     let plain = plain_numbers(text)?;
     known_functions(&plain)?;
-    let expression =
-        Expression::parse(&plain).map_err(|_| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
-    let origins = origins(&expression, shapes)?;
-    let partial = |(at, origin): (usize, &Origin)| match origin {
-        Origin::Shape(shape) => Some(Partial { shape: *shape, at, compiled: OnceLock::new() }),
-        Origin::State(_) => None,
-    };
-    let partials = origins.iter().enumerate().filter_map(partial).collect();
-    let constant = if origins.is_empty() { expression.eval(&[]).ok() } else { None };
-    Ok(Parts { constant, value: Some((expression, origins)), partials })
-}
-
-fn bare_number(text: &str) -> Option<f64> {
-    let digits = text.trim().trim_start_matches('-');
-    digits
-        .starts_with(|c: char| c.is_ascii_digit())
-        .then(|| text.trim().parse().ok().filter(|v: &f64| v.is_finite()))?
-}
-
-/// The expression crate reads no exponents: `1.5e-3` is written out as `0.0015`.
-fn plain_numbers(text: &str) -> Result<String, String> {
-    let bytes = text.as_bytes();
-    let (mut out, mut at) = (String::new(), 0);
-    while at < bytes.len() {
-        let in_word = at > 0 && (bytes[at - 1].is_ascii_alphanumeric() || bytes[at - 1] == b'_');
-        let begins = bytes[at].is_ascii_digit() || bytes[at] == b'.';
-        if !begins || in_word {
-            let end = (at + 1..=bytes.len()).find(|i| text.is_char_boundary(*i)).unwrap_or(bytes.len());
-            out.push_str(&text[at..end]);
-            at = end;
-            continue;
-        }
-        let mut end = at;
-        while end < bytes.len() && (bytes[end].is_ascii_digit() || bytes[end] == b'.') {
-            end += 1;
-        }
-        if end < bytes.len() && matches!(bytes[end], b'e' | b'E') {
-            let sign = usize::from(end + 1 < bytes.len() && matches!(bytes[end + 1], b'+' | b'-'));
-            let digits = bytes[end + 1 + sign..].iter().take_while(|b| b.is_ascii_digit()).count();
-            if digits > 0 {
-                end += 1 + sign + digits;
-            }
-        }
-        let word = &text[at..end];
-        let value: f64 = word.parse().map_err(|_| format!("{word:?} is no number"))?;
-        if !value.is_finite() {
-            return Err(format!("{word:?} is too large a number"));
-        }
-        out.push_str(&value.to_string());
-        at = end;
-    }
-    Ok(out)
-}
-
-/// A word in front of a bracket must be a function.
-fn known_functions(text: &str) -> Result<(), String> {
-    let mut rest = text;
-    while let Some(bracket) = rest.find('(') {
-        let before = rest[..bracket].trim_end();
-        let word_from = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).map_or(0, |i| i + 1);
-        let word = before.get(word_from..).unwrap_or_default();
-        if !word.is_empty() && !word.starts_with(|c: char| c.is_ascii_digit()) && !FUNCTIONS.contains(&word) {
-            return Err(format!("unknown function {word:?} (functions: {})", FUNCTIONS.join(" ")));
-        }
-        rest = &rest[bracket + 1..];
-    }
-    Ok(())
+    let shared =
+        Shared::parse(&plain).ok_or_else(|| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
+    let origins = origins(&shared.expression, shapes)?;
+    Ok(Parts::of(shared, origins))
 }
 
 /// Variables of a formula at most: they fit on the stack.
 const MOST_VARIABLES: usize = 32;
 
-fn evaluate((expression, origins): &Compiled, state: &State, shapes: &[f64]) -> f64 {
-    let mut values = [0.0; MOST_VARIABLES];
+fn evaluate<'o>(
+    expression: &Expression,
+    origins: impl ExactSizeIterator<Item = &'o Origin>,
+    state: &State,
+    shapes: &[f64],
+) -> f64 {
+    let (mut values, n) = ([0.0; MOST_VARIABLES], origins.len());
     for (value, origin) in values.iter_mut().zip(origins) {
         *value = origin.value(state, shapes);
     }
-    expression.eval(&values[..origins.len()]).unwrap_or(f64::NAN)
+    expression.eval(&values[..n]).unwrap_or(f64::NAN)
 }
 
 fn origins(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {

@@ -11,5 +11,6 @@ pub mod mistake;
 mod placed;
 mod poses;
 pub mod predict;
+mod spelling;
 mod temperatures;
 pub mod traces;
