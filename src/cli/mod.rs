@@ -112,18 +112,32 @@ enum Verb {
 /// Runs the program with the arguments of the process.
 #[must_use]
 pub fn main() -> ExitCode {
+    ahead_of_the_call();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         // clap exits with 2 for a bad call and 0 for --help and --version, which is what scripts rely on
         Err(e) => e.exit(),
     };
     let io = Io::new(cli.json);
-    // a fit waits for nobody but its own parts: this thread works with the others instead of beside them, so that no more run
-    // than there are processors. Nobody can have made a pool before: if one stood, it would stay
-    if matches!(&cli.verb, Verb::Identify(args) if !args.quick) {
-        let _ = rayon::ThreadPoolBuilder::new().use_current_thread().build_global();
-    }
     io.finish(dispatch(cli.verb, &io))
+}
+
+/// What `identify` needs of the catalogue takes as long to read as the call itself and the files that it names: another thread
+/// begins at once. A word that was meant for something else costs that, and changes nothing.
+fn ahead_of_the_call() {
+    let has = |word: &str| std::env::args_os().any(|typed| typed == word);
+    if !has("identify") || has("--quick") {
+        return;
+    }
+    // a fit waits for nobody but its own parts: this thread works with the others instead of beside them, so that no more run
+    // than there are processors. Nobody can have made a pool before: if one stood, it would stay. The first of the others reads as it
+    // starts: a job would find it asleep, and waking it takes longer than reading
+    let read = |thread| {
+        if thread == 1 {
+            crate::model::catalogue::Catalogue::read_rows_of_any_machine();
+        }
+    };
+    let _ = rayon::ThreadPoolBuilder::new().use_current_thread().start_handler(read).build_global();
 }
 
 /// Another verb, called by one of them with the words that a user would type.

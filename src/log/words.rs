@@ -94,7 +94,9 @@ fn decimal(whole: &[u8], fraction: &[u8], exponent: i32) -> f64 {
     text.extend(whole.iter().map(|b| *b as char));
     text.push('.');
     text.extend(fraction.iter().map(|b| *b as char));
-    text.push_str(&format!("e{exponent}"));
+    if exponent != 0 {
+        text.push_str(&format!("e{exponent}"));
+    }
     text.parse().unwrap_or(f64::NAN)
 }
 

@@ -143,10 +143,12 @@ struct Row {
     id: &'static str,
     /// The row's own text.
     text: &'static str,
+    glance: OnceLock<Glance>,
     effect: OnceLock<Option<Effect>>,
 }
 
 /// What the first lines of a row tell before it is read.
+#[derive(Debug, Clone)]
 struct Glance {
     /// A set of the paper, or a hypothesis.
     apart: bool,
@@ -157,8 +159,8 @@ struct Glance {
 
 impl Glance {
     fn of(row: &Row) -> Self {
-        let head = row.text.split("terms = [").next().unwrap_or_default();
-        let value = |key: &str| head.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "));
+        let head = || row.text.lines().take_while(|line| !line.starts_with("terms"));
+        let value = |key: &str| head().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = "));
         // `at = "B"` is an axis, `at = "base"` is none; `needs = ["B", "C"]`
         let words = ["at", "needs"].iter().filter_map(|key| value(key)).flat_map(|words| words.split('"'));
         let axis = |word: &str| {
@@ -188,6 +190,10 @@ impl Glance {
 }
 
 impl Row {
+    fn glance(&self) -> &Glance {
+        self.glance.get_or_init(|| Glance::of(self))
+    }
+
     fn effect(&self) -> Option<&Effect> {
         let read = || {
             let source = crate::diag::source("effects.toml (built in)", format!("{HEAD}{}", self.text));
@@ -198,7 +204,7 @@ impl Row {
 
     /// The effect, where it may act on a machine beside any model.
     fn acting_on(&self, machine: &Machine) -> Option<&Effect> {
-        if Glance::of(self).may_act_on(machine) { self.effect().filter(|e| e.acts_on(machine)) } else { None }
+        if self.glance().may_act_on(machine) { self.effect().filter(|e| e.acts_on(machine)) } else { None }
     }
 }
 
@@ -208,7 +214,7 @@ const HEAD: &str = "[[effect]]";
 /// The rows of the built-in file, each read at most once in a process.
 static ROWS: LazyLock<Arc<[Row]>> = LazyLock::new(|| {
     let id = |text: &'static str| text.split('"').nth(1).unwrap_or_default();
-    let row = |text| Row { id: id(text), text, effect: OnceLock::new() };
+    let row = |text| Row { id: id(text), text, glance: OnceLock::new(), effect: OnceLock::new() };
     BUILT_IN.split(HEAD).skip(1).map(row).collect()
 });
 
@@ -231,13 +237,15 @@ impl Catalogue {
     /// Begins to read, on another thread, the built-in rows that any machine has, for who will need them all: which machine it is
     /// will be known when they are read.
     pub fn read_ahead() {
-        let rows = Arc::clone(&ROWS);
-        rayon::spawn(move || {
-            // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
-            for row in rows.iter().rev().filter(|row| Glance::of(row).is_of_any_machine()) {
-                row.effect();
-            }
-        });
+        rayon::spawn(Self::read_rows_of_any_machine);
+    }
+
+    /// Reads the built-in rows that any machine has.
+    pub fn read_rows_of_any_machine() {
+        // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
+        for row in ROWS.iter().rev().filter(|row| row.glance().is_of_any_machine()) {
+            row.effect();
+        }
     }
 
     /// Begins to read and compile, on another thread, what any question to the whole catalogue will need for this machine:
@@ -328,7 +336,7 @@ mod tests {
         for machine in crate::machine::load(&source("machines.toml", crate::machine::BUILT_IN)).unwrap().0 {
             let acting = |c: &Catalogue| c.acting_on(&machine).map(|e| e.id.clone()).collect::<Vec<_>>();
             assert_eq!(acting(&lazy), acting(&catalogue), "{}", machine.name);
-            let passed_over = lazy.rows.iter().filter(|row| !Glance::of(row).may_act_on(&machine)).count();
+            let passed_over = lazy.rows.iter().filter(|row| !row.glance().may_act_on(&machine)).count();
             let others = catalogue.iter().filter(|e| !e.acts_on(&machine)).count();
             assert!(passed_over > 20 && passed_over <= others, "{passed_over} of {others}");
         }
