@@ -6,7 +6,7 @@ use super::solve::Solution;
 use super::type_b::TypeB;
 use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect};
+use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
 use crate::units::{significant, um_from_mm};
 use nalgebra::DVector;
@@ -29,11 +29,10 @@ const MOST_PROFILED: usize = 20_000;
 pub(super) fn outcome(
     fit: &Fit,
     machine: &Machine,
-    catalogue: &Catalogue,
     effects: &[&Effect],
     settings: &Settings,
     (solution, condition): (&Solution, f64),
-    type_b: &[TypeB],
+    (type_b, left_out): (&[TypeB], Option<uncertainty::LeftOut>),
 ) -> (Outcome, BTreeMap<usize, Vec<f64>>) {
     let (n, n_used) = (fit.data.observations.len(), fit.n_used());
     let p = fit.free.len();
@@ -44,7 +43,7 @@ pub(super) fn outcome(
         (None, (None, Vec::new()))
     } else {
         rayon::join(
-            || (!many).then(|| uncertainty::with_unmodelled(fit, machine, catalogue)),
+            || left_out.map(|all| uncertainty::with_unmodelled(fit, all)),
             || {
                 let weak = if many { Vec::new() } else { weak::weak(fit, effects) };
                 (held_out::by_visit(fit).map(|h| h.rms_um), weak)
@@ -157,7 +156,7 @@ pub(super) fn outcome(
                 sigma,
                 expanded,
                 interval,
-                sigma_noise: known.map(|c| (noise_variance(c) - by_visits[c]).max(0.0).sqrt()),
+                sigma_noise: known.map(|c| (noise_variance(c) - by_visits[c] - prior_variance(c)).max(0.0).sqrt()),
                 sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
                 moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
                 sigma_with_unmodelled: known
@@ -452,11 +451,13 @@ fn warnings(
     let limit = fit.noise.limit(fit.dof);
     if fit.dof > 0 && chi2_per_dof > limit && (dof == 0 || chi2 > limit * dof as f64) {
         out.push(format!(
-            "the touches miss the model by {}: something is missing in it, and the uncertainties count {} only (`axiscal diagnose` looks for it)",
+            "the touches miss the model by {}: something is missing in it, and the uncertainties count {} only (`axiscal diagnose` looks for it){}",
             fit.noise.times(chi2_per_dof.sqrt()),
-            if fit.type_b.is_empty() { "the noise" } else { "the noise and the type B rows" }
+            if fit.type_b.is_empty() { "the noise" } else { "the noise and the type B rows" },
+            fit.noise.or_the_probe(chi2_per_dof.sqrt()).map_or_else(String::new, |or| format!("; {or}"))
         ));
     }
+    out.extend(fit.noise.far_too_large(fit.chi2, fit.dof));
     out
 }
 

@@ -264,21 +264,90 @@ fn identify_from(
         stated_sigma_mm: settings.touch_sigma_mm,
         stated_tau_mm: settings.visit_sigma_mm,
     };
+    let moving =
+        effects.iter().any(|e| e.terms.iter().any(|t| t.formula.variables().iter().any(|v| MOVING.contains(v))));
+    let many = data.observations.len() > uncertainty::MOST_UNMODELLED;
+    let is_asked = !(settings.quick || settings.bare || many);
+    let solution = || find(&model, &data, settings, (&free, &priors), theta, (known, moving));
+    let (found, left_out) = if is_asked {
+        // what the model leaves out does not wait for the solution
+        rayon::join(solution, || Some(uncertainty::LeftOut::of(&model, machine, catalogue, &data)))
+    } else {
+        (solution(), None)
+    };
+    let Found { theta, residual_mm, studentised, weight, rejected, covariance, .. } = found;
+    let Found { observability, condition, seen, noise, strangers_beyond, solution, dof, unknown_masks, .. } = found;
+    let mut fit = Fit {
+        model,
+        data,
+        theta,
+        residual_mm,
+        studentised,
+        weight,
+        rejected,
+        covariance,
+        observability,
+        seen,
+        free,
+        priors,
+        knowledge,
+        type_b: Vec::new(),
+        noise,
+        strangers_beyond,
+        other_values: BTreeMap::new(),
+        chi2: solution.chi2,
+        dof,
+        outcome: Outcome::default(),
+    };
+    let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
+    fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
+    let (mut outcome, other_values) =
+        answer::outcome(&fit, machine, effects, settings, (&solution, condition), (&type_b, left_out));
+    outcome.warnings.extend(unknown_masks);
+    (fit.outcome, fit.other_values) = (outcome, other_values);
+    Ok(fit)
+}
+
+/// What the touches say of a model.
+struct Found {
+    theta: Vec<f64>,
+    residual_mm: Vec<f64>,
+    studentised: Vec<f64>,
+    weight: Vec<f64>,
+    rejected: BTreeMap<usize, String>,
+    covariance: DMatrix<f64>,
+    observability: solve::Observability,
+    condition: f64,
+    seen: solve::Observability,
+    noise: Noise,
+    strangers_beyond: Option<usize>,
+    solution: solve::Solution,
+    dof: usize,
+    /// What is said of masks of touches that do not exist.
+    unknown_masks: Vec<String>,
+}
+
+/// Solves a model from `theta` on: with the noise that the touches show, and without those that are strangers to it.
+fn find(
+    model: &Model,
+    data: &Data,
+    settings: &Settings,
+    (free, priors): (&[usize], &[Prior]),
+    mut theta: Vec<f64>,
+    (known, moving): (Known, bool),
+) -> Found {
     let first_noise = (known.rounding.added_to(settings.touch_sigma_mm.unwrap_or(known.declared_sigma_mm)), 0.0);
     let batch = model.prepare_holding(&data.observations, &theta, &|i| free.binary_search(&i).is_err());
     let start = DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i]));
-    let mut touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &priors, first_noise);
+    let mut touches = Touches::new(&batch, &data.visits, theta.clone(), free, priors, first_noise);
     let masked: Vec<bool> = { data.observations.iter().map(|o| settings.masked.iter().any(|m| m.is_of(o))).collect() };
     if masked.contains(&true) {
         touches.set_weights(masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
     }
     let first = solve::Problem::normal(&touches, &start, true);
-    let (observability, condition) =
-        rank::observe(&first.gram, &model, &data, &theta, &free, &priors, touches.weights());
-    let moving =
-        effects.iter().any(|e| e.terms.iter().any(|t| t.formula.variables().iter().any(|v| MOVING.contains(v))));
+    let (observability, condition) = rank::observe(&first.gram, model, data, &theta, free, priors, touches.weights());
     let mut search = Search {
-        data: &data,
+        data,
         observability: observability.clone(),
         touches,
         masked,
@@ -288,7 +357,7 @@ fn identify_from(
         judged: None,
     };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
-    let solution = search.follow_bends(solution, &model, &free);
+    let solution = search.follow_bends(solution, model, free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
     let solution = if settings.all_in { solution } else { search.without_strangers(solution, 0.0) };
     let first_steps = solution.iterations;
@@ -303,7 +372,7 @@ fn identify_from(
         solution = settled;
         noise
     };
-    solution = search.follow_bends(solution, &model, &free);
+    solution = search.follow_bends(solution, model, free);
     solution.iterations += first_steps;
     let dof = solve::Problem::n_rows(&search.touches).saturating_sub(observability.rank);
     for (column, &i) in free.iter().enumerate() {
@@ -339,12 +408,7 @@ fn identify_from(
     }
     let seen = search.seen_at(&solution.theta);
     let strangers_beyond = search.beyond;
-    drop(search.touches);
-    drop(batch);
-    let chi2 = solution.chi2;
-    let mut fit = Fit {
-        model,
-        data,
+    Found {
         theta,
         residual_mm,
         studentised,
@@ -352,25 +416,14 @@ fn identify_from(
         rejected,
         covariance,
         observability,
+        condition,
         seen,
-        free,
-        priors,
-        knowledge,
-        type_b: Vec::new(),
         noise,
         strangers_beyond,
-        other_values: BTreeMap::new(),
-        chi2,
+        solution,
         dof,
-        outcome: Outcome::default(),
-    };
-    let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
-    fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
-    let (mut outcome, other_values) =
-        answer::outcome(&fit, machine, catalogue, effects, settings, (&solution, condition), &type_b);
-    outcome.warnings.extend(unknown_masks);
-    (fit.outcome, fit.other_values) = (outcome, other_values);
-    Ok(fit)
+        unknown_masks,
+    }
 }
 
 /// Scatter of the ball's place from one index to the next as the machine file declares it, mm: of the rotary axes that

@@ -7,7 +7,8 @@ use super::solve::Problem as _;
 use super::{Fit, Knowledge};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
-use crate::model::predict::{Model, Unknown};
+use crate::model::data::Data;
+use crate::model::predict::{Model, Observation, Unknown};
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -18,6 +19,9 @@ pub(super) const MOST_UNMODELLED: usize = 20_000;
 
 /// Touches whose columns of the whole catalogue are held at once.
 const UNMODELLED_AT_ONCE: usize = 128;
+
+/// Up to this number of touches their columns of the whole catalogue are made beside the fit, and held.
+const HELD: usize = 1024;
 
 /// Variance of each free unknown that goes back to the scatter of visits.
 pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
@@ -139,17 +143,49 @@ pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c
     catalogue.acting_on(machine).filter(|e| !held(e)).collect()
 }
 
-/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size (not the
-/// set-up of blocks), and the ball's place scatters from one index to the next as far as that is known; and what is said of
-/// effects that could not be counted.
-pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> Unmodelled {
-    let mut effects = unmodelled_by(&fit.model.unknowns, machine, catalogue);
-    effects.retain(|e| !e.per_block);
-    let (effects, left_out) = with_values(effects, &fit.data.observations);
-    let others = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
-    let typical: Vec<f64> = others.unknowns.iter().map(|u| u.typical).collect();
+/// What a model leaves out (not the set-ups of blocks), and what it would do to touches. Nothing of it depends on a solution.
+pub(super) struct LeftOut {
+    model: Model,
+    /// mm at the usual size of each parameter, one row per touch; `None` where there are many, whose columns are made part by part.
+    columns: Option<DMatrix<f64>>,
+    /// What is said of effects that could not be counted.
+    says: Vec<String>,
+}
+
+impl LeftOut {
+    /// What `model` leaves out.
+    pub(super) fn of(model: &Model, machine: &Machine, catalogue: &Catalogue, data: &Data) -> Self {
+        let mut effects = unmodelled_by(&model.unknowns, machine, catalogue);
+        effects.retain(|e| !e.per_block);
+        let (effects, says) = with_values(effects, &data.observations);
+        let model = Model::new(machine, &effects, &data.set_ups, model.reference);
+        let columns = (data.observations.len() <= HELD).then(|| typical_columns(&model, &data.observations));
+        Self { model, columns, says }
+    }
+
+    fn columns(&self, fit: &Fit, part: &Range<usize>) -> DMatrix<f64> {
+        match &self.columns {
+            Some(all) => all.rows_range(part.clone()).into_owned(),
+            None => typical_columns(&self.model, &fit.data.observations[part.clone()]),
+        }
+    }
+}
+
+/// Columns of a model's unknowns times their usual sizes, mm.
+fn typical_columns(model: &Model, observations: &[Observation]) -> DMatrix<f64> {
+    let mut columns = columns_of(model, observations);
+    for (mut column, unknown) in columns.column_iter_mut().zip(&model.unknowns) {
+        column *= unknown.typical;
+    }
+    columns
+}
+
+/// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size, and the
+/// ball's place scatters from one index to the next as far as that is known; and what is said of effects that could not be
+/// counted.
+pub(super) fn with_unmodelled(fit: &Fit, left_out: LeftOut) -> Unmodelled {
     let theta = fit.free_theta();
-    let (p, q) = (fit.free.len(), typical.len());
+    let (p, q) = (fit.free.len(), left_out.model.n_unknowns());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
     // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many times
     // the touches themselves
@@ -158,10 +194,7 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
             let rows: Vec<usize> = part.clone().collect();
             let mut jacobian = touches.unwhitened_of(&theta, &rows).1;
             touches.whiten_of(&rows, &mut jacobian);
-            let mut b = columns_of(&others, &fit.data.observations[part.clone()]);
-            for (mut column, size) in b.column_iter_mut().zip(&typical) {
-                column *= *size;
-            }
+            let mut b = left_out.columns(fit, part);
             touches.whiten_of(&rows, &mut b);
             (jacobian, b)
         };
@@ -180,14 +213,14 @@ pub(super) fn with_unmodelled(fit: &Fit, machine: &Machine, catalogue: &Catalogu
     }
     let (taken, sigma) = rayon::join(|| sums.taken(&fit.seen), || sums.expected(&fit.seen));
     let mut holds: Vec<Vec<String>> = (0..p).map(|_| Vec::new()).collect();
-    for (u, taken) in others.unknowns.iter().zip(taken).filter(|(u, _)| !u.shape) {
+    for (u, taken) in left_out.model.unknowns.iter().zip(taken).filter(|(u, _)| !u.shape) {
         if let Some(c) = taken.and_then(|taken| one_result(fit, &taken))
             && !holds[c].contains(&u.effect)
         {
             holds[c].push(u.effect.clone());
         }
     }
-    Unmodelled { sigma, holds, left_out }
+    Unmodelled { sigma, holds, left_out: left_out.says }
 }
 
 /// What effects outside of the model may do to a fit.
@@ -233,13 +266,17 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, jacobian: &DMatrix<f64>, b: &DMatrix<f64>) {
-        let turned = jacobian.transpose();
+        let Self { gram, cross, inner } = self;
         rayon::join(
             || {
-                self.gram.gemm(1.0, &turned, jacobian, 1.0);
-                self.cross.gemm(1.0, &turned, b, 1.0);
+                for (from, n) in few_rows(b.nrows()) {
+                    let j = jacobian.rows(from, n).into_owned();
+                    let turned = j.transpose();
+                    gram.gemm(1.0, &turned, &j, 1.0);
+                    cross.gemm(1.0, &turned, &b.rows(from, n).into_owned(), 1.0);
+                }
             },
-            || add_lower_square(&mut self.inner, b),
+            || add_lower_square(inner, b),
         );
     }
 
@@ -290,16 +327,26 @@ impl Sums {
     }
 }
 
+/// First and number of a few of so many rows, all of them in turn: the memory that a product needs besides stays small, and is that of
+/// the one before.
+fn few_rows(rows: usize) -> impl Iterator<Item = (usize, usize)> {
+    const FEW: usize = 64;
+    (0..rows).step_by(FEW).map(move |from| (from, FEW.min(rows - from)))
+}
+
 /// Adds BᵀB to the lower triangle of a matrix; what stands above it means nothing.
 fn add_lower_square(into: &mut DMatrix<f64>, b: &DMatrix<f64>) {
     /// Columns of the product that are made together.
     const BLOCK: usize = 64;
     let q = b.ncols();
-    let turned = b.transpose();
     into.as_mut_slice().par_chunks_mut((q * BLOCK).max(1)).enumerate().for_each(|(k, part)| {
         let (from, n) = (k * BLOCK, part.len() / q);
         let mut part = DMatrixViewMut::from_slice(part, q, n);
-        part.rows_mut(from, q - from).gemm(1.0, &turned.rows(from, q - from), &b.columns(from, n), 1.0);
+        let mut part = part.rows_mut(from, q - from);
+        for (row, rows) in few_rows(b.nrows()) {
+            let turned = b.view((row, from), (rows, q - from)).transpose();
+            part.gemm(1.0, &turned, &b.view((row, from), (rows, n)).into_owned(), 1.0);
+        }
     });
 }
 
@@ -332,7 +379,7 @@ pub fn full_covariance(fit: &Fit) -> Covariance {
 /// The type A covariance of the results with something added, by places among the free unknowns.
 fn covariance_with(fit: &Fit, more: impl Fn(usize, usize) -> f64) -> Covariance {
     let results: Vec<(usize, usize)> =
-        fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].nuisance).collect();
+        fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].is_set_up()).collect();
     let row = |&(a, i): &(usize, usize)| -> Vec<f64> {
         results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect()
     };
