@@ -236,7 +236,10 @@ fn show(e: &Effect, machines: &[Machine]) -> String {
         let other = [("ISO", p.iso.as_ref().filter(|iso| **iso != p.name)), ("paper", p.alias.as_ref())];
         let other: Vec<String> = other.into_iter().filter_map(|(w, s)| Some(format!(" ({w} {})", s?))).collect();
         out += &match p.shape {
-            None => entry(&p.name, &format!("usually {} {}{}; {}", p.typical, p.unit, other.concat(), p.source)),
+            None => {
+                let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+                entry(&p.name, &format!("usually {}{unit}{}; {}", p.typical, other.concat(), p.source))
+            }
             Some((start, low, high)) => {
                 let tried =
                     p.scan.iter().map(|v| format!("{v:.3}").trim_end_matches('0').trim_end_matches('.').to_owned());

@@ -275,11 +275,16 @@ fn summary(
     }
     io.say(t.to_string());
     io.say(format!(
-        "{} touches on {}, mounting {:?}, about {}",
+        "{} touches on {}, mounting {:?}, about {}{}",
         plan.touches.len(),
         machine.name,
         plan.mounting,
-        program::duration(seconds)
+        program::duration(seconds),
+        // `assess` and the head of the program, which is the same for every control, know the plan alone
+        match program::duration(path.seconds) {
+            planned if planned == program::duration(seconds) => String::new(),
+            planned => format!(" with this control's own steps, {planned} as planned"),
+        }
     ));
     let stops: Vec<&Stop> =
         path.steps.iter().filter_map(|s| if let Step::Stop(stop) = s { Some(stop) } else { None }).collect();

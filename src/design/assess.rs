@@ -264,7 +264,8 @@ fn held_by(absorbed_by: &[String]) -> Option<&str> {
 }
 
 fn minutes(seconds: f64) -> String {
-    format!("{:.0} min", (seconds / 60.0).ceil())
+    // as the report says it of the same touches
+    format!("{:.0} min", (seconds / 60.0).round().max(1.0))
 }
 
 /// Touches that make an effect visible.
@@ -347,7 +348,7 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (Stri
     } else {
         format!("from {count} of {}", others.len())
     };
-    let says = format!("{} (+{}) tells it {whom}", best.habit.says, minutes(best.habit.seconds));
+    let says = format!("{} (+{}) tells the effect {whom}", best.habit.says, minutes(best.habit.seconds));
     (says, found.iter().map(|f| f.1.habit.id.clone()).collect())
 }
 

@@ -64,7 +64,7 @@ pub(super) struct Remedy {
 
 impl Remedy {
     pub fn new(habit: &Habit, varied: &View, results: &Results) -> Self {
-        let minutes = (habit.seconds / 60.0).ceil();
+        let minutes = (habit.seconds / 60.0).round().max(1.0);
         let left = unseen(varied, &results.names, &results.typical);
         Self { says: format!("{} (+{minutes} min)", habit.says), seconds: habit.seconds, left }
     }
@@ -113,8 +113,18 @@ pub(super) fn part(
         out.push(remedy.says.clone());
         open = left;
     }
-    if open.ncols() > 0 && !out.is_empty() {
-        out.push(format!("{} combination(s) are left that no variation of these touches tells", open.ncols()));
+    if out.is_empty() {
+        return out;
+    }
+    for (said, _) in
+        undetermined.iter_mut().zip(directions).filter(|(said, d)| d.is_some() && said.parted_by.is_empty())
+    {
+        said.says.push_str("; no variation parts them alone");
+    }
+    match open.ncols() {
+        0 => {}
+        1 => out.push("one combination is left that no variation of these touches tells".into()),
+        n => out.push(format!("{n} combinations are left that no variation of these touches tells")),
     }
     out
 }

@@ -60,16 +60,19 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     let noisy = coarse(NOISE_SHARE, |p| p.sigma);
     if !noisy.is_empty() {
         let says = format!(
-            "the noise of the touches alone leaves {} uncertain by more than a quarter of its usual size",
-            noisy.join(", ")
+            "the noise of the touches alone leaves {} uncertain by more than a quarter of {}",
+            noisy.join(", "),
+            usual_size(&noisy)
         );
         return (Score::NotEnough, format!("{says}{not_for}"));
     }
     let scattered = coarse(VISITS_SHARE, |p| p.sigma_with_visits);
     if !scattered.is_empty() {
         let says = format!(
-            "with the scatter of indexing {} is uncertain by more than half of its usual size, so that a usual error could not be told from none",
-            scattered.join(", ")
+            "with the scatter of indexing {} {} uncertain by more than half of {}, so that a usual error could not be told from none",
+            scattered.join(", "),
+            if scattered.len() == 1 { "is" } else { "are" },
+            usual_size(&scattered)
         );
         return (Score::NotEnough, format!("{says}{not_for}"));
     }
@@ -82,8 +85,9 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
     };
     if !open.is_empty() {
         reasons.push(format!(
-            "effects that are not in the model could shift {} by more than its usual size",
-            open.join(", ")
+            "effects that are not in the model could shift {} by more than {}",
+            open.join(", "),
+            usual_size(&open)
         ));
     }
     // what no touches of any kind tell from another effect is no fault of the plan, but it is no good value either
@@ -140,4 +144,8 @@ fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
 
 fn is_location(effect: &str) -> bool {
     effect.starts_with("location-") || effect.starts_with("paper-") || effect == "double-head-10"
+}
+/// That of one parameter, or of several.
+fn usual_size(names: &[&str]) -> &'static str {
+    if names.len() == 1 { "its usual size" } else { "their usual sizes" }
 }

@@ -180,7 +180,10 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
                      not predicted better with it, so that nothing is named.{first} More index visits would tell."
                 ),
                 _ => format!(
-                    "Something is missing ({against}), and no known effect explains it.{}",
+                    "Something is missing ({against}), and no known effect explains it{}.{}",
+                    fit.noise
+                        .or_the_probe(fit.outcome.chi2_per_dof.sqrt())
+                        .map_or_else(String::new, |or| format!("; {or}")),
                     gross.unwrap_or(first)
                 ),
             }

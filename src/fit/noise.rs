@@ -297,6 +297,50 @@ impl Noise {
         ))
     }
 
+    /// What a misfit of so many times the noise may be as well where no touches tell how much a touch scatters, in words.
+    #[must_use]
+    pub fn or_the_probe(&self, times: f64) -> Option<String> {
+        self.untold().map(|word| {
+            format!(
+                "or nothing is, and a touch scatters by some {:.2} um in place of the {word} {:.2} um: no repeats tell, and a \
+                 point touched ten times in a row would",
+                um_from_mm(self.sigma_mm * times),
+                um_from_mm(self.sigma_mm)
+            )
+        })
+    }
+
+    /// That the touches scatter by far less than the noise which no touches tell, in words.
+    #[must_use]
+    pub fn far_too_large(&self, chi2: f64, dof: usize) -> Option<String> {
+        /// A noise that is larger than the scatter by less than this is a rough figure.
+        const ROUGH: f64 = 1.5;
+        /// Touches that scatter by less, mm, are made without noise.
+        const WITHOUT_MM: f64 = 1e-6;
+        let word = self.untold()?;
+        let distribution = ChiSquared::new(dof as f64).ok()?;
+        let times = (chi2 / dof as f64).sqrt();
+        let says = times * ROUGH < 1.0 && times * self.sigma_mm > WITHOUT_MM && distribution.cdf(chi2) < LEVEL;
+        says.then(|| {
+            format!(
+                "the touches scatter around the model by {:.2} um, and the {word} noise is {:.2} um: no chance makes that. It is used all the \
+                 same, and the uncertainties are some {:.1} times too large; state what the probe repeats to ([noise] touch_um)",
+                um_from_mm(times * self.sigma_mm),
+                um_from_mm(self.sigma_mm),
+                1.0 / times
+            )
+        })
+    }
+
+    /// Where σ comes from, if no touches tell it.
+    fn untold(&self) -> Option<&'static str> {
+        match (self.source, self.repeats) {
+            ("declared", None) => Some("declared"),
+            ("study", None) => Some("stated"),
+            _ => None,
+        }
+    }
+
     /// What else the scatter of index visits holds, in words.
     #[must_use]
     pub fn visits_beyond(&self) -> Option<String> {

@@ -14,19 +14,34 @@ const EXPANDED_FROM: f64 = 1e3;
 /// Two-sided 95 % factor of Student's t; `dof` below 1 counts as 1, and where it is no number the noise counts as known.
 #[must_use]
 pub fn student_95(dof: f64) -> f64 {
+    // 12.706 with one degree of freedom
+    student(dof, Z, 0.975, 13.0)
+}
+
+/// What Student's t exceeds on either side as seldom as a normal value exceeds 4: once in 16 000 times. Degrees of freedom below 1
+/// count as 1.
+#[must_use]
+pub fn student_as_4(dof: f64) -> f64 {
+    /// The normal distribution function at 4.
+    const LEVEL: f64 = 0.999_968_328_758_166_9;
+    // 1.005e4 with one degree of freedom
+    student(dof, 4.0, LEVEL, 1.1e4)
+}
+
+/// A quantile of Student's t; `z` is that of the normal distribution, `most` one that it never exceeds.
+fn student(dof: f64, z: f64, level: f64, most: f64) -> f64 {
     let dof = dof.max(1.0);
     // Cornish and Fisher's expansion (Abramowitz and Stegun 26.7.5), which is below the quantile
-    let z2 = Z * Z;
-    let first = Z * (z2 + 1.0) / 4.0;
-    let second = Z * ((5.0 * z2 + 16.0) * z2 + 3.0) / 96.0;
-    let third = Z * (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / 384.0;
-    let start = Z + (first + (second + third / dof) / dof) / dof;
+    let z2 = z * z;
+    let first = z * (z2 + 1.0) / 4.0;
+    let second = z * ((5.0 * z2 + 16.0) * z2 + 3.0) / 96.0;
+    let third = z * (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / 384.0;
+    let start = z + (first + (second + third / dof) / dof) / dof;
     if dof >= EXPANDED_FROM {
         return start;
     }
     let Ok(t) = StudentsT::new(0.0, 1.0, dof) else { return start };
-    // 12.706 with one degree of freedom
-    inverse(|x| t.cdf(x), |x| t.pdf(x), 0.975, start, (Z, 13.0))
+    inverse(|x| t.cdf(x), |x| t.pdf(x), level, start, (z, most))
 }
 
 /// Upper 99.9 % point of Fisher's F.
@@ -76,6 +91,11 @@ mod tests {
         for (dof, t) in [(1.0, 12.706_204_736), (2.0, 4.302_652_730), (5.0, 2.570_581_836), (30.0, 2.042_272_456)] {
             assert!((student_95(dof) - t).abs() < 1e-8, "{dof}: {}", student_95(dof));
         }
+        // by numerical integration of the density
+        for (dof, t) in [(1.0, 10_050.2), (2.0, 125.64), (5.0, 12.28), (30.0, 4.68)] {
+            assert!((student_as_4(dof) / t - 1.0).abs() < 1e-2, "{dof}: {}", student_as_4(dof));
+        }
+        assert!((student_as_4(1e6) - 4.0).abs() < 1e-4 && student_as_4(f64::INFINITY) == 4.0);
         assert!((student_95(1e6) - 1.959_966_357).abs() < 1e-8, "{}", student_95(1e6));
         assert_eq!(student_95(f64::INFINITY), Z);
         assert_eq!(student_95(f64::NAN), student_95(1.0));

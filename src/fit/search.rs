@@ -294,7 +294,7 @@ impl Search<'_> {
             // back in what belongs, out what does not
             let scale2 = self.scale2(&solution, noise_dof);
             let back: Vec<usize> =
-                out.iter().copied().filter(|&i| snoop::belongs(self.off(&solution, i, scale2).1)).collect();
+                out.iter().copied().filter(|&i| self.belongs(&solution, i, scale2, noise_dof)).collect();
             let more: Vec<usize> = self.judge(&solution, noise_dof).dropped();
             if back.is_empty() && (more.is_empty() || out.len() >= most) {
                 break;
@@ -344,7 +344,8 @@ impl Search<'_> {
         solution = self.refit_here(solution.theta);
         // touches that the robust fit took for strangers, and that are not, come back
         let scale2 = self.scale2(&solution, noise.dof.unwrap_or(0.0));
-        out.retain(|&i| !snoop::belongs(self.off(&solution, i, scale2).1));
+        let noise_dof = noise.dof.unwrap_or(0.0);
+        out.retain(|&i| !self.belongs(&solution, i, scale2, noise_dof));
         let mut weights = all.to_vec();
         out.iter().for_each(|&i| weights[i] = 0.0);
         solution = self.refit(weights, &solution);
@@ -378,8 +379,17 @@ impl Search<'_> {
     }
 
     pub fn scale2(&self, solution: &solve::Solution, noise_dof: f64) -> f64 {
-        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank) as f64;
-        (solution.chi2 + noise_dof) / (dof + noise_dof).max(1.0)
+        (solution.chi2 + noise_dof) / (self.dof() + noise_dof).max(1.0)
+    }
+
+    /// Degrees of freedom of the touches that are used.
+    fn dof(&self) -> f64 {
+        solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank) as f64
+    }
+
+    /// Does a touch that is not used agree with those that are?
+    fn belongs(&self, solution: &solve::Solution, i: usize, scale2: f64, noise_dof: f64) -> bool {
+        snoop::belongs(self.off(solution, i, scale2).1, self.dof() + noise_dof)
     }
 
     /// How far touch i is off what the fit says, mm and in standard deviations.
@@ -397,7 +407,7 @@ impl Search<'_> {
             .filter(|&i| weights[i] == 0.0 && !self.masked[i])
             .map(|i| {
                 let (off_mm, standardised) = self.off(solution, i, scale2);
-                (i, snoop::Rejection { touch: i, off_mm, standardised }.reason())
+                (i, snoop::Rejection { touch: i, off_mm, standardised, dof: self.dof() }.reason())
             })
             .collect()
     }

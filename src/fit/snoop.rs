@@ -5,12 +5,19 @@
 //! externally studentised one: a missing effect widens it, and good touches are not thrown after a bad model.
 
 use super::normal::Touches;
+use super::quantiles::student_as_4;
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
-/// A touch further off than this many standard deviations is left out; the chance of a good one is 6e-5.
-const LIMIT: f64 = 4.0;
+/// A touch further off than 4 standard deviations is left out: the chance of a good one is 6e-5. Where few others say what a standard
+/// deviation is, it takes more for the same chance; `dof` are the degrees of freedom of that.
+fn limit(dof: f64) -> f64 {
+    student_as_4(dof)
+}
+
+/// The least that it ever is.
+const LEAST_LIMIT: f64 = 4.0;
 
 /// More than this share of rejected touches is no longer a matter of chips: it is a finding by itself.
 pub const MOST_SHARE: f64 = 0.02;
@@ -28,6 +35,8 @@ pub struct Rejection {
     pub off_mm: f64,
     /// The same in standard deviations.
     pub standardised: f64,
+    /// Degrees of freedom of what a standard deviation is.
+    pub dof: f64,
 }
 
 impl Rejection {
@@ -35,17 +44,19 @@ impl Rejection {
     #[must_use]
     pub fn reason(&self) -> String {
         // a touch that a wide misfit hides is told by the fit in which the rest votes first, and that is why it is out
-        if belongs(self.standardised) {
+        if belongs(self.standardised, self.dof) {
             return format!(
                 "{:+.1} um off what the other touches say: a robust fit, in which far touches count little, leaves it out with \
                  others: a chip, a drop or a double touch?",
                 um_from_mm(self.off_mm)
             );
         }
+        // of touches without noise the scatter is rounding: its multiples say nothing
+        let times = self.standardised.abs();
+        let times = if times < 1000.0 { format!("{times:.1}") } else { "more than 1000".to_owned() };
         format!(
-            "{:+.1} um off what the other touches say ({:.1} standard deviations of their scatter): a chip, a drop or a double touch?",
-            um_from_mm(self.off_mm),
-            self.standardised.abs()
+            "{:+.1} um off what the other touches say ({times} standard deviations of their scatter): a chip, a drop or a double touch?",
+            um_from_mm(self.off_mm)
         )
     }
 }
@@ -292,7 +303,7 @@ impl Snoop {
         while self.out.touches.len() < most {
             let worst = (0..n).map(|i| (i, self.standardised(i, least))).max_by(|x, y| x.1.abs().total_cmp(&y.1.abs()));
             let Some((i, w)) = worst else { break };
-            if w.abs() <= LIMIT {
+            if w.abs() <= LEAST_LIMIT || w.abs() <= limit(self.dof - 1.0 + self.noise_dof) {
                 break;
             }
             let mut column = rows.drop_touch(i, covariance, &mut self.out);
@@ -332,10 +343,10 @@ pub fn judge(gap_mm: f64, row: &DVector<f64>, covariance: &DMatrix<f64>, varianc
     (gap_mm, gap_mm / ((variance_mm2 + predicted) * scale2.max(1e-300)).sqrt())
 }
 
-/// True for a touch that is back in: [`judge`] finds it within the limit.
+/// True for a touch that is back in: [`judge`] finds it within the limit. `dof` are the degrees of freedom of its scale.
 #[must_use]
-pub fn belongs(standardised: f64) -> bool {
-    standardised.abs() < LIMIT
+pub fn belongs(standardised: f64, dof: f64) -> bool {
+    standardised.abs() < LEAST_LIMIT || standardised.abs() < limit(dof)
 }
 
 /// A face as it was touched: visit, block, rounded normal.

@@ -23,26 +23,23 @@ const ROUNDING: f64 = 1e-12;
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
 
-/// The pairs of results that are least told apart, among those that have a value.
+/// The pairs of results that are least told apart, among those that have a value: all that are worth naming, and the worst one in any
+/// case.
 pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<Correlation> {
-    let is_result = |i: &usize| !fit.model.unknowns[*i].nuisance && fit.covariance[(*i, *i)] > 0.0 && has_value(*i);
+    let is_result = |i: &usize| !fit.model.unknowns[*i].is_set_up() && fit.covariance[(*i, *i)] > 0.0 && has_value(*i);
     let results: Vec<usize> = fit.free.iter().copied().filter(is_result).collect();
     let mut out = Vec::new();
     for (k, &i) in results.iter().enumerate() {
         for &j in &results[..k] {
             let r = fit.covariance[(i, j)] / (fit.covariance[(i, i)] * fit.covariance[(j, j)]).sqrt();
-            if r.abs() > WORTH_NAMING {
-                out.push(Correlation {
-                    a: fit.model.unknowns[j].name.clone(),
-                    b: fit.model.unknowns[i].name.clone(),
-                    r: (r * 1e4).round() / 1e4,
-                });
-            }
+            out.push((r, j, i));
         }
     }
-    out.sort_by(|x, y| y.r.abs().total_cmp(&x.r.abs()));
-    out.truncate(MOST_PAIRS);
-    out
+    out.sort_by(|x, y| y.0.abs().total_cmp(&x.0.abs()));
+    let worth = out.iter().take_while(|(r, ..)| r.abs() > WORTH_NAMING).count();
+    out.truncate(worth.clamp(1, MOST_PAIRS));
+    let name = |i: usize| fit.model.unknowns[i].name.clone();
+    out.into_iter().map(|(r, a, b)| Correlation { a: name(a), b: name(b), r: (r * 1e4).round() / 1e4 }).collect()
 }
 
 /// Combinations of results that these touches determine no better than their typical sizes: columns scaled by typical

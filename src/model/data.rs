@@ -104,6 +104,10 @@ impl Data {
 #[must_use]
 pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut data = Data::default();
+    // they are large: each goes straight to where it stays
+    let n_touches = runs.iter().map(|r| r.touches.len()).sum();
+    data.observations.reserve(n_touches);
+    data.nominal.reserve(n_touches);
     let mut clock_s = 0.0;
     let mut first_touch_s: Option<f64> = None;
     let mut earliest_h = 0.0;
@@ -354,7 +358,12 @@ impl Circumstances<'_> {
         state[slot::SPINDLE] = spindle;
         state[slot::LENGTHS] = c.length_mm;
         state[slot::LENGTHS + 1] = c.machine.tool.length_mm;
-        let mut put = |from: usize, v: Vector3<f64>| state[from..from + 3].copy_from_slice(v.as_slice());
+        // what rounding leaves of a zero has a sign, and no formula may jump by it: `atan2(my, mx)` where the probe points along a face
+        const ROUNDING: f64 = 1e-12;
+        let mut put = |from: usize, v: Vector3<f64>| {
+            let v = v.map(|x| if x.abs() < ROUNDING { 0.0 } else { x });
+            state[from..from + 3].copy_from_slice(v.as_slice());
+        };
         let normal = Vector3::from(c.planned.normal).normalize();
         let turned = poses.turned(c.machine, c.carrier, c.at);
         let in_r = turned.to_r * normal;

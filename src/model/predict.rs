@@ -45,6 +45,14 @@ pub struct Unknown {
     pub shape: bool,
 }
 
+impl Unknown {
+    /// Where a block stands: solved for, and in no table of results.
+    #[must_use]
+    pub fn is_set_up(&self) -> bool {
+        self.nuisance && self.set_up.is_some()
+    }
+}
+
 /// A block as it stood during a run: what `block-setup` has a set of parameters for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetUp {

@@ -66,7 +66,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
         *out += &format!("cannot be told: {}\n", u.says);
     }
     if !a.parted_together.is_empty() {
-        *out += &format!("what tells all of it together: {}\n", a.parted_together.join("; and "));
+        *out += &super::fit::together(&a.parted_together);
     }
     let visible = a.effects.iter().filter(|e| e.visible).count();
     *out += &format!("\neffects that are not in the model: {visible} of {} leave a trace\n", a.effects.len());

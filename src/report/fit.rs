@@ -54,13 +54,26 @@ pub fn with_unit(amount: impl std::fmt::Display, unit: &str) -> String {
     if unit == "1" { amount.to_string() } else { format!("{amount} {unit}") }
 }
 
+/// The variations that tell what no single one parts; the last part may say that something is left.
+pub(super) fn together(parts: &[String]) -> String {
+    let all = parts.last().is_none_or(|last| !last.contains("left that no variation"));
+    let which = if all { "what tells all of it together" } else { "what tells as much of it as touches can" };
+    format!("{which}: {}\n", parts.join("; and "))
+}
+
 /// The whole answer.
 #[must_use]
 pub fn outcome(o: &Outcome, paper: Paper) -> String {
     let mut out = String::new();
     out += &format!(
-        "{}: {} touches, {} unknowns of rank {} ({} degrees of freedom), condition {:.1}\n",
-        o.machine, o.touches, o.unknowns, o.rank, o.dof, o.condition
+        "{}: {} touches, {} unknown{} of rank {} ({} degrees of freedom), condition {:.1}\n",
+        o.machine,
+        o.touches,
+        o.unknowns,
+        if o.unknowns == 1 { "" } else { "s" },
+        o.rank,
+        o.dof,
+        o.condition
     );
     out += &format!("error left {} um RMS; chi2/dof {:.3}", significant(o.rms_um), o.chi2_per_dof);
     if let Some(held_out) = o.held_out_rms_um {
@@ -153,7 +166,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         out += &format!("not told by this data: {}\n", u.says);
     }
     if !o.parted_together.is_empty() {
-        out += &format!("what tells all of it together: {}\n", o.parted_together.join("; and "));
+        out += &together(&o.parted_together);
     }
     // a column of the other sign puts hundreds of them elsewhere: one line says so
     let far = |r: &&Rejected| r.reason.starts_with(ELSEWHERE);

@@ -97,20 +97,25 @@ impl Word {
             Self::Before(i) => touch.stood_before_rad[i],
             Self::Hours => touch.hours,
             Self::Temperature => touch.temperature_deg_c,
-            Self::NormalInMachine(i) => touch.normal_machine[i],
-            Self::NormalInProbe(i) => touch.normal_probe[i],
+            Self::NormalInMachine(i) => plain(touch.normal_machine[i]),
+            Self::NormalInProbe(i) => plain(touch.normal_probe[i]),
             Self::Feed => touch.feed_mm_min,
             Self::Spindle => touch.spindle_rad,
-            Self::Gravity(i) => touch.down_tool[i],
+            Self::Gravity(i) => plain(touch.down_tool[i]),
             Self::Stylus => touch.stylus_mm,
             Self::OwnStylus => touch.own_stylus_mm,
             Self::NormalOfBlock(i) => touch.normal_carrier[i],
             Self::Point(i) => touch.point[i],
-            Self::Outward(i) => touch.outward[i],
+            Self::Outward(i) => plain(touch.outward[i]),
             Self::Edge => touch.edge_mm,
             Self::Parameter(i) => parameters.get(i).copied().unwrap_or(f64::NAN),
         }
     }
+}
+
+/// A part of a direction: a millionth of a millionth is what sines leave of 0, and a formula may jump with its sign.
+fn plain(part: f64) -> f64 {
+    if part.abs() > 1e-12 { part } else { 0.0 }
 }
 
 /// The operators that a formula may use.
