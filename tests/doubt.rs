@@ -599,3 +599,86 @@ fn a_log_without_noise_is_said_to_be_one() {
     assert_eq!(o.noise_source, "declared");
     assert!(o.noise_says.contains("agree exactly") && !o.noise_says.contains("too few"), "{}", o.noise_says);
 }
+
+/// What a prior lets a value be is no noise of the touches.
+#[test]
+fn the_touches_own_noise_holds_no_prior() {
+    let machine = machine("swivel-head");
+    let runs = measured(&machine, 38);
+    let own = |o: &Outcome, name: &str| o.parameters.iter().find(|p| p.name == name).unwrap().sigma_noise.unwrap();
+    let without = fit(&machine, &runs, &MODEL, Settings::default()).outcome;
+    let knowledge = [("dL".to_owned(), Knowledge::Prior { value: 0.0, sigma: 0.005 })].into_iter().collect();
+    let effects = [&MODEL[..], &["tool-length"]].concat();
+    let with = fit(&machine, &runs, &effects, Settings { knowledge, ..Settings::default() }).outcome;
+    // no touch tells the tool's length from EZ0B: all that is known of it is the prior
+    assert!(sigma(&with, "dL") > 0.0049 && own(&with, "dL") < 1e-6, "{}", own(&with, "dL"));
+    assert!(sigma(&with, "EZ0B") > 0.0049);
+    assert!((own(&with, "EZ0B") / own(&without, "EZ0B") - 1.0).abs() < 1e-3, "{}", own(&with, "EZ0B"));
+}
+
+/// Where no touches tell how much a touch scatters, a misfit may be the probe's, and touches that agree too well are said to.
+#[test]
+fn a_noise_that_no_touches_tell_is_not_taken_for_sure() {
+    let machine = machine("swivel-head");
+    let said = |program: &str, touch_um: f64| {
+        let plan = plan(&machine, program);
+        let touches = touch(&machine, &plan, &Scenario::flawless().with_noise(touch_um * 1e-3, 0.0, 39), None);
+        let settings = Settings { visit_sigma_mm: Some(0.0), quick: true, ..Settings::default() };
+        fit(&machine, &[(plan, touches)], &["location-b", "block-setup", "pretravel"], settings).outcome
+    };
+    let has = |o: &Outcome, words: &str| o.warnings.iter().any(|w| w.contains(words));
+    let (probe, quiet) =
+        ("or nothing is, and a touch scatters by some 5.", "no chance makes that. It is used all the same");
+    let five = said("head", 5.0);
+    assert!(five.noise_source == "declared" && has(&five, probe) && !has(&five, quiet), "{:?}", five.warnings);
+    let small = said("head", 0.05);
+    let word =
+        |o: &Outcome| o.warnings.iter().find_map(|w| w.split("some ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+    assert!(has(&small, quiet) && !has(&small, "or nothing is"), "{:?}", small.warnings);
+    assert!(word(&small).is_some_and(|times| (times / 20.0 - 1.0).abs() < 0.15), "{:?}", small.warnings);
+    for (program, touch_um) in [("head", 1.0), ("head", 0.0), ("full", 5.0), ("full", 0.05)] {
+        let o = said(program, touch_um);
+        assert!(
+            !has(&o, "or nothing is") && !has(&o, "no chance makes that"),
+            "{program} {touch_um}: {:?}",
+            o.warnings
+        );
+    }
+}
+
+/// Few touches say little of what a standard deviation is: good ones stay, and a chip goes all the same.
+#[test]
+fn good_touches_of_a_short_plan_stay() {
+    let machine = machine("swivel-head");
+    let head = plan(&machine, "head");
+    for (n, effects) in [(8, &["pretravel"][..]), (12, &["pretravel"]), (28, &["block-setup", "pretravel"])] {
+        let short = Plan { touches: head.touches[..n].to_vec(), ..head.clone() };
+        let (mut thrown, mut found) = (0, 0);
+        for seed in 0..150 {
+            let touches = touch(&machine, &short, &Scenario::flawless().with_noise(1e-3, 0.0, 1000 + seed), None);
+            let mut run = (short.clone(), touches);
+            let rejected = |run: &(Plan, Vec<Touch>)| {
+                let settings = Settings { bare: true, ..Settings::default() };
+                fit(&machine, std::slice::from_ref(run), effects, settings).rejected.keys().copied().collect::<Vec<_>>()
+            };
+            thrown += usize::from(!rejected(&run).is_empty());
+            chip(&mut run, 2, 0.2);
+            found += usize::from(rejected(&run) == [2]);
+        }
+        assert!(thrown <= 1, "{n} touches: good ones thrown out in {thrown} of 150 runs");
+        assert!(found >= 140, "{n} touches: a chip found in {found} of 150 runs");
+    }
+}
+
+/// Beside touches without noise a wrong one is off by any number of their standard deviations.
+#[test]
+fn a_number_of_standard_deviations_has_few_digits() {
+    let machine = machine("swivel-head");
+    let head = plan(&machine, "head");
+    let touches = touch(&machine, &head, &Scenario::flawless(), None);
+    let mut run = (head, touches);
+    chip(&mut run, 100, 0.008);
+    let rejected = fit(&machine, &[run], &["location-b", "block-setup", "pretravel"], Settings::default()).rejected;
+    let reason = rejected.get(&100).unwrap();
+    assert!(reason.contains("more than 1000 standard deviations") || reason.contains("(80."), "{reason}");
+}

@@ -119,6 +119,36 @@ fn values(effect: &Effect, n_sets: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..n_sets).flat_map(|_| effect.parameters.iter().map(|p| draw(p, rng)).collect::<Vec<_>>()).collect()
 }
 
+/// Where the probe points along the spindle its angle around it is that of two roundings, and a formula that jumps with it would say
+/// another thing of each touch in the prediction and in the virtual machine.
+#[test]
+fn an_angle_of_nothing_is_the_same_on_both_sides() {
+    const AROUND: &str = r#"
+[[effect]]
+id = "around"
+name = "Around"
+at = "trigger"
+terms = [ { parameter = "around", unit = "um", dof = "r", formula = "1 + cos(4*atan2(my, mx)) + sign(nz) + sign(gx)" } ]
+"#;
+    let open = |name: &str| Ok(source(name, AROUND));
+    let planted = "effects_file = \"mine.toml\"\n[effects.around]\naround = 4.0\n";
+    let mut catalogue = Catalogue::default();
+    catalogue.add_file(&source("mine.toml", AROUND)).unwrap();
+    for machine in machines() {
+        let plan = plan(&machine, "full");
+        let (scenario, _) = simulate::scenario::parse_with(&source("planted", planted), &machine, &open).unwrap();
+        let touches = touch(&machine, &plan, &scenario, None);
+        let data = assemble(&machine, &[Run { plan: &plan, touches: &touches, mounting: None, started_s: None }]);
+        let effects: Vec<&Effect> = catalogue.iter().collect();
+        let model = Model::new(&machine, &effects, &data.set_ups, machine.reference.pivot);
+        let along = data.observations.iter().filter(|o| o.state[11].hypot(o.state[12]) < 1e-9).count();
+        assert!(along > 50, "{}: {along} touches along the spindle", machine.name);
+        for o in &data.observations {
+            assert!(model.gap(o, &[4.0]).abs() < 1e-9, "{} touch {}: {:e}", machine.name, o.id, model.gap(o, &[4.0]));
+        }
+    }
+}
+
 /// Largest effect and what is left of it at the planted values, mm.
 fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaCha8Rng) -> (f64, f64) {
     let plan = random_plan(machine, mounting, 40, rng);

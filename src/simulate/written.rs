@@ -5,7 +5,7 @@ use super::own::{self, Own};
 use super::rigid::Vec3;
 use super::scenario::{BlockError, Misfit, Scenario, Value, axis_named, blocks_of};
 use super::terms::{Shape, Target, Term};
-use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
+use crate::diag::{Failure, Finding, Findings, Result, Severity, Source, from_toml};
 use crate::machine::Machine;
 use crate::units::{Plain, mm_from_um, rad_from_deg, ratio_from_ppm};
 use std::ops::Range;
@@ -56,10 +56,13 @@ pub fn parse_with(
     if let Some(node) = document.get_ref().get("effects_file") {
         reader.effects_file(&mut out, node, open);
     }
+    // what a file that cannot be read holds is not unknown
+    let unread = reader.findings.0.iter().any(|f| f.severity == Severity::Error);
     for (key, node) in in_order(document.get_ref()) {
         match &**key.get_ref() {
             "effects_file" => {}
             "seed" => out.seed = reader.seed(node),
+            "effects" if unread => {}
             "effects" => reader.effects(&mut out, node),
             "block" => reader.each(node, "block", |r, t, at| r.block(&mut out, t, at)),
             "harmonic" => reader.each(node, "harmonic", |r, t, at| r.harmonic(&mut out, t, at)),
