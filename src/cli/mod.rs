@@ -134,7 +134,7 @@ fn ahead_of_the_call() {
     // starts: a job would find it asleep, and waking it takes longer than reading
     let read = |thread| {
         if thread == 1 {
-            crate::model::catalogue::Catalogue::read_rows_of_any_machine();
+            crate::model::catalogue::Catalogue::read_rows();
         }
     };
     let _ = rayon::ThreadPoolBuilder::new().use_current_thread().start_handler(read).build_global();

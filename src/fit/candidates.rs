@@ -6,6 +6,7 @@ use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
 use crate::model::traces::Traces;
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 
 /// The columns of some effects: d gap / d parameter at zero effect, mm per unit, one row per touch.
 #[derive(Debug, Clone)]
@@ -38,10 +39,18 @@ pub(super) fn columns_of(model: &Model, observations: &[Observation]) -> DMatrix
     let traces = Traces::of(model, observations);
     let start = model.start();
     let mut values = DMatrix::zeros(observations.len(), model.n_unknowns());
+    let mut left = values.as_mut_slice();
+    // they stand one after the other
+    let mut each: Vec<(usize, usize, &mut [f64])> = Vec::new();
     for (first, count) in model.all_instances() {
-        let columns = first * observations.len()..(first + count) * observations.len();
-        traces.add_columns(first, &start[first..first + count], &mut values.as_mut_slice()[columns]);
+        let (own, behind) = left.split_at_mut(count * observations.len());
+        each.push((first, count, own));
+        left = behind;
     }
+    let add = |(first, count, own): (usize, usize, &mut [f64])| {
+        traces.add_columns(first, &start[first..first + count], own);
+    };
+    each.into_par_iter().for_each(add);
     values
 }
 

@@ -1,8 +1,38 @@
 //! `effects.toml` as a person wrote it: every field as it stands, with its place in the file. Nothing is checked here.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
+use std::ops::Range;
 use toml::Spanned;
+
+/// A word with its place in the file. The built-in rows, which are packed when the program is built, have no places.
+#[derive(Debug, Clone)]
+pub struct Placed(Spanned<String>);
+
+impl Placed {
+    /// The word.
+    #[must_use]
+    pub fn get_ref(&self) -> &String {
+        self.0.get_ref()
+    }
+
+    /// Where it stands, bytes.
+    #[must_use]
+    pub fn span(&self) -> Range<usize> {
+        self.0.span()
+    }
+}
+
+impl<'de> Deserialize<'de> for Placed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // people write TOML; what is packed is for no person
+        if deserializer.is_human_readable() {
+            Spanned::deserialize(deserializer).map(Self)
+        } else {
+            String::deserialize(deserializer).map(|word| Self(Spanned::new(0..0, word)))
+        }
+    }
+}
 
 /// A file of effects as written.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -21,7 +51,7 @@ pub struct File {
 pub struct EffectAsWritten {
     /// Short name, used in studies.
     #[schemars(with = "String")]
-    pub id: Spanned<String>,
+    pub id: Placed,
     /// Name for people.
     #[serde(default)]
     pub name: String,
@@ -36,7 +66,7 @@ pub struct EffectAsWritten {
     pub mends: String,
     /// An axis of the chain, or base, tool, workpiece, block, trigger, reading.
     #[schemars(with = "String")]
-    pub at: Spanned<String>,
+    pub at: Placed,
     /// Applies where its axes stand on this side only.
     pub side: Option<SideAsWritten>,
     /// `ball`: rotations of an axis that bears the workpiece are stated about the machine's ball point (the ball's centre
@@ -45,11 +75,11 @@ pub struct EffectAsWritten {
     /// Letters of further axes that the machine must have (on that side).
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
-    pub needs: Vec<Spanned<String>>,
+    pub needs: Vec<Placed>,
     /// Letters of axes that the machine must not have (on that side).
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
-    pub unless: Vec<Spanned<String>>,
+    pub unless: Vec<Placed>,
     /// Short word that groups effects in lists.
     #[serde(default)]
     pub family: String,
@@ -121,7 +151,7 @@ pub enum Frame {
 pub struct TermAsWritten {
     /// Name of its factor, unique among the effects of a model.
     #[schemars(with = "String")]
-    pub parameter: Spanned<String>,
+    pub parameter: Placed,
     /// ISO 230 symbol of the error motion or location error that it belongs to.
     pub iso: Option<String>,
     /// The paper's symbol.
@@ -130,20 +160,20 @@ pub struct TermAsWritten {
     pub sign: Option<SignAsWritten>,
     /// um mm urad mrad deg um/m um/h um/K ppm/K ms s h 1
     #[schemars(with = "String")]
-    pub unit: Spanned<String>,
+    pub unit: Placed,
     /// dx dy dz rx ry rz (axis, tool, workpiece, block), r (trigger), X Y Z A B C (reading).
     #[schemars(with = "String")]
-    pub dof: Spanned<String>,
+    pub dof: Placed,
     /// The function of the state.
     #[schemars(with = "String")]
-    pub formula: Spanned<String>,
+    pub formula: Placed,
     /// Usual size, in the unit.
     pub typical: Option<f64>,
     /// Where that size comes from.
     pub source: Option<String>,
     /// Where it differs from the effect's.
     #[schemars(with = "Option<String>")]
-    pub at: Option<Spanned<String>>,
+    pub at: Option<Placed>,
     /// Before or after the axis's motion.
     pub frame: Option<Frame>,
 }
@@ -154,10 +184,10 @@ pub struct TermAsWritten {
 pub struct ShapeAsWritten {
     /// Its name in the formulas.
     #[schemars(with = "String")]
-    pub parameter: Spanned<String>,
+    pub parameter: Placed,
     /// Its unit: the formula sees the value in it.
     #[schemars(with = "String")]
-    pub unit: Spanned<String>,
+    pub unit: Placed,
     /// Where the search begins.
     pub start: f64,
     /// Lowest value.
@@ -169,7 +199,7 @@ pub struct ShapeAsWritten {
     /// A variable at whose value something jumps: with touches at hand, what is tried are the places half-way between
     /// successive touches, in place of `scan`.
     #[schemars(with = "Option<String>")]
-    pub between: Option<Spanned<String>>,
+    pub between: Option<Placed>,
     /// Where the start comes from.
     pub source: Option<String>,
 }

@@ -1,6 +1,8 @@
 //! Effects as written → checked records; every finding has its place and says which words exist.
 
-use super::as_written::{EffectAsWritten, File, Frame, Per, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten};
+use super::as_written::{
+    EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten,
+};
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{CONSTANTS, FUNCTIONS, Formula, LONGEST, VARIABLES};
 use super::mistake;
@@ -8,7 +10,6 @@ use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
 use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
-use toml::Spanned;
 
 /// Name of the file's format.
 const FORMAT: &str = "axiscal-effects/1";
@@ -286,7 +287,7 @@ impl<'a> Check<'a> {
                 "write scan = [5, 10, 20] or scan = { from = 0.1, to = 5, points = 12, log = true }, from min to max",
             );
         }
-        let place = |word: &Spanned<String>| VARIABLES.iter().position(|v| v == word.get_ref());
+        let place = |word: &Placed| VARIABLES.iter().position(|v| v == word.get_ref());
         let between = s.between.as_ref().and_then(place);
         if let Some(word) = s.between.as_ref().filter(|_| between.is_none()) {
             self.error(
@@ -312,7 +313,7 @@ impl<'a> Check<'a> {
     }
 
     /// Letters of axes.
-    fn axes(&mut self, written: &[Spanned<String>]) -> Vec<AxisName> {
+    fn axes(&mut self, written: &[Placed]) -> Vec<AxisName> {
         let mut out = Vec::new();
         for word in written {
             match axis(word.get_ref()) {
@@ -403,14 +404,14 @@ impl<'a> Check<'a> {
     }
 
     /// Where a part of a formula stands in the file; `None` where it is not written there as it reads.
-    fn inside(&self, formula: &Spanned<String>, part: std::ops::Range<usize>) -> Option<std::ops::Range<usize>> {
+    fn inside(&self, formula: &Placed, part: std::ops::Range<usize>) -> Option<std::ops::Range<usize>> {
         let span = formula.span();
         let written = self.source.inner().get(span.clone())?;
         let from = span.start + written.find(formula.get_ref().as_str())?;
         (!part.is_empty()).then_some(from + part.start..from + part.end)
     }
 
-    fn unknown_unit(&mut self, unit: &Spanned<String>) {
+    fn unknown_unit(&mut self, unit: &Placed) {
         self.error(
             &unit.span(),
             "effects::unit",
