@@ -627,8 +627,7 @@ fn a_noise_that_no_touches_tell_is_not_taken_for_sure() {
         fit(&machine, &[(plan, touches)], &["location-b", "block-setup", "pretravel"], settings).outcome
     };
     let has = |o: &Outcome, words: &str| o.warnings.iter().any(|w| w.contains(words));
-    let (probe, quiet) =
-        ("or nothing is, and a touch scatters by some 5.", "no chance makes that. It is used all the same");
+    let (probe, quiet) = ("or nothing is, and a touch scatters by up to 5.", "lets them: no chance makes that");
     let five = said("head", 5.0);
     assert!(five.noise_source == "declared" && has(&five, probe) && !has(&five, quiet), "{:?}", five.warnings);
     let small = said("head", 0.05);

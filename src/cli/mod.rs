@@ -123,10 +123,12 @@ pub fn main() -> ExitCode {
 }
 
 /// What `identify` needs of the catalogue takes as long to read as the call itself and the files that it names: another thread
-/// begins at once. A word that was meant for something else costs that, and changes nothing.
+/// begins at once.
 fn ahead_of_the_call() {
-    let has = |word: &str| std::env::args_os().any(|typed| typed == word);
-    if !has("identify") || has("--quick") {
+    let typed: Vec<_> = std::env::args_os().skip(1).collect();
+    // the verb is the first word that is no option: none of those before it takes a value
+    let verb = typed.iter().find(|word| !word.to_string_lossy().starts_with('-'));
+    if verb.is_none_or(|verb| verb != "identify") || typed.iter().any(|word| word == "--quick") {
         return;
     }
     // a fit waits for nobody but its own parts: this thread works with the others instead of beside them, so that no more run

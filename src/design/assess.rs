@@ -8,6 +8,7 @@ use super::shapes::shapes;
 use super::view::{Noise, Planned, Task, View};
 use crate::diag::Result;
 use crate::fit::solve::observe;
+use crate::fit::span::LeastNorm;
 use crate::fit::statement;
 use crate::fit::uncertainty::expected;
 use crate::fit::{declared_tau_mm, held_first};
@@ -209,7 +210,7 @@ fn peak_um(view: &View, candidate: usize) -> f64 {
 
 /// Which parameters of the model take an effect that leaves no trace of its own.
 struct Absorbed {
-    svd: Option<nalgebra::SVD<f64, nalgebra::Dyn, nalgebra::Dyn>>,
+    least: LeastNorm,
     norms: Vec<f64>,
 }
 
@@ -226,15 +227,13 @@ impl Absorbed {
                 norm
             })
             .collect();
-        Self { svd: (!norms.is_empty()).then(|| scaled.svd(true, true)), norms }
+        Self { least: LeastNorm::of(&scaled, 1e-8), norms }
     }
 
     /// Names, largest first; the blocks' set-ups are one name.
     fn of(&self, view: &View, candidate: usize) -> Vec<String> {
         let columns: DMatrix<f64> = view.library.columns(candidate, 0);
-        let Some(Ok(x)) = self.svd.as_ref().map(|s| s.solve(&columns, 1e-8 * s.singular_values.max())) else {
-            return Vec::new();
-        };
+        let x = self.least.solve(&columns);
         // in units of what it does to the touches, so that unlike units compare
         let weight: DVector<f64> =
             DVector::from_fn(x.nrows(), |r, _| if self.norms[r] > 0.0 { x.row(r).norm() } else { 0.0 });

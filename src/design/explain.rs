@@ -5,6 +5,7 @@ use super::view::{Known, Noise, Planned, Task, View, keep_measured};
 use crate::diag::Result;
 use crate::fit::outcome::Undetermined;
 use crate::fit::solve::{Observability, observe};
+use crate::fit::span::{LeastNorm, span};
 use crate::fit::{Fit, Knowledge, effects_of};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
@@ -81,7 +82,7 @@ pub(super) fn part(
         return Vec::new();
     }
     let all = DMatrix::from_columns(&own);
-    let within = orthonormal(&all, 1e-6);
+    let within = span(&all, 1e-6);
     // a direction that stands in any combination that stays dark is not parted, though it may not be dark by itself
     let still_in: Vec<DVector<f64>> = remedies.iter().map(|r| shares(&all, &common(&within, &r.left))).collect();
     let mut place = 0;
@@ -116,10 +117,13 @@ pub(super) fn part(
     if out.is_empty() {
         return out;
     }
-    for (said, _) in
-        undetermined.iter_mut().zip(directions).filter(|(said, d)| d.is_some() && said.parted_by.is_empty())
-    {
-        said.says.push_str("; no variation parts them alone");
+    // what no single one parts may be parted by several
+    let left_in = shares(&all, &open);
+    let named = undetermined.iter_mut().zip(directions).filter(|(_, direction)| direction.is_some());
+    for (place, (said, _)) in named.enumerate() {
+        if said.parted_by.is_empty() && left_in[place] < STANDS_IN {
+            said.says.push_str("; no single variation of the touches tells it, several together do");
+        }
     }
     match open.ncols() {
         0 => {}
@@ -131,8 +135,7 @@ pub(super) fn part(
 
 /// The largest weight of each direction (unit columns) in the combinations that make up a space of theirs.
 fn shares(directions: &DMatrix<f64>, space: &DMatrix<f64>) -> DVector<f64> {
-    let weights = directions.clone().svd(true, true).solve(space, 1e-6);
-    let weights = weights.unwrap_or_else(|_| DMatrix::from_element(directions.ncols(), space.ncols(), 1.0));
+    let weights = LeastNorm::of(directions, 1e-6).solve(space);
     DVector::from_fn(directions.ncols(), |i, _| weights.row(i).iter().fold(0.0_f64, |m, w| m.max(w.abs())))
 }
 
@@ -146,13 +149,6 @@ fn common(open: &DMatrix<f64>, left: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = shared.tr_mul(&shared).symmetric_eigen();
     let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|&k| eigen.eigenvalues[k] >= LEFT * LEFT).collect();
     open * eigen.eigenvectors.select_columns(&kept)
-}
-
-/// An orthonormal basis of the columns' span.
-fn orthonormal(columns: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
-    let svd = columns.clone().svd(true, false);
-    let kept: Vec<usize> = (0..svd.singular_values.len()).filter(|&i| svd.singular_values[i] > tolerance).collect();
-    svd.u.map_or_else(|| DMatrix::zeros(columns.nrows(), 0), |u| u.select_columns(&kept))
 }
 
 /// Adds to every combination of results that the fit cannot tell the variations of the touches that part it, cheapest
@@ -215,5 +211,5 @@ fn unseen(view: &View, names: &[String], typical: &[f64]) -> DMatrix<f64> {
     if all.ncols() == 0 {
         return all;
     }
-    orthonormal(&all, 1e-6)
+    span(&all, 1e-6)
 }

@@ -145,6 +145,7 @@ fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
 fn is_location(effect: &str) -> bool {
     effect.starts_with("location-") || effect.starts_with("paper-") || effect == "double-head-10"
 }
+
 /// That of one parameter, or of several.
 fn usual_size(names: &[&str]) -> &'static str {
     if names.len() == 1 { "its usual size" } else { "their usual sizes" }

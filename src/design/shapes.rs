@@ -8,6 +8,7 @@ use super::record::Expected;
 use super::view::{Task, View};
 use crate::diag::{Failure, Result};
 use crate::fit::candidates::{Trials, Variant};
+use crate::fit::span::LeastNorm;
 use crate::fit::whitening::Whitening;
 use crate::fit::{all_tried, fine, jumps_in_a_design};
 use crate::model::catalogue::{Effect, Parameter};
@@ -15,7 +16,7 @@ use crate::model::data::Data;
 use crate::model::predict::{Model, Unknown};
 use crate::search::{Basis, without_rounding};
 use crate::units::significant;
-use nalgebra::{DMatrix, DVector, Dyn, SVD};
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// χ² grows by this much at the ends of a 95 % interval.
@@ -224,7 +225,7 @@ fn others(task: &Task, view: &View, (effect, p, start): (&Effect, &Parameter, f6
 
 /// What unknowns do while they follow something as well as they can.
 struct Follow {
-    svd: SVD<f64, Dyn, Dyn>,
+    least: LeastNorm,
     scale: Vec<f64>,
 }
 
@@ -233,12 +234,12 @@ impl Follow {
         let norm = |c: nalgebra::DVectorView<f64>| c.norm();
         let scale: Vec<f64> = columns.column_iter().map(norm).map(|n| if n > 0.0 { 1.0 / n } else { 0.0 }).collect();
         let scaled = DMatrix::from_fn(columns.nrows(), columns.ncols(), |r, c| columns[(r, c)] * scale[c]);
-        Self { svd: scaled.svd(true, true), scale }
+        const LEAST: f64 = 1e-7;
+        Self { least: LeastNorm::of(&scaled, LEAST), scale }
     }
 
     fn of(&self, what: &DVector<f64>) -> DVector<f64> {
-        const LEAST: f64 = 1e-7;
-        let x = self.svd.solve(what, LEAST).unwrap_or_else(|_| DVector::zeros(self.scale.len()));
+        let x = self.least.solve(&DMatrix::from_column_slice(what.len(), 1, what.as_slice()));
         DVector::from_fn(x.len(), |k, _| x[k] * self.scale[k])
     }
 }

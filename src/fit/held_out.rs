@@ -9,6 +9,7 @@
 use super::Fit;
 use super::normal::Touches;
 use super::solve::{Normal, Problem as _};
+use super::span::span;
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -241,14 +242,9 @@ impl Part<'_> {
         let b =
             DMatrix::from_fn(seen.len(), own.len(), |k, c| self.jacobian[(seen[k], own[c])] / self.whole.scale[own[c]]);
         let e = DVector::from_iterator(seen.len(), seen.iter().filter_map(|&k| errors[k]));
-        let svd = b.svd(true, false);
-        let Some(u) = svd.u else { return 0 };
-        let top = svd.singular_values.max();
-        let kept: Vec<usize> =
-            (0..svd.singular_values.len()).filter(|&k| svd.singular_values[k] > 1e-9 * top).collect();
-        let u = u.select_columns(&kept);
+        let u = span(&b, 1e-9);
         let left = &e - &u * u.tr_mul(&e);
         seen.iter().zip(left.iter()).for_each(|(&k, e)| errors[k] = Some(*e));
-        kept.len()
+        u.ncols()
     }
 }

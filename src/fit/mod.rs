@@ -23,6 +23,7 @@ mod search;
 pub mod shapes;
 pub mod snoop;
 pub mod solve;
+pub mod span;
 mod starts;
 pub mod statement;
 mod type_b;
@@ -379,7 +380,7 @@ fn find(
         theta[i] = solution.theta[column];
     }
     let residual_mm = search.touches.gaps(&solution.theta);
-    let mut rejected = search.reasons(&solution);
+    let mut rejected = search.reasons(&solution, noise.dof.unwrap_or(0.0));
     let mut unknown_masks = Vec::new();
     for mask in &settings.masked {
         match data.observations.iter().position(|o| mask.is_of(o)) {

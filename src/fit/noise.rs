@@ -300,17 +300,24 @@ impl Noise {
     /// What a misfit of so many times the noise may be as well where no touches tell how much a touch scatters, in words.
     #[must_use]
     pub fn or_the_probe(&self, times: f64) -> Option<String> {
-        self.untold().map(|word| {
-            format!(
-                "or nothing is, and a touch scatters by some {:.2} um in place of the {word} {:.2} um: no repeats tell, and a \
-                 point touched ten times in a row would",
-                um_from_mm(self.sigma_mm * times),
-                um_from_mm(self.sigma_mm)
+        let word = self.untold()?;
+        let um = um_from_mm(self.sigma_mm * times);
+        let visits = self.tau_mm > 0.0 && self.visit_source == "declared";
+        let (more, tells) = if visits {
+            (
+                " or the axes come back less exactly than declared",
+                "several times in a row, and poses that are come back to, would",
             )
-        })
+        } else {
+            ("", "ten times in a row would")
+        };
+        Some(format!(
+            "or nothing is, and a touch scatters by up to {um:.2} um in place of the {word} {:.2} um{more}: no repeats tell, and a point touched {tells}",
+            um_from_mm(self.sigma_mm)
+        ))
     }
 
-    /// That the touches scatter by far less than the noise which no touches tell, in words.
+    /// That the touches scatter by far less than the noise which no touches tell, in words; χ² and its degrees of freedom.
     #[must_use]
     pub fn far_too_large(&self, chi2: f64, dof: usize) -> Option<String> {
         /// A noise that is larger than the scatter by less than this is a rough figure.
@@ -323,20 +330,20 @@ impl Noise {
         let says = times * ROUGH < 1.0 && times * self.sigma_mm > WITHOUT_MM && distribution.cdf(chi2) < LEVEL;
         says.then(|| {
             format!(
-                "the touches scatter around the model by {:.2} um, and the {word} noise is {:.2} um: no chance makes that. It is used all the \
-                 same, and the uncertainties are some {:.1} times too large; state what the probe repeats to ([noise] touch_um)",
-                um_from_mm(times * self.sigma_mm),
-                um_from_mm(self.sigma_mm),
-                1.0 / times
+                "the touches fit {:.1} times better than the {word} noise of {:.2} um lets them: no chance makes that. It is used all the same, and \
+                 uncertainties that are the noise's are too large; state what the probe repeats to ([noise] touch_um)",
+                1.0 / times,
+                um_from_mm(self.sigma_mm)
             )
         })
     }
 
     /// Where σ comes from, if no touches tell it.
     fn untold(&self) -> Option<&'static str> {
-        match (self.source, self.repeats) {
-            ("declared", None) => Some("declared"),
-            ("study", None) => Some("stated"),
+        match self.source {
+            _ if self.repeats.is_some() || self.repeats_agree => None,
+            "declared" => Some("declared"),
+            "study" => Some("stated"),
             _ => None,
         }
     }

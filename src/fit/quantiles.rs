@@ -92,8 +92,8 @@ mod tests {
             assert!((student_95(dof) - t).abs() < 1e-8, "{dof}: {}", student_95(dof));
         }
         // by numerical integration of the density
-        for (dof, t) in [(1.0, 10_050.2), (2.0, 125.64), (5.0, 12.28), (30.0, 4.68)] {
-            assert!((student_as_4(dof) / t - 1.0).abs() < 1e-2, "{dof}: {}", student_as_4(dof));
+        for (dof, t) in [(1.0, 10_050.2), (2.0, 125.64), (5.0, 12.28), (30.0, 4.645)] {
+            assert!((student_as_4(dof) / t - 1.0).abs() < 2e-3, "{dof}: {}", student_as_4(dof));
         }
         assert!((student_as_4(1e6) - 4.0).abs() < 1e-4 && student_as_4(f64::INFINITY) == 4.0);
         assert!((student_95(1e6) - 1.959_966_357).abs() < 1e-8, "{}", student_95(1e6));

@@ -131,15 +131,18 @@ impl Revisits {
                 of.iter().for_each(|&i| column[i] -= rows[i].root * mean);
             }
         }
-        let svd = z.svd(true, false);
-        let Some(u) = svd.u else { return };
+        /// A visit's displacement that less than this share of the best seen one shows is not seen: what is left of it is rounding.
+        const SEEN: f64 = 1e-10;
+        let eigen = z.tr_mul(&z).symmetric_eigen();
+        let top = eigen.eigenvalues.max();
         let mut explained = 0.0;
         let mut n_contrasts = 0;
-        for (k, s) in svd.singular_values.iter().enumerate() {
-            if *s > 1e-6 {
-                let square = u.column(k).dot(&y).powi(2);
-                let followed = followed.map_or(0.0, |f| f.variance(rows, u.column(k).as_slice()));
-                self.contrasts.push(Contrast { lambda: s * s, square, followed });
+        for (v, &lambda) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
+            if lambda > SEEN * top && top > SEEN {
+                let u = &z * v / lambda.sqrt();
+                let square = u.dot(&y).powi(2);
+                let followed = followed.map_or(0.0, |f| f.variance(rows, u.as_slice()));
+                self.contrasts.push(Contrast { lambda, square, followed });
                 explained += square;
                 n_contrasts += 1;
             }
@@ -187,4 +190,84 @@ fn root(f: impl Fn(f64) -> f64, value: f64) -> f64 {
         if f(middle) > value { low = middle } else { high = middle }
     }
     0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use rand::{RngExt, SeedableRng};
+
+    /// What is left of y when each visit is displaced freely and each point has a mean of its own, and its degrees of freedom: by Gram and
+    /// Schmidt, twice.
+    fn left_by_hand(samples: &[Sample]) -> (f64, usize) {
+        let n = samples.len();
+        let count = |of: fn(&Sample) -> usize| samples.iter().map(of).max().unwrap() + 1;
+        let mut columns: Vec<DVector<f64>> = Vec::new();
+        for point in 0..count(|s| s.point) {
+            columns.push(DVector::from_fn(n, |i, _| f64::from(u8::from(samples[i].point == point))));
+        }
+        for visit in 0..count(|s| s.visit) {
+            for k in 0..3 {
+                columns.push(DVector::from_fn(
+                    n,
+                    |i, _| if samples[i].visit == visit { samples[i].normal[k] } else { 0.0 },
+                ));
+            }
+        }
+        let mut basis: Vec<DVector<f64>> = Vec::new();
+        let clear = |mut x: DVector<f64>, basis: &[DVector<f64>]| {
+            for _ in 0..2 {
+                basis.iter().for_each(|b| x -= b * b.dot(&x));
+            }
+            x
+        };
+        for column in columns {
+            let left = clear(column.clone(), &basis);
+            if left.norm() > 1e-9 * (1.0 + column.norm()) {
+                basis.push(left.normalize());
+            }
+        }
+        let y = DVector::from_iterator(n, samples.iter().map(|s| s.residual_mm));
+        (clear(y, &basis).norm_squared(), n - basis.len())
+    }
+
+    /// Faces that look straight along the axes make zeros that are exact, and columns that are the same: nothing of a visit's
+    /// displacement may stay in what counts as the noise of a touch.
+    #[test]
+    fn visits_are_taken_out_whole() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        for n_visits in 2..6 {
+            for tilt in [0.0, 1e-17, 0.3] {
+                for faces in [5, 3, 2] {
+                    let normals =
+                        [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
+                    let turned = nalgebra::Rotation3::from_euler_angles(0.0, tilt, 0.0);
+                    let mut samples = Vec::new();
+                    for visit in 0..n_visits {
+                        let moved = Vector3::from_fn(|_, _| rng.random_range(-10.0..10.0));
+                        for point in 0..4 * faces {
+                            let normal = turned * Vector3::from(normals[point % faces]);
+                            samples.push(Sample {
+                                residual_mm: normal.dot(&moved) + rng.random_range(-1.0..1.0),
+                                normal,
+                                repeat: samples.len(),
+                                visit,
+                                pose: 0,
+                                point,
+                            });
+                        }
+                    }
+                    let found = revisits(&samples, None);
+                    let (left, dof) = left_by_hand(&samples);
+                    assert_eq!(found.within.1, dof, "{n_visits} visits, {faces} faces, tilt {tilt}");
+                    assert!(
+                        (found.within.0 / left - 1.0).abs() < 1e-9,
+                        "{n_visits} visits, {faces} faces, tilt {tilt}: {} {left}",
+                        found.within.0
+                    );
+                }
+            }
+        }
+    }
 }

@@ -400,14 +400,14 @@ impl Search<'_> {
     }
 
     /// The rejected touches with their reasons.
-    pub fn reasons(&self, solution: &solve::Solution) -> BTreeMap<usize, String> {
+    pub fn reasons(&self, solution: &solve::Solution, noise_dof: f64) -> BTreeMap<usize, String> {
         let scale2 = self.scale2(solution, 0.0);
         let weights = self.touches.weights();
         (0..weights.len())
             .filter(|&i| weights[i] == 0.0 && !self.masked[i])
             .map(|i| {
                 let (off_mm, standardised) = self.off(solution, i, scale2);
-                (i, snoop::Rejection { touch: i, off_mm, standardised, dof: self.dof() }.reason())
+                (i, snoop::Rejection { touch: i, off_mm, standardised, dof: self.dof() + noise_dof }.reason())
             })
             .collect()
     }

@@ -4,6 +4,7 @@ use super::candidates::{columns_of, with_values};
 use super::normal::Touches;
 use super::outcome::Covariance;
 use super::solve::Problem as _;
+use super::span::span;
 use super::{Fit, Knowledge};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -79,9 +80,7 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
         .iter()
         .map(|v| DVector::from_fn(p, |c, _| v[c] / fit.seen.scale[c] / typical(c)).normalize())
         .collect();
-    let svd = DMatrix::from_columns(&each).svd(true, false);
-    let kept: Vec<usize> = (0..each.len()).filter(|&k| svd.singular_values[k] > 1e-9).collect();
-    let Some(basis) = svd.u.map(|u| u.select_columns(&kept)) else { return DVector::zeros(p) };
+    let basis = span(&DMatrix::from_columns(&each), 1e-9);
     // less than this is the rounding of a value that stays where it is
     const LEAST: f64 = 1e-11;
     DVector::from_fn(p, |c, _| Some(basis.row(c).norm() * typical(c)).filter(|m| *m > LEAST).unwrap_or(0.0))

@@ -3,6 +3,7 @@
 use super::Fit;
 use super::outcome::{Combination, Correlation};
 use super::solve::{Problem as _, RANK_TOLERANCE};
+use super::span::span;
 use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
 use nalgebra::{DMatrix, DVector, DVectorView};
@@ -17,14 +18,17 @@ const GRAM_SEES: f64 = 1e-4;
 /// The same against the columns before the projection: their Gram matrix is good to some 1e-15.
 const GRAM_SEES_OF_RAW: f64 = 1e-6;
 
+/// Correlations below this are none.
+const NOTHING: f64 = 0.05;
+
 /// What is left of a column that is taken out whole, as a share of it: gauges are said elsewhere.
 const ROUNDING: f64 = 1e-12;
 
 /// Pairs that are named at most.
 const MOST_PAIRS: usize = 8;
 
-/// The pairs of results that are least told apart, among those that have a value: all that are worth naming, and the worst one in any
-/// case.
+/// The pairs of results that are least told apart, among those that have a value: all that are worth naming, and the worst one where it is
+/// anything.
 pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<Correlation> {
     let is_result = |i: &usize| !fit.model.unknowns[*i].is_set_up() && fit.covariance[(*i, *i)] > 0.0 && has_value(*i);
     let results: Vec<usize> = fit.free.iter().copied().filter(is_result).collect();
@@ -36,8 +40,9 @@ pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<
         }
     }
     out.sort_by(|x, y| y.0.abs().total_cmp(&x.0.abs()));
-    let worth = out.iter().take_while(|(r, ..)| r.abs() > WORTH_NAMING).count();
-    out.truncate(worth.clamp(1, MOST_PAIRS));
+    let worth = |least: f64| out.iter().take_while(|(r, ..)| r.abs() > least).count();
+    let named = worth(WORTH_NAMING).max(worth(NOTHING).min(1)).min(MOST_PAIRS);
+    out.truncate(named);
     let name = |i: usize| fit.model.unknowns[i].name.clone();
     out.into_iter().map(|(r, a, b)| Correlation { a: name(a), b: name(b), r: (r * 1e4).round() / 1e4 }).collect()
 }
@@ -147,11 +152,7 @@ fn from_rows(
         column /= if norm > 0.0 { norm } else { 1.0 };
     }
     if !nuisance.is_empty() {
-        let svd = set_ups.svd(true, false);
-        let top = svd.singular_values.max();
-        let kept: Vec<usize> =
-            (0..svd.singular_values.len()).filter(|&k| svd.singular_values[k] > RANK_TOLERANCE * top).collect();
-        let basis = svd.u.map_or_else(|| DMatrix::zeros(own.nrows(), 0), |u| u.select_columns(&kept));
+        let basis = span(&set_ups, RANK_TOLERANCE);
         // once more: what is left is far smaller than what was there
         for _ in 0..2 {
             own -= &basis * basis.tr_mul(&own);

@@ -358,22 +358,20 @@ impl Circumstances<'_> {
         state[slot::SPINDLE] = spindle;
         state[slot::LENGTHS] = c.length_mm;
         state[slot::LENGTHS + 1] = c.machine.tool.length_mm;
+        let mut put = |from: usize, v: Vector3<f64>| state[from..from + 3].copy_from_slice(v.as_slice());
         // what rounding leaves of a zero has a sign, and no formula may jump by it: `atan2(my, mx)` where the probe points along a face
         const ROUNDING: f64 = 1e-12;
-        let mut put = |from: usize, v: Vector3<f64>| {
-            let v = v.map(|x| if x.abs() < ROUNDING { 0.0 } else { x });
-            state[from..from + 3].copy_from_slice(v.as_slice());
-        };
+        let plain = |v: Vector3<f64>| v.map(|x| if x.abs() <= ROUNDING { 0.0 } else { x });
         let normal = Vector3::from(c.planned.normal).normalize();
         let turned = poses.turned(c.machine, c.carrier, c.at);
         let in_r = turned.to_r * normal;
         let into_probe = nalgebra::Rotation3::from_axis_angle(&c.machine.tool.direction, -spindle);
-        put(slot::NORMAL_IN_R, in_r);
-        put(slot::NORMAL_IN_PROBE, into_probe * (turned.into_tool * in_r));
-        put(slot::GRAVITY, turned.into_tool * -Vector3::z());
+        put(slot::NORMAL_IN_R, plain(in_r));
+        put(slot::NORMAL_IN_PROBE, plain(into_probe * (turned.into_tool * in_r)));
+        put(slot::GRAVITY, plain(turned.into_tool * -Vector3::z()));
         put(slot::NORMAL_OF_BLOCK, normal);
         put(slot::POINT, c.planned.point.into());
-        put(slot::OUTWARD, outward(c.machine, c.carrier, &c.block.centre.into()));
+        put(slot::OUTWARD, plain(outward(c.machine, c.carrier, &c.block.centre.into())));
         state[slot::EDGE] = Vector3::from(c.block.size).dot(&normal.abs());
         state
     }

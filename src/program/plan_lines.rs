@@ -7,6 +7,7 @@
 use super::plan::{Plan, PlanTouch};
 use crate::axes::{AxisMap, AxisName};
 use compact_str::CompactString;
+use memchr::{memchr_iter, memmem};
 use rayon::prelude::*;
 
 /// Below this number of lines threads are not worth their start.
@@ -22,9 +23,14 @@ const POWERS: [f64; DIGITS + 1] =
 pub(super) fn read(text: &str) -> Option<Plan> {
     const BEGIN: &str = "\n  \"touches\": [";
     const END: &str = "\n  ]";
-    let begin = text.find(BEGIN)? + BEGIN.len();
-    let end = begin + text[begin..].find(END)?;
-    let lines: Vec<&str> = text[begin..end].strip_prefix('\n')?.split('\n').collect();
+    // many bytes at a time: the end is some megabytes behind the beginning
+    let find = |within: &str, what: &str| memmem::find(within.as_bytes(), what.as_bytes());
+    let begin = find(text, BEGIN)? + BEGIN.len();
+    let end = begin + find(&text[begin..], END)?;
+    let lines = text[begin..end].strip_prefix('\n')?;
+    let ends = memchr_iter(b'\n', lines.as_bytes()).chain([lines.len()]);
+    let from = |from: &mut usize, end| Some(&lines[std::mem::replace(from, end + 1)..end]);
+    let lines: Vec<&str> = ends.scan(0, from).collect();
     let n = lines.len();
     let touch = |(i, line): (usize, &&str)| {
         let line = if i + 1 < n { line.strip_suffix(',')? } else { line };

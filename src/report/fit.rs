@@ -57,7 +57,7 @@ pub fn with_unit(amount: impl std::fmt::Display, unit: &str) -> String {
 /// The variations that tell what no single one parts; the last part may say that something is left.
 pub(super) fn together(parts: &[String]) -> String {
     let all = parts.last().is_none_or(|last| !last.contains("left that no variation"));
-    let which = if all { "what tells all of it together" } else { "what tells as much of it as touches can" };
+    let which = if all { "what tells all of it together" } else { "what tells a part of it" };
     format!("{which}: {}\n", parts.join("; and "))
 }
 

@@ -73,16 +73,20 @@ fn record(t: &Tolerance, p: &Parameter, meaning: &str, effects: &[&Effect]) -> P
 pub fn correlation(fit: &Fit) -> Correlation {
     let c = uncertainty::results_covariance(fit);
     let sd = |i: usize| c.matrix[i][i].max(0.0).sqrt();
-    let matrix = (0..c.names.len())
-        .map(|i| {
-            let row = (0..c.names.len()).map(|j| {
+    // those of the table of results
+    let is_result = |name: &String| fit.model.unknowns.iter().any(|u| u.name == *name && !u.nuisance);
+    let shown: Vec<usize> = (0..c.names.len()).filter(|&i| is_result(&c.names[i])).collect();
+    let matrix = shown
+        .iter()
+        .map(|&i| {
+            let row = shown.iter().map(|&j| {
                 let r = c.matrix[i][j] / (sd(i) * sd(j));
                 r.is_finite().then(|| ((r.clamp(-1.0, 1.0)) * 1e4).round() / 1e4)
             });
             row.collect()
         })
         .collect();
-    Correlation { names: c.names, matrix }
+    Correlation { names: shown.iter().map(|&i| c.names[i].clone()).collect(), matrix }
 }
 
 /// What a compensation carries and leaves, whoever controls the machine.

@@ -115,7 +115,7 @@ impl Word {
 
 /// A part of a direction: a millionth of a millionth is what sines leave of 0, and a formula may jump with its sign.
 fn plain(part: f64) -> f64 {
-    if part.abs() > 1e-12 { part } else { 0.0 }
+    if part.abs() <= 1e-12 { 0.0 } else { part }
 }
 
 /// The operators that a formula may use.
