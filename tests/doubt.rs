@@ -632,7 +632,7 @@ fn a_noise_that_no_touches_tell_is_not_taken_for_sure() {
     assert!(five.noise_source == "declared" && has(&five, probe) && !has(&five, quiet), "{:?}", five.warnings);
     let small = said("head", 0.05);
     let word =
-        |o: &Outcome| o.warnings.iter().find_map(|w| w.split("some ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
+        |o: &Outcome| o.warnings.iter().find_map(|w| w.split("es fit ").nth(1)?.split(' ').next()?.parse::<f64>().ok());
     assert!(has(&small, quiet) && !has(&small, "or nothing is"), "{:?}", small.warnings);
     assert!(word(&small).is_some_and(|times| (times / 20.0 - 1.0).abs() < 0.15), "{:?}", small.warnings);
     for (program, touch_um) in [("head", 1.0), ("head", 0.0), ("full", 5.0), ("full", 0.05)] {
