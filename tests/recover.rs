@@ -203,6 +203,9 @@ fn what_follows_a_held_value_says_by_how_much() {
             let runs: Vec<_> = plans.iter().zip(&touches).map(|(p, t)| (p, &t[..])).collect();
             let fit = identify(&machine, &runs, &[&[first, second, "block-setup", "pretravel"], &more[..]].concat());
             let case = format!("{name} {programs:?} with {more:?}");
+            let paper = axiscal::report::plot::Paper { width: 400, ascii: false, colour: false };
+            let said = axiscal::report::fit::outcome(&fit.outcome, paper);
+            let named = said.lines().find(|l| l.starts_with(axiscal::report::fit::FOLLOW)).unwrap_or_default();
             let results = truth.into_iter().filter(|t| !t.0.contains('@'));
             for (parameter, planted) in results.chain(planted.iter().map(|(name, value)| ((*name).to_owned(), *value)))
             {
@@ -213,6 +216,8 @@ fn what_follows_a_held_value_says_by_how_much() {
                 match (p.status, p.moves_with_unseen) {
                     (Status::Identified, _) if off < exact => n_exact += 1,
                     (Status::Identified, Some(moves)) if off < 10.0 * moves && moves < p.sigma.unwrap() => {
+                        // a reader of the answer in words is told, too
+                        assert!(named.contains(&format!(" {parameter} ")), "{case} {parameter}: {named:?}");
                         (n_moved, farthest) = (n_moved + 1, farthest.max(off / moves));
                     }
                     (Status::Identified, moves) => {

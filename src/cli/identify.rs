@@ -45,7 +45,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         fit.outcome.covariance = Some(fit::uncertainty::full_covariance(&fit));
         fit.outcome.covariance_type_a = (!fit.type_b.is_empty()).then(|| fit::uncertainty::results_covariance(&fit));
     }
-    let mut outcome = fit.outcome;
+    let mut outcome = std::mem::take(&mut fit.outcome);
     if let Some(active) = loaded.active()? {
         let idle =
             if loaded.transformation() == Some(true) { 0 } else { active.idle_without_transformation(&loaded.machine) };
@@ -64,8 +64,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if !args.residuals {
         outcome.residuals = None;
     }
+    if io.json {
+        io.answer(&outcome);
+        // the process ends with its answer: to give back piece by piece what a study holds would take longer than to write it
+        if !io.within {
+            std::mem::forget((loaded, fit, outcome));
+        }
+        return Ok(Answer::Done);
+    }
     io.say(crate::report::fit::outcome(&outcome, io.paper(false)));
-    if let (Some(residuals), false) = (&outcome.residuals, io.json) {
+    if let Some(residuals) = &outcome.residuals {
         let mut t = crate::report::fit::table(&["run", "touch", "residual um", "standardised"]);
         for r in residuals {
             t.add_row(vec![
@@ -78,7 +86,6 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
-    io.answer(&outcome);
     Ok(Answer::Done)
 }
 

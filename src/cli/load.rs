@@ -2,7 +2,7 @@
 
 use super::common::{Io, load_machine};
 use crate::design::{Planned, keep_measured};
-use crate::diag::{Failure, Finding, Result, Source, source};
+use crate::diag::{Failure, Finding, Findings, Result, Source, source};
 use crate::files;
 use crate::fit::{self, Fit, Settings};
 use crate::log::{self, Touch};
@@ -13,6 +13,7 @@ use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
 use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -278,9 +279,12 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     }
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for entry in &study.data {
-        let plan_path = folder.join(&entry.plan);
-        let (plan, plan_digest) = at_the_name(load_plan_and_digest(&plan_path, &machine, io), &entry.plan, &src)?;
+    // all at once; what is to be said of them is said in their order
+    let plans: Vec<Result<ReadPlan>> =
+        study.data.par_iter().map(|entry| read_plan(&folder.join(&entry.plan), &machine)).collect();
+    for (entry, read) in study.data.iter().zip(plans) {
+        let ReadPlan { plan, findings, digest: plan_digest } = at_the_name(read, &entry.plan, &src)?;
+        io.report(&findings);
         let log_path = folder.join(&entry.log);
         let bytes = at_the_name(files::read_bytes(&log_path), &entry.log, &src)?;
         let digest = Sha256::digest(&bytes).to_vec();
@@ -372,14 +376,23 @@ pub fn controller_path(word: &str, folder: &Path) -> String {
 /// # Errors
 /// When it is unusable or for another machine.
 pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
-    load_plan_and_digest(path, machine, io).map(|(plan, _)| plan)
+    let ReadPlan { plan, findings, .. } = read_plan(path, machine)?;
+    io.report(&findings);
+    Ok(plan)
 }
 
-/// The same, and the SHA-256 of the file.
-fn load_plan_and_digest(path: &Path, machine: &Machine, io: &Io) -> Result<(Plan, Vec<u8>)> {
+/// A plan as it was read.
+struct ReadPlan {
+    plan: Plan,
+    /// What is to be said of it.
+    findings: Vec<Finding>,
+    /// SHA-256 of the file.
+    digest: Vec<u8>,
+}
+
+fn read_plan(path: &Path, machine: &Machine) -> Result<ReadPlan> {
     let src = source(path.display().to_string(), files::read_text(path)?);
-    let (plan, findings) = Plan::parse(&src)?;
-    io.report(&findings.0);
+    let (plan, Findings(mut findings)) = Plan::parse(&src)?;
     if plan.machine != machine.name {
         return Err(Failure::new(
             "plan::other_machine",
@@ -388,13 +401,15 @@ fn load_plan_and_digest(path: &Path, machine: &Machine, io: &Io) -> Result<(Plan
         .help("name the machine that the plan was made for, or make the plan again"));
     }
     if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
-        io.report(&[Finding::warning(
-            "plan::machine_changed",
-            format!("the description of {:?} has changed since {} was made", machine.name, path.display()),
-        )
-        .help("if the change moves the chain, the blocks or the probe, generate the plan again")]);
+        findings.push(
+            Finding::warning(
+                "plan::machine_changed",
+                format!("the description of {:?} has changed since {} was made", machine.name, path.display()),
+            )
+            .help("if the change moves the chain, the blocks or the probe, generate the plan again"),
+        );
     }
-    Ok((plan, Sha256::digest(src.inner().as_bytes()).to_vec()))
+    Ok(ReadPlan { plan, findings, digest: Sha256::digest(src.inner().as_bytes()).to_vec() })
 }
 
 /// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.

@@ -2,7 +2,7 @@
 
 use super::outcome::{Combination, FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::shapes::NOT_CREDIBLE;
-use super::solve::Solution;
+use super::solve::{Problem as _, Solution};
 use super::type_b::TypeB;
 use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
 use crate::machine::Machine;
@@ -42,13 +42,14 @@ pub(super) fn outcome(
     let (unmodelled, (held_out_rms_um, weak)) = if settings.quick || settings.bare {
         (None, (None, Vec::new()))
     } else {
-        rayon::join(
-            || left_out.map(|all| uncertainty::with_unmodelled(fit, all)),
-            || {
-                let weak = if many { Vec::new() } else { weak::weak(fit, effects) };
-                (held_out::by_visit(fit).map(|h| h.rms_um), weak)
-            },
-        )
+        fit.with_touches(fit.noise.tau_mm, |touches| {
+            let beside = || {
+                let normal = touches.normal(&fit.free_theta(), true);
+                let weak = if many { Vec::new() } else { weak::weak(fit, effects, &normal.gram) };
+                (held_out::by_visit_of(fit, touches, normal).map(|h| h.rms_um), weak)
+            };
+            rayon::join(|| left_out.map(|all| uncertainty::with_unmodelled(fit, touches, all)), beside)
+        })
     };
     let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
     // what the scatter of the priors makes of it

@@ -57,9 +57,21 @@ pub fn by_visit(fit: &Fit) -> Option<HeldOut> {
     by_group(fit, &fit.data.visits)
 }
 
+/// The same, with the touches of the fit and their normal equations at its solution.
+pub(super) fn by_visit_of(fit: &Fit, touches: &Touches, normal: Normal) -> Option<HeldOut> {
+    each_left_out(Whole::new(fit, touches, normal), &fit.data.visits)
+}
+
 /// Leaves out each group in turn. `groups[i]` is the group of observation i; touches of a visit stand in one group.
 #[must_use]
 pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
+    fit.with_touches(fit.noise.tau_mm, |touches| {
+        each_left_out(Whole::new(fit, touches, touches.normal(&fit.free_theta(), true)), groups)
+    })
+}
+
+fn each_left_out(whole: Whole, groups: &[usize]) -> Option<HeldOut> {
+    let fit = whole.fit;
     let mut members: Vec<Vec<usize>> = Vec::new();
     for i in (0..groups.len()).filter(|&i| fit.weight[i] > 0.0) {
         if groups[i] >= members.len() {
@@ -71,10 +83,7 @@ pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
     if members.len() < 2 {
         return None;
     }
-    let predicted: Vec<Vec<Option<f64>>> = fit.with_touches(fit.noise.tau_mm, |touches| {
-        let rest = Whole::new(fit, touches);
-        members.par_iter().map(|m| rest.without(m).predict(&[])).collect()
-    });
+    let predicted: Vec<Vec<Option<f64>>> = members.par_iter().map(|m| whole.without(m).predict(&[])).collect();
     let mut error_mm = vec![None; groups.len()];
     for (group, errors) in members.iter().zip(predicted) {
         group.iter().zip(errors).for_each(|(&i, e)| error_mm[i] = e);
@@ -103,7 +112,7 @@ pub fn later_run(fit: &Fit) -> Option<HeldOut> {
         })
         .collect();
     let (errors, n_own) = fit.with_touches(fit.noise.tau_mm, |touches| {
-        let whole = Whole::new(fit, touches);
+        let whole = Whole::new(fit, touches, touches.normal(&fit.free_theta(), true));
         let part = whole.without(&group);
         let mut errors = part.predict(&own);
         let n_own = part.without_own(&own, &mut errors);
@@ -185,11 +194,9 @@ struct Part<'w> {
 }
 
 impl<'f> Whole<'f> {
-    fn new(fit: &'f Fit, touches: &'f Touches<'f>) -> Self {
-        let theta = fit.free_theta();
-        let Normal { gram, gradient, .. } = touches.normal(&theta, true);
+    fn new(fit: &'f Fit, touches: &'f Touches<'f>, Normal { gram, gradient, .. }: Normal) -> Self {
         let scale = gram.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
-        Self { fit, touches, theta, gradient, gram, scale }
+        Self { fit, touches, theta: fit.free_theta(), gradient, gram, scale }
     }
 
     fn without<'w>(&'w self, group: &'w [usize]) -> Part<'w> {

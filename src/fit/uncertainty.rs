@@ -145,7 +145,9 @@ pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c
 /// What a model leaves out (not the set-ups of blocks), and what it would do to touches. Nothing of it depends on a solution.
 pub(super) struct LeftOut {
     model: Model,
-    /// mm at the usual size of each parameter, one row per touch; `None` where there are many, whose columns are made part by part.
+    /// Its unknowns, without those that are seen to do nothing to any touch.
+    acting: Vec<usize>,
+    /// mm at the usual size of each of these, one row per touch; `None` where there are many, whose columns are made part by part.
     columns: Option<DMatrix<f64>>,
     /// What is said of effects that could not be counted.
     says: Vec<String>,
@@ -158,15 +160,14 @@ impl LeftOut {
         effects.retain(|e| !e.per_block);
         let (effects, says) = with_values(effects, &data.observations);
         let model = Model::new(machine, &effects, &data.set_ups, model.reference);
-        let columns = (data.observations.len() <= HELD).then(|| typical_columns(&model, &data.observations));
-        Self { model, columns, says }
-    }
-
-    fn columns(&self, fit: &Fit, part: &Range<usize>) -> DMatrix<f64> {
-        match &self.columns {
-            Some(all) => all.rows_range(part.clone()).into_owned(),
-            None => typical_columns(&self.model, &fit.data.observations[part.clone()]),
+        let (mut acting, mut columns): (Vec<usize>, _) = ((0..model.n_unknowns()).collect(), None);
+        if data.observations.len() <= HELD {
+            let all = typical_columns(&model, &data.observations);
+            let idle: Vec<usize>;
+            (idle, acting) = acting.into_iter().partition(|&c| all.column(c).iter().all(|v| *v == 0.0));
+            columns = Some(all.remove_columns_at(&idle));
         }
+        Self { model, acting, columns, says }
     }
 }
 
@@ -182,20 +183,28 @@ fn typical_columns(model: &Model, observations: &[Observation]) -> DMatrix<f64> 
 /// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size, and the
 /// ball's place scatters from one index to the next as far as that is known; and what is said of effects that could not be
 /// counted.
-pub(super) fn with_unmodelled(fit: &Fit, left_out: LeftOut) -> Unmodelled {
+pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -> Unmodelled {
     let theta = fit.free_theta();
-    let (p, q) = (fit.free.len(), left_out.model.n_unknowns());
+    let LeftOut { model, acting, columns: held, says } = left_out;
+    let (p, q) = (fit.free.len(), acting.len());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
-    // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many times
-    // the touches themselves
-    fit.with_touches(fit.noise.tau_mm, |touches| {
+    let jacobian = |rows: &[usize]| {
+        let mut jacobian = touches.unwhitened_of(&theta, rows).1;
+        touches.whiten_of(rows, &mut jacobian);
+        jacobian
+    };
+    if let Some(mut b) = held {
+        let all: Vec<usize> = (0..b.nrows()).collect();
+        let (jacobian, ()) = rayon::join(|| jacobian(&all), || touches.whitening().apply_in_parallel(&mut b));
+        sums.add(&jacobian, &b);
+    } else {
+        // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many
+        // times the touches themselves
         let columns = |part: &Range<usize>| {
             let rows: Vec<usize> = part.clone().collect();
-            let mut jacobian = touches.unwhitened_of(&theta, &rows).1;
-            touches.whiten_of(&rows, &mut jacobian);
-            let mut b = left_out.columns(fit, part);
+            let mut b = typical_columns(&model, &fit.data.observations[part.clone()]);
             touches.whiten_of(&rows, &mut b);
-            (jacobian, b)
+            (jacobian(&rows), b)
         };
         let parts: Vec<Range<usize>> =
             touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)).collect();
@@ -204,7 +213,7 @@ pub(super) fn with_unmodelled(fit: &Fit, left_out: LeftOut) -> Unmodelled {
             // in their order, so that the sums are the same on any number of processors
             made.iter().for_each(|(jacobian, b)| sums.add(jacobian, b));
         }
-    });
+    }
     for (unknown, _, sigma) in &fit.priors {
         if let Ok(c) = fit.free.binary_search(unknown) {
             sums.gram[(c, c)] += sigma.powi(-2);
@@ -212,14 +221,14 @@ pub(super) fn with_unmodelled(fit: &Fit, left_out: LeftOut) -> Unmodelled {
     }
     let (taken, sigma) = rayon::join(|| sums.taken(&fit.seen), || sums.expected(&fit.seen));
     let mut holds: Vec<Vec<String>> = (0..p).map(|_| Vec::new()).collect();
-    for (u, taken) in left_out.model.unknowns.iter().zip(taken).filter(|(u, _)| !u.shape) {
+    for (u, taken) in acting.iter().map(|&i| &model.unknowns[i]).zip(taken).filter(|(u, _)| !u.shape) {
         if let Some(c) = taken.and_then(|taken| one_result(fit, &taken))
             && !holds[c].contains(&u.effect)
         {
             holds[c].push(u.effect.clone());
         }
     }
-    Unmodelled { sigma, holds, left_out: left_out.says }
+    Unmodelled { sigma, holds, left_out: says }
 }
 
 /// What effects outside of the model may do to a fit.
@@ -269,10 +278,10 @@ impl Sums {
         rayon::join(
             || {
                 for (from, n) in few_rows(b.nrows()) {
-                    let j = jacobian.rows(from, n).into_owned();
+                    let j = jacobian.rows(from, n);
                     let turned = j.transpose();
                     gram.gemm(1.0, &turned, &j, 1.0);
-                    cross.gemm(1.0, &turned, &b.rows(from, n).into_owned(), 1.0);
+                    cross.gemm(1.0, &turned, &b.rows(from, n), 1.0);
                 }
             },
             || add_lower_square(inner, b),
@@ -286,19 +295,26 @@ impl Sums {
         const SHARE: f64 = 1e-3;
         let (p, q) = self.cross.shape();
         let scaled = DMatrix::from_fn(p, p, |i, j| self.gram[(i, j)] / (seen.scale[i] * seen.scale[j]));
-        let cross = DMatrix::from_fn(p, q, |i, j| self.cross[(i, j)] / seen.scale[i]);
-        let solution = if seen.full() {
-            scaled.cholesky().map(|c| c.solve(&cross))
+        let mut cross = DMatrix::from_fn(p, q, |i, j| self.cross[(i, j)] / seen.scale[i]);
+        let factor = if seen.full() {
+            scaled.cholesky()
         } else {
-            let reduced = (seen.seen.tr_mul(&scaled) * &seen.seen).cholesky();
-            reduced.map(|c| &seen.seen * c.solve(&seen.seen.tr_mul(&cross)))
+            cross = seen.seen.tr_mul(&cross);
+            (seen.seen.tr_mul(&scaled) * &seen.seen).cholesky()
         };
-        let Some(x) = solution else { return vec![None; q] };
+        let Some(factor) = factor.filter(|f| f.l_dirty().solve_lower_triangular_mut(&mut cross)) else {
+            return vec![None; q];
+        };
         let taken = |j: usize| {
-            let whole = self.inner[(j, j)];
-            let left = whole - cross.column(j).dot(&x.column(j));
-            (whole > 0.0 && left < 1.0 && left < SHARE * whole)
-                .then(|| DVector::from_fn(p, |i, _| x[(i, j)].abs() * self.gram[(i, i)].sqrt() / seen.scale[i]))
+            // the square of L⁻¹·column is what the unknowns take
+            let (whole, mut x) = (self.inner[(j, j)], cross.column(j).into_owned());
+            let left = whole - x.norm_squared();
+            if !(whole > 0.0 && left < 1.0 && left < SHARE * whole) {
+                return None;
+            }
+            factor.l_dirty().ad_solve_lower_triangular_mut(&mut x);
+            let x = if seen.full() { x } else { &seen.seen * x };
+            Some(DVector::from_fn(p, |i, _| x[i].abs() * self.gram[(i, i)].sqrt() / seen.scale[i]))
         };
         (0..q).map(taken).collect()
     }
@@ -344,7 +360,7 @@ fn add_lower_square(into: &mut DMatrix<f64>, b: &DMatrix<f64>) {
         let mut part = part.rows_mut(from, q - from);
         for (row, rows) in few_rows(b.nrows()) {
             let turned = b.view((row, from), (rows, q - from)).transpose();
-            part.gemm(1.0, &turned, &b.view((row, from), (rows, n)).into_owned(), 1.0);
+            part.gemm(1.0, &turned, &b.view((row, from), (rows, n)), 1.0);
         }
     });
 }

@@ -2,7 +2,7 @@
 
 use super::Fit;
 use super::outcome::{Combination, Correlation};
-use super::solve::{Problem as _, RANK_TOLERANCE};
+use super::solve::RANK_TOLERANCE;
 use super::span::span;
 use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
@@ -49,15 +49,14 @@ pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<
 
 /// Combinations of results that these touches determine no better than their typical sizes: columns scaled by typical
 /// size, nuisance projected out, singular values below 1 (in units of the noise). Without those that leave no trace, which
-/// are said elsewhere.
-pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
+/// are said elsewhere. `gram`: that of the fit's touches and priors.
+pub(super) fn weak(fit: &Fit, effects: &[&Effect], gram: &DMatrix<f64>) -> Vec<Combination> {
     let is_nuisance = |c: &usize| fit.model.unknowns[fit.free[*c]].nuisance;
     let (nuisance, physical): (Vec<usize>, Vec<usize>) = (0..fit.free.len()).partition(is_nuisance);
     if physical.is_empty() {
         return Vec::new();
     }
     let typical = |c: usize| fit.model.unknowns[fit.free[c]].typical;
-    let gram = fit.with_touches(fit.noise.tau_mm, |t| t.normal(&fit.free_theta(), true).gram);
     // what the columns are before anything is taken out of them: all that is left may be rounding
     let raw: Vec<f64> = physical.iter().map(|&c| gram[(c, c)].max(0.0).sqrt() * typical(c)).collect();
     let size =
@@ -65,7 +64,7 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect]) -> Vec<Combination> {
     let precise = |(values, directions): &Spectrum| {
         values.iter().zip(directions.column_iter()).all(|(s, d)| *s > GRAM_SEES_OF_RAW * size(d))
     };
-    let quick = if fit.seen.full() { from_gram(&gram, &physical, &nuisance, typical) } else { None };
+    let quick = if fit.seen.full() { from_gram(gram, &physical, &nuisance, typical) } else { None };
     let (values, directions) = quick.filter(precise).unwrap_or_else(|| {
         let jacobian = only_seen(fit.linear(fit.noise.tau_mm).jacobian, &fit.seen);
         from_rows(&jacobian, &physical, &nuisance, typical)

@@ -10,6 +10,7 @@ use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
 use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
+use std::sync::Arc;
 
 /// Name of the file's format.
 const FORMAT: &str = "axiscal-effects/1";
@@ -118,11 +119,15 @@ impl<'a> Check<'a> {
         for s in &w.shape {
             self.shape(s, &mut parameters);
         }
-        let names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let names: Arc<[String]> = parameters.iter().map(|p| p.name.clone()).collect();
         let mut needs = self.axes(&w.needs);
         let unless = self.axes(&w.unless);
-        let terms: Vec<Term> = w.terms.iter().filter_map(|t| self.term(w, t, &names, &mut needs)).collect();
+        let mut terms: Vec<Term> = Vec::with_capacity(w.terms.len());
+        for t in &w.terms {
+            // the components of an effect mostly go by one formula
+            let known = terms.iter().find(|k| k.formula.text() == t.formula.get_ref()).map(|k| k.formula.clone());
+            terms.extend(self.term((w, t), &names, known, &mut needs));
+        }
         if !self.built_in {
             self.usable(w);
         }
@@ -331,9 +336,9 @@ impl<'a> Check<'a> {
 
     fn term(
         &mut self,
-        w: &EffectAsWritten,
-        t: &TermAsWritten,
-        names: &[&str],
+        (w, t): (&EffectAsWritten, &TermAsWritten),
+        names: &Arc<[String]>,
+        known: Option<Formula>,
         needs: &mut Vec<AxisName>,
     ) -> Option<Term> {
         let at = t.at.as_ref().unwrap_or(&w.at);
@@ -367,7 +372,12 @@ impl<'a> Check<'a> {
         };
         needs.extend(needed.filter(|axis| !needs.contains(axis)));
         let text = t.formula.get_ref();
-        let formula = if self.built_in { Ok(Formula::unchecked(text, names)) } else { Formula::parse(text, names) };
+        let words = || names.iter().map(String::as_str).collect::<Vec<_>>();
+        let formula = match known {
+            Some(formula) => Ok(formula),
+            None if self.built_in => Ok(Formula::unchecked(text, names)),
+            None => Formula::parse(text, &words()),
+        };
         match formula {
             Ok(formula) if !self.built_in && formula.constant().is_some_and(|c| !c.is_finite()) => {
                 self.error(
@@ -391,7 +401,7 @@ impl<'a> Check<'a> {
                 } else {
                     "angles A B C are radians inside a formula; unary minus binds tighter than ^: write -(x^2)"
                 };
-                let place = mistake::find(text, names).and_then(|m| self.inside(&t.formula, m.at));
+                let place = mistake::find(text, &words()).and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
                     &place.unwrap_or_else(|| t.formula.span()),
                     "effects::formula",

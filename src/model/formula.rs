@@ -102,10 +102,12 @@ impl MakeOperators<f64> for Words {
 type Expression = FlatEx<f64, Words>;
 
 /// Where the value of a variable of an expression comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Origin {
     State(usize),
     Shape(usize),
+    /// A number of the formula itself.
+    Number(f64),
 }
 
 impl Origin {
@@ -113,12 +115,13 @@ impl Origin {
         match self {
             Self::State(i) => state[i],
             Self::Shape(i) => shapes.get(i).copied().unwrap_or(f64::NAN),
+            Self::Number(number) => number,
         }
     }
 }
 
 /// An expression as the crate has it. It is large (twenty kilobytes, whatever stands in it): one is made for all formulas that
-/// differ in the names of their variables only.
+/// differ in their variables and numbers only.
 #[derive(Debug)]
 struct Shared {
     expression: Expression,
@@ -171,17 +174,20 @@ impl Parts {
 /// A text that is compiled at most once; `None` where it is no formula.
 type Once = Arc<OnceLock<Option<Arc<Shared>>>>;
 
-/// What is built in, by its text with its variables numbered: some thirty expressions stand in three hundred terms, and the crate
-/// takes a tenth of a millisecond for each.
+/// What is built in, by its text with places for variables and numbers: some thirty expressions stand in three hundred terms, and the
+/// crate takes up to a tenth of a millisecond for each.
 static BUILT_IN: LazyLock<Mutex<HashMap<String, Once>>> = LazyLock::new(Mutex::default);
 
-/// A formula, compiled when it is first used: a study takes a few of the many that are built in.
+/// A formula, compiled when it is first used: a study takes a few of the many that are built in. Copies are one and the same.
 #[derive(Debug, Clone)]
-pub struct Formula {
+pub struct Formula(Arc<Written>);
+
+#[derive(Debug)]
+struct Written {
     text: String,
     /// Names of the effect's parameters that may stand inside.
-    shapes: Vec<String>,
-    parts: OnceLock<Option<Arc<Parts>>>,
+    shapes: Arc<[String]>,
+    parts: OnceLock<Option<Parts>>,
 }
 
 impl Formula {
@@ -196,31 +202,32 @@ impl Formula {
         if let Some(wrong) = super::mistake::find(text, shapes) {
             return Err(wrong.says);
         }
-        let parts = OnceLock::from(Some(Arc::new(compile(text, shapes)?)));
-        Ok(Self { parts, ..Self::unchecked(text, shapes) })
+        let parts = OnceLock::from(Some(compile(text, shapes)?));
+        let shapes = shapes.iter().map(|s| (*s).to_owned()).collect();
+        Ok(Self(Arc::new(Written { text: text.to_owned(), shapes, parts })))
     }
 
     /// A built-in formula, known to be good: nothing is parsed before it is used, and never twice. A bad one has no value anywhere.
-    pub(super) fn unchecked(text: &str, shapes: &[&str]) -> Self {
-        let shapes = shapes.iter().map(|s| (*s).to_owned()).collect();
-        Self { text: text.to_owned(), shapes, parts: OnceLock::new() }
+    pub(super) fn unchecked(text: &str, shapes: &Arc<[String]>) -> Self {
+        Self(Arc::new(Written { text: text.to_owned(), shapes: Arc::clone(shapes), parts: OnceLock::new() }))
     }
 
     fn parts(&self) -> Option<&Parts> {
-        self.parts.get_or_init(|| self.compiled().map(Arc::new)).as_deref()
+        self.0.parts.get_or_init(|| self.compiled()).as_ref()
     }
 
     /// Of a built-in formula, whose expression is shared. The map is free again while one of them is compiled.
     fn compiled(&self) -> Option<Parts> {
-        if let Some(constant) = bare_number(&self.text) {
+        if let Some(constant) = bare_number(&self.0.text) {
             return Some(Parts::Constant(constant));
         }
         // a parameter of the effect goes before a variable of the same name
         let origin = |word: &str| {
-            let shape = self.shapes.iter().position(|s| s == word).map(Origin::Shape);
+            let shape = self.0.shapes.iter().position(|s| s == word).map(Origin::Shape);
             shape.or_else(|| VARIABLES.iter().position(|v| *v == word).map(Origin::State))
         };
-        let (text, origins) = numbered(&self.text, origin)?;
+        let (text, origins) =
+            numbered(&self.0.text, origin, Origin::Number).filter(|(_, origins)| origins.len() <= MOST_VARIABLES)?;
         let once = Arc::clone(BUILT_IN.lock().unwrap_or_else(PoisonError::into_inner).entry(text.clone()).or_default());
         let shared = once.get_or_init(|| Shared::parse(&text)).clone()?;
         // a word that is none of them would stand among the variables
@@ -235,7 +242,7 @@ impl Formula {
     /// The formula as it was written.
     #[must_use]
     pub fn text(&self) -> &str {
-        &self.text
+        &self.0.text
     }
 
     /// Its value where it uses no variable.

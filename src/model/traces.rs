@@ -10,11 +10,14 @@ use super::predict::{Active, Model, Observation};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
+/// Touches whose slopes stand together.
+const SOME: usize = 64;
+
 /// How the gap of each touch follows displacements at each place of a model.
 #[derive(Debug)]
 pub struct Traces<'a> {
     batch: Batch<'a>,
-    /// d gap / d component: mm per mm, or mm per rad; touches of one component side by side, components of one place likewise.
+    /// d gap / d component: mm per mm, or mm per rad. Some touches after others; of these, touches of one component side by side.
     slope: Vec<f64>,
     /// Values of formulas without shape parameters at all touches.
     plain: HashMap<&'a str, Vec<f64>>,
@@ -29,21 +32,19 @@ impl<'a> Traces<'a> {
         let theta = model.start();
         let at = batch.at(&theta);
         let n_components = 6 * model.slots.len();
-        let mut rows = vec![0.0; n * n_components];
-        rows.par_chunks_mut(n_components.max(1)).enumerate().for_each_init(
+        let mut slope = vec![0.0; n * n_components];
+        slope.par_chunks_mut((SOME * n_components).max(1)).enumerate().for_each_init(
             || batch.scratch(),
-            |scratch, (i, row)| {
-                let slopes = at.slopes(i, scratch).iter().flatten();
-                row.iter_mut().zip(slopes).for_each(|(into, slope)| *into = *slope);
+            |scratch, (k, part)| {
+                let here = part.len() / n_components;
+                for i in 0..here {
+                    for (c, slope) in at.slopes(k * SOME + i, scratch).iter().flatten().enumerate() {
+                        part[c * here + i] = *slope;
+                    }
+                }
             },
         );
         drop(at);
-        let mut slope = vec![0.0; n * n_components];
-        for (i, row) in rows.chunks_exact(n_components.max(1)).enumerate() {
-            for (c, value) in row.iter().enumerate() {
-                slope[c * n + i] = *value;
-            }
-        }
         let formulas = model.active.iter().map(|a| &a.term.formula);
         let plain: HashMap<&str, &Formula> =
             formulas.filter(|f| f.constant().is_none() && !f.has_shape()).map(|f| (f.text(), f)).collect();
@@ -69,9 +70,11 @@ impl<'a> Traces<'a> {
         for active in self.batch.model().active.iter().filter(|a| a.first == first) {
             let formula = &active.term.formula;
             let column = &mut columns[(active.unknown - first) * n..][..n];
-            let slope = &self.slope[(6 * active.slot + active.component) * n..][..n];
+            let component = 6 * active.slot + active.component;
             if let Some(constant) = formula.constant() {
-                self.add(column, active, slope.iter().map(|s| s * constant));
+                for (at, slope) in self.slopes(component) {
+                    self.add(&mut column[at..], active, at, slope.iter().map(|s| s * constant));
+                }
                 continue;
             }
             let coefficient = match self.plain.get(formula.text()) {
@@ -84,15 +87,27 @@ impl<'a> Traces<'a> {
                     all().map(|o| if here(&o) { own.next().unwrap_or_default() } else { 0.0 }).collect()
                 }),
             };
-            self.add(column, active, slope.iter().zip(coefficient).map(|(s, c)| s * c));
+            for (at, slope) in self.slopes(component) {
+                self.add(&mut column[at..], active, at, slope.iter().zip(&coefficient[at..]).map(|(s, c)| s * c));
+            }
         }
     }
 
-    fn add(&self, column: &mut [f64], active: &Active, amounts: impl Iterator<Item = f64>) {
+    /// The slopes of one component: number of the first touch, and those of it and the next ones.
+    fn slopes(&self, component: usize) -> impl Iterator<Item = (usize, &[f64])> {
+        let n_components = 6 * self.batch.model().slots.len();
+        self.slope.chunks((SOME * n_components).max(1)).enumerate().map(move |(k, part)| {
+            let here = part.len() / n_components;
+            (k * SOME, &part[component * here..][..here])
+        })
+    }
+
+    /// Adds amounts to a column from a touch on.
+    fn add(&self, column: &mut [f64], active: &Active, from: usize, amounts: impl Iterator<Item = f64>) {
         match active.set_up {
             None => column.iter_mut().zip(amounts).for_each(|(into, amount)| *into += active.factor * amount),
             Some(own) => {
-                let touched = self.batch.observations().iter().map(|o| o.set_up == own);
+                let touched = self.batch.observations()[from..].iter().map(|o| o.set_up == own);
                 for ((into, amount), here) in column.iter_mut().zip(amounts).zip(touched) {
                     if here {
                         *into += active.factor * amount;

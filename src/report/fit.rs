@@ -132,6 +132,10 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
     if !holds.is_empty() {
         out += &format!("{HOLDS}: {}\n", holds.join("; "));
     }
+    let following: Vec<String> = following(&results).collect();
+    if !following.is_empty() {
+        out += &format!("{FOLLOW}: {}\n", following.join(", "));
+    }
     let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
     if !blocks.is_empty() {
         let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
@@ -196,6 +200,16 @@ pub const HOLDS: &str =
 pub fn held(parameters: &[Parameter]) -> impl Iterator<Item = String> {
     let with = parameters.iter().filter(|p| !p.holds.is_empty() && !p.name.contains('@'));
     with.map(|p| format!("{} holds {}", p.name, p.holds.join(", ")))
+}
+
+/// What is said of values that are told exactly only while what is not told is what it is held at.
+pub const FOLLOW: &str =
+    "these move, while what is not told below moves by its usual size, by (in the standard uncertainties)";
+
+/// Results that follow what is not told, and by how much: `EZ0B 0.000000760 mm`.
+fn following(results: &[&Parameter]) -> impl Iterator<Item = String> {
+    let moves = results.iter().filter_map(|p| Some((*p, p.moves_with_unseen?)));
+    moves.map(|(p, by)| format!("{} {}", p.name, with_unit(significant(by), &p.unit)))
 }
 
 /// What a table does not show for want of room; nothing where it shows all.
