@@ -9,7 +9,7 @@
 mod comparison;
 mod problems;
 
-use comparison::{Answer, Peers, compare, identify_both, run_crate, run_identify};
+use comparison::{Answer, Peers, compare, identify_all, run_crate, run_identify};
 use problems::Problem;
 use std::fmt::Write;
 use std::path::Path;
@@ -101,7 +101,7 @@ fn agree(peers: &Peers, folder: &Path) {
             }
         }
     }
-    identify_both(peers, folder, 1).into_iter().for_each(drop);
+    identify_all(peers, folder, 1).into_iter().for_each(drop);
 }
 
 /// One size of problem: everybody's best times.
@@ -257,24 +257,25 @@ fn solvers(results: &[Size]) -> String {
 }
 
 fn whole_process(peers: &Peers, folder: &Path) -> String {
-    let [ours, plain, theirs] = identify_both(peers, folder, 40);
+    let [quick, plain, theirs] = identify_all(peers, folder, 12);
     let mut out = String::from(
         "## Whole process: `identify` on the paper's 356 touches\n\nFrom the call to the answer in JSON, files read \
-         included; median (fastest) run.\n\n| program | ms | ratio |\n|---|---|---|\n",
+         included: median (fastest) of runs that follow one of the same program, the programs in turn. Ratio: how many times as \
+         fast as the script.\n\n\
+         | program | ms | ratio |\n|---|---|---|\n",
     );
-    let ours = ours.expect("our own program always runs");
-    let row = |t: &comparison::Times| format!("{} ({})", milliseconds(t.median_s), milliseconds(t.least_s));
-    writeln!(out, "| `axiscal identify --quick` | {} | 1 |", row(&ours)).unwrap();
-    if let Some(t) = plain {
-        writeln!(out, "| `axiscal identify` | {} | {:.1} |", row(&t), t.median_s / ours.median_s).unwrap();
+    let script_s = theirs.as_ref().map(|t| (t.median_s, t.least_s));
+    let names = ["`axiscal identify --quick`", "`axiscal identify`", "SciPy (`benches/peers/identify.py`)"];
+    for (name, times) in names.into_iter().zip([quick, plain, theirs]) {
+        let Some(t) = times else {
+            writeln!(out, "| {name} | left out | |").unwrap();
+            continue;
+        };
+        let ratio = script_s.map_or_else(String::new, |(median_s, least_s)| {
+            format!("{:.0} ({:.0})", median_s / t.median_s, least_s / t.least_s)
+        });
+        writeln!(out, "| {name} | {} ({}) | {ratio} |", milliseconds(t.median_s), milliseconds(t.least_s)).unwrap();
     }
-    match theirs {
-        Some(t) => {
-            writeln!(out, "| SciPy (`benches/peers/identify.py`) | {} | {:.0} |", row(&t), t.median_s / ours.median_s)
-        }
-        None => writeln!(out, "| SciPy | left out | |"),
-    }
-    .unwrap();
     out.push('\n');
     out
 }

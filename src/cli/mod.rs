@@ -4,6 +4,7 @@
 //! "no", 2 the input or the call was unusable.
 
 mod add;
+mod ahead;
 mod assess;
 mod check;
 mod common;
@@ -120,7 +121,7 @@ enum Verb {
 pub fn main() -> ExitCode {
     // a good call of this verb needs none of the options of the others, whose making takes a third of the time of the fit; what is wrong
     // with a bad one, all of them together say
-    if ahead_of_the_call()
+    if ahead::of_identify()
         && let Ok(Cli { json, verb: Often::Identify(args) }) = Cli::try_parse()
     {
         let io = Io::new(json);
@@ -133,31 +134,6 @@ pub fn main() -> ExitCode {
     };
     let io = Io::new(cli.json);
     io.finish(dispatch(cli.verb, &io))
-}
-
-/// What `identify` needs of the catalogue takes as long to read as the call itself and the files that it names: another thread
-/// begins at once. Is it called?
-fn ahead_of_the_call() -> bool {
-    let typed: Vec<_> = std::env::args_os().skip(1).collect();
-    // the verb is the first word that is no option: none of those before it takes a value
-    let verb = typed.iter().find(|word| !word.to_string_lossy().starts_with('-'));
-    let is_called = verb.is_some_and(|verb| verb == "identify");
-    if !is_called || typed.iter().any(|word| word == "--quick") {
-        return is_called;
-    }
-    // a fit waits for nobody but its own parts: this thread works with the others instead of beside them, so that no more run
-    // than there are processors. Nobody can have made a pool before: if one stood, it would stay. The first of the others reads as it
-    // starts: a job would find it asleep, and waking it takes longer than reading
-    let read = |thread| {
-        if thread == 1 {
-            // the C library lets the heap of such a thread grow page by page, each with a call to the system that keeps the others
-            // from their memory; what it had once it has again without one: a few large pieces first
-            std::hint::black_box([(); 16].map(|()| Vec::<u8>::with_capacity(100_000)));
-            crate::model::catalogue::Catalogue::read_rows();
-        }
-    };
-    let _ = rayon::ThreadPoolBuilder::new().use_current_thread().start_handler(read).build_global();
-    is_called
 }
 
 /// Another verb, called by one of them with the words that a user would type.

@@ -206,10 +206,10 @@ pub fn held(parameters: &[Parameter]) -> impl Iterator<Item = String> {
 pub const FOLLOW: &str =
     "these move, while what is not told below moves by its usual size, by (in the standard uncertainties)";
 
-/// Results that follow what is not told, and by how much: `EZ0B 0.000000760 mm`.
+/// Results that follow what is not told, and by how much: `EZ0B by 0.000000760 mm`.
 fn following(results: &[&Parameter]) -> impl Iterator<Item = String> {
     let moves = results.iter().filter_map(|p| Some((*p, p.moves_with_unseen?)));
-    moves.map(|(p, by)| format!("{} {}", p.name, with_unit(significant(by), &p.unit)))
+    moves.map(|(p, by)| format!("{} by {}", p.name, with_unit(significant(by), &p.unit)))
 }
 
 /// What a table does not show for want of room; nothing where it shows all.
