@@ -307,6 +307,21 @@ mod tests {
                 assert!(t.formula.eval(&[0.5; VARIABLES.len()], &shapes).is_finite(), "{} {}", e.id, t.formula.text());
             }
         }
+        // a built-in formula shares its expression with others that differ in variables and numbers: its value is its own
+        let state: [f64; VARIABLES.len()] = std::array::from_fn(|i| 0.31 + 0.017 * i as f64);
+        for (written, row) in catalogue.iter().zip(ROWS.iter()) {
+            let packed = row.read().unwrap();
+            let shapes: Vec<f64> = packed.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
+            for (w, p) in written.terms.iter().zip(&packed.terms) {
+                let (w, p) = (&w.formula, &p.formula);
+                let (own, shared) = (w.eval(&state, &shapes), p.eval(&state, &shapes));
+                assert!((own - shared).abs() <= 1e-14 * own.abs(), "{}: {own} {shared}", w.text());
+                let slopes = |f: &crate::model::formula::Formula| f.partials(&state, &shapes).collect::<Vec<_>>();
+                for ((i, own), (k, shared)) in slopes(w).into_iter().zip(slopes(p)) {
+                    assert!(i == k && (own - shared).abs() <= 1e-12 * own.abs(), "{}: {own} {shared}", w.text());
+                }
+            }
+        }
     }
 
     #[test]
