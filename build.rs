@@ -1,11 +1,24 @@
 //! The built-in catalogue is read once, while the program is built: `effects.toml`, row by row, as MessagePack, which a process
-//! reads in a tenth of the time. Nothing is checked or changed here: a test compares what comes of both (`model::catalogue`).
+//! reads in a tenth of the time, and its formulas as program text. Nothing is checked or changed here: tests compare what comes of
+//! both with what a user's file becomes (`model::catalogue`).
 
+#[path = "src/model/words.rs"]
+mod words;
+
+use exmex::prelude::*;
+use exmex::{MakeOperators, Operator};
+use std::collections::BTreeSet;
 use std::error::Error;
+use std::fmt::Write as _;
+use std::num::ParseFloatError;
+use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::path::PathBuf;
+use std::str::FromStr;
+use words::{Value, operators};
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=src/model/words.rs");
     println!("cargo::rerun-if-changed=effects.toml");
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     let file: toml::Table = toml::from_str(&std::fs::read_to_string("effects.toml")?)?;
@@ -18,5 +31,145 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     std::fs::write(out.join("effects.msgpack"), &bytes)?;
     std::fs::write(out.join("effects_ends.rs"), format!("&{ends:?}"))?;
+    std::fs::write(out.join("formulas.rs"), formulas(rows)?)?;
     Ok(())
+}
+
+/// Every formula of the rows, in the order of their texts, as `model::expression::BUILT_IN` has them.
+fn formulas(rows: &[toml::Value]) -> Result<String, Box<dyn Error>> {
+    let all = |list, word| {
+        let entries = rows.iter().filter_map(move |row| row.get(list)?.as_array()).flatten();
+        entries.filter_map(move |entry| entry.get(word)?.as_str()).collect::<BTreeSet<&str>>()
+    };
+    let shapes = all("shape", "parameter");
+    let mut out = String::from("&[");
+    for text in all("terms", "formula") {
+        let not_read = |e: exmex::ExError| format!("effects.toml: formula {text:?}: {}", e.msg());
+        let flat = Flat::parse(text).map_err(not_read)?;
+        let variables = flat.var_names();
+        let place = |name: &String| variables.iter().position(|own| own == name);
+        // the crate takes every step of the formula, and each writes itself down
+        let body = |flat: &Flat| -> Option<String> {
+            let values = flat.var_names().iter().map(|name| Some(Code(format!("v[{}]", place(name)?))));
+            let Code(code) = flat.eval(&values.collect::<Option<Vec<_>>>()?).ok()?;
+            Some(format!("|{}| {code}", if code.contains("v[") { "v" } else { "_" }))
+        };
+        let derivative = |at: usize| {
+            let is_shape = shapes.contains(variables[at].as_str());
+            is_shape.then(|| flat.clone().partial(at).ok().and_then(|of| body(&of))).flatten()
+        };
+        let value = body(&flat).ok_or_else(|| format!("effects.toml: formula {text:?} has no value"))?;
+        write!(out, "BuiltIn {{ text: {text:?}, variables: &{variables:?}, value: {value}, derivatives: &[")?;
+        for at in 0..variables.len() {
+            match derivative(at) {
+                Some(derivative) => write!(out, "Some({derivative}), ")?,
+                None => out.push_str("None, "),
+            }
+        }
+        out.push_str("] },\n");
+    }
+    out.push(']');
+    Ok(out)
+}
+
+/// The text of a program that computes a number.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Code(String);
+
+type Flat = FlatEx<Code, Words>;
+
+/// The words of formulas, in program text.
+#[derive(Debug, Clone)]
+struct Words;
+
+impl MakeOperators<Code> for Words {
+    fn make<'a>() -> Vec<Operator<'a, Code>> {
+        operators()
+    }
+}
+
+impl Code {
+    fn number(value: f64) -> Self {
+        Self(format!("{value:?}_f64"))
+    }
+
+    fn call(self, name: &str, other: Option<Self>) -> Self {
+        Self(match other {
+            Some(other) => format!("Value::{name}({}, {})", self.0, other.0),
+            None => format!("Value::{name}({})", self.0),
+        })
+    }
+}
+
+impl FromStr for Code {
+    type Err = ParseFloatError;
+
+    fn from_str(digits: &str) -> Result<Self, ParseFloatError> {
+        digits.parse().map(Self::number)
+    }
+}
+
+impl From<u8> for Code {
+    fn from(value: u8) -> Self {
+        Self::number(value.into())
+    }
+}
+
+impl From<f32> for Code {
+    fn from(value: f32) -> Self {
+        Self::number(value.into())
+    }
+}
+
+/// Rust's own operators between texts.
+macro_rules! between {
+    ($($of:ident $method:ident $sign:literal)*) => {$(
+        impl $of for Code {
+            type Output = Self;
+
+            fn $method(self, other: Self) -> Self {
+                Self(format!("({} {} {})", self.0, $sign, other.0))
+            }
+        }
+    )*};
+}
+
+between! { Add add "+" Sub sub "-" Mul mul "*" Div div "/" }
+
+impl Neg for Code {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self(format!("(-{})", self.0))
+    }
+}
+
+impl Value for Code {
+    fn pi() -> Self {
+        Self("std::f64::consts::PI".to_owned())
+    }
+
+    fn power(self, power: Self) -> Self {
+        self.call("power", Some(power))
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        self.call("atan2", Some(x))
+    }
+
+    fn modulo(self, period: Self) -> Self {
+        self.call("modulo", Some(period))
+    }
+
+    fn sign(self) -> Self {
+        self.call("sign", None)
+    }
+
+    fn step(self) -> Self {
+        self.call("step", None)
+    }
+
+    fn function(self, name: &'static str, _of: fn(f64) -> f64) -> Self {
+        Self(format!("f64::{name}({})", self.0))
+    }
 }

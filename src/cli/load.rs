@@ -274,9 +274,6 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
-    if whole {
-        catalogue.prepare(&machine);
-    }
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     // all at once; what is to be said of them is said in their order

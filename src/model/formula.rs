@@ -1,13 +1,11 @@
 //! Formulas of effects: parsed once, evaluated at the state of a touch, with partial derivatives for shape parameters.
 //!
-//! The expression crate does the parsing and differentiation; this module fixes the words that a formula may use
-//! (docs/guide/effects.md) and turns a mistake into a sentence that names it.
+//! The expression crate does the parsing and differentiation (`model::expression`); this module fixes the variables that a formula may
+//! use (docs/guide/effects.md) and turns a mistake into a sentence that names it.
 
-use super::spelling::{bare_number, known_functions, numbered, plain_numbers};
-use exmex::prelude::*;
-use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
-use std::collections::HashMap;
-use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
+use super::expression::Expression;
+use super::spelling::{bare_number, known_functions, plain_numbers};
+use std::sync::{Arc, OnceLock};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
 pub const VARIABLES: [&str; 40] = [
@@ -65,49 +63,11 @@ pub const CONSTANTS: [&str; 4] = ["pi", "PI", "e", "E"];
 /// Bytes of a formula at most: the expression crate takes a time that grows with the square of its terms.
 pub const LONGEST: usize = 4000;
 
-/// The operators of a formula: those of the expression crate that docs/guide/effects.md names, and `sign`, `mod`, `step`.
-#[derive(Clone, Debug)]
-pub struct Words;
-
-/// Made once: the expression crate asks for them several times for each formula.
-static WORDS: LazyLock<Vec<Operator<'static, f64>>> = LazyLock::new(|| {
-    let kept = ["+", "-", "*", "/", "^"];
-    let mut ops: Vec<Operator<'static, f64>> = FloatOpsFactory::<f64>::make()
-        .into_iter()
-        .filter(|op| kept.contains(&op.repr()) || FUNCTIONS.contains(&op.repr()) || op.repr() == "PI")
-        .collect();
-    let has = |ops: &[Operator<'static, f64>], word: &str| ops.iter().any(|op| op.repr() == word);
-    if !has(&ops, "sign") {
-        ops.push(Operator::make_unary("sign", |x: f64| if x == 0.0 { 0.0 } else { x.signum() }));
-    }
-    if !has(&ops, "step") {
-        ops.push(Operator::make_unary("step", |x: f64| if x >= 0.0 { 1.0 } else { 0.0 }));
-    }
-    if !has(&ops, "mod") {
-        ops.push(Operator::make_bin(
-            "mod",
-            BinOp { apply: |a: f64, b: f64| a - b * (a / b).floor(), prio: 4, is_commutative: false },
-        ));
-    }
-    ops.push(Operator::make_constant("pi", std::f64::consts::PI));
-    ops
-});
-
-impl MakeOperators<f64> for Words {
-    fn make<'a>() -> Vec<Operator<'a, f64>> {
-        WORDS.clone()
-    }
-}
-
-type Expression = FlatEx<f64, Words>;
-
 /// Where the value of a variable of an expression comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Origin {
     State(usize),
     Shape(usize),
-    /// A number of the formula itself.
-    Number(f64),
 }
 
 impl Origin {
@@ -115,70 +75,31 @@ impl Origin {
         match self {
             Self::State(i) => state[i],
             Self::Shape(i) => shapes.get(i).copied().unwrap_or(f64::NAN),
-            Self::Number(number) => number,
         }
     }
 }
 
-/// An expression as the crate has it. It is large (twenty kilobytes, whatever stands in it): one is made for all formulas that
-/// differ in their variables and numbers only.
-#[derive(Debug)]
-struct Shared {
-    expression: Expression,
-    /// By variable.
-    derivatives: Vec<OnceLock<Option<Derivative>>>,
-}
-
-/// A derivative, and which of the expression's variables its own are.
-#[derive(Debug)]
-struct Derivative {
-    expression: Expression,
-    variables: Vec<usize>,
-}
-
-impl Shared {
-    fn parse(text: &str) -> Option<Arc<Self>> {
-        let expression = Expression::parse(text).ok()?;
-        let derivatives = expression.var_names().iter().map(|_| OnceLock::new()).collect();
-        Some(Arc::new(Self { expression, derivatives }))
-    }
-
-    /// The derivative with respect to one of its variables, made when somebody asks for it: that takes longer than the formula
-    /// itself, and effects of no size need none. `None` where the crate cannot differentiate (`floor`, `step`, …).
-    fn derivative(&self, at: usize) -> Option<&Derivative> {
-        let make = || {
-            let expression = self.expression.clone().partial(at).ok()?;
-            let of_name = |name: &String| self.expression.var_names().iter().position(|own| own == name);
-            let variables = expression.var_names().iter().map(of_name).collect::<Option<Vec<_>>>()?;
-            Some(Derivative { expression, variables })
-        };
-        self.derivatives.get(at)?.get_or_init(make).as_ref()
-    }
-}
-
-/// What a formula is once it is compiled.
+/// What a formula is once its words are known.
 #[derive(Debug)]
 enum Parts {
     Constant(f64),
     /// An expression with the origins of its variables.
-    Expression(Arc<Shared>, Vec<Origin>),
+    Expression(Expression, Vec<Origin>),
 }
 
 impl Parts {
-    fn of(shared: Arc<Shared>, origins: Vec<Origin>) -> Self {
-        let constant = if origins.is_empty() { shared.expression.eval(&[]).ok() } else { None };
-        constant.map_or(Self::Expression(shared, origins), Self::Constant)
+    fn of(expression: Expression, shapes: &[impl AsRef<str>]) -> Result<Self, String> {
+        let origins = origins(&expression.variables(), shapes)?;
+        Ok(if origins.is_empty() {
+            Self::Constant(expression.value(&[]))
+        } else {
+            Self::Expression(expression, origins)
+        })
     }
 }
 
-/// A text that is compiled at most once; `None` where it is no formula.
-type Once = Arc<OnceLock<Option<Arc<Shared>>>>;
-
-/// What is built in, by its text with places for variables and numbers: some thirty expressions stand in three hundred terms, and the
-/// crate takes up to a tenth of a millisecond for each.
-static BUILT_IN: LazyLock<Mutex<HashMap<String, Once>>> = LazyLock::new(Mutex::default);
-
-/// A formula, compiled when it is first used: a study takes a few of the many that are built in. Copies are one and the same.
+/// A formula. What a built-in one consists of is looked up when it is first used: a study takes a few of the many. Copies are one and
+/// the same.
 #[derive(Debug, Clone)]
 pub struct Formula(Arc<Written>);
 
@@ -216,27 +137,12 @@ impl Formula {
         self.0.parts.get_or_init(|| self.compiled()).as_ref()
     }
 
-    /// Of a built-in formula, whose expression is shared. The map is free again while one of them is compiled.
+    /// Of a built-in formula.
     fn compiled(&self) -> Option<Parts> {
         if let Some(constant) = bare_number(&self.0.text) {
             return Some(Parts::Constant(constant));
         }
-        // a parameter of the effect goes before a variable of the same name
-        let origin = |word: &str| {
-            let shape = self.0.shapes.iter().position(|s| s == word).map(Origin::Shape);
-            shape.or_else(|| VARIABLES.iter().position(|v| *v == word).map(Origin::State))
-        };
-        let (text, origins) =
-            numbered(&self.0.text, origin, Origin::Number).filter(|(_, origins)| origins.len() <= MOST_VARIABLES)?;
-        let once = Arc::clone(BUILT_IN.lock().unwrap_or_else(PoisonError::into_inner).entry(text.clone()).or_default());
-        let shared = once.get_or_init(|| Shared::parse(&text)).clone()?;
-        // a word that is none of them would stand among the variables
-        (shared.expression.var_names().len() == origins.len()).then(|| Parts::of(shared, origins))
-    }
-
-    /// Compiles it, if that has not been done.
-    pub(super) fn prepare(&self) {
-        self.parts();
+        Parts::of(Expression::built_in(&self.0.text)?, &self.0.shapes).ok()
     }
 
     /// The formula as it was written.
@@ -280,7 +186,9 @@ impl Formula {
     pub fn eval(&self, state: &State, shapes: &[f64]) -> f64 {
         match self.parts() {
             Some(Parts::Constant(constant)) => *constant,
-            Some(Parts::Expression(shared, origins)) => evaluate(&shared.expression, origins.iter(), state, shapes),
+            Some(Parts::Expression(expression, origins)) => {
+                with_values(origins, state, shapes, |values| expression.value(values))
+            }
             None => f64::NAN,
         }
     }
@@ -288,7 +196,7 @@ impl Formula {
     /// Values at many states. Touches of one pose mostly follow one another: where the variables are those of the state before,
     /// so is the value.
     pub fn eval_each<'s>(&self, states: impl Iterator<Item = &'s State>, shapes: &[f64]) -> Vec<f64> {
-        let Some(Parts::Expression(shared, origins)) = self.parts() else {
+        let Some(Parts::Expression(expression, origins)) = self.parts() else {
             return states.map(|state| self.eval(state, shapes)).collect();
         };
         let mut before = [0.0_f64; MOST_VARIABLES];
@@ -300,7 +208,7 @@ impl Formula {
                 same &= before.to_bits() == value.to_bits();
                 *before = value;
             }
-            let value = last.filter(|_| same).unwrap_or_else(|| shared.expression.eval(before).unwrap_or(f64::NAN));
+            let value = last.filter(|_| same).unwrap_or_else(|| expression.value(before));
             last = Some(value);
             value
         };
@@ -318,9 +226,8 @@ impl Formula {
     }
 
     fn derivative(&self, at: usize, state: &State, shapes: &[f64]) -> Option<f64> {
-        let Some(Parts::Expression(shared, origins)) = self.parts() else { return None };
-        let of = shared.derivative(at)?;
-        Some(evaluate(&of.expression, of.variables.iter().map(|i| &origins[*i]), state, shapes))
+        let Some(Parts::Expression(expression, origins)) = self.parts() else { return None };
+        with_values(origins, state, shapes, |values| expression.derivative(at, values))
     }
 
     fn difference(&self, shape: usize, state: &State, shapes: &[f64]) -> f64 {
@@ -340,33 +247,29 @@ fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     }
     let plain = plain_numbers(text)?;
     known_functions(&plain)?;
-    let shared =
-        Shared::parse(&plain).ok_or_else(|| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
-    let origins = origins(&shared.expression, shapes)?;
-    Ok(Parts::of(shared, origins))
+    let expression =
+        Expression::read(&plain).ok_or_else(|| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
+    Parts::of(expression, shapes)
 }
 
 /// Variables of a formula at most: they fit on the stack.
 const MOST_VARIABLES: usize = 32;
 
-fn evaluate<'o>(
-    expression: &Expression,
-    origins: impl ExactSizeIterator<Item = &'o Origin>,
-    state: &State,
-    shapes: &[f64],
-) -> f64 {
-    let (mut values, n) = ([0.0; MOST_VARIABLES], origins.len());
+/// Hands on the values of an expression's variables.
+fn with_values<T>(origins: &[Origin], state: &State, shapes: &[f64], of: impl FnOnce(&[f64]) -> T) -> T {
+    let mut values = [0.0; MOST_VARIABLES];
+    let values = &mut values[..origins.len()];
     for (value, origin) in values.iter_mut().zip(origins) {
         *value = origin.value(state, shapes);
     }
-    expression.eval(&values[..n]).unwrap_or(f64::NAN)
+    of(values)
 }
 
-fn origins(expression: &Expression, shapes: &[&str]) -> Result<Vec<Origin>, String> {
-    let names = expression.var_names();
+fn origins(names: &[&str], shapes: &[impl AsRef<str>]) -> Result<Vec<Origin>, String> {
     if names.len() > MOST_VARIABLES {
         return Err(format!("a formula has more than {MOST_VARIABLES} variables"));
     }
+    let shapes: Vec<&str> = shapes.iter().map(AsRef::as_ref).collect();
     names
         .iter()
         .map(|name| {
