@@ -199,14 +199,15 @@ impl Catalogue {
 
     /// Begins to read, on another thread, all built-in rows, for who will need them.
     pub fn read_ahead() {
-        rayon::spawn(Self::read_rows);
+        rayon::spawn(|| Self::read_rows(|| ()));
     }
 
-    /// Reads all built-in rows.
-    pub fn read_rows() {
+    /// Reads all built-in rows; between them the thread may do something else.
+    pub fn read_rows(between: impl Fn()) {
         // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
         for row in ROWS.iter().rev() {
             row.effect();
+            between();
         }
     }
 

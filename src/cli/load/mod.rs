@@ -1,11 +1,13 @@
 //! From a study's path to machine, effects and touches: opens what the study names.
 
+mod run;
+
 use super::common::{Io, load_machine};
 use crate::design::{Planned, keep_measured};
-use crate::diag::{Failure, Finding, Findings, Result, Source, source};
+use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::files;
 use crate::fit::{self, Fit, Settings};
-use crate::log::{self, Touch};
+use crate::log::Touch;
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
@@ -14,6 +16,8 @@ use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
 use rayon::prelude::*;
+use run::{ReadLog, ReadPlan, ReadRun};
+pub use run::{load_plan, read_log};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -264,7 +268,12 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     io.report(&findings.0);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let machines = study.machines.as_ref().map(|m| folder.join(m));
-    let machine = located(load_machine(&study.machine, machines.as_deref(), io), &src)?;
+    // all files at once; what is to be said of them is said in their order
+    let (machine, plans) = rayon::join(
+        || load_machine(&study.machine, machines.as_deref(), io),
+        || study.data.par_iter().map(|entry| ReadPlan::of(&folder.join(&entry.plan))).collect::<Vec<_>>(),
+    );
+    let machine = located(machine, &src)?;
     hash.update(machine.sha256.as_bytes());
     let mut catalogue = Catalogue::built_in()?;
     for name in &study.effects_files {
@@ -274,17 +283,16 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
+    let read: Vec<Result<ReadRun>> =
+        study.data.par_iter().zip(plans).map(|(entry, plan)| ReadRun::of(entry, plan?, &folder, &machine)).collect();
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    // all at once; what is to be said of them is said in their order
-    let plans: Vec<Result<ReadPlan>> =
-        study.data.par_iter().map(|entry| read_plan(&folder.join(&entry.plan), &machine)).collect();
-    for (entry, read) in study.data.iter().zip(plans) {
-        let ReadPlan { plan, findings, digest: plan_digest } = at_the_name(read, &entry.plan, &src)?;
+    for (entry, read) in study.data.iter().zip(read) {
+        let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest }, log } =
+            at_the_name(read, &entry.plan, &src)?;
         io.report(&findings);
         let log_path = folder.join(&entry.log);
-        let bytes = at_the_name(files::read_bytes(&log_path), &entry.log, &src)?;
-        let digest = Sha256::digest(&bytes).to_vec();
+        let ReadLog { findings, touches, digest } = at_the_name(log, &entry.log, &src)?;
         if let Some((first, _)) = seen.iter().find(|(_, d)| *d == digest) {
             io.report(&[Finding::warning(
                 "study::log_twice",
@@ -292,7 +300,7 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
             )
             .help("a log counted twice makes every uncertainty too small: name each run once")]);
         }
-        seen.push((log_path.clone(), digest.clone()));
+        seen.push((log_path, digest.clone()));
         if let Some(path) = &entry.compensation {
             let active = at_the_name(load_compensation(&folder.join(path), &machine), path, &src)?;
             let idle = does_not_act(&active, &machine, &plan);
@@ -303,12 +311,8 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
             hash.update(part);
             data.update(part);
         }
-        let controller = controller_path(&entry.controller, &folder);
-        let read = read_log(&bytes, &log_path, (&controller, entry.run), &machine, &plan, io);
-        let mut touches = at_the_name(read, &entry.controller, &src)?;
-        if controller != "csv" {
-            on_the_study_clock(&mut touches, &plan, entry.started_s);
-        }
+        io.report(&findings);
+        let touches = at_the_name(touches, &entry.controller, &src)?;
         runs.push(LoadedRun {
             plan,
             touches,
@@ -366,123 +370,4 @@ fn placed(Failure(findings): Failure, study: &Source) -> Failure {
 pub fn controller_path(word: &str, folder: &Path) -> String {
     let file = folder.join(word);
     if word.ends_with(".toml") && file.is_file() { file.display().to_string() } else { word.to_owned() }
-}
-
-/// Reads a plan and checks that it is for this machine.
-///
-/// # Errors
-/// When it is unusable or for another machine.
-pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
-    let ReadPlan { plan, findings, .. } = read_plan(path, machine)?;
-    io.report(&findings);
-    Ok(plan)
-}
-
-/// A plan as it was read.
-struct ReadPlan {
-    plan: Plan,
-    /// What is to be said of it.
-    findings: Vec<Finding>,
-    /// SHA-256 of the file.
-    digest: Vec<u8>,
-}
-
-fn read_plan(path: &Path, machine: &Machine) -> Result<ReadPlan> {
-    let src = source(path.display().to_string(), files::read_text(path)?);
-    let (plan, Findings(mut findings)) = Plan::parse(&src)?;
-    if plan.machine != machine.name {
-        return Err(Failure::new(
-            "plan::other_machine",
-            format!("{} is a plan for machine {:?}, not {:?}", path.display(), plan.machine, machine.name),
-        )
-        .help("name the machine that the plan was made for, or make the plan again"));
-    }
-    if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
-        findings.push(
-            Finding::warning(
-                "plan::machine_changed",
-                format!("the description of {:?} has changed since {} was made", machine.name, path.display()),
-            )
-            .help("if the change moves the chain, the blocks or the probe, generate the plan again"),
-        );
-    }
-    Ok(ReadPlan { plan, findings, digest: Sha256::digest(src.inner().as_bytes()).to_vec() })
-}
-
-/// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.
-/// Without `started` the runs follow one another, by the plan's times. A touch without a time behind others that have one
-/// (the program was started again) follows the last of them as the plan has it: time does not run backward.
-fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>) {
-    let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
-    // the touch made before, once one had a time of its own: on the study's clock, and as planned
-    let mut last: Option<(f64, f64)> = None;
-    let mut made: Vec<&mut Touch> = touches.iter_mut().collect();
-    made.sort_by_key(|t| t.line);
-    for touch in made {
-        let planned = plan.touch(touch.id).and_then(|t| t.time_s);
-        touch.time_s = match (started_s, first, touch.time_s) {
-            (Some(started), Some((first_s, planned_s)), Some(time_s)) => Some(started + planned_s + time_s - first_s),
-            // begun again at an earlier set-up it comes after the last one all the same
-            _ => last.zip(planned).map(|((time_s, then), now)| time_s + (now - then).max(0.0)),
-        };
-        last = touch.time_s.zip(planned).or(last);
-    }
-}
-
-/// Reads a log (or touches CSV), the run of this number or the last complete one, and matches it to its plan.
-///
-/// # Errors
-/// When nothing in it can be used.
-pub fn read_log(
-    bytes: &[u8],
-    path: &Path,
-    (controller, run): (&str, Option<usize>),
-    machine: &Machine,
-    plan: &Plan,
-    io: &Io,
-) -> Result<Vec<Touch>> {
-    let (reader, findings) = log::Reader::load(controller, files::read_text)?;
-    io.report(&findings);
-    let (read, findings) = log::read_run(bytes, &path.display().to_string(), reader.writer(), machine, plan, run)?;
-    io.report(&findings.0);
-    Ok(read.touches)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn time_does_not_run_backward_behind_a_second_start() {
-        let machine = crate::post::tests::machine("swivel-head");
-        let mut plan = crate::post::tests::plan(&machine, "head", "x+");
-        plan.touches.iter_mut().zip([100.0, 160.0, 200.0]).for_each(|(t, s)| t.time_s = Some(s));
-        let touches = |times: [Option<f64>; 3], lines: [usize; 3]| -> Vec<Touch> {
-            let touch = |((planned, time_s), line): ((&crate::program::plan::PlanTouch, Option<f64>), usize)| Touch {
-                id: planned.id,
-                position: planned.nominal_position(),
-                status: log::Status::Hit,
-                time_s,
-                temperature_deg_c: None,
-                line,
-            };
-            plan.touches.iter().zip(times).zip(lines).map(touch).collect()
-        };
-        let made = |times: [Option<f64>; 3], lines: [usize; 3], started_s: Option<f64>| -> Vec<Option<f64>> {
-            let mut touches = touches(times, lines);
-            on_the_study_clock(&mut touches, &plan, started_s);
-            touches.iter().map(|t| t.time_s).collect()
-        };
-        let on_the_clock = |times: [Option<f64>; 3], started_s: Option<f64>| made(times, [1, 2, 3], started_s);
-        // 90 s where the plan has 60: behind it the plan goes on from there
-        let stopped = [Some(7.0), Some(97.0), None];
-        assert_eq!(on_the_clock(stopped, Some(1000.0)), [Some(1100.0), Some(1190.0), Some(1230.0)]);
-        assert_eq!(on_the_clock([Some(7.0), None, None], Some(0.0)), [Some(100.0), Some(160.0), Some(200.0)]);
-        assert_eq!(on_the_clock([None, Some(7.0), Some(8.0)], Some(0.0)), [None, Some(160.0), Some(161.0)]);
-        // begun again at an earlier set-up: what was made last comes last
-        let again = made([Some(7.0), None, Some(107.0)], [1, 3, 2], Some(0.0));
-        assert_eq!(again, [Some(100.0), Some(200.0), Some(200.0)]);
-        assert_eq!(on_the_clock(stopped, None), [None; 3]);
-        assert_eq!(on_the_clock([None; 3], Some(0.0)), [None; 3]);
-    }
 }

@@ -1,0 +1,196 @@
+//! A run's plan and log, read: what is to be said of them is kept for who says it in the order of the study.
+
+use super::controller_path;
+use crate::cli::common::Io;
+use crate::diag::{Failure, Finding, Findings, Result, source};
+use crate::files;
+use crate::log::{self, Touch};
+use crate::machine::Machine;
+use crate::program::plan::Plan;
+use crate::study;
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// Reads a plan and checks that it is for this machine.
+///
+/// # Errors
+/// When it is unusable or for another machine.
+pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
+    let mut read = ReadPlan::of(path)?;
+    read.check_belongs(path, machine)?;
+    io.report(&read.findings);
+    Ok(read.plan)
+}
+
+/// A plan as it was read.
+pub(super) struct ReadPlan {
+    pub plan: Plan,
+    /// What is to be said of it.
+    pub findings: Vec<Finding>,
+    /// SHA-256 of the file.
+    pub digest: Vec<u8>,
+}
+
+impl ReadPlan {
+    pub fn of(path: &Path) -> Result<Self> {
+        let src = source(path.display().to_string(), files::read_text(path)?);
+        let (plan, Findings(findings)) = Plan::parse(&src)?;
+        Ok(Self { plan, findings, digest: Sha256::digest(src.inner().as_bytes()).to_vec() })
+    }
+
+    fn check_belongs(&mut self, path: &Path, machine: &Machine) -> Result<()> {
+        let plan = &self.plan;
+        if plan.machine != machine.name {
+            return Err(Failure::new(
+                "plan::other_machine",
+                format!("{} is a plan for machine {:?}, not {:?}", path.display(), plan.machine, machine.name),
+            )
+            .help("name the machine that the plan was made for, or make the plan again"));
+        }
+        if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
+            self.findings.push(
+                Finding::warning(
+                    "plan::machine_changed",
+                    format!("the description of {:?} has changed since {} was made", machine.name, path.display()),
+                )
+                .help("if the change moves the chain, the blocks or the probe, generate the plan again"),
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A log as it was read.
+pub(super) struct ReadLog {
+    /// What is to be said of it, usable or not.
+    pub findings: Vec<Finding>,
+    /// Matched to its plan.
+    pub touches: Result<Vec<Touch>>,
+    /// SHA-256 of the file.
+    pub digest: Vec<u8>,
+}
+
+/// Plan and log of a run as they were read.
+pub(super) struct ReadRun {
+    pub plan: ReadPlan,
+    pub log: Result<ReadLog>,
+}
+
+impl ReadRun {
+    /// The log of an entry of a study, beside its plan.
+    ///
+    /// # Errors
+    /// When the plan is for another machine.
+    pub fn of(entry: &study::DataEntry, mut plan: ReadPlan, folder: &Path, machine: &Machine) -> Result<Self> {
+        plan.check_belongs(&folder.join(&entry.plan), machine)?;
+        let path = folder.join(&entry.log);
+        let log = files::read_bytes(&path).map(|bytes| {
+            let controller = controller_path(&entry.controller, folder);
+            let (findings, mut touches) = matched(&bytes, &path, (&controller, entry.run), machine, &plan.plan);
+            if let Ok(touches) = &mut touches
+                && controller != "csv"
+            {
+                on_the_study_clock(touches, &plan.plan, entry.started_s);
+            }
+            ReadLog { findings, touches, digest: Sha256::digest(&bytes).to_vec() }
+        });
+        Ok(Self { plan, log })
+    }
+}
+
+/// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.
+/// Without `started` the runs follow one another, by the plan's times. A touch without a time behind others that have one
+/// (the program was started again) follows the last of them as the plan has it: time does not run backward.
+fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>) {
+    let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
+    // the touch made before, once one had a time of its own: on the study's clock, and as planned
+    let mut last: Option<(f64, f64)> = None;
+    let mut made: Vec<&mut Touch> = touches.iter_mut().collect();
+    made.sort_by_key(|t| t.line);
+    for touch in made {
+        let planned = plan.touch(touch.id).and_then(|t| t.time_s);
+        touch.time_s = match (started_s, first, touch.time_s) {
+            (Some(started), Some((first_s, planned_s)), Some(time_s)) => Some(started + planned_s + time_s - first_s),
+            // begun again at an earlier set-up it comes after the last one all the same
+            _ => last.zip(planned).map(|((time_s, then), now)| time_s + (now - then).max(0.0)),
+        };
+        last = touch.time_s.zip(planned).or(last);
+    }
+}
+
+/// Reads a log (or touches CSV), the run of this number or the last complete one, and matches it to its plan.
+///
+/// # Errors
+/// When nothing in it can be used.
+pub fn read_log(
+    bytes: &[u8],
+    path: &Path,
+    (controller, run): (&str, Option<usize>),
+    machine: &Machine,
+    plan: &Plan,
+    io: &Io,
+) -> Result<Vec<Touch>> {
+    let (findings, touches) = matched(bytes, path, (controller, run), machine, plan);
+    io.report(&findings);
+    touches
+}
+
+/// What is to be said of a log, and its touches.
+fn matched(
+    bytes: &[u8],
+    path: &Path,
+    (controller, run): (&str, Option<usize>),
+    machine: &Machine,
+    plan: &Plan,
+) -> (Vec<Finding>, Result<Vec<Touch>>) {
+    let mut findings = Vec::new();
+    let mut read = || {
+        let (reader, said) = log::Reader::load(controller, files::read_text)?;
+        findings.extend(said);
+        let name = path.display().to_string();
+        let (read, said) = log::read_run(bytes, &name, reader.writer(), machine, plan, run)?;
+        findings.extend(said.0);
+        Ok(read.touches)
+    };
+    let touches = read();
+    (findings, touches)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_does_not_run_backward_behind_a_second_start() {
+        let machine = crate::post::tests::machine("swivel-head");
+        let mut plan = crate::post::tests::plan(&machine, "head", "x+");
+        plan.touches.iter_mut().zip([100.0, 160.0, 200.0]).for_each(|(t, s)| t.time_s = Some(s));
+        let touches = |times: [Option<f64>; 3], lines: [usize; 3]| -> Vec<Touch> {
+            let touch = |((planned, time_s), line): ((&crate::program::plan::PlanTouch, Option<f64>), usize)| Touch {
+                id: planned.id,
+                position: planned.nominal_position(),
+                status: log::Status::Hit,
+                time_s,
+                temperature_deg_c: None,
+                line,
+            };
+            plan.touches.iter().zip(times).zip(lines).map(touch).collect()
+        };
+        let made = |times: [Option<f64>; 3], lines: [usize; 3], started_s: Option<f64>| -> Vec<Option<f64>> {
+            let mut touches = touches(times, lines);
+            on_the_study_clock(&mut touches, &plan, started_s);
+            touches.iter().map(|t| t.time_s).collect()
+        };
+        let on_the_clock = |times: [Option<f64>; 3], started_s: Option<f64>| made(times, [1, 2, 3], started_s);
+        // 90 s where the plan has 60: behind it the plan goes on from there
+        let stopped = [Some(7.0), Some(97.0), None];
+        assert_eq!(on_the_clock(stopped, Some(1000.0)), [Some(1100.0), Some(1190.0), Some(1230.0)]);
+        assert_eq!(on_the_clock([Some(7.0), None, None], Some(0.0)), [Some(100.0), Some(160.0), Some(200.0)]);
+        assert_eq!(on_the_clock([None, Some(7.0), Some(8.0)], Some(0.0)), [None, Some(160.0), Some(161.0)]);
+        // begun again at an earlier set-up: what was made last comes last
+        let again = made([Some(7.0), None, Some(107.0)], [1, 3, 2], Some(0.0));
+        assert_eq!(again, [Some(100.0), Some(200.0), Some(200.0)]);
+        assert_eq!(on_the_clock(stopped, None), [None; 3]);
+        assert_eq!(on_the_clock([None; 3], Some(0.0)), [None; 3]);
+    }
+}
