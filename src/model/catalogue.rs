@@ -6,6 +6,7 @@ use super::formula::Formula;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source, from_toml};
 use crate::machine::{Machine, Side};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, OnceLock};
 
 /// The effects that are built in, as they are written.
@@ -181,6 +182,9 @@ static ROWS: LazyLock<Arc<[Row]>> = LazyLock::new(|| {
     starts.zip(ENDS).map(row).collect()
 });
 
+/// Does some thread read all rows, or has it done so?
+static BEGUN: AtomicBool = AtomicBool::new(false);
+
 /// All effects that exist.
 #[derive(Debug, Clone, Default)]
 pub struct Catalogue {
@@ -197,13 +201,16 @@ impl Catalogue {
         Ok(Self { rows: Arc::clone(&ROWS), own: Vec::new() })
     }
 
-    /// Begins to read, on another thread, all built-in rows, for who will need them.
+    /// Begins to read, on another thread, all built-in rows, for who will need them; unless somebody has begun.
     pub fn read_ahead() {
-        rayon::spawn(|| Self::read_rows(|| ()));
+        if !BEGUN.load(Ordering::Relaxed) {
+            rayon::spawn(|| Self::read_rows(|| ()));
+        }
     }
 
     /// Reads all built-in rows; between them the thread may do something else.
     pub fn read_rows(between: impl Fn()) {
+        BEGUN.store(true, Ordering::Relaxed);
         // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
         for row in ROWS.iter().rev() {
             row.effect();
