@@ -1,12 +1,15 @@
 //! The built-in catalogue is read once, while the program is built: `effects.toml`, row by row, as MessagePack, which a process
-//! reads in a tenth of the time, and its formulas as program text. Nothing is checked or changed here: tests compare what comes of
-//! both with what a user's file becomes (`model::catalogue`).
+//! reads in a tenth of the time, and its formulas as program text. Nothing is changed here, and nothing is checked but that a formula can
+//! be read: tests compare what comes of both with what a user's file becomes (`model::catalogue`).
 
+#[path = "src/model/spelling.rs"]
+mod spelling;
 #[path = "src/model/words.rs"]
 mod words;
 
 use exmex::prelude::*;
 use exmex::{MakeOperators, Operator};
+use spelling::{bare_number, plain_numbers};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -18,6 +21,7 @@ use words::{Value, operators};
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=src/model/spelling.rs");
     println!("cargo::rerun-if-changed=src/model/words.rs");
     println!("cargo::rerun-if-changed=effects.toml");
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
@@ -44,21 +48,25 @@ fn formulas(rows: &[toml::Value]) -> Result<String, Box<dyn Error>> {
     let shapes = all("shape", "parameter");
     let mut out = String::from("&[");
     for text in all("terms", "formula") {
-        let not_read = |e: exmex::ExError| format!("effects.toml: formula {text:?}: {}", e.msg());
-        let flat = Flat::parse(text).map_err(not_read)?;
+        if bare_number(text).is_some() {
+            continue;
+        }
+        let not_read = |says: &str| format!("effects.toml: formula {text:?}: {says}");
+        let plain = plain_numbers(text).map_err(|says| not_read(&says))?;
+        let flat = Flat::parse(&plain).map_err(|e| not_read(e.msg()))?;
         let variables = flat.var_names();
         let place = |name: &String| variables.iter().position(|own| own == name);
         // the crate takes every step of the formula, and each writes itself down
         let body = |flat: &Flat| -> Option<String> {
-            let values = flat.var_names().iter().map(|name| Some(Code(format!("v[{}]", place(name)?))));
-            let Code(code) = flat.eval(&values.collect::<Option<Vec<_>>>()?).ok()?;
+            let values = flat.var_names().iter().map(|name| Some(Code::text(format!("v[{}]", place(name)?))));
+            let Code { code, .. } = flat.eval(&values.collect::<Option<Vec<_>>>()?).ok()?;
             Some(format!("|{}| {code}", if code.contains("v[") { "v" } else { "_" }))
         };
         let derivative = |at: usize| {
             let is_shape = shapes.contains(variables[at].as_str());
             is_shape.then(|| flat.clone().partial(at).ok().and_then(|of| body(&of))).flatten()
         };
-        let value = body(&flat).ok_or_else(|| format!("effects.toml: formula {text:?} has no value"))?;
+        let value = body(&flat).ok_or_else(|| not_read("it has no value"))?;
         write!(out, "BuiltIn {{ text: {text:?}, variables: &{variables:?}, value: {value}, derivatives: &[")?;
         for at in 0..variables.len() {
             match derivative(at) {
@@ -73,8 +81,21 @@ fn formulas(rows: &[toml::Value]) -> Result<String, Box<dyn Error>> {
 }
 
 /// The text of a program that computes a number.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct Code(String);
+#[derive(Debug, Clone, Default)]
+struct Code {
+    code: String,
+    /// The number itself, where no variable has a part in it: the crate leaves out factors of 1 and summands of 0.
+    constant: Option<f64>,
+}
+
+impl PartialEq for Code {
+    fn eq(&self, other: &Self) -> bool {
+        match (self.constant, other.constant) {
+            (None, None) => self.code == other.code,
+            (one, two) => one == two,
+        }
+    }
+}
 
 type Flat = FlatEx<Code, Words>;
 
@@ -90,14 +111,30 @@ impl MakeOperators<Code> for Words {
 
 impl Code {
     fn number(value: f64) -> Self {
-        Self(format!("{value:?}_f64"))
+        let code =
+            if value.is_finite() { format!("{value:?}_f64") } else { format!("f64::from_bits({})", value.to_bits()) };
+        Self { code, constant: Some(value) }
     }
 
-    fn call(self, name: &str, other: Option<Self>) -> Self {
-        Self(match other {
-            Some(other) => format!("Value::{name}({}, {})", self.0, other.0),
-            None => format!("Value::{name}({})", self.0),
-        })
+    fn text(code: String) -> Self {
+        Self { code, constant: None }
+    }
+
+    /// A step with one number: `of` it where it is known, else its text.
+    fn one(self, of: impl Fn(f64) -> f64, text: impl Fn(&str) -> String) -> Self {
+        self.constant.map_or_else(|| Self::text(text(&self.code)), |x| Self::number(of(x)))
+    }
+
+    /// A step with two.
+    fn two(self, other: Self, of: impl Fn(f64, f64) -> f64, text: impl Fn(&str, &str) -> String) -> Self {
+        match (self.constant, other.constant) {
+            (Some(a), Some(b)) => Self::number(of(a, b)),
+            _ => Self::text(text(&self.code, &other.code)),
+        }
+    }
+
+    fn call(self, name: &str, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        self.two(other, of, |a, b| format!("Value::{name}({a}, {b})"))
     }
 }
 
@@ -128,7 +165,7 @@ macro_rules! between {
             type Output = Self;
 
             fn $method(self, other: Self) -> Self {
-                Self(format!("({} {} {})", self.0, $sign, other.0))
+                self.two(other, |a, b| $of::$method(a, b), |a, b| format!("({a} {} {b})", $sign))
             }
         }
     )*};
@@ -140,36 +177,36 @@ impl Neg for Code {
     type Output = Self;
 
     fn neg(self) -> Self {
-        Self(format!("(-{})", self.0))
+        self.one(|x| -x, |x| format!("(-{x})"))
     }
 }
 
 impl Value for Code {
     fn pi() -> Self {
-        Self("std::f64::consts::PI".to_owned())
+        Self::number(f64::pi())
     }
 
     fn power(self, power: Self) -> Self {
-        self.call("power", Some(power))
+        self.call("power", power, Value::power)
     }
 
     fn atan2(self, x: Self) -> Self {
-        self.call("atan2", Some(x))
+        self.call("atan2", x, Value::atan2)
     }
 
     fn modulo(self, period: Self) -> Self {
-        self.call("modulo", Some(period))
+        self.call("modulo", period, Value::modulo)
     }
 
     fn sign(self) -> Self {
-        self.call("sign", None)
+        self.one(Value::sign, |x| format!("Value::sign({x})"))
     }
 
     fn step(self) -> Self {
-        self.call("step", None)
+        self.one(Value::step, |x| format!("Value::step({x})"))
     }
 
-    fn function(self, name: &'static str, _of: fn(f64) -> f64) -> Self {
-        Self(format!("f64::{name}({})", self.0))
+    fn function(self, name: &'static str, of: fn(f64) -> f64) -> Self {
+        self.one(of, |x| format!("f64::{name}({x})"))
     }
 }

@@ -203,7 +203,7 @@ impl Catalogue {
 
     /// Begins to read, on another thread, all built-in rows, for who will need them; unless somebody has begun.
     pub fn read_ahead() {
-        if !BEGUN.load(Ordering::Relaxed) {
+        if !BEGUN.swap(true, Ordering::Relaxed) {
             rayon::spawn(|| Self::read_rows(|| ()));
         }
     }

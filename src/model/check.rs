@@ -24,7 +24,7 @@ const ASSUMED: &str = "assumed";
 /// Reads effects as written and gathers what is wrong with them.
 pub(super) struct Check<'a> {
     source: &'a Source,
-    /// Built-in effects are checked by a test, and their formulas are compiled when they are used.
+    /// Built-in effects are checked by a test, and their formulas were compiled with the program.
     built_in: bool,
     pub(super) findings: Findings,
 }

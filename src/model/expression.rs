@@ -4,9 +4,8 @@
 //! Both come of the same crate, the same words and the same steps in the same order (`build.rs`); a test holds their values together.
 
 use super::words::{Value, operators};
-use exmex::MakeOperators;
-use exmex::Operator;
 use exmex::prelude::*;
+use exmex::{MakeOperators, Operator};
 use std::sync::{LazyLock, OnceLock};
 
 /// A function of the variables of an expression.

@@ -4,7 +4,7 @@
 //! use (docs/guide/effects.md) and turns a mistake into a sentence that names it.
 
 use super::expression::Expression;
-use super::spelling::{bare_number, known_functions, plain_numbers};
+use super::spelling::{bare_number, plain_numbers};
 use std::sync::{Arc, OnceLock};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
@@ -128,17 +128,17 @@ impl Formula {
         Ok(Self(Arc::new(Written { text: text.to_owned(), shapes, parts })))
     }
 
-    /// A built-in formula, known to be good: nothing is parsed before it is used, and never twice. A bad one has no value anywhere.
+    /// A built-in formula, known to be good: looked up when it is first used. One that is not among them has no value anywhere.
     pub(super) fn unchecked(text: &str, shapes: &Arc<[String]>) -> Self {
         Self(Arc::new(Written { text: text.to_owned(), shapes: Arc::clone(shapes), parts: OnceLock::new() }))
     }
 
     fn parts(&self) -> Option<&Parts> {
-        self.0.parts.get_or_init(|| self.compiled()).as_ref()
+        self.0.parts.get_or_init(|| self.found()).as_ref()
     }
 
-    /// Of a built-in formula.
-    fn compiled(&self) -> Option<Parts> {
+    /// What was made of a built-in formula.
+    fn found(&self) -> Option<Parts> {
         if let Some(constant) = bare_number(&self.0.text) {
             return Some(Parts::Constant(constant));
         }
@@ -252,6 +252,21 @@ fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     Parts::of(expression, shapes)
 }
 
+/// A word in front of a bracket must be a function.
+fn known_functions(text: &str) -> Result<(), String> {
+    let mut rest = text;
+    while let Some(bracket) = rest.find('(') {
+        let before = rest[..bracket].trim_end();
+        let word_from = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).map_or(0, |i| i + 1);
+        let word = before.get(word_from..).unwrap_or_default();
+        if !word.is_empty() && !word.starts_with(|c: char| c.is_ascii_digit()) && !FUNCTIONS.contains(&word) {
+            return Err(format!("unknown function {word:?} (functions: {})", FUNCTIONS.join(" ")));
+        }
+        rest = &rest[bracket + 1..];
+    }
+    Ok(())
+}
+
 /// Variables of a formula at most: they fit on the stack.
 const MOST_VARIABLES: usize = 32;
 
@@ -332,6 +347,32 @@ mod tests {
         ] {
             let value = Formula::parse(text, &[]).unwrap().eval(&at("B", b), &[]);
             assert!((value - expected).abs() < 1e-14, "{text}: {value}");
+        }
+    }
+
+    #[test]
+    fn every_function_is_known() {
+        for function in FUNCTIONS {
+            let second = if matches!(function, "atan2" | "mod") { ", 0.7" } else { "" };
+            let value = Formula::parse(&format!("{function}(B{second})"), &[]).unwrap().eval(&at("B", 0.3), &[]);
+            let x: f64 = 0.3;
+            let expected = match function {
+                "sin" => x.sin(),
+                "cos" => x.cos(),
+                "tan" => x.tan(),
+                "asin" => x.asin(),
+                "acos" => x.acos(),
+                "atan" => x.atan(),
+                "atan2" => x.atan2(0.7),
+                "exp" => x.exp(),
+                "ln" => x.ln(),
+                "sqrt" => x.sqrt(),
+                "floor" => 0.0,
+                "sign" | "step" => 1.0,
+                // abs, mod
+                _ => x,
+            };
+            assert_eq!(value, expected, "{function}");
         }
     }
 

@@ -1,6 +1,4 @@
-//! The text of a formula before the expression crate reads it: numbers as the crate knows them, and functions that exist.
-
-use super::formula::FUNCTIONS;
+//! The numbers of a formula before the expression crate reads it (`build.rs` shares this file).
 
 /// The value of a formula that is nothing but a number.
 pub(super) fn bare_number(text: &str) -> Option<f64> {
@@ -43,19 +41,4 @@ pub(super) fn plain_numbers(text: &str) -> Result<String, String> {
         at = end;
     }
     Ok(out)
-}
-
-/// A word in front of a bracket must be a function.
-pub(super) fn known_functions(text: &str) -> Result<(), String> {
-    let mut rest = text;
-    while let Some(bracket) = rest.find('(') {
-        let before = rest[..bracket].trim_end();
-        let word_from = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).map_or(0, |i| i + 1);
-        let word = before.get(word_from..).unwrap_or_default();
-        if !word.is_empty() && !word.starts_with(|c: char| c.is_ascii_digit()) && !FUNCTIONS.contains(&word) {
-            return Err(format!("unknown function {word:?} (functions: {})", FUNCTIONS.join(" ")));
-        }
-        rest = &rest[bracket + 1..];
-    }
-    Ok(())
 }

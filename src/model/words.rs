@@ -56,7 +56,8 @@ impl Value for f64 {
     }
 }
 
-/// The operators of a formula (docs/guide/effects.md), with the priorities of the expression crate's own.
+/// The operators of a formula (docs/guide/effects.md). Those that the expression crate has itself have its priorities; `mod`, `sign` and
+/// `step` are ours.
 #[must_use]
 pub fn operators<T: Value>() -> Vec<Operator<'static, T>> {
     fn binary<T: Value>(

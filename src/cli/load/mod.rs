@@ -12,7 +12,7 @@ use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
 use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
-use crate::study::Study;
+use crate::study::{DataEntry, Study};
 use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
 use rayon::prelude::*;
@@ -268,7 +268,7 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     io.report(&findings.0);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let machines = study.machines.as_ref().map(|m| folder.join(m));
-    // all files at once; what is to be said of them is said in their order
+    // the machine beside the plans; what is to be said of each is said in its turn
     let (machine, plans) = rayon::join(
         || load_machine(&study.machine, machines.as_deref(), io),
         || study.data.par_iter().map(|entry| ReadPlan::of(&folder.join(&entry.plan))).collect::<Vec<_>>(),
@@ -283,11 +283,17 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
-    let read: Vec<Result<ReadRun>> =
-        study.data.par_iter().zip(plans).map(|(entry, plan)| ReadRun::of(entry, plan?, &folder, &machine)).collect();
+    let read = |(entry, plan): (&DataEntry, Result<ReadPlan>)| ReadRun::of(entry, plan?, &folder, &machine);
+    // small logs at once; of large ones, which all threads read together, one after the other: each lies in memory, and with it what is
+    // to be said of it
+    let each: Box<dyn Iterator<Item = Result<ReadRun>>> = if are_small(&study.data, &folder) {
+        Box::new(study.data.par_iter().zip(plans).map(read).collect::<Vec<_>>().into_iter())
+    } else {
+        Box::new(study.data.iter().zip(plans).map(read))
+    };
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for (entry, read) in study.data.iter().zip(read) {
+    for (entry, read) in study.data.iter().zip(each) {
         let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest }, log } =
             at_the_name(read, &entry.plan, &src)?;
         io.report(&findings);
@@ -324,6 +330,14 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let hexadecimal = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
     let (sha256, data_sha256) = (hexadecimal(hash), hexadecimal(data));
     Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256, data_sha256 })
+}
+
+/// Are the logs of a study so small together that they are read at once?
+fn are_small(data: &[DataEntry], folder: &Path) -> bool {
+    const SMALL: u64 = 4 << 20;
+    // what cannot be read is said in its turn
+    let size = |entry: &DataEntry| std::fs::metadata(folder.join(&entry.log)).map_or(0, |found| found.len());
+    data.iter().map(size).sum::<u64>() <= SMALL
 }
 
 /// What is wrong with a file that the study names gets the place of its name, where it has none of its own.

@@ -7,7 +7,7 @@ use crate::files;
 use crate::log::{self, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
-use crate::study;
+use crate::study::DataEntry;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -24,6 +24,7 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
 
 /// A plan as it was read.
 pub(super) struct ReadPlan {
+    /// What is to be touched.
     pub plan: Plan,
     /// What is to be said of it.
     pub findings: Vec<Finding>,
@@ -32,6 +33,10 @@ pub(super) struct ReadPlan {
 }
 
 impl ReadPlan {
+    /// Of a file, for whatever machine.
+    ///
+    /// # Errors
+    /// When it is unusable.
     pub fn of(path: &Path) -> Result<Self> {
         let src = source(path.display().to_string(), files::read_text(path)?);
         let (plan, Findings(findings)) = Plan::parse(&src)?;
@@ -72,7 +77,9 @@ pub(super) struct ReadLog {
 
 /// Plan and log of a run as they were read.
 pub(super) struct ReadRun {
+    /// Its plan, which is for the study's machine.
     pub plan: ReadPlan,
+    /// Its log.
     pub log: Result<ReadLog>,
 }
 
@@ -81,7 +88,7 @@ impl ReadRun {
     ///
     /// # Errors
     /// When the plan is for another machine.
-    pub fn of(entry: &study::DataEntry, mut plan: ReadPlan, folder: &Path, machine: &Machine) -> Result<Self> {
+    pub fn of(entry: &DataEntry, mut plan: ReadPlan, folder: &Path, machine: &Machine) -> Result<Self> {
         plan.check_belongs(&folder.join(&entry.plan), machine)?;
         let path = folder.join(&entry.log);
         let log = files::read_bytes(&path).map(|bytes| {
