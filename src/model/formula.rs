@@ -369,8 +369,8 @@ mod tests {
                 "sqrt" => x.sqrt(),
                 "floor" => 0.0,
                 "sign" | "step" => 1.0,
-                // abs, mod
-                _ => x,
+                "abs" | "mod" => x,
+                _ => panic!("{function} has no value to compare with"),
             };
             assert_eq!(value, expected, "{function}");
         }
