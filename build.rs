@@ -9,7 +9,7 @@ mod words;
 
 use exmex::prelude::*;
 use exmex::{MakeOperators, Operator};
-use spelling::{bare_number, plain_numbers};
+use spelling::{bare_number, spelled_out};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -52,7 +52,7 @@ fn formulas(rows: &[toml::Value]) -> Result<String, Box<dyn Error>> {
             continue;
         }
         let not_read = |says: &str| format!("effects.toml: formula {text:?}: {says}");
-        let plain = plain_numbers(text).map_err(|says| not_read(&says))?;
+        let plain = spelled_out(text).map_err(|says| not_read(&says))?;
         let flat = Flat::parse(&plain).map_err(|e| not_read(e.msg()))?;
         let variables = flat.var_names();
         let place = |name: &String| variables.iter().position(|own| own == name);

@@ -199,6 +199,73 @@ pub fn from_json(error: &serde_json::Error, source: &Source, code: &'static str)
     Finding::error(code, error.to_string()).at(source, at..at)
 }
 
+/// Where a field of an entry of a list stands in a JSON text (`touches`, 3, `point`), or a field of the whole; the entry
+/// where it has no such field. `None` where the text is not so.
+#[must_use]
+pub fn in_json(text: &str, entry: Option<(&str, usize)>, field: &str) -> Option<Range<usize>> {
+    let whole = skip_blanks(text, 0);
+    let Some((list, number)) = entry else { return json_member(text, whole, field) };
+    let list = json_member(text, whole, list)?;
+    let mut at = skip_blanks(text, list.start + 1);
+    for _ in 0..number {
+        at = skip_blanks(text, json_end(text, at)?);
+        at = skip_blanks(text, at + 1);
+    }
+    if text.as_bytes().get(at) != Some(&b'{') {
+        return None;
+    }
+    json_member(text, at, field).or_else(|| Some(at..json_end(text, at)?))
+}
+
+fn skip_blanks(text: &str, at: usize) -> usize {
+    at + text.as_bytes().iter().skip(at).take_while(|b| b.is_ascii_whitespace()).count()
+}
+
+/// Where the value that begins at a place ends.
+fn json_end(text: &str, at: usize) -> Option<usize> {
+    let (mut depth, mut inside, mut escaped) = (0_usize, false, false);
+    for (i, byte) in text.bytes().enumerate().skip(at) {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' if inside => escaped = true,
+            b'"' => {
+                inside = !inside;
+                if !inside && depth == 0 {
+                    return Some(i + 1);
+                }
+            }
+            _ if inside => {}
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' if depth > 0 => {
+                depth -= 1;
+                if depth == 0 {
+                    return Some(i + 1);
+                }
+            }
+            // behind a number or a word
+            b',' | b']' | b'}' | b' ' | b'\n' | b'\r' | b'\t' if depth == 0 => return Some(i),
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The value of a key of the object that begins at a place.
+fn json_member(text: &str, at: usize, key: &str) -> Option<Range<usize>> {
+    let mut at = skip_blanks(text, at + 1);
+    while text.as_bytes().get(at) == Some(&b'"') {
+        let end = json_end(text, at)?;
+        let colon = skip_blanks(text, end);
+        let value = skip_blanks(text, colon + 1);
+        let behind = json_end(text, value)?;
+        if text.get(at + 1..end - 1) == Some(key) {
+            return Some(value..behind);
+        }
+        at = skip_blanks(text, skip_blanks(text, behind) + 1);
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,6 +276,21 @@ mod tests {
         let finding = Finding::error("t::t", "wrong").at(&src, 9..10);
         assert_eq!(finding.place().unwrap(), "m.toml:2:4");
         assert_eq!(finding.to_string(), "m.toml:2:4: wrong");
+    }
+
+    #[test]
+    fn a_field_of_a_list_has_its_place() {
+        let text = r#"{ "name": "a \"touches\": [", "n": 1,
+  "touches": [
+    {"id":1,"point":[0,1,2],"pose":{"B":0}}, {"id":2, "point" : [3, 4, 5]} ] }"#;
+        let at = |entry, field| in_json(text, entry, field).map(|span| &text[span]);
+        assert_eq!(at(None, "n"), Some("1"));
+        assert_eq!(at(Some(("touches", 0)), "pose"), Some(r#"{"B":0}"#));
+        assert_eq!(at(Some(("touches", 1)), "point"), Some("[3, 4, 5]"));
+        assert_eq!(at(Some(("touches", 1)), "end"), Some(r#"{"id":2, "point" : [3, 4, 5]}"#));
+        assert_eq!(at(Some(("touches", 2)), "id"), None);
+        assert_eq!(at(Some(("blocks", 0)), "name"), None);
+        assert_eq!(in_json("", None, "a"), None);
     }
 
     #[test]

@@ -383,3 +383,114 @@ fn a_reference_beyond_any_machine_is_refused() {
     }
     assert_eq!(call("0,0,-202.684").status.code(), Some(0));
 }
+
+/// An edit of a plan, of its JSON.
+type Edit = fn(&mut serde_json::Value);
+
+#[test]
+fn a_plan_that_cannot_be_so_is_refused_by_every_verb() {
+    let job = Job::new();
+    let good = job.read("table.plan.json");
+    let edits: [(&str, Edit); 3] = [
+        // the second coordinate of every point, and nothing else
+        ("point", |p| p["touches"].as_array_mut().unwrap().iter_mut().for_each(|t| t["point"][1] = 0.0.into())),
+        ("ball_radius_mm", |p| p["ball_radius_mm"] = 1e12.into()),
+        ("tool_length_mm", |p| p["tool_length_mm"] = 0.0.into()),
+    ];
+    let new = [
+        "new",
+        "--machine",
+        "swivel-head",
+        "--plan",
+        "table.plan.json",
+        "--log",
+        "good.log",
+        "--controller",
+        "linuxcnc",
+        "--out",
+        "study.toml",
+    ];
+    expect(&job.call(&new), 0, &[]);
+    for (field, edit) in edits {
+        let mut plan: serde_json::Value = serde_json::from_str(&good).unwrap();
+        edit(&mut plan);
+        job.write("table.plan.json", serde_json::to_string(&plan).unwrap());
+        let verbs: [&[&str]; 9] = [
+            &["identify", "study.toml"],
+            &["compare", "study.toml"],
+            &["diagnose", "study.toml"],
+            &["report", "study.toml", "--out", "r.html"],
+            &["export", "study.toml", "--controller", "linuxcnc", "--out", "comp"],
+            &["parse", "good.log", "--controller", "linuxcnc", "--plan", "table.plan.json", "--out", "t.csv"],
+            &["assess", "--machine", "swivel-head", "--plan", "table.plan.json"],
+            &[
+                "check",
+                "table.ngc",
+                "--machine",
+                "swivel-head",
+                "--controller",
+                "linuxcnc",
+                "--plan",
+                "table.plan.json",
+            ],
+            &[
+                "simulate",
+                "--plan",
+                "table.plan.json",
+                "--machine",
+                "swivel-head",
+                "--scenario",
+                "wrong.toml",
+                "--controller",
+                "linuxcnc",
+                "--out",
+                "x.log",
+            ],
+        ];
+        for verb in verbs {
+            let out = job.call(verb);
+            assert_eq!(out.status.code(), Some(2), "{field} {verb:?}: {}", said(&out));
+        }
+        for file in ["r.html", "comp", "t.csv", "x.log"] {
+            assert!(!job.path(file).exists(), "{field} {file}");
+        }
+    }
+}
+
+#[test]
+fn a_backup_far_beyond_the_machine_is_refused() {
+    let job = Job::new();
+    let new = [
+        "new",
+        "--machine",
+        "swivel-head",
+        "--plan",
+        "table.plan.json",
+        "--log",
+        "good.log",
+        "--controller",
+        "linuxcnc",
+        "--out",
+        "study.toml",
+    ];
+    expect(&job.call(&new), 0, &[]);
+    let export = [
+        "export",
+        "study.toml",
+        "--controller",
+        "sinumerik",
+        "--out",
+        "comp",
+        "--accept-unverified",
+        "--force",
+        "--backup",
+        "bk.ini",
+        "--json",
+    ];
+    for value in ["1e308", "1e6", "-5000"] {
+        job.write("bk.ini", format!("CHANDATA(1)\n$TC_CARR5[1]={value}\n$TC_CARR15[1]=0\nM17\n"));
+        let out = job.call(&export);
+        assert_eq!(out.status.code(), Some(2), "{value}: {}", said(&out));
+        assert!(!job.path("comp").exists());
+    }
+}

@@ -341,7 +341,7 @@ fn a_jump_that_was_taken_out_is_named_before_what_follows_from_it() {
 #[test]
 fn a_word_that_is_not_known_is_said_before_what_goes_with_it() {
     let original = original("fanuc", None);
-    for (block, expected) in [("M3 S500", "M3 is not known here"), ("G28 Z0.", "G28 is not known here")] {
+    for (block, expected) in [("M3 S500", "M3 is not known to axiscal"), ("G28 Z0.", "G28 is not known to axiscal")] {
         let edited = with(&original.text, "M9", 1, &|l| format!("{l}{block}\n"));
         let says = original.says(&edited);
         assert!(says.iter().any(|s| s.contains(expected)), "{block}: {says:?}");
@@ -390,7 +390,7 @@ fn late_contacts_reference_systems_holds_and_signs_are_seen_without_a_program_to
                 ("LT0.02]GOTO", "LT0.09]GOTO", "check::goes_on"),
                 ("#3004=2", "#3004=3", "check::not_run"),
                 ("G0 ", "G-0 ", "check::not_understood"),
-                ("G4 P10", "G4 P-10", "check::not_understood"),
+                ("G53\n", "G53 P-10\n", "check::not_understood"),
                 ("M5", "M-5", "check::not_understood"),
             ][..],
         ),
@@ -470,7 +470,7 @@ fn variant(base: &str, lines: &str) -> Result<Postprocessor, axiscal::diag::Fail
 }
 
 /// Values that a builder or a user may give each setting, as the guide and the files name them.
-const SETTINGS: [(&[&str], &str, &[&str]); 25] = [
+const SETTINGS: [(&[&str], &str, &[&str]); 27] = [
     (&["fanuc", "haas"], "program_number", &["1234"]),
     (&["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"], "triggered_within", &["0.08"]),
     (&["fanuc", "haas"], "missed_within", &["0.03"]),
@@ -482,17 +482,19 @@ const SETTINGS: [(&[&str], &str, &[&str]); 25] = [
     (&["fanuc", "haas"], "probe_input", &["#1004", "#1032", "#11004"]),
     (&["fanuc", "haas"], "cancel", &["G69 G40 G80"]),
     (&["haas"], "dynamic_offset", &[""]),
-    (&["fanuc", "haas"], "wait", &["M53", "G4 P500"]),
+    (&["fanuc"], "wait", &["M53", "G53"]),
+    (&["haas"], "wait", &["M53", "G4 P500"]),
+    (&["haas"], "read_ahead", &["G103 P1\nG4 P1"]),
     (&["fanuc", "haas", "heidenhain", "sinumerik"], "modulo", &["C"]),
-    (&["fanuc", "haas"], "time", &["no"]),
+    (&["fanuc", "haas", "sinumerik"], "time", &["no"]),
     (&["fanuc", "haas"], "tool_offset", &["5"]),
     (&["heidenhain", "sinumerik"], "probe_on", &["M27"]),
     (&["heidenhain", "sinumerik"], "probe_off", &["M28"]),
     (&["heidenhain"], "folder", &["TNC:\\PROBE\\"]),
     (&["heidenhain"], "cancel", &["M129\nPLANE RESET STAY\nM127"]),
     (&["sinumerik"], "probe", &["2"]),
-    (&["sinumerik"], "timer", &["3"]),
     (&["sinumerik"], "tool_edge", &["D2"]),
+    (&["linuxcnc"], "version", &["master"]),
     (&["linuxcnc"], "probe_on", &["M64 P0"]),
     (&["linuxcnc"], "probe_off", &["M65 P0"]),
     (&["fanuc-inspection-plus", "haas-inspection-plus"], "probe_input", &["#1004"]),

@@ -102,14 +102,17 @@ pose = { SWIVEL = 0.0, C = [45.0, 165.0, 285.0] }
 blocks = ["x+"]
 touch = [{ faces = ["+Z"], grid = "top" }, { faces = ["+X", "-X", "+Y", "-Y"], grid = "side" }]
 [[stage.setup]]
-pose = { SWIVEL = -40.0, C = [20.0, 200.0] }
+pose = { SWIVEL = TILT, C = [20.0, 200.0] }
 blocks = ["x+"]
 touch = [{ faces = ["+Z"], grid = "top" }]
 "#;
 
 fn other_points(machine: &Machine) -> Plan {
-    let swivel = machine.rotary().map(|a| a.name.to_string()).find(|n| n != "C").unwrap();
-    let (spec, _) = program::load(&source("other.toml", OTHER.replace("SWIVEL", &swivel))).unwrap();
+    let swivel = machine.rotary().find(|a| a.name.to_string() != "C").unwrap();
+    // to the side where the axis can turn
+    let tilt = if swivel.range[0] <= -40.0 { "-40.0" } else { "40.0" };
+    let text = OTHER.replace("SWIVEL", &swivel.name.to_string()).replace("TILT", tilt);
+    let (spec, _) = program::load(&source("other.toml", text)).unwrap();
     program::generate(machine, &spec, &program::Options::default()).unwrap().0.plan
 }
 
@@ -133,6 +136,8 @@ fn at_other_points_the_error_falls_by_what_was_predicted() {
         ("swivel-head", &["head", "table"][..], ["location-b", "location-c"]),
         ("trunnion", &["basic"][..], ["location-a", "location-c"]),
         ("swivel-table-b", &["basic"][..], ["location-b", "location-c"]),
+        ("nutating-b", &["basic"][..], ["location-b", "location-c"]),
+        ("trunnion-offset", &["basic"][..], ["location-a", "location-c"]),
     ] {
         let machine = machine(name);
         let catalogue = Catalogue::built_in().unwrap();

@@ -170,6 +170,8 @@ fn the_second_machine_of_the_paper() {
 fn the_table_machines() {
     every_controller("trunnion", "basic", true);
     every_controller("swivel-table-b", "basic", true);
+    every_controller("nutating-b", "basic", true);
+    every_controller("trunnion-offset", "basic", true);
 }
 
 #[test]
@@ -212,6 +214,8 @@ fn no_message_is_cut() {
         ("trunnion", "basic", &[false, true]),
         ("trunnion", "full", &[false, true]),
         ("swivel-table-b", "basic", &[false, true]),
+        ("nutating-b", "basic", &[false, true]),
+        ("trunnion-offset", "basic", &[false, true]),
     ] {
         let machine = machine(machine_name);
         for tcp in frames {
@@ -276,6 +280,90 @@ fn emitted_programs_are_those_in_the_tree() {
             assert!(kept == text, "{}: another length or other line ends", path.display());
         }
     }
+}
+
+/// The lines of a program that are no remarks.
+fn code_lines<'a>(post: &Postprocessor, text: &'a str) -> Vec<&'a str> {
+    text.lines().filter(|l| !l.starts_with(post.comment.open.trim())).collect()
+}
+
+/// Haas counts rotary axes by letter (96-8000 p. 113: X, Y, Z, A, B): B is #5045 and C #5046 on any machine. By count C of a
+/// machine with B and C would be #5045, another axis's variable.
+#[test]
+fn haas_numbers_rotary_axes_by_letter() {
+    let post = controller("haas");
+    for (machine_name, program, there, lacks) in [
+        ("swivel-head", "head", [5, 6], 4),
+        ("trunnion", "basic", [4, 6], 5),
+        ("double-head", "double-head", [4, 5], 6),
+    ] {
+        let machine = machine(machine_name);
+        let text = written(&post, &machine, &generated(&machine, program, false)).text;
+        let code = code_lines(&post, &text).join("\n");
+        for family in [502, 504, 506] {
+            assert!(
+                there.iter().all(|n| code.contains(&format!("#{family}{n}"))),
+                "{machine_name}: #{family}{there:?}"
+            );
+            assert!(!code.contains(&format!("#{family}{lacks}")), "{machine_name}: #{family}{lacks}");
+        }
+        // the probe is switched on before the first move, and blocks let the limit of reading ahead act before a position is read
+        let at = |what: &str| code.find(what).unwrap_or_else(|| panic!("{what}"));
+        assert!(at("\nM59 P1134\n") < at("\nG103 P1\nG4 P1\nG4 P1\nG4 P1\n") && at("\nG103 P1") < at("#504"));
+        assert!(at("\nM69 P1134\n") > at("\nN9\n"));
+    }
+}
+
+/// A G4 does not stop a Fanuc from reading ahead (B-63944EN/03 p. 556 names what does): no program counts on one.
+#[test]
+fn fanuc_waits_by_what_stops_reading_ahead() {
+    let machine = machine("trunnion");
+    let post = controller("fanuc");
+    for tcp in [false, true] {
+        let generated = generated(&machine, "basic", tcp);
+        let text = written(&post, &machine, &generated).text;
+        let code = code_lines(&post, &text);
+        assert!(!code.iter().any(|l| l.starts_with("G4 ")) && code.iter().filter(|l| **l == "G53").count() >= 3);
+    }
+}
+
+/// The time of a touch needs no machine data of a SINUMERIK: an index of $AC_TIMER beyond MD28258 would be an alarm.
+#[test]
+fn sinumerik_reads_a_clock_that_every_control_has() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "head", false);
+    let text = written(&controller("sinumerik"), &machine, &generated).text;
+    assert!(!text.contains("$AC_TIMER") && text.contains("$A_SECOND"));
+    let without = written(&variant("sinumerik", "[settings]\ntime = \"no\"\n"), &machine, &generated).text;
+    assert!(!without.contains("$A_SECOND") && !without.contains("AXC_T=") && !without.contains(" T%"));
+}
+
+/// What no public source says is said where the program is read.
+#[test]
+fn what_no_public_source_says_is_said_in_the_programs() {
+    let unverified = |name: &str| -> String {
+        let post = controller(name);
+        let kinds =
+            post.tables.iter().flat_map(|t| &t.kind).flat_map(|k| &k.vector).filter_map(|v| v.unverified.clone());
+        let files = post.tables.iter().flat_map(|t| &t.file).filter_map(|f| f.unverified.clone());
+        post.unverified.iter().map(|(_, why)| why.clone()).chain(kinds).chain(files).collect::<Vec<_>>().join("\n")
+    };
+    for (control, words) in [
+        ("heidenhain", &["MB0", "-1 of the 4th", "M_TRUNCATE", "M_APPEND", "CYCL DEF 13.1", "ID241"][..]),
+        ("fanuc", &["19700 to 19702", "G10 L52", "#4130", "#4023"]),
+        ("haas", &["settings 261 and 262", "the setting's number"]),
+    ] {
+        let said = unverified(control);
+        for word in words {
+            assert!(said.contains(word), "{control}: {word}\n{said}");
+        }
+    }
+    // the head's parameters are documented for the 30i (A-79348E pp. 83, 84)
+    let fanuc = controller("fanuc").tables.unwrap();
+    let first = |v: &&axiscal::post::tables::VectorForm| v.names["parameter"][0].clone();
+    let mut head =
+        fanuc.kind.iter().flat_map(|k| &k.vector).filter(|v| ["N19709", "N19712"].contains(&first(v).as_str()));
+    assert!(head.all(|v| v.unverified.is_none() && v.source.is_some()));
 }
 
 // ------------------------------------------------------------------------------------------------ variants as files
@@ -423,7 +511,9 @@ fn an_origin_of_many_digits_fits_the_lines() {
         moved += &ends(line, by).unwrap_or_else(|| format!("{line}\n"));
     }
     let (machines, _) = machine::load(&source("machines", &moved)).unwrap();
-    for (name, program) in [("swivel-head", "head"), ("trunnion", "basic"), ("double-head", "double-head")] {
+    for (name, program) in
+        [("swivel-head", "head"), ("trunnion", "basic"), ("double-head", "double-head"), ("nutating-b", "basic")]
+    {
         let machine = machines.iter().find(|m| m.name == name).unwrap();
         for tcp in [false, true] {
             let generated = generated(machine, program, tcp);

@@ -93,9 +93,12 @@ fn rubbish_is_two_with_a_remedy() {
             let said = String::from_utf8_lossy(&out.stderr).into_owned();
             assert_eq!(out.status.code(), Some(2), "{verb:?} {file}: {said}");
             assert!(said.contains("error:") && !said.contains("panicked"), "{verb:?} {file}: {said}");
-            // with --json nothing that is no answer stands on stdout
+            // with --json stdout holds the refusal, and nothing else
             let out = axiscal(at, &[verb, &[file], more, &["--json"]].concat());
-            assert!(out.status.code() == Some(2) && out.stdout.is_empty(), "{verb:?} {file}");
+            assert_eq!(out.status.code(), Some(2), "{verb:?} {file}");
+            let refused: Value = serde_json::from_slice(&out.stdout).unwrap();
+            assert_eq!(refused["format"], "axiscal-failure/1", "{verb:?} {file}");
+            assert!(!refused["findings"].as_array().unwrap().is_empty(), "{verb:?} {file}");
         }
         assert_eq!(axiscal(at, &[verb, &["study.toml", "--no-such-option"]].concat()).status.code(), Some(2));
     }

@@ -668,7 +668,24 @@ impl Job {
     }
 
     fn export(&self, study: &str, out: &str) -> Check {
-        self.call(&["export", &format!("{study}.toml"), "--controller", "linuxcnc", "--out", out]).map(|_| ())
+        // the rig's own control: identity kinematics, no home offsets, no axis tables
+        let letters = match self.machine.as_str() {
+            "double-head" => "XYZAB",
+            "trunnion" => "XYZAC",
+            _ => "XYZBC",
+        };
+        let n = letters.len();
+        let mut ini = format!(
+            "[KINS]\nKINEMATICS = trivkins coordinates={letters}\nJOINTS = {n}\n[TRAJ]\nCOORDINATES = {letters}\nLINEAR_UNITS = mm\n"
+        );
+        for (joint, letter) in letters.chars().enumerate() {
+            let kind = if "ABC".contains(letter) { "ANGULAR" } else { "LINEAR" };
+            ini += &format!("[JOINT_{joint}]\nTYPE = {kind}\n");
+        }
+        let path = self.dir.join("rig.ini");
+        std::fs::write(&path, ini).map_err(|e| e.to_string())?;
+        let (study, path) = (format!("{study}.toml"), path.display().to_string());
+        self.call(&["export", &study, "--controller", "linuxcnc", "--ini", &path, "--out", out]).map(|_| ())
     }
 
     /// LinuxCNC with an exported component and its values.

@@ -43,15 +43,17 @@ const fn case(machine: &'static str, programs: &'static [&'static str], effects:
     Case { machine, programs, effects }
 }
 
-const CASES: [Case; 8] = [
+const CASES: [Case; 10] = [
     case("swivel-head", &["head", "table"], &["location-b", "location-c"]),
     case("swivel-head", &["full"], &["location-b", "location-c", "radial-c-2", "squareness-xy"]),
     case("double-head", &["double-head"], &["location-b", "location-a"]),
     case("double-head", &["full"], &["location-b", "location-a", "radial-b-2"]),
     case("trunnion", &["basic"], &["location-a", "location-c"]),
-    case("trunnion", &["full"], &["location-a", "location-c", "radial-c-2", "squareness-xy"]),
     case("swivel-table-b", &["basic"], &["location-b", "location-c"]),
-    case("swivel-table-b", &["full"], &["location-b", "location-c", "radial-c-2", "squareness-xy"]),
+    case("nutating-b", &["basic"], &["location-b", "location-c"]),
+    case("nutating-b", &["full"], &["location-b", "location-c", "radial-c-2", "squareness-xy"]),
+    case("trunnion-offset", &["basic"], &["location-a", "location-c"]),
+    case("trunnion-offset", &["full"], &["location-a", "location-c", "radial-c-2", "squareness-xy"]),
 ];
 
 /// Errors of every sign (some 20 um, 0.004 deg), blocks that stand elsewhere, a late trigger.

@@ -206,9 +206,27 @@ pub struct Statement {
 pub struct Code {
     /// In the order of the text.
     pub statements: Vec<Statement>,
+    /// What the grammar knows to be there and does not know the meaning of: the program is refused with all of it.
+    pub unknown: Vec<Unknown>,
+    /// The program's own number, as it is written.
+    pub number: Option<(String, Range<usize>)>,
+}
+
+/// Something in a program whose meaning is not known to axiscal. It may be right all the same.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unknown {
+    /// Bytes of the text.
+    pub at: Range<usize>,
+    /// As a person calls it: `G4`, `P with G64`, `o repeat`.
+    pub name: String,
 }
 
 impl Code {
+    /// Notes what is not known.
+    pub fn is_unknown(&mut self, at: Range<usize>, name: impl Into<String>) {
+        self.unknown.push(Unknown { at, name: name.into() });
+    }
+
     /// Adds a statement and gives its place.
     pub fn push(&mut self, at: Range<usize>, what: What) -> usize {
         self.statements.push(Statement { at, what });

@@ -352,8 +352,10 @@ impl<'a, 'b> Walk<'a, 'b> {
     fn moving(&self, from: &Position, to: &Position) -> Vec<AxisName> {
         // under a transformation the rounded angle of a turn moves the linear axes by its arc over the lift's height
         const TURNED_MM: f64 = 0.05;
-        let far = |a: &AxisName| (to.get(*a) - from.get(*a)).abs() > self.case.same;
         let tcp = self.case.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
+        // under a transformation both ends are rounded in each of three words: 2 * 0.87 um at three decimals
+        let same = if tcp { 2.0 } else { 1.0 } * self.case.same;
+        let far = |a: &AxisName| (to.get(*a) - from.get(*a)).abs() > same;
         let turns = tcp && AxisName::ALL.iter().any(|a| a.is_rotary() && far(a));
         let moved = |a: &AxisName| far(a) && (!turns || a.is_rotary() || (to.get(*a) - from.get(*a)).abs() > TURNED_MM);
         AxisName::ALL.into_iter().filter(moved).collect()

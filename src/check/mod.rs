@@ -93,9 +93,63 @@ struct Part {
 pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
     let program = read(post, source, against.beside)?;
     match against.plan {
-        Some(plan) => with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?),
-        None => without_plan(machine, post, source, against, &program),
+        // what was edited comes first, and then what the control says to it
+        Some(plan) => {
+            refuse_unknown(program.unknown_of_grammar(), source)?;
+            let number = number(post, &program, source)?;
+            let mut checked = with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?)?;
+            checked.findings.extend(number);
+            Ok(checked)
+        }
+        None => {
+            refuse_unknown(&program.unknown(machine, post), source)?;
+            without_plan(machine, post, source, against, &program)
+        }
     }
+}
+
+/// Everything that is not known, each with its first place: a person corrects or rewrites the program once.
+fn refuse_unknown(unknown: &[code::Unknown], source: &Source) -> Result<()> {
+    const SHOWN: usize = 20;
+    const HELP: &str = "it may be right; whether it is safe cannot be said";
+    let mut counts: Vec<(&code::Unknown, usize)> = Vec::new();
+    for one in unknown {
+        match counts.iter_mut().find(|(first, _)| first.name == one.name) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((one, 1)),
+        }
+    }
+    if counts.is_empty() {
+        return Ok(());
+    }
+    let says = |(first, count): &(&code::Unknown, usize)| {
+        let times = if *count > 1 { format!(" (it stands {count} times)") } else { String::new() };
+        Finding::error("check::not_known", format!("{} is not known to axiscal{times}", first.name))
+            .help(HELP)
+            .at(source, first.at.clone())
+    };
+    let mut findings: Vec<Finding> = counts.iter().take(SHOWN).map(says).collect();
+    if counts.len() > SHOWN {
+        let rest = format!("and {} more that are not known", counts.len() - SHOWN);
+        findings.push(Finding::error("check::not_known", rest).help(HELP));
+    }
+    Err(Failure(findings))
+}
+
+/// Beside its plan, a program has the number that the settings gave it. Another one harms nothing, unless the program would call itself.
+fn number(post: &Postprocessor, program: &runs::Program, source: &Source) -> Result<Option<Finding>> {
+    let Some((digits, at)) = program.number() else { return Ok(None) };
+    if let Some(wrong) = post.impossible_program_number(digits) {
+        return Err(Finding::error("check::not_understood", format!("O{digits}: {wrong}"))
+            .help("give it another number")
+            .at(source, at.clone())
+            .into());
+    }
+    Ok(post.other_program_number(digits).map(|other| {
+        Finding::warning("check::program_number", format!("O{digits}: {other}"))
+            .help("is no other program of that number at the control? nothing else depends on it")
+            .at(source, at.clone())
+    }))
 }
 
 /// Is a text a program of the control's dialect, as far as the grammar says?
@@ -103,7 +157,7 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
 /// # Errors
 /// The first place that is not of the grammar.
 pub fn grammar(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<()> {
-    read(post, source, beside).map(|_| ())
+    read(post, source, beside).and_then(|program| refuse_unknown(program.unknown_of_grammar(), source))
 }
 
 fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<runs::Program> {

@@ -100,6 +100,10 @@ pub trait Dialect: Clone + Send + Sync {
     fn after_abort(&self) -> Option<Self> {
         None
     }
+    /// What axiscal does not know of a block, by name. Values that are computed are NaN.
+    fn unknown(&self, _words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+        Vec::new()
+    }
     /// A block of words with their values.
     ///
     /// # Errors

@@ -6,9 +6,9 @@ mod skewed;
 mod spindle;
 
 use super::blind;
-use super::code::{Code, Expr, Var, What};
+use super::code::{Code, Expr, Unknown, Var, What, Word};
 use super::explore::{Limits, Told, explore};
-use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Start, Vm};
+use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Spoken, Start, Vm};
 use super::seconds::Clock;
 use super::world::World;
 use super::{heidenhain, macro_b, ngc, sinumerik, statements};
@@ -58,6 +58,48 @@ impl Program {
         }
         let setups = highest.min(MOST_SETUPS) as u32;
         Ok(Self { dialect: rule.dialect, code, from: set_at.map(|at| (var, at)), setups })
+    }
+
+    /// The program's own number, and where it stands.
+    pub fn number(&self) -> Option<&(String, Range<usize>)> {
+        self.code.number.as_ref()
+    }
+
+    /// What the grammar does not know the meaning of.
+    pub fn unknown_of_grammar(&self) -> &[Unknown] {
+        &self.code.unknown
+    }
+
+    /// Everything in it that is not known to axiscal, wherever the program comes to; in the order of the text.
+    pub fn unknown(&self, machine: &Machine, post: &Postprocessor) -> Vec<Unknown> {
+        let words = match self.dialect {
+            DialectName::Ngc => self.unknown_words::<ngc::Ngc>(machine, post),
+            DialectName::MacroB => self.unknown_words::<macro_b::MacroB>(machine, post),
+            DialectName::Klartext => self.unknown_words::<heidenhain::Heidenhain>(machine, post),
+            DialectName::Sinumerik => self.unknown_words::<sinumerik::Sinumerik>(machine, post),
+        };
+        let mut all = [self.code.unknown.clone(), words].concat();
+        all.sort_by_key(|unknown| unknown.at.start);
+        all
+    }
+
+    fn unknown_words<D: Dialect>(&self, machine: &Machine, post: &Postprocessor) -> Vec<Unknown> {
+        let control = D::begin(Start::Fresh, post, machine);
+        let value = |word: &Word| match &word.value {
+            Expr::Number(n) => *n,
+            _ => f64::NAN,
+        };
+        let blocks = self.code.statements.iter().filter_map(|statement| match &statement.what {
+            What::Block(words) => Some((&statement.at, words)),
+            _ => None,
+        });
+        let unknown = blocks.flat_map(|(at, words)| {
+            let spoken: Vec<Spoken> =
+                words.iter().map(|w| Spoken { address: w.address, value: value(w), point: w.point }).collect();
+            let names = control.unknown(&spoken, post);
+            names.into_iter().map(|name| Unknown { at: at.clone(), name }).collect::<Vec<_>>()
+        });
+        unknown.collect()
     }
 
     /// Probing moves are programmed by direction and length.

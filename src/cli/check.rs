@@ -1,6 +1,6 @@
 //! `axiscal check`: an NC program read back, run on the virtual machine, and judged.
 
-use super::common::MachineArgs;
+use super::common::{MachineArgs, finding_record};
 use super::load::load_plan;
 use super::{Answer, Io};
 use crate::check::{self, Against, Checked};
@@ -151,17 +151,7 @@ fn refused(findings: &[Finding]) -> String {
 }
 
 fn answer(machine: &Machine, post: &Postprocessor, args: &Args, checked: &Checked, io: &Io) {
-    let findings: Vec<serde_json::Value> = checked
-        .findings
-        .iter()
-        .map(|f| {
-            let place = f.place();
-            let mut parts = place.as_deref().unwrap_or("").rsplit(':');
-            let column = parts.next().and_then(|c| c.parse::<usize>().ok());
-            let line = parts.next().and_then(|l| l.parse::<usize>().ok());
-            json!({ "code": f.code, "says": f.message, "help": f.help, "line": line, "column": column })
-        })
-        .collect();
+    let findings: Vec<serde_json::Value> = checked.findings.iter().map(finding_record).collect();
     io.answer(&json!({
         "format": "axiscal-check/1",
         "file": args.file.display().to_string(),

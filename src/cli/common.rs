@@ -1,6 +1,6 @@
 //! What every verb shares: printing, exit codes, and finding machines.
 
-use crate::diag::{Failure, Finding, Findings, Result, source};
+use crate::diag::{Failure, Finding, Findings, Result, Severity, source};
 use crate::files;
 use crate::machine::{self, Machine};
 use crate::report::plot::Paper;
@@ -20,6 +20,25 @@ pub enum Answer {
 
 /// Set when something that was printed did not arrive.
 static OUTPUT_LOST: AtomicBool = AtomicBool::new(false);
+
+/// Set when the JSON answer was printed.
+static ANSWERED: AtomicBool = AtomicBool::new(false);
+
+/// A finding as JSON: code, severity, what it says and what to do, and its place where it has one.
+pub fn finding_record(finding: &Finding) -> serde_json::Value {
+    let place = finding.place();
+    let mut parts = place.as_deref().unwrap_or("").rsplit(':');
+    let column = parts.next().and_then(|c| c.parse::<usize>().ok());
+    let line = parts.next().and_then(|l| l.parse::<usize>().ok());
+    let severity = match finding.severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Info => "note",
+    };
+    serde_json::json!({
+        "code": finding.code, "severity": severity, "says": finding.message, "help": finding.help, "line": line, "column": column,
+    })
+}
 
 /// Prints a line; a reader that has gone away (`| head`) is no error, a full disk is.
 pub fn print(text: &str) {
@@ -96,6 +115,7 @@ impl Io {
         if self.json && !self.within {
             let text = serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"));
             print(&text);
+            ANSWERED.store(true, Ordering::Relaxed);
         }
     }
 
@@ -108,9 +128,9 @@ impl Io {
         for finding in findings {
             let place = finding.place().map(|p| format!("{p}: ")).unwrap_or_default();
             let word = match finding.severity {
-                crate::diag::Severity::Error => "error",
-                crate::diag::Severity::Warning => "warning",
-                crate::diag::Severity::Info => "note",
+                Severity::Error => "error",
+                Severity::Warning => "warning",
+                Severity::Info => "note",
             };
             let mut err = std::io::stderr();
             // one line that tools can read (file:line:column), then the picture for the person
@@ -147,6 +167,11 @@ impl Io {
             Ok(Answer::No) => ExitCode::from(1),
             Err(Failure(findings)) => {
                 self.report(&findings);
+                // one object on stdout, whatever comes of the call
+                if !ANSWERED.load(Ordering::Relaxed) {
+                    let findings: Vec<serde_json::Value> = findings.iter().map(finding_record).collect();
+                    self.answer(&serde_json::json!({ "format": "axiscal-failure/1", "findings": findings }));
+                }
                 ExitCode::from(2)
             }
         }

@@ -2,22 +2,27 @@
 
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
+use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, Source, source};
-use crate::diagnose::{self, Subject, Verdict};
+use crate::diagnose::consequence::Consequence;
+use crate::diagnose::{self, Diagnosis, Subject, Verdict};
 use crate::files;
 use crate::fit::outcome::Undetermined;
 use crate::fit::{Fit, Settings};
 use crate::machine::Machine;
-use crate::post::Postprocessor;
 use crate::post::tables::{LengthUnit, Tables};
+use crate::post::{Postprocessor, Release};
 use crate::report::fit::{number, significant, table};
 use crate::tables::compensation::{Compensation, Provenance};
 use crate::tables::control::{self, backup, backup::Old};
-use crate::tables::correction::Correction;
+use crate::tables::correction::{Correction, left_um};
 use crate::tables::linuxcnc::{self, Export, Left, Options, ini::UserIni};
+use crate::tables::place::{Meaning, meaning};
+use crate::tables::rows::TableError;
 use crate::units::Plain;
 use comfy_table::Cell;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `export`.
@@ -40,6 +45,9 @@ pub struct Args {
     /// LinuxCNC: the machine's INI file, for its old values
     #[arg(long, value_name = "FILE")]
     pub ini: Option<PathBuf>,
+    /// LinuxCNC: its version, 2.9 or master (default: `version` in [settings] of the postprocessor file)
+    #[arg(long, value_name = "VERSION")]
+    pub target: Option<String>,
     /// The control's own backup of the values that are to be changed: they are added to
     #[arg(long, value_name = "FILE", alias = "active")]
     pub backup: Option<PathBuf>,
@@ -62,17 +70,22 @@ pub struct Args {
 /// # Errors
 /// When the study is unusable, the controller has no tables, or a value is beyond the limits.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let post = match args.controller.as_str() {
-        linuxcnc::CONTROLLER => None,
-        word => {
-            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
-            io.report(&findings);
-            let tables = post.tables.clone().ok_or_else(|| {
-                Failure::new("export::controller", format!("controller {word:?} has no [tables]: no tables are known for it"))
-                    .help("`axiscal controllers` lists those that are built in; [tables] in a file of your own says what it has")
-            })?;
-            Some((post.name, tables))
+    let (described, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
+    io.report(&findings);
+    if described.tables.is_none() && described.releases.is_empty() {
+        let says = format!("controller {:?} has no [tables]: no tables are known for it", args.controller);
+        return Err(Failure::new("export::controller", says).help(
+            "`axiscal controllers` lists those that are built in; [tables] in a file of your own says what it has",
+        ));
+    }
+    let post = described.tables.clone().map(|tables| (described.name.clone(), tables));
+    let release = match (&post, &args.target) {
+        (Some(_), Some(_)) => {
+            return Err(Failure::new("export::options", "--target is for linuxcnc only")
+                .help("leave it away: the tables of this control do not depend on a version"));
         }
+        (Some(_), None) => None,
+        (None, target) => Some(described.release(target.as_deref())?.clone()),
     };
     if post.is_none() && (args.backup.is_some() || !args.old.is_empty() || args.unit == LengthUnit::Inch) {
         return Err(Failure::new("export::options", "--backup, --old and --unit are not for linuxcnc")
@@ -109,13 +122,15 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         Some(date) => date.clone(),
         None => newest_log(&loaded),
     };
-    let forced: Vec<String> = judged(&loaded, &fit, &settings, args, io)?.into_iter().collect();
-    let provenance = provenance(&loaded, date, forced);
+    let Judged { forced, doubts } = judged(&loaded, &fit, &settings, args, io)?;
+    let provenance = provenance(&loaded, date, forced.into_iter().collect());
     let correction = correction(&loaded, &fit, active.as_ref(), provenance, io)?;
     if let Some((name, tables)) = &post {
-        return control(&loaded, name, tables, (&correction, &fit.outcome.undetermined), args, io);
+        let found = (&correction, &fit.outcome.undetermined[..], &doubts[..]);
+        return control(&loaded, name, tables, found, args, io);
     }
-    let export = export(&loaded, &correction, args, io)?;
+    let version = release.as_ref().map(|r| r.name.clone());
+    let export = export(&loaded, &correction, release, args, io)?;
     for (name, contents) in &export.files {
         files::write_whole(&args.out.join(name), contents)?;
     }
@@ -124,47 +139,122 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     say_not_told(&fit.outcome.undetermined, io);
     io.answer(&json!({
         "controller": args.controller,
+        "version": version,
         "out": args.out.display().to_string(),
         "files": export.files.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "terms": export.component.compensation.terms,
         "left": export.component.left,
         "stock_left": export.stock.left,
+        "table_errors": export.table_errors,
+        "changes": export.changes,
+        "could_be_wrong": doubts,
         "not_told": fit.outcome.undetermined,
         "radius_mm": args.radius,
     }));
     Ok(Answer::Done)
 }
 
-/// A model that does not fit must not become a compensation: what is missing stands in the wrong parameters. Where it is forced
-/// all the same: what speaks against it.
-fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io) -> Result<Option<String>> {
+/// What the diagnosis says of an export.
+#[derive(Debug, Default)]
+struct Judged {
+    /// What speaks against it, where it was forced all the same.
+    forced: Option<String>,
+    /// By how much each exported value could be wrong because of what is missing, the worst against its tolerance first.
+    doubts: Vec<Doubt>,
+}
+
+/// By how much an exported value could be wrong.
+#[derive(Debug, serde::Serialize)]
+struct Doubt {
+    #[serde(flatten)]
+    what: Consequence,
+    /// What that does at the tolerance's radius, um; none where the unit says nothing about that.
+    off_um: Option<f64>,
+    /// Its tolerance, in its unit.
+    tolerance: f64,
+}
+
+impl Doubt {
+    /// How often the tolerance goes into it.
+    fn ratio(&self) -> f64 {
+        self.what.off / self.tolerance
+    }
+
+    fn says(&self, radius_mm: f64) -> String {
+        let Consequence { parameter, unit, off, because, .. } = &self.what;
+        let size = match self.off_um {
+            Some(um) => format!("{} um at {} mm", significant(um), Plain(radius_mm)),
+            None => format!("{} {unit}", significant(*off)),
+        };
+        // in the same unit, so that the two can be compared
+        let limit = match self.off_um.filter(|_| self.ratio() > 0.0) {
+            Some(um) => format!("{} um", significant(um / self.ratio())),
+            None => format!("{} {unit}", significant(self.tolerance)),
+        };
+        format!("{parameter} could be wrong by {size}; its tolerance is {limit} (cause: {because})")
+    }
+}
+
+/// The values that go into tables, with how wrong they could be.
+fn doubts(loaded: &Loaded, found: &Diagnosis) -> Vec<Doubt> {
+    let tolerance = &loaded.study.tolerance;
+    let is_exported = |c: &&Consequence| {
+        let effect = loaded.catalogue.get(&c.effect, &loaded.machine);
+        effect.is_some_and(|effect| {
+            let index = effect.parameters.iter().position(|p| p.name == c.parameter);
+            index.is_some_and(|i| meaning(effect, i, &loaded.machine) != Meaning::Measurement)
+        })
+    };
+    let doubt = |c: &Consequence| {
+        let tolerance_of = tolerance.limit(&c.parameter, &c.unit)?;
+        let off_um = left_um(c.off, &c.unit, tolerance.radius_mm);
+        Some(Doubt { what: c.clone(), off_um, tolerance: tolerance_of })
+    };
+    let mut out: Vec<Doubt> = found.consequences.iter().filter(is_exported).filter_map(doubt).collect();
+    out.sort_by(|a, b| b.ratio().total_cmp(&a.ratio()));
+    out
+}
+
+/// What a model lacks stands in part in its parameters. That is a remark where no exported value could be wrong by more than its
+/// tolerance, and else refuses the export.
+fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io) -> Result<Judged> {
     let settings = Settings { quick: true, ..settings.clone() };
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit };
     let options = diagnose::Options { at_most: 1, refit: false, power: false, ..diagnose::Options::default() };
     let found = diagnose::diagnose(subject, &options)?;
-    let (word, next) = match found.verdict {
-        Verdict::TooLittleData if found.most_missed => {
-            ("too-little-data", "most touches cannot be used, and the rest is no sample of the machine".to_owned())
-        }
-        Verdict::Adequate | Verdict::TooLittleData => return Ok(None),
-        Verdict::MissingEffect => {
-            let named = found.candidates.first().map_or_else(String::new, |c| format!(" (first: {})", c.effect));
-            ("missing-effect", format!("an effect is missing from the model{named}"))
-        }
-        Verdict::Unexplained if found.faint => {
-            ("unexplained", "the model fits within the noise, but a faint pattern is left in the touches".to_owned())
-        }
-        Verdict::Unexplained => ("unexplained", "the model fails, and no known effect explains it".to_owned()),
+    let word = match found.verdict {
+        Verdict::Adequate => return Ok(Judged::default()),
+        Verdict::TooLittleData if !found.most_missed => return Ok(Judged::default()),
+        Verdict::TooLittleData => "too-little-data",
+        Verdict::MissingEffect => "missing-effect",
+        Verdict::Unexplained => "unexplained",
     };
-    let finding = Finding::error(
-        "export::verdict",
-        format!("the diagnosis is {word}: {next}; the parameters of this model are then wrong"),
-    )
-    .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
+    let doubts = doubts(loaded, &found);
+    let named = found.candidates.first().filter(|_| found.verdict == Verdict::MissingEffect);
+    let named = named.map_or_else(String::new, |c| format!(" ({})", c.effect));
+    let radius_mm = loaded.study.tolerance.radius_mm;
+    let refused = match (found.mistake(), doubts.first()) {
+        (Some(mistake), _) => Some(mistake),
+        (None, Some(worst)) if worst.ratio() > 1.0 => Some(worst.says(radius_mm)),
+        (None, worst) => {
+            let most = worst.map_or_else(|| "no exported value depends on it".to_owned(), |d| d.says(radius_mm));
+            let says = format!("the diagnosis is {word}{named}; the largest consequence: {most}");
+            let remark = if found.faint {
+                Finding::info("export::verdict", says)
+            } else {
+                Finding::warning("export::verdict", says)
+            };
+            io.report(&[remark.help("`axiscal diagnose` shows what is missing")]);
+            None
+        }
+    };
+    let Some(why) = refused else { return Ok(Judged { forced: None, doubts }) };
+    let finding = Finding::error("export::verdict", format!("the diagnosis is {word}{named}: {why}"))
+        .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
     if args.force {
         let says = finding.message.clone();
         io.report(&[Finding { severity: crate::diag::Severity::Warning, help: None, ..finding }]);
-        return Ok(Some(says));
+        return Ok(Judged { forced: Some(says), doubts });
     }
     Err(finding.into())
 }
@@ -199,15 +289,26 @@ fn correction(
     let (correction, findings) =
         Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, loaded.during(active), provenance)?;
     io.report(&findings.0);
-    Ok(correction)
+    Ok(Correction { used: used(loaded), ..correction })
 }
 
-fn export(loaded: &Loaded, correction: &Correction, args: &Args, io: &Io) -> Result<Export> {
+/// From where to where the programs of the study move the rotary axes.
+fn used(loaded: &Loaded) -> BTreeMap<AxisName, [f64; 2]> {
+    let mut out: BTreeMap<AxisName, [f64; 2]> = BTreeMap::new();
+    let poses = loaded.runs.iter().flat_map(|r| &r.plan.touches).map(|t| &t.pose);
+    for (axis, at) in poses.flat_map(|pose| loaded.machine.rotary().filter_map(|a| Some((a.name, pose.get(a.name)?)))) {
+        let range = out.entry(axis).or_insert([at, at]);
+        *range = [range[0].min(at), range[1].max(at)];
+    }
+    out
+}
+
+fn export(loaded: &Loaded, correction: &Correction, release: Option<Release>, args: &Args, io: &Io) -> Result<Export> {
     let ini = match &args.ini {
         Some(path) => Some(UserIni::read(&source(path.display().to_string(), files::read_text(path)?))?),
         None => None,
     };
-    let options = Options { radius_mm: args.radius, force: args.force, ini, ..Options::default() };
+    let options = Options { radius_mm: args.radius, force: args.force, ini, release, ..Options::default() };
     let (export, findings) = linuxcnc::export(&loaded.machine, correction, &options)?;
     io.report(&findings.0);
     Ok(export)
@@ -222,14 +323,20 @@ fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args:
             not_its_own(&text, correction)?;
             io.report(&written_by_an_export(&text, correction).into_iter().collect::<Vec<_>>());
             let such_as = control::example(machine, tables).unwrap_or_default();
-            backup::read_such_as(&text, &tables.backup, &names, &such_as)?
+            let old = backup::read_such_as(&text, &tables.backup, &names, &such_as)?;
+            backup::within_reach(&old, Some(&text), machine)?;
+            old
         }
         None => Old::default(),
     };
     for word in &args.old {
         let bad = |what: &str| {
+            // a table has a thousand names: the nearest are those that may be meant
+            let meant = word.split('=').next().unwrap_or_default();
+            let shown = crate::simulate::scenario::nearest(meant, names.iter().cloned().collect());
+            let more = if names.len() > shown.len() { " …" } else { "" };
             Failure::new("export::old", format!("--old {word:?}: {what}"))
-                .help(format!("write NAME=VALUE with one of: {}", names.iter().cloned().collect::<Vec<_>>().join(", ")))
+                .help(format!("write NAME=VALUE with one of: {}{more}", shown.join(", ")))
         };
         let (name, value) = word.rsplit_once('=').ok_or_else(|| bad("there is no ="))?;
         let plain = backup::plain_name(name);
@@ -243,6 +350,7 @@ fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args:
         old.assumed.remove(known);
         old.texts.insert(known.clone(), digits);
     }
+    backup::within_reach(&old, None, machine)?;
     Ok(old)
 }
 
@@ -286,7 +394,7 @@ fn control(
     loaded: &Loaded,
     name: &str,
     tables: &Tables,
-    (correction, not_told): (&Correction, &[Undetermined]),
+    (correction, not_told, doubts): (&Correction, &[Undetermined], &[Doubt]),
     args: &Args,
     io: &Io,
 ) -> Result<Answer> {
@@ -316,9 +424,11 @@ fn control(
     let mut t = table(&["value", "old", "new", "change", "unit"]);
     for v in &export.values {
         let show = |x: f64| number(control::digits(x, v.decimals, false));
+        // what is taken from the machine's description is no value of the control
+        let known = |x: f64| if v.known { show(x) } else { Cell::new("not known") };
         let spelling = tables.file.first().and_then(|f| f.spelling.as_ref());
         let shown = spelling.and_then(|s| v.names.get(s)).or(v.names.values().next()).cloned().unwrap_or_default();
-        t.add_row(vec![Cell::new(shown), show(v.old), show(v.new), show(v.new - v.old), Cell::new(v.unit)]);
+        t.add_row(vec![Cell::new(shown), known(v.old), known(v.new), show(v.change()), Cell::new(v.unit)]);
     }
     crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
     io.say(format!("{}\n{t}", tables.says));
@@ -335,7 +445,7 @@ fn control(
             ));
         }
     }
-    say_left("which leaves", &export.left, args, io);
+    say_left("which leaves", (&export.left, &export.table_errors), args, io);
     io.say(format!(
         "rounding to the control's resolution leaves up to {} um; all constant errors that were identified together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
         significant(export.rounding_um), significant(export.rest_um), significant(export.longer_tool_um)
@@ -351,15 +461,31 @@ fn control(
         "out": args.out.display().to_string(),
         "files": export.files.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "terms": export.compensation.terms,
-        "values": export.values,
+        "values": export.values.iter().map(value_record).collect::<Vec<_>>(),
+        "changes": export.changes,
+        "could_be_wrong": doubts,
         "left": export.left,
         "not_told": not_told,
         "rounding_um": export.rounding_um,
         "rest_um": export.rest_um,
         "longer_tool_um": export.longer_tool_um,
+        "table_errors": export.table_errors,
         "radius_mm": args.radius,
     }));
     Ok(Answer::Done)
+}
+
+/// A value as the JSON has it: without old and new where the control's present value is not known.
+fn value_record(value: &control::fill::Value) -> serde_json::Value {
+    let mut record = json!(value);
+    if let Some(fields) = record.as_object_mut() {
+        fields.insert("change".to_owned(), json!(value.change()));
+        if !value.known {
+            fields.insert("old".to_owned(), serde_json::Value::Null);
+            fields.insert("new".to_owned(), serde_json::Value::Null);
+        }
+    }
+    record
 }
 
 /// The restoring file of an earlier export may be all that is left of the control's old values: it is not written over by another.
@@ -470,8 +596,8 @@ fn say(export: &Export, args: &Args, io: &Io) {
     }
     crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
     io.say(format!("By the kinematics component:\n{t}"));
-    say_left("which leaves", &export.component.left, args, io);
-    say_left("LinuxCNC without the component (stock/) leaves", &export.stock.left, args, io);
+    say_left("which leaves", (&export.component.left, &export.table_errors), args, io);
+    say_left("LinuxCNC without the component (stock/) leaves", (&export.stock.left, &export.table_errors), args, io);
     io.say(format!(
         "{}: {} files; README.txt says how to load them and what must be set again",
         args.out.display(),
@@ -486,8 +612,8 @@ fn say_not_told(not_told: &[Undetermined], io: &Io) {
     }
 }
 
-fn say_left(what: &str, left: &[Left], args: &Args, io: &Io) {
-    if left.is_empty() {
+fn say_left(what: &str, (left, tables): (&[Left], &[TableError]), args: &Args, io: &Io) {
+    if left.is_empty() && tables.is_empty() {
         io.say(format!("{what}: nothing of what was identified"));
         return;
     }
@@ -495,5 +621,8 @@ fn say_left(what: &str, left: &[Left], args: &Args, io: &Io) {
     for l in left {
         let size = l.size(significant);
         io.say(format!("  {:<6} {} {} leaves {size}: {}", l.parameter, significant(l.value), l.unit, l.why));
+    }
+    for table in tables {
+        io.say(format!("  {}", table.says(significant)));
     }
 }

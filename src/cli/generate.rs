@@ -69,10 +69,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     keep_other_plans(&plan_file, &machine, &spec)?;
     if args.tcp
         && post.check.as_ref().is_some_and(|rule| rule.dialect == DialectName::Ngc)
-        && let Err(why) = linuxcnc::stock::module_of(&machine)
+        && !post.releases.is_empty()
+        && let Err(why) = linuxcnc::stock::module_of(&machine, post.release(None)?)
     {
         return Err(Failure::new("generate::no_transformation", format!("{} cannot run under a transformation of LinuxCNC's own: {why}", machine.name))
-            .help("generate without --tcp: under the kinematics component that `export` writes, coordinates stay axis positions"));
+            .help("generate without --tcp: under the kinematics component that `export` writes, coordinates stay axis positions. Is it another version of LinuxCNC, name it under [settings] of a postprocessor file of your own"));
     }
     let options = Options { strict: args.strict, tcp: args.tcp };
     let (mut generated, findings) = program::generate(&machine, &spec, &options)?;

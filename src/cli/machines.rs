@@ -5,6 +5,7 @@ use super::{Answer, Io};
 use crate::diag::Result;
 use crate::machine::{Axis, Carrier, Machine, Side};
 use crate::report::fit::{number, table};
+use crate::units::um_from_mm;
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::PathBuf;
@@ -72,7 +73,8 @@ fn show(m: &Machine, io: &Io) {
             number(if a.name.is_rotary() { format!("{:+}", a.sense) } else { "-".into() }),
             number(format!("{low} … {high} {}", if a.name.is_rotary() { "deg" } else { "mm" })),
             number(if a.name.is_rotary() {
-                crate::units::um_from_mm(a.indexing_repeatability_mm).to_string()
+                let assumed = if m.assumed_indexing.contains(&a.name) { " (assumed)" } else { "" };
+                format!("{}{assumed}", um_from_mm(a.indexing_repeatability_mm))
             } else {
                 "-".into()
             }),
@@ -118,7 +120,9 @@ fn as_json(m: &Machine) -> serde_json::Value {
             json!({ "name": a.name, "side": if a.side == Side::Tool { "tool" } else { "workpiece" },
                 "kind": if a.name.is_rotary() { "rotary" } else { "linear" },
                 "direction": a.direction.as_slice(), "point_mm": a.point.as_slice(), "sense": a.sense, "range": a.range,
-                "range_machine": machine_range(m, a) })
+                "range_machine": machine_range(m, a),
+                "indexing_repeatability_um": a.name.is_rotary().then(|| um_from_mm(a.indexing_repeatability_mm)),
+                "indexing_repeatability_assumed": m.assumed_indexing.contains(&a.name) })
         })
         .collect();
     let mountings: Vec<_> = m

@@ -1,9 +1,10 @@
 //! `axiscal parse`: a controller's log → the touches CSV.
 
-use super::common::load_machine;
+use super::common::finding_record;
+use super::load::load_plan_and_machine;
 use super::{Answer, Io};
 use crate::axes::AxisName;
-use crate::diag::{Result, source};
+use crate::diag::Result;
 use crate::files;
 use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch};
 use crate::machine::Machine;
@@ -53,6 +54,8 @@ struct Parsed<'a> {
     elsewhere: usize,
     missing: Vec<u64>,
     touches: Vec<serde_json::Value>,
+    /// What was noticed while reading.
+    findings: Vec<serde_json::Value>,
 }
 
 /// Runs `parse`.
@@ -60,10 +63,7 @@ struct Parsed<'a> {
 /// # Errors
 /// When the plan, the machine or the log is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let plan_source = source(args.plan.display().to_string(), files::read_text(&args.plan)?);
-    let (plan, findings) = Plan::parse(&plan_source)?;
-    io.report(&findings.0);
-    let machine = load_machine(&plan.machine, args.machines.as_deref(), io)?;
+    let (plan, machine) = load_plan_and_machine(&args.plan, args.machines.as_deref(), io)?;
     let (reader, findings) = log::Reader::load(&args.controller, files::read_text)?;
     io.report(&findings);
     let bytes = files::read_bytes(&args.log)?;
@@ -77,7 +77,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(out) = &args.out {
         io.say(format!("touches written to {}", out.display()));
     }
-    io.answer(&answer(&machine, &plan, &read));
+    let findings = findings.0.iter().map(finding_record).collect();
+    io.answer(&Parsed { findings, ..answer(&machine, &plan, &read) });
     Ok(Answer::Done)
 }
 
@@ -122,6 +123,7 @@ fn answer<'a>(machine: &Machine, plan: &'a Plan, read: &MatchedLog) -> Parsed<'a
         elsewhere: count(Status::Elsewhere),
         missing: plan.touches.iter().map(|t| t.id).filter(|id| !have.contains(id)).collect(),
         touches: touches.collect(),
+        findings: Vec::new(),
     }
 }
 

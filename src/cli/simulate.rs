@@ -137,11 +137,16 @@ fn reported<T>((value, findings): (T, Findings), io: &Io) -> T {
 fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Findings)> {
     let file = if path.is_dir() { path.join("compensation.json") } else { path.to_path_buf() };
     let text = source(file.display().to_string(), files::read_text(&file)?);
+    // one check of the file, whoever reads it
+    let record = crate::tables::compensation::Compensation::read(&text)?;
+    let said = record.check_belongs(machine, &record.controller)?;
     let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
-    Compensation::parse_with(&text, machine, &|name| {
+    let (loaded, mut findings) = Compensation::parse_with(&text, machine, &|name| {
         let beside = folder.join(name);
         Ok(source(beside.display().to_string(), files::read_text(&beside)?))
-    })
+    })?;
+    findings.0.extend(said.0);
+    Ok((loaded, findings))
 }
 
 /// The touches as a CSV holds them; every simulated touch has its number.

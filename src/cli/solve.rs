@@ -6,17 +6,17 @@ use super::{Answer, Io, add};
 use crate::compare::told;
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
-use crate::diagnose::words::{self, list, one_of};
-use crate::diagnose::{Options, Subject, Verdict, diagnose};
-use crate::fit::outcome::{Outcome, Parameter, Status};
-use crate::fit::{self, Fit};
+use crate::diagnose::solving::{self, Added, Change, Host, Refusal, Request, State, Stop, Visited, Why};
+use crate::diagnose::words::{list, one_of};
+use crate::diagnose::{Options, Verdict};
+use crate::fit::Fit;
+use crate::fit::outcome::{Outcome, Parameter};
 use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
-use nalgebra::{DMatrix, DVector};
+use crate::search::groups::PLAUSIBLE;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::io::{BufRead, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `solve`.
 #[derive(Debug, clap::Args)]
@@ -31,26 +31,29 @@ pub struct Args {
     pub at_most: usize,
 }
 
-/// An effect whose size has at least this chance under pure noise says nothing any more beside the later ones.
-const DROP_P: f64 = 0.05;
-
 /// What was done.
 #[derive(Debug, Serialize)]
 struct Solution {
     format: &'static str,
+    /// Effects that were added and are in the model.
     steps: Vec<Step>,
     /// Why the loop ended.
     stopped: String,
-    /// The last verdict.
+    /// Verdict of the last model, which is the study's.
     verdict: Verdict,
-    /// Effects that were added and say nothing beside the later ones: they were taken out again.
+    /// The same in a sentence.
+    says: String,
+    /// Every model that was in force, the first one first and the last one last.
+    models: Vec<Visited>,
+    /// Effects that were added and removed again: the model without them is as good.
     dropped: Vec<String>,
-    /// Effects that were added and taken out again, because the end was not what they had promised.
+    /// Effects that were added and removed again, because the end was not what they had promised.
     taken_back: Vec<String>,
     /// What stays open.
     open: Vec<String>,
     rms_um: f64,
     noise_um: f64,
+    chi2_per_dof: f64,
     held_out_rms_um: Option<f64>,
     effects: Vec<String>,
 }
@@ -69,17 +72,73 @@ struct Step {
     p_adjusted: f64,
     rms_before_um: f64,
     rms_after_um: f64,
-    /// On touches that had no part in choosing the effect (the choice redone for each index visit left out).
+    /// Cross-validated error of the model before it.
     held_out_before_um: Option<f64>,
+    /// With it, on touches that had no part in choosing it (the choice redone for each index position left out).
     held_out_after_um: Option<f64>,
     /// Standard error of the difference.
     held_out_se_um: Option<f64>,
 }
 
-/// What the user says to a proposal.
-enum Reply {
-    Take(String),
-    Stop,
+impl Step {
+    fn of(added: &Added) -> Self {
+        let Added { id, proposal, name_in_doubt, rms_um } = added;
+        let mut same_as: Vec<String> = std::iter::once(&proposal.effect).chain(&proposal.same_as).cloned().collect();
+        same_as.retain(|s| s != id);
+        Self {
+            found: found_as(id, &same_as, proposal.or_else.as_deref(), *name_in_doubt),
+            added: id.clone(),
+            same_as,
+            never_parted: proposal.never_parted,
+            p_adjusted: proposal.p_adjusted,
+            rms_before_um: rms_um.0,
+            rms_after_um: rms_um.1,
+            held_out_before_um: proposal.held_out_before_um,
+            held_out_after_um: proposal.held_out_after_um,
+            held_out_se_um: proposal.held_out_se_um,
+        }
+    }
+}
+
+/// The terminal and the study.
+struct Terminal<'a> {
+    args: &'a Args,
+    io: &'a Io,
+}
+
+impl Host for Terminal<'_> {
+    fn looked(&mut self, state: &State, added: &[Added]) -> Result<()> {
+        let (o, found) = (&state.fit.outcome, &state.found);
+        self.io.say(format!(
+            "--- step {}: {} um RMS left, noise {} um, chi2/dof {:.2}{}",
+            added.len() + 1,
+            significant(o.rms_um),
+            significant(o.noise_um),
+            o.chi2_per_dof,
+            cross_validated(found)
+        ));
+        self.io.say(&found.says);
+        Ok(())
+    }
+
+    fn agree(&mut self, proposal: &Candidate) -> Result<Option<String>> {
+        propose(proposal, self.io);
+        ask(proposal, self.args.yes)
+    }
+
+    fn change(&mut self, change: &Change, added: &[Added]) -> Result<()> {
+        let of = |effects: Vec<String>| add::Args { study: self.args.study.clone(), effects, dry_run: false };
+        match change {
+            Change::Add(id, nested_rms_um) => {
+                add::add_chosen(&of(vec![id.clone()]), &self.io.inner(), *nested_rms_um)?;
+            }
+            Change::Remove(ids, why) => {
+                self.io.say(leaves(ids, why, added));
+                add::remove(&of(ids.clone()), &self.io.inner())?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Runs `solve`. The answer is "no" when something is left that nothing explains.
@@ -87,133 +146,42 @@ enum Reply {
 /// # Errors
 /// When the study is unusable, or nobody is there to agree.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let mut steps: Vec<Step> = Vec::new();
-    let mut taken_back: Vec<String> = Vec::new();
-    let (loaded, fit, found, stopped) = loop {
-        let (loaded, fit) = look(&args.study, io)?;
-        let o = &fit.outcome;
-        io.say(format!(
-            "--- step {}: {} um RMS left, noise {} um, chi2/dof {:.2}{}",
-            steps.len() + 1,
-            significant(o.rms_um),
-            significant(o.noise_um),
-            o.chi2_per_dof,
-            left_out(&fit)
-        ));
-        let mut settings = loaded.settings();
-        settings.quick = true;
-        let subject =
-            Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-        let planned = loaded.planned();
-        let found = diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?;
-        io.say(&found.says);
-        let mistake = found.mistake();
-        let stopped = match (&found.verdict, found.candidates.first()) {
-            _ if mistake.is_some() => Some(format!(
-                "a gross mistake must be put right first, and the touches made again: {}",
-                mistake.unwrap_or_default()
-            )),
-            (Verdict::MissingEffect, Some(first)) if first.proposed => {
-                if let Some(why) = unbelievable(first) {
-                    Some(why)
-                } else if steps.len() >= args.at_most {
-                    Some(format!("{} effects were added, as many as --at-most allows", steps.len()))
-                } else {
-                    propose(first, io);
-                    match ask(first, args.yes)? {
-                        Reply::Take(id) => {
-                            let change =
-                                add::Args { study: args.study.clone(), effects: vec![id.clone()], dry_run: false };
-                            add::add_chosen(&change, &io.inner(), first.held_out_after_um.filter(|_| first.nested))?;
-                            let after_fit = look(&args.study, io)?.1;
-                            let added: Vec<&str> =
-                                steps.iter().map(|s| s.added.as_str()).chain([id.as_str()]).collect();
-                            let refused = refused(&after_fit, &added);
-                            let after = after_fit.outcome;
-                            let mut same_as: Vec<String> =
-                                std::iter::once(first.effect.clone()).chain(first.same_as.clone()).collect();
-                            same_as.retain(|s| *s != id);
-                            if refused.is_some() {
-                                add::remove(&change, &io.inner())?;
-                                taken_back.push(id);
-                                break (loaded, fit, found, refused.unwrap_or_default());
-                            }
-                            steps.push(Step {
-                                found: found_as(&id, &same_as, first.or_else.as_deref(), found.name_in_doubt),
-                                added: id,
-                                same_as,
-                                never_parted: first.never_parted,
-                                p_adjusted: first.p_adjusted,
-                                rms_before_um: o.rms_um,
-                                rms_after_um: after.rms_um,
-                                held_out_before_um: first.held_out_before_um,
-                                held_out_after_um: first.held_out_after_um,
-                                held_out_se_um: first.held_out_se_um,
-                            });
-                            None
-                        }
-                        Reply::Stop => Some("you stopped it".to_owned()),
-                    }
-                }
-            }
-            (Verdict::Unexplained, _) if found.faint => {
-                Some("what is left is as small as the noise, but for a pattern too faint to name".to_owned())
-            }
-            (Verdict::Unexplained, Some(first)) if found.in_question().is_some() => {
-                let (beside, add) = beside(&steps, &loaded);
-                Some(format!(
-                    "{} passes the test{beside}, but touches that had no part in choosing it are not predicted better with it: \
-                     {add}`{}` looks for touches that tell",
-                    one_of(&first.effect, &first.same_as),
-                    super::next::plan_next(&loaded)
-                ))
-            }
-            (Verdict::Unexplained, _) if found.sketchable => {
-                let (beside, add) = beside(&steps, &loaded);
-                Some(format!(
-                    "no known effect explains what is left{beside}: {add}`{}` writes its curve as a formula",
-                    super::next::sketch_effect(&loaded)
-                ))
-            }
-            (Verdict::Unexplained, _) => Some(format!(
-                "no known effect explains what is left{}: {}",
-                beside(&steps, &loaded).0,
-                words::at_the_machine(&found)
-            )),
-            (Verdict::TooLittleData, _) => Some("too few touches to judge".to_owned()),
-            (Verdict::MissingEffect, _) => Some("what is missing is not borne out".to_owned()),
-            _ => Some("nothing is left that these touches can show".to_owned()),
-        };
-        if let Some(stopped) = stopped {
-            break (loaded, fit, found, stopped);
-        }
+    let loaded = load_study(&args.study, &io.inner())?;
+    let (settings, planned) = (loaded.settings(), loaded.planned());
+    let request = Request {
+        machine: &loaded.machine,
+        catalogue: &loaded.catalogue,
+        settings: &settings,
+        fit: &|settings| loaded.fit(settings),
+        options: Options { planned: Some(&planned), ..Options::default() },
+        at_most: args.at_most,
     };
-    // names that end in something unexplained were names for a part of it, and may all be wrong
-    let unexplained = found.verdict == Verdict::Unexplained && !found.faint;
-    if unexplained && !steps.is_empty() {
-        let each = |s: &Step| {
-            format!("{}: {} > {} um RMS", s.added, significant(s.rms_before_um), significant(s.rms_after_um))
-        };
-        let found: Vec<String> = steps.iter().map(each).collect();
-        let added: Vec<String> = steps.drain(..).map(|s| s.added).collect();
-        io.say(format!("what was added ({}) is not all that is there: it is taken out again", found.join("; ")));
-        let change = add::Args { study: args.study.clone(), effects: added.clone(), dry_run: false };
-        add::remove(&change, &io.inner())?;
-        taken_back.extend(added);
+    let ending = solving::solve(request, &mut Terminal { args, io })?;
+    let solving::Ending { state: State { fit, found }, models, added, dropped, taken_back, stop } = ending;
+    if load_study(&args.study, &io.inner())?.study.effects != fit.outcome.effects {
+        return Err(Failure::new("study::changed", format!("{} was changed meanwhile", args.study.display()))
+            .help("its model is not the one that was fitted last: call `axiscal solve` again"));
     }
-    let dropped = drop_idle(args, &steps, &fit, io)?;
-    let same = dropped.is_empty() && taken_back.is_empty();
-    let fit = if same { fit } else { look(&args.study, io)?.1 };
+    // what was added and taken back is what the reason speaks of
+    let beside: Vec<&str> = match added.is_empty() {
+        true => taken_back.iter().map(String::as_str).collect(),
+        false => added.iter().map(|a| a.id.as_str()).collect(),
+    };
+    let stopped = stopped(&stop, &beside, &loaded);
+    let steps: Vec<Step> = added.iter().map(Step::of).collect();
     let solution = Solution {
         format: "axiscal-solution/1",
         open: open(&steps, &found, &fit.outcome),
         verdict: found.verdict,
+        says: found.says.clone(),
+        models,
         stopped,
         dropped,
         taken_back,
         rms_um: fit.outcome.rms_um,
         noise_um: fit.outcome.noise_um,
-        held_out_rms_um: fit.outcome.held_out_rms_um,
+        chi2_per_dof: fit.outcome.chi2_per_dof,
+        held_out_rms_um: found.held_out_rms_um,
         effects: fit.outcome.effects.clone(),
         steps,
     };
@@ -223,79 +191,81 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     Ok(if no { Answer::No } else { Answer::Done })
 }
 
-fn look(study: &Path, io: &Io) -> Result<(Loaded, Fit)> {
-    let loaded = load_study(study, &io.inner())?;
-    let fit = loaded.fit(&loaded.settings())?;
-    Ok((loaded, fit))
+/// The model's cross-validated error, in words.
+fn cross_validated(found: &Diagnosis) -> String {
+    let Some(rms_um) = found.held_out_rms_um else { return String::new() };
+    let se = found.held_out_se_um;
+    let doubt = se.map_or_else(String::new, |se| format!(" ± {} (one standard error)", digits(se, Some(se))));
+    format!(", {}{doubt} um on index visits left out", digits(rms_um, se))
 }
 
-/// What the model leaves of index visits that were left out of the fit, in words.
-fn left_out(fit: &Fit) -> String {
-    let Some(h) = fit::held_out::by_visit(fit) else { return String::new() };
-    let se =
-        h.standard_error_um.map_or_else(String::new, |se| format!(" ± {} (one standard error)", digits(se, Some(se))));
-    format!(", {}{se} um on index visits left out", digits(h.rms_um, h.standard_error_um))
+/// Why the loop ended, in words.
+fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
+    let (beside, add) = beside(added, loaded);
+    match stop {
+        Stop::Mistake(mistake) => {
+            format!("a gross mistake must be put right first, and the touches made again: {mistake}")
+        }
+        Stop::TooLarge(effect) => format!(
+            "the first proposal ({effect}) would need more than {PLAUSIBLE:.0} times its usual size: it may be a name for something \
+             else. `axiscal add` puts it in if you know better"
+        ),
+        Stop::AtMost(n) => format!("{n} effects were added, as many as --at-most allows"),
+        Stop::Refused(refusal) => not_credible(refusal),
+        Stop::ByUser => "you stopped it".to_owned(),
+        Stop::Faint => "what is left is as small as the noise, but for a pattern too faint to name".to_owned(),
+        Stop::InQuestion(first) => format!(
+            "{} passes the test{beside}, but touches that had no part in choosing it are not predicted better with it: \
+             {add}`{}` looks for touches that tell",
+            one_of(&first.effect, &first.same_as),
+            super::next::plan_next(loaded)
+        ),
+        Stop::Sketchable => format!(
+            "no known effect explains what is left{beside}: {add}`{}` writes its curve as a formula",
+            super::next::sketch_effect(loaded)
+        ),
+        Stop::Unexplained(check) => format!("no known effect explains what is left{beside}: {check}"),
+        Stop::TooLittleData => "too few touches to judge".to_owned(),
+        Stop::NotConfirmed => "what is missing is not borne out".to_owned(),
+        Stop::Nothing => "nothing is left that these touches can show".to_owned(),
+    }
 }
 
-/// Why nobody should believe a proposal: a size far beyond what such an effect has, as names get that stand for another one.
-fn unbelievable(first: &Candidate) -> Option<String> {
-    (!first.plausible).then(|| {
-        format!(
-            "the first proposal ({}) would need more than {:.0} times its usual size: it may be a name for something else. \
-             `axiscal add` puts it in if you know better",
-            first.effect,
-            crate::search::groups::PLAUSIBLE
-        )
-    })
+/// Why an effect was not kept, in words.
+fn not_credible(refusal: &Refusal) -> String {
+    match refusal {
+        Refusal::TooLarge { effect, parameter, times } => format!(
+            "{effect} is taken back: its {parameter} would be {times:.0} times as large as such an effect usually is"
+        ),
+        Refusal::Together { effect, other, parameters: [a, b], r } => format!(
+            "{effect} is taken back: these touches cannot tell its size from that of {other} ({a} and {b} go together with a \
+             correlation of {r:.3}), so that the two may cancel"
+        ),
+    }
 }
 
-/// Sizes of two added effects that go together like this are those of two names for one thing, or of two that cancel.
-const TOGETHER: f64 = 0.99;
-
-/// Why a model with these added effects is not to be believed, after the full fit.
-fn refused(fit: &Fit, added: &[&str]) -> Option<String> {
-    // where a combination leaves no trace the values of its members are a convention, and no sizes
-    let is_told = |i: usize| {
-        let u = &fit.model.unknowns[i];
-        let is = |p: &Parameter| p.name == u.name && p.effect == u.effect && p.status == Status::Identified;
-        fit.outcome.parameters.iter().any(is)
-    };
-    let of: Vec<usize> = fit
-        .free
-        .iter()
-        .copied()
-        .filter(|&i| added.contains(&fit.model.unknowns[i].effect.as_str()) && !fit.model.unknowns[i].shape)
-        .filter(|&i| is_told(i))
-        .collect();
-    let last = added.last()?;
-    for &i in of.iter().filter(|&&i| fit.model.unknowns[i].effect == *last) {
-        let u = &fit.model.unknowns[i];
-        let times = (fit.theta[i] / u.typical).abs();
-        let sure = fit.theta[i].abs() > 2.0 * fit.covariance[(i, i)].max(0.0).sqrt();
-        if u.typical > 0.0 && sure && times > crate::search::groups::PLAUSIBLE {
-            return Some(format!(
-                "{last} is taken back: its {} would be {times:.0} times as large as such an effect usually is",
-                u.name
-            ));
+/// Why effects are removed from the model, in words.
+fn leaves(ids: &[String], why: &Why, added: &[Added]) -> String {
+    match why {
+        Why::Refused(refusal) => not_credible(refusal),
+        Why::Worse => {
+            let each =
+                |a: &Added| format!("{}: {} > {} um RMS", a.id, significant(a.rms_um.0), significant(a.rms_um.1));
+            let all: Vec<String> = added.iter().map(each).collect();
+            format!("The added effects ({}) do not explain all of the error. They are removed again.", all.join("; "))
+        }
+        Why::Idle(as_good) => {
+            let (fall, se) = as_good.fall_um;
+            format!(
+                "{} is no longer needed and is removed: the model without it fits as well (p = {:.2}), and its cross-validated \
+                 error changes by {} ± {} um.",
+                ids.join(", "),
+                as_good.p,
+                digits(fall, Some(se)),
+                digits(se, Some(se))
+            )
         }
     }
-    for (k, &i) in of.iter().enumerate() {
-        for &j in &of[..k] {
-            let (a, b) = (&fit.model.unknowns[i], &fit.model.unknowns[j]);
-            let scale = (fit.covariance[(i, i)] * fit.covariance[(j, j)]).max(0.0).sqrt();
-            let r = if scale > 0.0 { fit.covariance[(i, j)] / scale } else { 0.0 };
-            if a.effect != b.effect && r.abs() > TOGETHER {
-                return Some(format!(
-                    "{last} is taken back: these touches cannot tell its size from that of {} ({} and {} go together with a \
-                     correlation of {r:.3}), so that the two may cancel",
-                    if a.effect == *last { &b.effect } else { &a.effect },
-                    a.name,
-                    b.name
-                ));
-            }
-        }
-    }
-    None
 }
 
 /// The proposal and its reason.
@@ -345,9 +315,9 @@ fn propose(first: &Candidate, io: &Io) {
 }
 
 /// Asks on the terminal; the first of the group is taken with `--yes`.
-fn ask(first: &Candidate, yes: bool) -> Result<Reply> {
+fn ask(first: &Candidate, yes: bool) -> Result<Option<String>> {
     if yes {
-        return Ok(Reply::Take(first.effect.clone()));
+        return Ok(Some(first.effect.clone()));
     }
     if !std::io::stdin().is_terminal() {
         return Err(Failure::new("solve::nobody", "nobody is there to agree: the input is no terminal")
@@ -364,14 +334,14 @@ fn ask(first: &Candidate, yes: bool) -> Result<Reply> {
         let _ = write!(std::io::stderr(), "{choice}: ");
         let mut line = String::new();
         if std::io::stdin().lock().read_line(&mut line).unwrap_or(0) == 0 {
-            return Ok(Reply::Stop);
+            return Ok(None);
         }
         match line.trim().to_lowercase().as_str() {
-            "" | "y" | "yes" => return Ok(Reply::Take(first.effect.clone())),
-            "n" | "no" | "q" => return Ok(Reply::Stop),
+            "" | "y" | "yes" => return Ok(Some(first.effect.clone())),
+            "n" | "no" | "q" => return Ok(None),
             word => {
                 if let Some(member) = word.parse::<usize>().ok().and_then(|n| members.get(n.wrapping_sub(1))) {
-                    return Ok(Reply::Take((*member).clone()));
+                    return Ok(Some((*member).clone()));
                 }
             }
         }
@@ -380,39 +350,12 @@ fn ask(first: &Candidate, yes: bool) -> Result<Reply> {
 
 /// What was added before something is left that nothing explains, in words: it is taken out again, and what is said of the rest
 /// holds beside it only.
-fn beside(steps: &[Step], loaded: &Loaded) -> (String, String) {
-    if steps.is_empty() {
+fn beside(added: &[&str], loaded: &Loaded) -> (String, String) {
+    if added.is_empty() {
         return (String::new(), String::new());
     }
-    let added: Vec<&str> = steps.iter().map(|s| s.added.as_str()).collect();
     let study = super::next::quoted(&loaded.path);
     (format!(" beside {}", added.join(", ")), format!("`axiscal add {study} {}` and then ", added.join(" ")))
-}
-
-/// Effects that the loop added and that say nothing any more beside the later ones (Wald), taken out again.
-fn drop_idle(args: &Args, steps: &[Step], fit: &Fit, io: &Io) -> Result<Vec<String>> {
-    let mut dropped = Vec::new();
-    // the last one was needed a moment ago
-    for step in steps.iter().rev().skip(1) {
-        let of: Vec<usize> = fit.free.iter().copied().filter(|&i| fit.model.unknowns[i].effect == step.added).collect();
-        let linear: Vec<usize> = of.into_iter().filter(|&i| !fit.model.unknowns[i].shape).collect();
-        let theta = DVector::from_iterator(linear.len(), linear.iter().map(|&i| fit.theta[i]));
-        let c = DMatrix::from_fn(linear.len(), linear.len(), |a, b| fit.covariance[(linear[a], linear[b])]);
-        let Some(weight) = c.try_inverse() else { continue };
-        let size2 = theta.dot(&(weight * &theta));
-        let p = ChiSquared::new(linear.len() as f64).map_or(0.0, |d| d.sf(size2));
-        if p > DROP_P {
-            io.say(format!(
-                "{} says nothing any more beside the later effects (p = {p:.2}): it is taken out",
-                step.added
-            ));
-            let change = add::Args { study: args.study.clone(), effects: vec![step.added.clone()], dry_run: false };
-            add::remove(&change, &io.inner())?;
-            dropped.push(step.added.clone());
-            break;
-        }
-    }
-    Ok(dropped)
 }
 
 /// What nobody knows yet.

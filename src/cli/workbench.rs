@@ -176,7 +176,9 @@ impl Host for Desk {
                 vec!["plan-next".into(), study, "--out".into(), out, "--controller".into(), controller.clone(), minutes]
             }
             Verb::Export(controller) => {
-                vec!["export".into(), study, "--out".into(), out, "--controller".into(), controller.clone()]
+                // the page says beside the button what that accepts
+                let accept = "--accept-unverified".into();
+                vec!["export".into(), study, "--out".into(), out, "--controller".into(), controller.clone(), accept]
             }
         };
         run_verb(&words, folder)

@@ -131,9 +131,8 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let mut parameters = parameters;
     let of_shapes = shapes(task, &view, &mut parameters);
     for p in &mut parameters {
-        let equal = effects
-            .iter()
-            .filter(|e| !e.visible && e.habits.is_empty() && held_by(&e.absorbed_by) == Some(p.name.as_str()));
+        // where the lines of two axes miss each other, a turn about the first moves the second in more than one way
+        let equal = effects.iter().filter(|e| !e.visible && e.habits.is_empty() && e.absorbed_by.contains(&p.name));
         p.holds = equal.map(|e| e.effect.clone()).collect();
     }
     let groups = groups(&effects);
@@ -256,12 +255,6 @@ impl Absorbed {
 /// The blocks' set-up among the parameters that take an effect.
 const SET_UPS: &str = "the set-up of the blocks";
 
-/// The one parameter, beside the set-up of the blocks, that takes an effect.
-fn held_by(absorbed_by: &[String]) -> Option<&str> {
-    let mut results = absorbed_by.iter().filter(|n| *n != SET_UPS);
-    results.next().filter(|_| results.next().is_none()).map(String::as_str)
-}
-
 fn minutes(seconds: f64) -> String {
     // as the report says it of the same touches
     format!("{:.0} min", (seconds / 60.0).round().max(1.0))
@@ -299,7 +292,7 @@ fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String], blind
             );
             (says, found.iter().map(|t| t.habit.id.clone()).collect())
         }
-        None if held_by(absorbed_by).is_some() => (
+        None if absorbed_by.iter().any(|name| name != SET_UPS) => (
             format!(
                 "not observable with these or any varied touches: it is one number with {}",
                 absorbed_by.join(" and ")

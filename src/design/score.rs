@@ -126,9 +126,13 @@ pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
 /// How many effects leave no trace, as the list of effects counts them, and which of them no touches would show.
 fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
     let all: Vec<&super::record::Seen> = a.effects.iter().filter(|e| !e.visible).collect();
-    let held = a.parameters.iter().filter(|p| !p.holds.is_empty());
-    let mut not_counted: Vec<String> =
-        held.map(|p| format!("{}, which {} holds", p.holds.join(", "), p.name)).collect();
+    let held = all.iter().filter_map(|e| {
+        let by: Vec<&str> =
+            a.parameters.iter().filter(|p| p.holds.contains(&e.effect)).map(|p| p.name.as_str()).collect();
+        let verb = if by.len() == 1 { "holds" } else { "hold" };
+        (!by.is_empty()).then(|| format!("{}, which {} {verb}", e.effect, by.join(", ")))
+    });
+    let mut not_counted: Vec<String> = held.collect();
     let still = all.iter().filter(|e| e.typical_um <= 0.0 && !equal(&e.effect));
     let still: Vec<&str> = still.map(|e| e.effect.as_str()).collect();
     if !still.is_empty() {

@@ -56,6 +56,10 @@ pub struct Diagnosis {
     pub visits_come_back: bool,
     /// √(Σr²/n) over the touches used, µm.
     pub rms_um: f64,
+    /// Cross-validated error of the model (`fit::held_out::by_visit`), µm: the same figure as in every other answer.
+    pub held_out_rms_um: Option<f64>,
+    /// Standard error of that, µm.
+    pub held_out_se_um: Option<f64>,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,
     /// Scatter of index visits that the tests allow for, µm.
@@ -89,6 +93,9 @@ pub struct Diagnosis {
     pub needs_temperature: Vec<String>,
     /// Effects that leave no trace in these touches.
     pub not_seen: Vec<String>,
+    /// By how much each result could be wrong because of what is missing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub consequences: Vec<super::consequence::Consequence>,
     /// What is left open, for a further program.
     #[serde(skip)]
     pub open: super::open::Open,
@@ -197,9 +204,9 @@ pub struct Candidate {
     pub proposed: bool,
     /// RMS with it in the model, µm.
     pub rms_after_um: f64,
-    /// RMS on touches of set-ups that had no part in fit and choice, µm.
+    /// Cross-validated error of the model without it, µm: the model's one figure.
     pub held_out_before_um: Option<f64>,
-    /// The same with it.
+    /// The same with it, on the same touches; they had no part in its choice where `nested` says so.
     pub held_out_after_um: Option<f64>,
     /// Standard error of the difference of the two, µm.
     pub held_out_se_um: Option<f64>,

@@ -3,6 +3,7 @@
 
 use crate::fit::Fit;
 use crate::fit::whitening::Whitening;
+use crate::search::held_out::Colours;
 use crate::search::{Basis, PureError, Question};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -84,10 +85,10 @@ impl Evidence {
         Question { residual: &self.residual, base: &self.base, pure: self.pure }
     }
 
-    /// What turns whitened errors of a visit's rows back into µm of its touches, by number of the visit. Whitening mixes
+    /// What turns whitened rows of a visit back into µm of its touches, by number of the visit. Whitening mixes
     /// touches of one visit only, so that one column for each place in a visit shows it whole.
     #[must_use]
-    pub fn colours_um(&self, fit: &Fit) -> HashMap<usize, DMatrix<f64>> {
+    pub fn colours_um(&self, fit: &Fit) -> Colours {
         let mut rows: HashMap<usize, Vec<usize>> = HashMap::new();
         for (row, visit) in self.visits.iter().enumerate() {
             rows.entry(*visit).or_default().push(row);
@@ -105,7 +106,7 @@ impl Evidence {
             let block = DMatrix::from_fn(n, n, |a, b| white[(of[a], b)]);
             Some((visit, block.try_inverse()?))
         });
-        each.collect()
+        Colours { by_group: each.collect(), sigma: crate::units::um_from_mm(fit.noise.sigma_mm) }
     }
 
     /// Columns of gaps (all observations × columns, mm) as rows of this regression.

@@ -97,35 +97,36 @@ fn faces(fit: &Fit) -> Vec<usize> {
         .collect()
 }
 
-/// Turns about the rotary axes: their lever arms are the model's own.
+/// Turns of the rotary axes about their own line and tilts of it: their lever arms are the model's own.
 fn turns(fit: &Fit, machine: &Machine) -> Vec<Direction> {
-    let dof = |axis: AxisName| match axis {
+    const DOFS: [&str; 3] = ["rx", "ry", "rz"];
+    let own = |axis: AxisName| match axis {
         AxisName::A => "rx",
         AxisName::B => "ry",
         _ => "rz",
     };
     let mut out = Vec::new();
     for axis in machine.rotary() {
-        let text = format!(
-            "[[effect]]\nid = \"turn\"\nat = \"{0}\"\nterms = [{{ parameter = \"turn\", unit = \"urad\", dof = \"{1}\", formula = \"1\" }}]",
-            axis.name,
-            dof(axis.name)
-        );
-        let mut own = Catalogue::default();
-        if own.add_file(&crate::diag::source("turn", text)).is_err() {
+        // 1 everywhere, and still an error motion: a constant would say where the line is, at the reference point
+        let one = format!("1 + 0*{}", axis.name);
+        let term = |dof| format!("{{ parameter = \"{dof}\", unit = \"urad\", dof = \"{dof}\", formula = \"{one}\" }}");
+        let terms = DOFS.map(term).join(", ");
+        let text = format!("[[effect]]\nid = \"turn\"\nat = \"{}\"\nterms = [{terms}]", axis.name);
+        let mut catalogue = Catalogue::default();
+        if catalogue.add_file(&crate::diag::source("turn", text)).is_err() {
             continue;
         }
-        let Some(effect) = own.get("turn", machine) else { continue };
+        let Some(effect) = catalogue.get("turn", machine) else { continue };
         let made = columns(machine, &[effect], &fit.data, &fit.data.observations, fit.model.reference, None);
-        let weight: Vec<f64> = made.values.column(0).iter().map(|v| um_from_mm(*v)).collect();
-        if weight.iter().any(|w| w.abs() > 1e-6) {
-            out.push(Direction {
-                name: format!("turn-{}", axis.name),
-                at: axis.name.to_string(),
-                dof: dof(axis.name).to_owned(),
-                unit: "urad".to_owned(),
-                weight,
-            });
+        for (i, dof) in DOFS.into_iter().enumerate() {
+            let weight: Vec<f64> = made.values.column(i).iter().map(|v| um_from_mm(*v)).collect();
+            if weight.iter().any(|w| w.abs() > 1e-6) {
+                let about = dof.trim_start_matches('r').to_uppercase();
+                let is_own = dof == own(axis.name);
+                let name = if is_own { format!("turn-{}", axis.name) } else { format!("tilt-{}-{about}", axis.name) };
+                let (at, dof, unit) = (axis.name.to_string(), dof.to_owned(), "urad".to_owned());
+                out.push(Direction { name, at, dof, unit, weight });
+            }
         }
     }
     out
@@ -147,6 +148,10 @@ pub fn direction_words(name: &str, machine: &Machine) -> String {
             if turns { format!("in {axis} of the table, turning with it") } else { format!("in {axis} of the table") }
         }
         Some(("turn", axis)) => format!("as a turn about {axis}"),
+        Some(("tilt", which)) => {
+            let (axis, about) = which.split_once('-').unwrap_or((which, ""));
+            format!("as a tilt of {axis} about {about}")
+        }
         _ => "along the approach".to_owned(),
     }
 }

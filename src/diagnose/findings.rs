@@ -12,7 +12,6 @@ use crate::model::formula::slot;
 use crate::search::dependence::Dependence;
 use crate::search::generic::{Direction, Features, Kind};
 use crate::search::groups::Group;
-use crate::search::held_out::{Choice, held_out_in};
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::power;
 use crate::units::{mm_from_um, um_from_mm};
@@ -214,10 +213,13 @@ pub(super) fn put_together(
         blocks,
         faint: false,
         most_missed: false,
+        consequences: Vec::new(),
         name_in_doubt: false,
         untold: false,
         visits_come_back: words::visits_come_back(fit),
         rms_um: fit.outcome.rms_um,
+        held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
+        held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
         visit_source: fit.noise.visit_source.to_owned(),
@@ -414,16 +416,11 @@ fn candidate(
     let p_adjusted = tests().map(|s| s.p_adjusted).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
     let held = if first && seen.search.leader().is_some() {
-        seen.nested.clone()
+        seen.folds.chosen(seen.evidence, seen.named, &seen.nested)
     } else {
-        held_out_in(
-            seen.evidence.question(),
-            &seen.named.library.only(chosen),
-            &seen.evidence.visits,
-            Choice::Given(0),
-            &|visit, e| seen.colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e),
-        )
+        seen.folds.given(seen.evidence, seen.named, chosen)
     };
+    let errors = seen.folds.errors(&held);
     let told = told(&score.covariance);
     // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
     let tested = &seen.search.scores[chosen];
@@ -472,9 +469,9 @@ fn candidate(
         p_adjusted,
         proposed: first && borne_out && p_adjusted < FAMILY_LEVEL,
         rms_after_um: first_order.rms_um(&raw_mm),
-        held_out_before_um: Some(held.before).filter(|x| x.is_finite()),
-        held_out_after_um: Some(held.after).filter(|x| x.is_finite()),
-        held_out_se_um: Some(held.fall_error).filter(|x| x.is_finite()),
+        held_out_before_um: errors.before_um,
+        held_out_after_um: errors.after_um,
+        held_out_se_um: errors.fall_se_um,
         nested: first && seen.search.leader().is_some() && !seen.given,
         parameters,
         not_told,

@@ -6,10 +6,12 @@
 //! tell apart stand together; and where nothing fits, the variable is named on which the misfit depends.
 
 pub mod answer;
+pub mod consequence;
 pub mod evidence;
 pub mod features;
 mod findings;
 mod first_order;
+pub mod folds;
 mod gathered;
 pub mod gross;
 mod missed;
@@ -20,6 +22,7 @@ mod own_curve;
 pub mod places;
 mod rivals;
 pub mod sketch;
+pub mod solving;
 mod standing_out;
 mod tell;
 mod untold;
@@ -34,14 +37,13 @@ use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
 use crate::search::generic::{Features, Generics};
 use crate::search::groups::Group;
-use crate::search::held_out::{Choice, HeldOut, held_out_in};
+use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::{LackOfFit, Question, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::{Diagnosis, Verdict};
 use evidence::Evidence;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use named::Named;
-use std::collections::HashMap;
 pub use tell::NEVER as NEVER_PARTED;
 
 /// What is diagnosed.
@@ -101,8 +103,8 @@ pub struct Examination<'a> {
     pub nested: HeldOut,
     /// ... or, where that bears nothing out, the first finding behind it that held-out touches bear out by itself.
     pub given: bool,
-    /// Whitened errors of a visit into µm ([`Evidence::colours_um`]).
-    pub colours_um: HashMap<usize, DMatrix<f64>>,
+    /// What cross-validated errors are worked out from.
+    pub folds: folds::Folds,
 }
 
 /// The same touches with index visits that come back exactly.
@@ -157,15 +159,13 @@ pub fn examine<'a>(
     at_most: usize,
 ) -> Examination<'a> {
     let question = evidence.question();
-    let colours_um = evidence.colours_um(fit);
     let search = Search::new(question, &named.library);
     let (order, ordered, jacobian) = ordering
         .and_then(|o| Some((o.search(&search)?, &o.named, &o.evidence.jacobian)))
         .unwrap_or_else(|| (search.clone(), named, &evidence.jacobian));
-    let colour = |visit: usize, e: &DVector<f64>| colours_um.get(&visit).map_or_else(|| e.clone(), |c| c * e);
-    let nested = held_out_in(question, &named.library, &evidence.visits, Choice::Redone, &colour);
+    let nested = held_out(question, &named.library, &evidence.visits, Choice::Redone);
     let mut groups = order.groups(at_most);
-    let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &colour, &nested);
+    let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
     let given = behind.is_some();
     Examination {
         groups,
@@ -176,7 +176,7 @@ pub fn examine<'a>(
         lack_of_fit: lack_of_fit(&question),
         nested: behind.unwrap_or(nested),
         given,
-        colours_um,
+        folds: folds::Folds::of(fit, evidence, named),
         evidence,
         named,
         search,
@@ -185,13 +185,7 @@ pub fn examine<'a>(
 
 /// Where held-out touches do not bear out the first finding, one behind it that they do comes before it: of two effects that act
 /// at once the stronger may live in a few visits, and predict none of them from the others.
-fn borne_out_behind(
-    groups: &mut [Group],
-    search: &Search,
-    visits: &[usize],
-    colour: crate::search::held_out::Colour,
-    nested: &HeldOut,
-) -> Option<HeldOut> {
+fn borne_out_behind(groups: &mut [Group], search: &Search, visits: &[usize], nested: &HeldOut) -> Option<HeldOut> {
     /// What comes second by chance is never as sure.
     const SURE: f64 = 1e-4;
     if search.leader().is_none() || verdict::bears_out(nested) {
@@ -203,7 +197,7 @@ fn borne_out_behind(
             continue;
         }
         let own = search.library.only(candidate);
-        let mut held = held_out_in(search.question, &own, visits, Choice::Given(0), colour);
+        let mut held = held_out(search.question, &own, visits, Choice::Given(0));
         if held.falls() {
             held.folds.iter_mut().for_each(|f| f.chosen = f.chosen.map(|_| candidate));
             groups[..=place].rotate_right(1);
@@ -299,6 +293,10 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         gross.splice(0..0, missed);
     }
     let mut out = findings::put_together(subject, &seen, &features, (verdict, &beside), gross, options);
+    if out.mistake().is_none() {
+        let of = (out.verdict, beside.gathered.is_some());
+        out.consequences = consequence::consequences(subject, &seen, &generics, of)?;
+    }
     if options.refit
         && let Some(first) = out.candidates.first_mut()
         && (first.proposed || fit.outcome.rejected.iter().any(|r| !r.reason.starts_with("taken out")))

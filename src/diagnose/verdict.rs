@@ -206,6 +206,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
     out.power.clear();
     out.not_seen.clear();
     out.outliers.clear();
+    out.consequences.clear();
     (out.moved_block, out.sketchable) = (None, false);
     out.faces.clear();
     out.blocks.clear();

@@ -241,7 +241,34 @@ pub(super) fn outcome(
         .concat(),
     };
     outcome.warnings.extend(unnamed(&outcome));
+    for i in 0..outcome.undetermined.len() {
+        outcome.undetermined[i].moves_um = moves_um(fit, &outcome, i);
+    }
     (outcome, other_values)
+}
+
+/// By how much the machine's errors in a combination that is not told move the touch that they move most, µm: what is seen of
+/// it stands in the values of those that are not held at 0.
+fn moves_um(fit: &Fit, outcome: &Outcome, which: usize) -> Option<f64> {
+    let combination = &outcome.undetermined[which].combination;
+    let member = |i: &usize| {
+        let u = &fit.model.unknowns[*i];
+        !u.nuisance && !u.shape && combination.contains_key(&u.name)
+    };
+    let members: Vec<usize> = (0..fit.theta.len()).filter(member).collect();
+    if members.is_empty() {
+        return None;
+    }
+    let mut without = fit.theta.clone();
+    members.iter().for_each(|&i| without[i] = 0.0);
+    let batch = fit.model.prepare(&fit.data.observations);
+    let (with, without, mut scratch) = (batch.at(&fit.theta), batch.at(&without), batch.scratch());
+    let moved = |i: usize| {
+        let at_theta = with.gap(i, &mut scratch);
+        (at_theta - without.gap(i, &mut scratch)).abs()
+    };
+    let used = (0..fit.weight.len()).filter(|&i| fit.weight[i] > 0.0);
+    Some(um_from_mm(used.map(moved).fold(0.0, f64::max)))
 }
 
 /// Is a value further off than any machine's?

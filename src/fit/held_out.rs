@@ -5,6 +5,9 @@
 //! G the Gram matrix of all and G_g that of the group, C = (G − G_g + Λ)⁻¹ and θ − C·(gradient without the group), so that
 //! nothing is fitted again. Λ, 1/(1000 typical sizes)², keeps C finite where only the group sees an unknown; touches
 //! that then cannot be predicted, because the prediction is more uncertain than three touches' noise, judge nothing.
+//!
+//! Weights, and with them the touches that can be predicted, come from the noise of a touch and the declared or stated scatter of
+//! index positions (`Noise::tau_fold_mm`): the same for every model of the same touches, so that their errors compare.
 
 use super::Fit;
 use super::normal::Touches;
@@ -57,15 +60,19 @@ pub fn by_visit(fit: &Fit) -> Option<HeldOut> {
     by_group(fit, &fit.data.visits)
 }
 
-/// The same, with the touches of the fit and their normal equations at its solution.
+/// The same, where the touches of the fit and their normal equations at its solution are at hand.
 pub(super) fn by_visit_of(fit: &Fit, touches: &Touches, normal: Normal) -> Option<HeldOut> {
-    each_left_out(Whole::new(fit, touches, normal), &fit.data.visits)
+    if fit.noise.tau_mm == fit.noise.tau_fold_mm {
+        each_left_out(Whole::new(fit, touches, normal), &fit.data.visits)
+    } else {
+        by_visit(fit)
+    }
 }
 
 /// Leaves out each group in turn. `groups[i]` is the group of observation i; touches of a visit stand in one group.
 #[must_use]
 pub fn by_group(fit: &Fit, groups: &[usize]) -> Option<HeldOut> {
-    fit.with_touches(fit.noise.tau_mm, |touches| {
+    fit.with_touches(fit.noise.tau_fold_mm, |touches| {
         each_left_out(Whole::new(fit, touches, touches.normal(&fit.free_theta(), true)), groups)
     })
 }
@@ -111,7 +118,7 @@ pub fn later_run(fit: &Fit) -> Option<HeldOut> {
             u.nuisance && u.set_up.is_some_and(|s| !elsewhere(s))
         })
         .collect();
-    let (errors, n_own) = fit.with_touches(fit.noise.tau_mm, |touches| {
+    let (errors, n_own) = fit.with_touches(fit.noise.tau_fold_mm, |touches| {
         let whole = Whole::new(fit, touches, touches.normal(&fit.free_theta(), true));
         let part = whole.without(&group);
         let mut errors = part.predict(&own);

@@ -42,6 +42,9 @@ pub struct Noise {
     pub visit_dof: Option<f64>,
     /// What tests for missing effects use, mm: the 90 % upper bound of τ, or the declared value.
     pub tau_test_mm: f64,
+    /// What cross-validation uses, mm: τ as the study states it, or as the axes declare it. Never τ from revisited poses: an effect
+    /// that the model lacks can make that as large as itself, and its own touches would then count as unpredictable.
+    pub tau_fold_mm: f64,
     /// Standard deviation of touches of one point in visits of one pose, each visit displaced freely, mm, where it is so much above
     /// that of touches right after each other that it counts for nothing: something changes between the visits and is no noise.
     pub later_mm: Option<f64>,
@@ -126,6 +129,7 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
             (None, None) => (rounding.added_to(known.declared_sigma_mm), "declared", None),
         };
     let n_poses = samples.iter().map(|s| s.pose).collect::<std::collections::BTreeSet<_>>().len();
+    let tau_fold_mm = known.stated_tau_mm.unwrap_or(if n_poses < 2 { 0.0 } else { known.declared_tau_mm });
     let fixed = |tau_mm, visit_source| (tau_mm, visit_source, None, tau_mm);
     let enough = revisits.contrasts.len() >= LEAST_REVISITS && from_repeats.is_some();
     let (tau_mm, visit_source, visit_dof, tau_test_mm) = match known.stated_tau_mm {
@@ -156,6 +160,7 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         visit_source,
         visit_dof,
         tau_test_mm,
+        tau_fold_mm,
         later_mm,
         repeats,
         contradicted_mm,

@@ -111,6 +111,9 @@ pub struct Undetermined {
     pub combination: BTreeMap<String, f64>,
     /// In words.
     pub says: String,
+    /// By how much the machine's errors in it move the touch that they move most, at the values that stand for all of it, µm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moves_um: Option<f64>,
     /// What would part them: variations of the touches, cheapest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parted_by: Vec<String>,

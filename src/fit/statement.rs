@@ -119,7 +119,7 @@ fn one(
             trade(&physical, !blocks.is_empty())
         ),
     };
-    Undetermined { combination, says, parted_by: Vec::new() }
+    Undetermined { combination, says, moves_um: None, parted_by: Vec::new() }
 }
 
 /// An amount of an unknown with its unit; lengths all in mm, so that they compare.

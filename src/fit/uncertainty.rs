@@ -66,7 +66,7 @@ pub fn free_covariance(fit: &Fit) -> DMatrix<f64> {
 
 /// How far each free unknown moves, in its unit, while what leaves no trace at the solution moves by its usual size. 0 for
 /// what does not depend on it at all: combinations without a trace bend, and a value that has no part in them where everything
-/// is nominal may have a small one where the machine stands.
+/// is nominal may have a small one where the machine stands, or come to it on the way.
 pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     let p = fit.free.len();
     if fit.seen.unseen.is_empty() {
@@ -81,9 +81,42 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
         .map(|v| DVector::from_fn(p, |c, _| v[c] / fit.seen.scale[c] / typical(c)).normalize())
         .collect();
     let basis = span(&DMatrix::from_columns(&each), 1e-9);
+    let straight = DVector::from_fn(p, |c, _| basis.row(c).norm() * typical(c));
+    let steps = basis.column_iter().map(|column| DVector::from_fn(p, |c, _| column[c] * typical(c)));
+    // along a shape that is not seen nothing is known of the way beyond its room
+    let moves_a_shape = |step: &DVector<f64>| {
+        (0..p).any(|c| fit.model.unknowns[fit.free[c]].shape && step[c].abs() > 1e-9 * typical(c))
+    };
+    let steps: Vec<DVector<f64>> = steps.filter(|step| !moves_a_shape(step)).collect();
+    let moves = straight + bends(fit, &steps);
     // less than this is the rounding of a value that stays where it is
     const LEAST: f64 = 1e-11;
-    DVector::from_fn(p, |c, _| Some(basis.row(c).norm() * typical(c)).filter(|m| *m > LEAST).unwrap_or(0.0))
+    moves.map(|m| if m > LEAST { m } else { 0.0 })
+}
+
+/// How far the free unknowns must follow, each in its unit, for steps of this length that leave no trace at the solution to leave none
+/// on the way either: the sum of the second-order terms of all steps.
+fn bends(fit: &Fit, steps: &[DVector<f64>]) -> DVector<f64> {
+    let p = fit.free.len();
+    let mut out = DVector::zeros(p);
+    if steps.is_empty() {
+        return out;
+    }
+    let theta = fit.free_theta();
+    fit.with_touches(fit.noise.tau_mm, |touches: &Touches| {
+        let here = touches.normal(&theta, true);
+        let s = &fit.seen.scale;
+        let scaled = DMatrix::from_fn(p, p, |a, b| here.gram[(a, b)] / (s[a] * s[b]));
+        let Some(factor) = (fit.seen.seen.tr_mul(&scaled) * &fit.seen.seen).cholesky() else { return };
+        for step in steps {
+            let gradient = |theta: &DVector<f64>| touches.normal(theta, false).gradient;
+            // forwards and backwards: what is straight, and the noise of the touches in it, cancels
+            let curved = (gradient(&(&theta + step)) + gradient(&(&theta - step))) / 2.0 - &here.gradient;
+            let back = &fit.seen.seen * factor.solve(&fit.seen.seen.tr_mul(&curved.component_div(s)));
+            out += back.component_div(s).abs();
+        }
+    });
+    out
 }
 
 /// How far a shape parameter that leaves no trace may go, by its place among the free unknowns: until what it does has changed by all

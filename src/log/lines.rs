@@ -117,7 +117,7 @@ pub fn without_leader(line: &[u8]) -> &[u8] {
 pub const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// How a run begins; the second where a control writes no blanks.
-const HEADS: [&[u8]; 2] = [b"H AXISCAL ", b"HAXISCAL1"];
+pub const HEADS: [&[u8]; 2] = [b"H AXISCAL ", b"HAXISCAL1"];
 
 /// Where the head of a run begins in the middle of a line: the line end before it was lost.
 #[must_use]

@@ -2,18 +2,17 @@
 
 use super::parse::Rejected;
 use super::place::{Capped, Places};
-use super::rows;
+use super::rows::{self, RowForm};
 use super::swaps;
 use super::touch::{RawTouch, Status, Touch};
 use crate::axes::{AxisName, Position};
-use crate::diag::{Finding, Findings, Result};
+use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
-use crate::post::as_written::Role;
 use crate::program::plan::{Plan, PlanTouch};
 use std::collections::BTreeMap;
 
 /// A rotary axis that reads further from its pose than this (deg) did not make this touch.
-const POSE_ROOM_DEG: f64 = 0.5;
+pub(super) const POSE_ROOM_DEG: f64 = 0.5;
 
 /// Matches touches to the plan. Positions are axis positions relative to R, mm and deg.
 ///
@@ -22,15 +21,15 @@ const POSE_ROOM_DEG: f64 = 0.5;
 /// # Errors
 /// When most touches cannot be this plan's: swapped columns, inches, another origin, another plan.
 pub fn match_to_plan(machine: &Machine, plan: &Plan, raw: Vec<RawTouch>) -> Result<(Vec<Touch>, Findings)> {
-    match_at(machine, plan, raw, &[Role::Search, Role::Release, Role::Measure], None, &Rejected::default())
+    match_at(machine, plan, raw, RowForm::default(), None, &Rejected::default())
 }
 
-/// The same with places in the log for the findings, and the rows of one touch in a log of columns.
+/// The same with places in the log for the findings, and what the rows are in a log of nothing but rows.
 pub(super) fn match_at(
     machine: &Machine,
     plan: &Plan,
     raw: Vec<RawTouch>,
-    per_touch: &[Role],
+    form: RowForm<'_>,
     places: Option<&Places<'_>>,
     rejected: &Rejected,
 ) -> Result<(Vec<Touch>, Findings)> {
@@ -41,10 +40,13 @@ pub(super) fn match_at(
     };
     let mut rejected = rejected.clone();
     let raw = if raw.iter().any(|t| t.id.is_none()) {
-        let (numbered, unclear, row_findings) = rows::number(machine, plan, raw, per_touch, &at);
-        findings.0.extend(row_findings);
-        rejected.ids.extend(unclear);
-        numbered
+        let numbered = rows::number(machine, plan, raw, form, &at);
+        findings.0.extend(numbered.findings);
+        if findings.has_errors() {
+            return Err(Failure(findings.0));
+        }
+        rejected.ids.extend(numbered.unclear);
+        numbered.touches
     } else {
         raw
     };
@@ -182,15 +184,18 @@ pub(super) fn room_mm(machine: &Machine) -> f64 {
     machine.probe.overtravel + machine.probe.placement_tolerance
 }
 
+/// By how much the rotary axes that a log holds differ at most, deg.
+pub(super) fn turned_deg(machine: &Machine, one: &Position, other: &Position, present: [bool; 6]) -> f64 {
+    let differ =
+        machine.rotary().filter(|a| present[a.name.index()]).map(|a| (one.get(a.name) - other.get(a.name)).abs());
+    differ.fold(0.0, f64::max)
+}
+
 /// Can this position be that touch?
 pub(super) fn fits(machine: &Machine, planned: &PlanTouch, position: &Position, present: [bool; 6]) -> bool {
     let nominal = planned.nominal_position();
     let off = (position.xyz_mm() - nominal.xyz_mm()).norm();
-    let turned = machine
-        .rotary()
-        .filter(|a| present[a.name.index()])
-        .map(|a| (position.get(a.name) - nominal.get(a.name)).abs())
-        .fold(0.0, f64::max);
+    let turned = turned_deg(machine, position, &nominal, present);
     // comparisons are written so that a NaN does not fit
     off <= room_mm(machine) && turned <= POSE_ROOM_DEG
 }

@@ -15,6 +15,7 @@ mod reader;
 mod record;
 mod rows;
 mod runs;
+mod shift;
 mod stretch;
 mod swaps;
 pub mod touch;
@@ -106,21 +107,15 @@ pub(crate) fn read_digested(
             let (touches, unclear, more) = points::touches(machine, plan, &read, form, &places)
                 .map_err(|f| Failure([findings.0.clone(), f.0].concat()))?;
             let ending = if read.ended { Ending::Line } else { Ending::CutOff };
-            let rejected = Rejected { ids: unclear, unnamed: false };
+            let rejected = Rejected { ids: unclear, ..Rejected::default() };
             let findings = Findings([findings.0, more.0].concat());
-            let (per_touch, runs) = (Vec::new(), read.runs);
-            (ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs }, findings)
+            (of_touches(touches, ending, rejected, read.runs), findings)
         }
         Writer::Csv => {
             let (touches, findings) = csv::read(bytes, name)?;
-            let per_touch = Vec::new();
             let unnamed = findings.0.iter().any(|f| f.code == "log::not_understood");
-            let rejected = Rejected { ids: Vec::new(), unnamed };
-            let ending = Ending::Unmarked;
-            (
-                ParsedLog { touches, header: None, ending, rejected, columns: false, per_touch, runs: Vec::new() },
-                findings,
-            )
+            let rejected = Rejected { unnamed, ..Rejected::default() };
+            (of_touches(touches, Ending::Unmarked, rejected, Vec::new()), findings)
         }
     };
     let joined = |findings: &Findings, failure: Failure| Failure([findings.0.clone(), failure.0].concat());
@@ -135,9 +130,13 @@ pub(crate) fn read_digested(
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
-    let (touches, more) =
-        matching::match_at(machine, plan, parsed.touches, &parsed.per_touch, Some(&places), &parsed.rejected)
-            .map_err(|f| joined(&findings, f))?;
+    let form = rows::RowForm {
+        per_touch: &parsed.per_touch,
+        says_status: parsed.rows_say_status,
+        lost: &parsed.rejected.lines,
+    };
+    let (touches, more) = matching::match_at(machine, plan, parsed.touches, form, Some(&places), &parsed.rejected)
+        .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
     if !touches.iter().any(|t| t.status == Status::Hit) {
         findings.push(
@@ -151,6 +150,12 @@ pub(crate) fn read_digested(
     let usable = touches.iter().filter(|t| t.status != Status::Elsewhere).count();
     let complete = usable == plan.touches.len() && parsed.ending != Ending::CutOff;
     Ok((MatchedLog { touches, complete, ending: parsed.ending, runs: parsed.runs }, findings))
+}
+
+/// A log of touches with numbers, without a head.
+fn of_touches(touches: Vec<RawTouch>, ending: Ending, rejected: Rejected, runs: Vec<RunFound>) -> ParsedLog {
+    let (header, per_touch) = (None, Vec::new());
+    ParsedLog { touches, header, ending, rejected, columns: false, per_touch, rows_say_status: false, runs }
 }
 
 /// Is this the log of the plan's program?

@@ -28,6 +28,8 @@ pub struct ParsedLog {
     pub columns: bool,
     /// The rows of one touch, in order, in a log of columns.
     pub per_touch: Vec<Role>,
+    /// Each row of a log of columns says whether the probe triggered.
+    pub rows_say_status: bool,
     /// The runs that the log holds.
     pub runs: Vec<RunFound>,
 }
@@ -52,6 +54,8 @@ pub struct Rejected {
     pub ids: Vec<u64>,
     /// There are some that name none.
     pub unnamed: bool,
+    /// Numbers of these lines, ascending.
+    pub lines: Vec<usize>,
 }
 
 /// Reads a log: the last complete run in it.
@@ -62,6 +66,15 @@ pub struct Rejected {
 /// When nothing of it can be used: empty, binary, UTF-16, or without one line that is understood.
 pub fn parse(bytes: &[u8], name: &str, post: &Postprocessor) -> Result<(ParsedLog, Findings)> {
     parse_run(bytes, name, post, None)
+}
+
+/// No line has as many decimals as the form says.
+fn other_decimals(said: usize, found: &[u8]) -> Finding {
+    let found = String::from_utf8_lossy(found);
+    let message = format!("no row has {said} decimals, as the form of this log says: the first number is {found}");
+    Finding::error("log::decimals", message).help(
+        "write `decimals` as the log has it into a form of your own; numbers with 4 or 5 decimals are often inches: then unit = \"inch\", too",
+    )
 }
 
 /// Reads a log: the run of this number, from 1, or the last complete one.
@@ -78,7 +91,7 @@ pub fn parse_run(
     let mut findings = Findings::default();
     let start = sniff(bytes, &places, &mut findings)?;
     let rule = with_its_mark(bytes, &post.log, &places, &mut findings);
-    let columns = rule.columns.as_ref().filter(|_| looks_like_columns(&bytes[start..]));
+    let columns = rule.columns.as_ref().filter(|c| looks_like_columns(&bytes[start..], c));
     let is_columns = columns.is_some();
     let reader = Reader { rule: &rule, columns };
     let read = reader.read(&bytes[start..], start);
@@ -97,6 +110,26 @@ pub fn parse_run(
         });
     }
     let n_faults = faults.len();
+    // one mistake of a form that a user wrote, not one of each row
+    if is_columns && read.touches.is_empty() && n_faults > 0 {
+        let of_line = |e: &Event| reader.line(&e.line).err().map(|fault| (e.line.start, fault));
+        let each: Vec<_> = read.events.iter().filter(|e| matches!(e.what, What::Fault)).filter_map(of_line).collect();
+        if let Some((start, first)) = each.first().filter(|_| each.iter().all(|(_, f)| f.code == "log::decimals")) {
+            let at = start + first.at;
+            return Err(places
+                .at(other_decimals(rule.decimals, &bytes[at..at + first.length]), at..at + first.length)
+                .into());
+        }
+    }
+    if let Some(columns) = columns.filter(|c| !c.prefix.is_empty()) {
+        let others = read.lines.saturating_sub(read.touches.len() + n_faults);
+        if others > 0 {
+            let message = format!("{others} of {} lines do not hold {:?} and are not read", read.lines, columns.prefix);
+            findings.push(
+                Finding::info("log::other_lines", message).help("prefix in [log.columns] says which lines are rows"),
+            );
+        }
+    }
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
     glued(bytes, start, &read.events, &places, &mut findings);
     let runs = runs::split(&read.touches, &read.events, |line| reader.may_be_head(line));
@@ -126,10 +159,11 @@ pub fn parse_run(
     let first = run.header.as_ref().map_or(0, |h| h.line);
     let last = run.end.map_or(usize::MAX, |(_, line)| line);
     let lost = read.events.iter().filter(|e| matches!(e.what, What::Fault) && (first..=last).contains(&e.line.number));
-    let lost: Vec<Option<u64>> =
-        lost.filter(|e| reader.may_be_touch(&e.line)).map(|e| named(e.line.bytes, &rule)).collect();
-    let unnamed = lost.iter().any(Option::is_none);
-    let rejected = Rejected { ids: lost.into_iter().flatten().collect(), unnamed };
+    let lost: Vec<(usize, Option<u64>)> =
+        lost.filter(|e| reader.may_be_touch(&e.line)).map(|e| (e.line.number, named(e.line.bytes, &rule))).collect();
+    let unnamed = lost.iter().any(|(_, id)| id.is_none());
+    let lines = lost.iter().map(|(line, _)| *line).collect();
+    let rejected = Rejected { ids: lost.into_iter().filter_map(|(_, id)| id).collect(), unnamed, lines };
     let mut touches = run.take(read.touches);
     run.say_resumed(&mut touches, &rule, &places, &mut findings);
     if let Some(header) = &run.header {
@@ -143,7 +177,7 @@ pub fn parse_run(
         }
     }
     let unit = match &run.header {
-        _ if is_columns => LengthUnit::Mm,
+        _ if is_columns => columns.map(|c| c.unit).unwrap_or_default(),
         Some(header) => header.unit,
         // a head that is lost said what the others say, or what the postprocessor file lets the program write
         None => units.first().filter(|u| units.iter().all(|v| v == *u)).copied().unwrap_or(post.log.unit),
@@ -151,10 +185,18 @@ pub fn parse_run(
     if unit == LengthUnit::Inch {
         touches.iter_mut().for_each(|t| t.position = t.position.with_xyz_mm(t.position.xyz_mm().map(mm_from_inch)));
     }
-    let per_touch = post.log.columns.as_ref().map(|c| c.per_touch.clone()).unwrap_or_default();
-    let parsed =
-        ParsedLog { touches, header: run.header, ending, rejected, columns: is_columns, per_touch, runs: found };
-    findings.finish(parsed)
+    let per_touch = columns.map(|c| c.per_touch.clone()).unwrap_or_default();
+    let rows_say_status = columns.is_some_and(|c| !c.status.is_empty());
+    findings.finish(ParsedLog {
+        touches,
+        header: run.header,
+        ending,
+        rejected,
+        columns: is_columns,
+        per_touch,
+        rows_say_status,
+        runs: found,
+    })
 }
 
 /// Heads in the middle of a line.

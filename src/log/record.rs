@@ -220,12 +220,17 @@ fn axis_of(letter: u8) -> Option<AxisName> {
 
 /// A finite number, or the fault that says what stands there instead.
 fn value<'a>(line: &[u8], at: &'a [u8], rule: &LogRule) -> Result<(&'a [u8], Number), Fault> {
+    value_before(line, at, rule, b"")
+}
+
+/// The same where this text follows the number, which may be a comma. Empty: blanks.
+fn value_before<'a>(line: &[u8], at: &'a [u8], rule: &LogRule, separator: &[u8]) -> Result<(&'a [u8], Number), Fault> {
     let fault = |code, message: String| Err(Fault::at(line, at, word_length(at), code, message));
     let shown = || show(&padded(at));
     match number(rule.mark)(at) {
         Ok((rest, n)) if n.value.is_finite() => {
             let other = if rule.mark == b',' { b'.' } else { b',' };
-            if rest.first() == Some(&other) {
+            if rest.first() == Some(&other) && separator.first() != Some(&other) {
                 let mark = other as char;
                 let what_to_do = match rule.other_mark {
                     None => format!(
@@ -376,7 +381,8 @@ fn head_without_blanks(rest: &[u8], line_number: usize) -> Option<LogHeader> {
     })
 }
 
-/// Reads a row of columns: a touch without a number, hit for all that the row says. `None` for a blank line.
+/// Reads a row of columns: a touch without a number, hit for all that the row says. `None` for a line that is no row: a blank one, or
+/// one without what stands before the numbers of each row.
 ///
 /// # Errors
 /// When the line is not such a row.
@@ -385,7 +391,13 @@ pub fn row(line: &[u8], line_number: usize, columns: &ColumnRule, rule: &LogRule
     if rest.is_empty() || rest == b"%" {
         return Ok(None);
     }
+    if !columns.prefix.is_empty() {
+        let prefix = columns.prefix.as_bytes();
+        let Some(at) = memchr::memmem::find(rest, prefix) else { return Ok(None) };
+        rest = blanks(&rest[at + prefix.len()..]);
+    }
     let exact_rule = LogRule { decimals: columns.decimals, ..rule.clone() };
+    let separator = columns.separator.as_bytes();
     let mut position = Position::default();
     let mut present = [false; 6];
     for (index, axis) in columns.axes.iter().enumerate() {
@@ -393,30 +405,64 @@ pub fn row(line: &[u8], line_number: usize, columns: &ColumnRule, rule: &LogRule
             let message = format!("{index} numbers, expected {}: the line was cut", columns.axes.len());
             return Err(Fault::at(line, rest, 1, "log::cut_line", message));
         }
-        let (tail, n) = value(line, rest, rule)?;
+        let (tail, n) = value_before(line, rest, rule, separator)?;
         let width = rest.len() - tail.len();
-        if !tail.is_empty() && blanks(tail).len() == tail.len() {
-            let message = format!("expected a blank after the number, found {}", show(tail));
+        let after = blanks(tail);
+        let last = index + 1 == columns.axes.len();
+        let between = match separator {
+            [] if last && columns.has_tail() => Some(after),
+            [] => (after.is_empty() || after.len() < tail.len()).then_some(after),
+            _ if last || after.is_empty() => Some(after),
+            _ => after.strip_prefix(separator).map(blanks),
+        };
+        let Some(between) = between else {
+            let wanted = if separator.is_empty() { "a blank".to_owned() } else { format!("{:?}", columns.separator) };
+            let message = format!("expected {wanted} after the number, found {}", show(tail));
             return Err(Fault::at(line, tail, 1, "log::in_number", message));
-        }
+        };
         exact(line, rest, width, n, &exact_rule)?;
         if let Some(axis) = axis {
             position.set(*axis, n.value);
             present[axis.index()] = true;
         }
-        rest = blanks(tail);
+        rest = between;
     }
-    if !rest.is_empty() {
-        let message = format!("more than {} numbers: {}", columns.axes.len(), show(rest));
-        return Err(Fault::at(line, rest, rest.len(), "log::too_long", message));
+    let (rest, status) = row_status(line, rest, columns)?;
+    match columns.suffix.as_bytes() {
+        [] if rest.is_empty() => {}
+        [] => {
+            let message = format!("more than {} numbers: {}", columns.axes.len(), show(rest));
+            return Err(Fault::at(line, rest, rest.len(), "log::too_long", message));
+        }
+        suffix if rest.starts_with(suffix) => {}
+        _ => {
+            let (code, found) = match rest {
+                [] => ("log::cut_line", "the line was cut".to_owned()),
+                _ => ("log::too_long", format!("found {}", show(rest))),
+            };
+            let message = format!("expected {:?} behind the {} numbers: {found}", columns.suffix, columns.axes.len());
+            return Err(Fault::at(line, rest, rest.len(), code, message));
+        }
     }
-    Ok(Some(RawTouch {
-        id: None,
-        position,
-        present,
-        status: Status::Hit,
-        time_s: None,
-        temperature_deg_c: None,
-        line: line_number,
-    }))
+    Ok(Some(RawTouch { id: None, position, present, status, time_s: None, temperature_deg_c: None, line: line_number }))
+}
+
+/// Whether the probe triggered, where a row says so behind its numbers, and what follows.
+fn row_status<'a>(line: &[u8], rest: &'a [u8], columns: &ColumnRule) -> Result<(&'a [u8], Status), Fault> {
+    if columns.status.is_empty() {
+        return Ok((rest, Status::Hit));
+    }
+    let says = rest.strip_prefix(columns.status.as_bytes()).map(blanks).and_then(<[u8]>::split_first);
+    match says {
+        Some((b'1', after)) => Ok((blanks(after), Status::Hit)),
+        Some((b'0', after)) => Ok((blanks(after), Status::Miss)),
+        _ => {
+            let message = format!(
+                "expected {:?} and 1 (triggered) or 0 behind the numbers, found {}",
+                columns.status,
+                show(rest)
+            );
+            Err(Fault::at(line, rest, rest.len(), "log::status", message))
+        }
+    }
 }

@@ -4,7 +4,7 @@
 //! A line that is not understood is only noted here: what is wrong with it is found out for the few that are shown.
 
 use super::fast::{self, Table};
-use super::lines::{BYTE_ORDER_MARK, Line, blanks, first, inner_head, without_leader, without_trailer};
+use super::lines::{BYTE_ORDER_MARK, HEADS, Line, blanks, first, inner_head, without_leader, without_trailer};
 use super::record::{LogHeader, Record, begin, record, row};
 use super::touch::RawTouch;
 use super::words::Fault;
@@ -162,9 +162,14 @@ impl Reader<'_> {
     }
 }
 
-/// A log begins with numbers and holds no line of words near its beginning: it is nothing but columns.
+/// The log holds nothing but rows of this form: it begins with numbers and holds no line of words near its beginning; or it holds what
+/// stands before the numbers of each row, and no head of a run.
 #[must_use]
-pub fn looks_like_columns(bytes: &[u8]) -> bool {
+pub fn looks_like_columns(bytes: &[u8], columns: &ColumnRule) -> bool {
+    if !columns.prefix.is_empty() {
+        let holds = |what: &[u8]| memchr::memmem::find(bytes, what).is_some();
+        return holds(columns.prefix.as_bytes()) && !HEADS.iter().any(|head| holds(head));
+    }
     let firsts = super::lines::Lines::new(bytes, 0).filter_map(|l| blanks(l.bytes).first().copied()).take(64);
     let mut numbers = 0;
     for first in firsts {

@@ -1,11 +1,13 @@
 //! When most touches lie far from their places: which simple mistake would explain it?
 
-use super::matching::{fits, ranges};
+use super::matching::{POSE_ROOM_DEG, fits, ranges, turned_deg};
+use super::rows::Lines;
+use super::shift::common_shift;
 use super::touch::RawTouch;
 use crate::axes::{AxisName, Position};
 use crate::diag::Finding;
 use crate::machine::Machine;
-use crate::program::plan::PlanTouch;
+use crate::program::plan::{Plan, PlanTouch};
 use crate::units::{inch_from_mm, mm_from_inch};
 use nalgebra::Vector3;
 
@@ -20,7 +22,7 @@ struct Mistake {
 /// What would put the touches that are far from their places where they belong.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Supposed {
-    /// `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`, `mm`: as the effect of gross mistakes calls its parameters.
+    /// `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`, `mm`, of rows also `shift`, `inch shift`: as the effect of gross mistakes calls its parameters.
     pub name: String,
     /// In words: "the sign of B were the other one".
     pub says: String,
@@ -104,6 +106,77 @@ pub(super) fn explain(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], bad: 
         .help("use the plan that `axiscal generate` wrote together with the program")
 }
 
+/// What would put most rows of a log without numbers onto the lines of the plan's touches; `on_none` lie on none.
+pub(super) fn explain_rows(plan: &Plan, lines: &Lines<'_>, rows: &[RawTouch], on_none: usize) -> Option<Finding> {
+    let supposed = suppose_rows(plan, lines, rows, on_none)?;
+    let message = format!(
+        "{} of {} rows lie on the line of no touch, and {} would if {}",
+        supposed.far, supposed.of, supposed.right, supposed.says
+    );
+    Some(Finding::error("log::swapped", message).help(supposed.help))
+}
+
+/// The one simple mistake that explains nearly all rows.
+pub(super) fn suppose_rows(plan: &Plan, lines: &Lines<'_>, rows: &[RawTouch], on_none: usize) -> Option<Supposed> {
+    let right = |undo: &dyn Fn(Position) -> Position| {
+        rows.iter().filter(|row| !lines.at(&undo(row.position), row.present).is_empty()).count()
+    };
+    let simple = mistakes(lines.machine()).into_iter();
+    let shifts = [
+        ("shift", "", Box::new(|p: Position| p) as Box<dyn Fn(Position) -> Position>),
+        ("inch shift", "the numbers were inches, and then ", Box::new(inches_undone)),
+    ];
+    let shifted = shifts.into_iter().filter_map(|(name, before, first)| {
+        let by = shift_of_rows(plan, lines, rows, &first)?;
+        Some(Mistake {
+            name: name.to_owned(),
+            says: format!("{before}{}", shift_says(&by)),
+            help: SHIFT_HELP,
+            undo: Box::new(move |p| {
+                let p = first(p);
+                p.with_xyz_mm(p.xyz_mm() - by)
+            }),
+        })
+    });
+    simple.chain(shifted).find_map(|mistake| {
+        let right = right(&mistake.undo);
+        let help = match mistake.name.as_str() {
+            "inch" => "rows do not say their unit: write unit = \"inch\" into [log.columns] of a postprocessor file of your own",
+            "shift" | "inch shift" => {
+                "rows of PROBEOPEN and of a console are in the work coordinate system that was active: was it another one than the program's? is `origin` in machines.toml the machine position at the origin of R?"
+            }
+            _ => mistake.help,
+        };
+        (right * 10 >= rows.len() * 9).then_some(Supposed {
+            name: mistake.name,
+            says: mistake.says,
+            help,
+            far: on_none,
+            right,
+            of: rows.len(),
+        })
+    })
+}
+
+/// The shift that puts nearly all rows onto lines of the plan; `first` is done before.
+fn shift_of_rows(
+    plan: &Plan,
+    lines: &Lines<'_>,
+    rows: &[RawTouch],
+    first: &dyn Fn(Position) -> Position,
+) -> Option<Vector3<f64>> {
+    let machine = lines.machine();
+    let found: Vec<Position> = rows.iter().map(|row| first(row.position)).collect();
+    let found_mm: Vec<Vector3<f64>> = found.iter().map(Position::xyz_mm).collect();
+    let planned: Vec<Position> = plan.touches.iter().map(PlanTouch::nominal_position).collect();
+    let planned_mm: Vec<Vector3<f64>> = planned.iter().map(Position::xyz_mm).collect();
+    let posed = |i: usize, j: usize| turned_deg(machine, &found[i], &planned[j], rows[i].present) <= POSE_ROOM_DEG;
+    let lies = |i: usize, by: &Vector3<f64>| {
+        lines.at(&found[i].with_xyz_mm(found_mm[i] - by), rows[i].present).first().copied()
+    };
+    common_shift(&found_mm, &planned_mm, &posed, &lies)
+}
+
 fn mistakes(machine: &Machine) -> Vec<Mistake> {
     let columns = "check the order of the columns: the file itself is not changed";
     let signs =
@@ -141,7 +214,7 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
         name: "inch".to_owned(),
         says: "the numbers were inches".into(),
         help: "the head of a log says its unit, MM or INCH, as the program was written (unit in [log]): was the log written by it?",
-        undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(mm_from_inch))),
+        undo: Box::new(inches_undone),
     });
     all.push(Mistake {
         name: "mm".to_owned(),
@@ -171,6 +244,18 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
     all
 }
 
+fn inches_undone(at: Position) -> Position {
+    at.with_xyz_mm(at.xyz_mm().map(mm_from_inch))
+}
+
+const SHIFT_HELP: &str =
+    "is `origin` in machines.toml the machine position at the origin of R? was another offset active in that run?";
+
+/// A shift in words.
+pub(super) fn shift_says(by: &Vector3<f64>) -> String {
+    format!("all were shifted by X {:.3} Y {:.3} Z {:.3} mm", by.x, by.y, by.z)
+}
+
 /// The same shift in all touches: another origin.
 fn shift(pairs: &[(&PlanTouch, RawTouch)], whole: impl Fn(&RawTouch, &PlanTouch) -> Position) -> Option<Mistake> {
     let median = |axis: usize| {
@@ -182,8 +267,8 @@ fn shift(pairs: &[(&PlanTouch, RawTouch)], whole: impl Fn(&RawTouch, &PlanTouch)
     let by = Vector3::new(median(0)?, median(1)?, median(2)?);
     Some(Mistake {
         name: "shift".to_owned(),
-        says: format!("all were shifted by X {:.3} Y {:.3} Z {:.3} mm", by.x, by.y, by.z),
-        help: "is `origin` in machines.toml the machine position at the origin of R? was another offset active in that run?",
+        says: shift_says(&by),
+        help: SHIFT_HELP,
         undo: Box::new(move |p| p.with_xyz_mm(p.xyz_mm() - by)),
     })
 }

@@ -39,7 +39,13 @@ fn codes(findings: &[Finding]) -> Vec<&'static str> {
 
 #[test]
 fn what_the_machine_would_write_is_read_back() {
-    let machines = [("swivel-head", "table"), ("trunnion", "table"), ("double-head", "head")];
+    let machines = [
+        ("swivel-head", "table"),
+        ("trunnion", "table"),
+        ("double-head", "head"),
+        ("nutating-b", "table"),
+        ("trunnion-offset", "table"),
+    ];
     for ((name, mounting), post) in machines.into_iter().flat_map(|m| posts().iter().map(move |p| (m, p))) {
         let machine = machine(name);
         for frame in [ControllerFrame::Axes, ControllerFrame::Tcp] {

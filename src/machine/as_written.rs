@@ -319,13 +319,81 @@ pub struct Mounting {
 }
 
 /// What a block stands on: a box under it.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Riser {
     /// From the block's lower face down, mm.
     pub height: f64,
-    /// Edges along X and Y, mm.
+    /// Edges along X and Y, mm; along the two other axes where it does not go along Z.
     pub size: [f64; 2],
+    /// Where it goes from the block, e.g. `-Y`; left out: -Z, or to where the carrier's solids are.
+    pub toward: Option<Toward>,
+}
+
+// machines are recognised by a digest of their records' debug form: a riser that goes down is written as it always was
+impl std::fmt::Debug for Riser {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut out = f.debug_struct("Riser");
+        out.field("height", &self.height).field("size", &self.size);
+        if let Some(toward) = self.toward.filter(|t| *t != Toward::MinusZ) {
+            out.field("toward", &toward);
+        }
+        out.finish()
+    }
+}
+
+/// A direction along an axis of R.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+pub enum Toward {
+    /// +X
+    #[serde(rename = "+X")]
+    PlusX,
+    /// -X
+    #[serde(rename = "-X")]
+    MinusX,
+    /// +Y
+    #[serde(rename = "+Y")]
+    PlusY,
+    /// -Y
+    #[serde(rename = "-Y")]
+    MinusY,
+    /// +Z
+    #[serde(rename = "+Z")]
+    PlusZ,
+    /// -Z
+    #[serde(rename = "-Z")]
+    MinusZ,
+}
+
+impl Toward {
+    /// All, down first.
+    pub const ALL: [Self; 6] = [Self::MinusZ, Self::MinusY, Self::PlusY, Self::MinusX, Self::PlusX, Self::PlusZ];
+
+    /// The axis, 0 to 2 for X to Z, and the sign.
+    #[must_use]
+    pub fn axis_and_sign(self) -> (usize, f64) {
+        match self {
+            Self::PlusX => (0, 1.0),
+            Self::MinusX => (0, -1.0),
+            Self::PlusY => (1, 1.0),
+            Self::MinusY => (1, -1.0),
+            Self::PlusZ => (2, 1.0),
+            Self::MinusZ => (2, -1.0),
+        }
+    }
+
+    /// As it is written.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::PlusX => "+X",
+            Self::MinusX => "-X",
+            Self::PlusY => "+Y",
+            Self::MinusY => "-Y",
+            Self::PlusZ => "+Z",
+            Self::MinusZ => "-Z",
+        }
+    }
 }
 
 /// A block, mm in R at zero.

@@ -4,7 +4,8 @@ mod chain;
 
 use super::as_written::{self as w, AxisKind};
 use super::check_parts::Carriers;
-use super::{Axis, Carrier, Machine, Mounting, Reference, Side};
+use super::{Axis, Carrier, Machine, Mounting, Reference, Side, Solid};
+use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
 use crate::units::Plain;
 use nalgebra::{Unit, Vector3};
@@ -19,6 +20,13 @@ pub(super) const LARGEST: f64 = 1e5;
 
 /// Two linear axes further off square than this are a slip of the pen, deg: real ones are off by some hundredths.
 pub(super) const LARGEST_SQUARENESS_DEG: f64 = 0.1;
+
+/// Scatter of the ball's position per index where a rotary axis states none, µm, 1 sigma: what the built-in machines have.
+/// With 0 every uncertainty would be too small.
+const ASSUMED_INDEXING_UM: f64 = 0.5;
+
+/// No scatter is larger than this, µm: more is a slip of the pen.
+pub(super) const LARGEST_SCATTER_UM: f64 = 1000.0;
 
 /// Reads and checks a machines file.
 ///
@@ -61,8 +69,8 @@ pub fn load(source: &Source) -> Result<(Vec<Machine>, Findings)> {
 }
 
 pub(super) struct Check<'a> {
-    source: &'a Source,
-    findings: Findings,
+    pub(super) source: &'a Source,
+    pub(super) findings: Findings,
 }
 
 /// An axis whose own fields are good, its place in the chain not yet known.
@@ -107,6 +115,7 @@ impl Check<'_> {
         }
         let workpiece = self.exactly_one(&here, name, "workpiece", m.workpiece.all());
         let tool = self.exactly_one(&here, name, "tool", m.tool.all());
+        let before_the_chain = self.findings.0.len();
         let mut axes = Vec::new();
         if let Some(workpiece) = workpiece {
             axes.extend(self.chain(name, &loose, &refused, &workpiece.parent, Side::Workpiece));
@@ -125,7 +134,9 @@ impl Check<'_> {
             }
             axes.extend(tool_side);
         }
-        if workpiece.is_some() && tool.is_some() && m.axis.len() == loose.len() {
+        // a chain that breaks off lacks axes for that reason alone
+        let is_whole = self.findings.0.len() == before_the_chain;
+        if is_whole && workpiece.is_some() && tool.is_some() && m.axis.len() == loose.len() {
             for a in &loose {
                 if !axes.iter().any(|b| b.name == a.axis.name) {
                     self.error(
@@ -180,8 +191,8 @@ impl Check<'_> {
             );
             return None;
         };
-        self.probe(name, &probe.0);
-        let styli = self.styli(name, &m.stylus, probe.0.get_ref());
+        let probe_is_good = self.probe(name, &probe.0);
+        let styli = if probe_is_good { self.styli(name, &m.stylus, probe.0.get_ref()) } else { Vec::new() };
         let Some(reference) = m.reference else {
             self.error(
                 &here,
@@ -191,6 +202,9 @@ impl Check<'_> {
             );
             return None;
         };
+        for (field, point) in [("pivot", reference.pivot), ("ball", reference.ball), ("table", reference.table)] {
+            self.finite3(&here, &format!("{field} of the reference of {name:?}"), point);
+        }
         let tool = self.tool(name, tool?)?;
         let carriers = |word: &str| -> Option<Carrier> {
             match word {
@@ -203,8 +217,9 @@ impl Check<'_> {
             }
         };
         let carriers = Carriers { of: &carriers, cut: !refused.is_empty() };
-        let solids = m.solid.iter().filter_map(|s| self.solid(name, s, &carriers)).collect();
-        let mountings: Vec<Mounting> = m.mounting.iter().filter_map(|x| self.mounting(name, x, &carriers)).collect();
+        let solids: Vec<Solid> = m.solid.iter().filter_map(|s| self.solid(name, s, &carriers)).collect();
+        let mountings: Vec<Mounting> =
+            m.mounting.iter().filter_map(|x| self.mounting(name, x, &solids, &carriers)).collect();
         for (i, x) in m.mounting.iter().enumerate() {
             if m.mounting[..i].iter().any(|y| y.name.get_ref() == x.name.get_ref()) {
                 self.error(
@@ -217,7 +232,7 @@ impl Check<'_> {
         }
         // the probe must fit between ball and pivot, else the collision check looks at nothing
         let p = probe.0.get_ref();
-        if p.stem_length + p.body_length > tool.length_mm {
+        if probe_is_good && tool.length_mm > 0.0 && p.stem_length + p.body_length > tool.length_mm {
             self.error(
                 &probe.0.span(),
                 "machine::probe_too_long",
@@ -232,6 +247,20 @@ impl Check<'_> {
         }
         if self.findings.0[before..].iter().any(|f| f.severity == crate::diag::Severity::Error) {
             return None;
+        }
+        let rotary = |a: &&w::Axis| a.name.get_ref().is_rotary() && a.indexing_repeatability_um.is_none();
+        let assumed_indexing: Vec<AxisName> = m.axis.iter().filter(rotary).map(|a| *a.name.get_ref()).collect();
+        if !assumed_indexing.is_empty() {
+            let letters: Vec<String> = assumed_indexing.iter().map(ToString::to_string).collect();
+            let says = format!(
+                "{name:?} has no indexing_repeatability_um for {}: {ASSUMED_INDEXING_UM} um is assumed",
+                letters.join(" and ")
+            );
+            self.findings.push(
+                Finding::info("machine::assumed_indexing", says)
+                    .help("write how well the axis comes back to a position (1 sigma, from the maker's sheet), or 0")
+                    .at(self.source, here.clone()),
+            );
         }
         // identical for identical contents: the debug form of the record, not the bytes with their comments
         let sha256 = format!(
@@ -258,6 +287,7 @@ impl Check<'_> {
             styli,
             solids,
             mountings,
+            assumed_indexing,
             sha256,
         })
     }
@@ -413,13 +443,15 @@ impl Check<'_> {
                 }
             }
         };
-        let repeatability = a.indexing_repeatability_um.as_ref().map_or(0.0, |r| *r.get_ref());
-        if !(repeatability.is_finite() && repeatability >= 0.0) {
+        let repeatability = a.indexing_repeatability_um.as_ref();
+        let repeatability_um =
+            repeatability.map_or(if name.is_rotary() { ASSUMED_INDEXING_UM } else { 0.0 }, |r| *r.get_ref());
+        if !(0.0..=LARGEST_SCATTER_UM).contains(&repeatability_um) {
             self.error(
-                &span,
+                &repeatability.map_or(span.clone(), toml::Spanned::span),
                 "machine::repeatability",
-                format!("indexing repeatability of axis {name} is {} um", Plain(repeatability)),
-                "it is a standard deviation: 0 or more",
+                format!("indexing repeatability of axis {name} is {} um", Plain(repeatability_um)),
+                format!("it is a standard deviation: 0 or more, up to {LARGEST_SCATTER_UM} um"),
             );
         }
         Some(Loose {
@@ -430,7 +462,7 @@ impl Check<'_> {
                 point: point?,
                 sense,
                 range: range?,
-                indexing_repeatability_mm: crate::units::mm_from_um(repeatability),
+                indexing_repeatability_mm: crate::units::mm_from_um(repeatability_um),
             },
             parent: parent?,
             span,

@@ -1,10 +1,13 @@
 //! The parts of a machine that are no axes: spindle, probe, solids and mountings, checked for [`super::check`].
 
 use super::as_written as w;
-use super::check::{Check, LARGEST};
+use super::check::{Check, LARGEST, LARGEST_SCATTER_UM};
+use super::risers;
 use super::{Block, Carrier, Mounting, SAME_STYLUS_MM, Shape, Solid, Stylus, Tool};
+use crate::diag::Finding;
 use crate::units::Plain;
 use nalgebra::Vector3;
+use std::ops::Range;
 
 /// What can bear a solid or a mounting.
 pub(super) struct Carriers<'a> {
@@ -18,12 +21,12 @@ impl Check<'_> {
         let direction = self.direction(&t.direction.span(), "direction of the tool", *t.direction.get_ref());
         let pivot = self.finite3(&t.parent.span(), "pivot of the tool", t.pivot);
         let length = *t.length.get_ref();
-        if !(length.is_finite() && length > 0.0) {
+        if !(length > 0.0 && length <= LARGEST) {
             self.error(
                 &t.length.span(),
                 "machine::tool_length",
                 format!("tool length of {machine:?} is {} mm", Plain(length)),
-                "from the pivot to the ball's centre, more than 0",
+                format!("from the pivot to the ball's centre, more than 0 and up to {LARGEST}"),
             );
         }
         if t.spindle_sense.abs() != 1 {
@@ -37,7 +40,8 @@ impl Check<'_> {
         Some(Tool { pivot: pivot?, direction: direction?, length_mm: length, spindle_sense: t.spindle_sense as f64 })
     }
 
-    pub(super) fn probe(&mut self, machine: &str, probe: &toml::Spanned<w::Probe>) {
+    /// The probe; false where one of its numbers is none, and nothing that is told by them can be judged.
+    pub(super) fn probe(&mut self, machine: &str, probe: &toml::Spanned<w::Probe>) -> bool {
         let p = probe.get_ref();
         let positive = [
             ("ball_radius", p.ball_radius),
@@ -57,15 +61,22 @@ impl Check<'_> {
             ("position_feed", p.position_feed),
             ("back_off", p.back_off),
         ];
+        let mut are_good = true;
         for (field, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
+            let largest = if field == "repeatability_um" { LARGEST_SCATTER_UM } else { LARGEST };
+            if !(value > 0.0 && value <= largest) {
+                are_good = false;
                 self.error(
                     &probe.span(),
                     "machine::probe",
                     format!("{field} of the probe of {machine:?} is {}", Plain(value)),
-                    "write a number greater than 0",
+                    format!("write a number greater than 0, up to {largest}"),
                 );
             }
+        }
+        // how they stand to one another says nothing while one of them is no length
+        if !are_good {
+            return false;
         }
         if p.stem_radius >= p.ball_radius {
             self.error(
@@ -122,6 +133,7 @@ impl Check<'_> {
                 "swap the two feeds",
             );
         }
+        true
     }
 
     /// Further styli. Plans know a stylus by its length and ball, so no two may be alike.
@@ -229,7 +241,42 @@ impl Check<'_> {
         found
     }
 
-    pub(super) fn mounting(&mut self, machine: &str, x: &w::Mounting, carriers: &Carriers) -> Option<Mounting> {
+    fn riser_is_good(&mut self, span: &Range<usize>, of: &str, r: &w::Riser) -> bool {
+        let is_good = r.height > 0.0 && r.height <= LARGEST && r.size.iter().all(|s| *s > 0.0 && *s <= LARGEST);
+        if !is_good {
+            let help = format!("write height and size in mm, more than 0 and up to {LARGEST}");
+            self.error(span, "machine::riser", format!("riser of {of} has no usable size"), help);
+        }
+        is_good
+    }
+
+    /// A riser that ends in the air: its length or its direction is another one.
+    fn say_hanging(&mut self, machine: &str, block: &w::Block, placed: &risers::Placed) {
+        let name = block.name.get_ref();
+        let toward = placed.toward.as_str();
+        let message = match placed {
+            risers::Placed { meets_nothing: true, .. } => {
+                format!("the riser of block {name:?} of {machine:?} goes to {toward} and meets no solid of its carrier")
+            }
+            risers::Placed { gap_mm: Some(gap), .. } => format!(
+                "the riser of block {name:?} of {machine:?} goes to {toward} and ends {gap:.1} mm from the solid that is there"
+            ),
+            _ => return,
+        };
+        let help =
+            "write the direction to the table into the riser, e.g. toward = \"-Y\", or correct its height or the solid";
+        self.findings
+            .push(Finding::warning("machine::riser_hangs", message).help(help).at(self.source, block.name.span()));
+    }
+
+    /// `fixed`: the machine's own solids.
+    pub(super) fn mounting(
+        &mut self,
+        machine: &str,
+        x: &w::Mounting,
+        fixed: &[Solid],
+        carriers: &Carriers,
+    ) -> Option<Mounting> {
         let name = x.name.get_ref();
         if x.carrier.get_ref() == "base" {
             self.error(
@@ -243,7 +290,9 @@ impl Check<'_> {
         }
         let carrier = self.carrier(machine, name, &x.carrier, carriers)?;
         let mut solids: Vec<Solid> = x.solid.iter().filter_map(|s| self.solid(machine, s, carriers)).collect();
+        let n_own = solids.len();
         let mut blocks: Vec<Block> = Vec::new();
+        let of_all = x.riser.filter(|r| self.riser_is_good(&x.name.span(), &format!("mounting {name:?}"), r));
         for b in &x.block {
             let block = b.name.get_ref();
             if blocks.iter().any(|o| &o.name == block) {
@@ -293,22 +342,17 @@ impl Check<'_> {
                 Some(word) => self.carrier(machine, block, word, carriers)?,
                 None => carrier,
             };
-            let riser = b.riser.or(x.riser);
-            if let Some(r) = riser {
-                if !(r.height > 0.0 && r.height <= LARGEST && r.size.iter().all(|s| *s > 0.0 && *s <= LARGEST)) {
-                    self.error(
-                        &b.name.span(),
-                        "machine::riser",
-                        format!("riser of block {block:?} has no usable size"),
-                        format!("write height and size in mm, more than 0 and up to {LARGEST}"),
-                    );
-                }
-                let mut under = centre;
-                under.z -= size[2] / 2.0 + r.height / 2.0;
+            let own = b.riser.filter(|r| self.riser_is_good(&b.name.span(), &format!("block {block:?}"), r));
+            let mut riser = if b.riser.is_some() { own } else { of_all };
+            if let Some(r) = &mut riser {
+                let bearing: Vec<&Solid> = fixed.iter().chain(&solids[..n_own]).collect();
+                let placed = risers::place(&centre, &size, r, carrier, &bearing);
+                self.say_hanging(machine, b, &placed);
+                r.toward = Some(placed.toward);
                 solids.push(Solid {
                     name: format!("riser of {block}"),
                     carrier,
-                    shape: Shape::Box { centre: under, size: Vector3::new(r.size[0], r.size[1], r.height) },
+                    shape: risers::body(&centre, &size, r, placed.toward),
                 });
             }
             blocks.push(Block { name: block.clone(), centre, size, riser, carrier });

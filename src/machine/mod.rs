@@ -7,6 +7,7 @@
 pub mod as_written;
 mod check;
 mod check_parts;
+mod risers;
 
 pub use check::load;
 
@@ -241,6 +242,8 @@ pub struct Machine {
     pub solids: Vec<Solid>,
     /// Artefacts as they can be mounted.
     pub mountings: Vec<Mounting>,
+    /// Rotary axes whose indexing repeatability the description does not state: a default is assumed.
+    pub assumed_indexing: Vec<AxisName>,
     /// SHA-256 of the description that this was read from, hexadecimal.
     pub sha256: String,
 }
@@ -269,6 +272,22 @@ impl Machine {
     #[must_use]
     pub fn axis(&self, name: AxisName) -> Option<&Axis> {
         self.axes.iter().find(|a| a.name == name)
+    }
+
+    /// The largest coordinate of the description, as R or the control has it, mm or deg: of ends of linear axes, points of rotary
+    /// ones, reference points, blocks and the tool.
+    #[must_use]
+    pub fn largest_coordinate(&self) -> f64 {
+        let linear = self.axes.iter().filter(|a| !a.name.is_rotary());
+        let ends = linear.flat_map(|a| {
+            let origin = self.origin.get(a.name).unwrap_or(0.0);
+            a.range.into_iter().flat_map(move |end| [end, end + origin])
+        });
+        let points =
+            self.axes.iter().map(|a| a.point).chain([self.tool.pivot, self.reference.ball, self.reference.table]);
+        let blocks = self.mountings.iter().flat_map(|m| &m.blocks).map(|b| b.centre);
+        let points = points.chain(blocks).flat_map(|p| [p.x, p.y, p.z]);
+        ends.chain(points).chain([self.tool.length_mm]).fold(360.0, |most, c| most.max(c.abs()))
     }
 
     /// The axes of one side, from the base on.

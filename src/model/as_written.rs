@@ -69,8 +69,8 @@ pub struct EffectAsWritten {
     pub at: Placed,
     /// Applies where its axes stand on this side only.
     pub side: Option<SideAsWritten>,
-    /// `ball`: rotations of an axis that bears the workpiece are stated about the machine's ball point (the ball's centre
-    /// at zero), not about the reference point or the origin of R.
+    /// `line`: constant errors of a rotary axis turn about its own line, as its error motions always do. `ball`: rotations
+    /// of a linear axis that bears the workpiece are stated at the ball's centre at zero, not at the origin of R.
     pub about: Option<About>,
     /// Letters of further axes that the machine must have (on that side).
     #[serde(default)]
@@ -117,6 +117,8 @@ pub enum SideAsWritten {
 pub enum About {
     /// The ball's centre at zero.
     Ball,
+    /// The rotary axis's own line.
+    Line,
 }
 
 /// What an effect has a set of parameters for.

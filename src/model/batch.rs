@@ -7,7 +7,7 @@
 
 use super::catalogue::Place;
 use super::formula::slot;
-use super::placed::{Placed, Rigid};
+use super::placed::{Centre, Placed, Rigid};
 use super::predict::{Active, Changes, Model, Observation};
 use crate::axes::AxisName;
 use crate::geometry::Displacement;
@@ -88,6 +88,15 @@ pub struct At<'b> {
 }
 
 impl Model {
+    /// Where the transform of a slot is stated; a block turns about its own centre.
+    fn centre_of(&self, slot: usize, set_up: Option<usize>) -> Centre<'_> {
+        let slot = &self.slots[slot];
+        match set_up {
+            Some(s) if slot.place == Place::Block => (&self.set_ups()[s].centre, None),
+            _ => (&slot.centre, slot.frame.as_ref()),
+        }
+    }
+
     /// Prepares touches for many evaluations.
     #[must_use]
     pub fn prepare<'a>(&'a self, observations: &'a [Observation]) -> Batch<'a> {
@@ -219,14 +228,14 @@ impl Batch<'_> {
     #[must_use]
     pub fn scratch(&self) -> Scratch {
         let n = self.model.slots.len();
-        let nowhere = Placed::new(&Displacement::default(), &Vector3::zeros());
+        let nowhere = Placed::new(&Displacement::default(), (&Vector3::zeros(), None));
         Scratch {
             displacement: vec![Displacement::default(); n],
             placed: vec![nowhere; n],
             gradient: vec![[0.0; 6]; n],
             coefficient: vec![0.0; self.model.active.len()],
-            moved: Vec::with_capacity(3 * self.model.tool.len() + 2),
-            met: Vec::with_capacity(3 * self.model.workpiece.len() + 2),
+            moved: Vec::with_capacity(5 * self.model.tool.len() + 2),
+            met: Vec::with_capacity(5 * self.model.workpiece.len() + 2),
             turned: [None; 6],
         }
     }
@@ -256,14 +265,7 @@ impl Batch<'_> {
         let placed = all
             .iter()
             .enumerate()
-            .map(|(i, d)| {
-                let slot = &model.slots[i % n_slots];
-                let centre = match (i / n_slots).checked_sub(1) {
-                    Some(s) if slot.place == Place::Block => model.set_ups()[s].centre,
-                    _ => slot.centre,
-                };
-                Placed::new(d, &centre)
-            })
+            .map(|(i, d)| Placed::new(d, model.centre_of(i % n_slots, (i / n_slots).checked_sub(1))))
             .collect();
         At { batch: self, theta, displacement: all, placed, n_slots }
     }
@@ -340,9 +342,7 @@ impl At<'_> {
             }
         }
         for &i in &batch.moving {
-            let slot = &model.slots[i];
-            let centre = if slot.place == Place::Block { model.set_ups()[o.set_up].centre } else { slot.centre };
-            scratch.placed[i].set(&scratch.displacement[i], &centre);
+            scratch.placed[i].set(&scratch.displacement[i], model.centre_of(i, Some(o.set_up)));
         }
     }
 
@@ -398,7 +398,7 @@ impl At<'_> {
         }
         let mut at_rotary = pose.len();
         for link in model.tool.iter().rev() {
-            if let Some(i) = link.after {
+            for i in link.after.into_iter().rev().flatten() {
                 point = at_slot(i).rigid.apply(&point);
                 moved.push(point);
             }
@@ -409,7 +409,7 @@ impl At<'_> {
                 point += travel(&link.axis);
             }
             moved.push(point);
-            if let Some(i) = link.before {
+            for i in link.before.into_iter().rev().flatten() {
                 point = at_slot(i).rigid.apply(&point);
                 moved.push(point);
             }
@@ -425,7 +425,7 @@ impl At<'_> {
         let chain = &model.workpiece[..model.carrier_length(model.set_ups()[o.set_up].carrier)];
         let mut at_rotary = 0;
         for link in chain {
-            if let Some(i) = link.before {
+            for i in link.before.into_iter().flatten() {
                 met.push(point);
                 point = at_slot(i).rigid.undo(&point);
             }
@@ -436,7 +436,7 @@ impl At<'_> {
             } else {
                 point -= travel(&link.axis);
             }
-            if let Some(i) = link.after {
+            for i in link.after.into_iter().flatten() {
                 met.push(point);
                 point = at_slot(i).rigid.undo(&point);
             }
@@ -469,7 +469,7 @@ impl At<'_> {
             undone(back.next(), i, &mut g, gradient);
         }
         for link in chain.iter().rev() {
-            if let Some(i) = link.after {
+            for i in link.after.into_iter().rev().flatten() {
                 undone(back.next(), i, &mut g, gradient);
             }
             if link.axis.name.is_rotary() {
@@ -483,7 +483,7 @@ impl At<'_> {
             {
                 gradient[i][link.axis.name.index()] -= motion_slope(&link.axis, &g, p);
             }
-            if let Some(i) = link.before {
+            for i in link.before.into_iter().rev().flatten() {
                 undone(back.next(), i, &mut g, gradient);
             }
         }
@@ -501,7 +501,7 @@ impl At<'_> {
             applied(back.next(), i, &mut g, gradient);
         }
         for link in &model.tool {
-            if let Some(i) = link.before {
+            for i in link.before.into_iter().flatten() {
                 applied(back.next(), i, &mut g, gradient);
             }
             if let Some(p) = back.next()
@@ -515,7 +515,7 @@ impl At<'_> {
             } else if batch.roles.trigger.is_some() {
                 along += on_line(&link.axis, &g);
             }
-            if let Some(i) = link.after {
+            for i in link.after.into_iter().flatten() {
                 applied(back.next(), i, &mut g, gradient);
             }
         }

@@ -1,5 +1,6 @@
 //! Effects as data: `effects.toml`, built in and of the user's own, as written and checked.
 
+pub use super::as_written::About;
 use super::as_written::{EffectAsWritten, File};
 use super::check::Check;
 use super::formula::Formula;
@@ -97,8 +98,8 @@ pub struct Effect {
     pub family: String,
     /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
     pub discrete: bool,
-    /// Rotations of an axis that bears the workpiece are stated about the ball's centre at zero.
-    pub about_ball: bool,
+    /// About which point its rotations are stated, where the place does not say it.
+    pub about: Option<About>,
     /// One set of parameters for each block.
     pub per_block: bool,
     /// Solved for, but no result.

@@ -1,11 +1,11 @@
 //! Effects as written → checked records; every finding has its place and says which words exist.
 
 use super::as_written::{
-    EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten,
+    About, EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten,
 };
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{CONSTANTS, FUNCTIONS, Formula, LONGEST, VARIABLES};
-use super::mistake;
+use super::{degrees, mistake};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
@@ -130,6 +130,7 @@ impl<'a> Check<'a> {
         }
         if !self.built_in {
             self.usable(w);
+            self.about_fits(w, &terms);
         }
         if w.terms.is_empty() {
             self.error(
@@ -153,7 +154,7 @@ impl<'a> Check<'a> {
             unless,
             family: if w.family.is_empty() { "own".to_owned() } else { w.family.clone() },
             discrete: w.discrete,
-            about_ball: w.about.is_some(),
+            about: w.about,
             per_block: w.per == Some(Per::Block),
             nuisance: w.nuisance,
             paper: w.paper,
@@ -161,6 +162,21 @@ impl<'a> Check<'a> {
             terms,
             built_in: self.built_in,
         })
+    }
+
+    /// `about` says something of one kind of axis only.
+    fn about_fits(&mut self, w: &EffectAsWritten, terms: &[Term]) {
+        let at = |rotary: bool| {
+            terms.iter().any(|t| matches!(t.place, Place::Before(a) | Place::After(a) if a.is_rotary() == rotary))
+        };
+        let idle = match w.about {
+            Some(About::Line) if !at(true) => ("line", "a rotary"),
+            Some(About::Ball) if !at(false) => ("ball", "a linear"),
+            _ => return,
+        };
+        let message = format!("about = {:?} of {:?} says something of {} axis only", idle.0, w.id.get_ref(), idle.1);
+        let help = "leave it out: error motions of a rotary axis always turn about its own line";
+        self.findings.push(Finding::warning("effects::about", message).help(help).at(self.source, w.id.span()));
     }
 
     /// An effect needs an id to be put into a model by, and a number that no formula uses would never be known.
@@ -392,6 +408,7 @@ impl<'a> Check<'a> {
                 let parameter = names.iter().position(|name| name == t.parameter.get_ref())?;
                 if !self.built_in {
                     self.acts(w, t, &formula, parameter);
+                    self.in_degrees(w, t, &words());
                 }
                 Some(Term { parameter, place, component, formula })
             }
@@ -399,7 +416,7 @@ impl<'a> Check<'a> {
                 let help = if text.len() > LONGEST {
                     "write it shorter, or as several terms of one parameter"
                 } else {
-                    "angles A B C are radians inside a formula; unary minus binds tighter than ^: write -(x^2)"
+                    "angles A B C are radians inside a formula"
                 };
                 let place = mistake::find(text, &words()).and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
@@ -410,6 +427,15 @@ impl<'a> Check<'a> {
                 );
                 None
             }
+        }
+    }
+
+    /// A number of degrees where radians are meant.
+    fn in_degrees(&mut self, w: &EffectAsWritten, t: &TermAsWritten, shapes: &[&str]) {
+        if let Some(found) = degrees::find(t.formula.get_ref(), shapes) {
+            let says = format!("formula {:?} of {:?}: {found}", t.formula.get_ref(), w.id.get_ref());
+            let finding = Finding::warning("effects::in_degrees", says).help(found.remedy());
+            self.findings.push(finding.at(self.source, t.formula.span()));
         }
     }
 

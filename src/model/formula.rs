@@ -4,7 +4,7 @@
 //! use (docs/guide/effects.md) and turns a mistake into a sentence that names it.
 
 use super::expression::Expression;
-use super::spelling::{bare_number, plain_numbers};
+use super::spelling::{bare_number, spelled_out};
 use std::sync::{Arc, OnceLock};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
@@ -245,26 +245,9 @@ fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     if let Some(constant) = bare_number(text) {
         return Ok(Parts::Constant(constant));
     }
-    let plain = plain_numbers(text)?;
-    known_functions(&plain)?;
-    let expression =
-        Expression::read(&plain).ok_or_else(|| format!("it cannot be read (functions: {})", FUNCTIONS.join(" ")))?;
+    let cannot = |says: &str| format!("{says} (functions: {})", FUNCTIONS.join(" "));
+    let expression = Expression::read(&spelled_out(text)?).ok_or_else(|| cannot("it cannot be read"))?;
     Parts::of(expression, shapes)
-}
-
-/// A word in front of a bracket must be a function.
-fn known_functions(text: &str) -> Result<(), String> {
-    let mut rest = text;
-    while let Some(bracket) = rest.find('(') {
-        let before = rest[..bracket].trim_end();
-        let word_from = before.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).map_or(0, |i| i + 1);
-        let word = before.get(word_from..).unwrap_or_default();
-        if !word.is_empty() && !word.starts_with(|c: char| c.is_ascii_digit()) && !FUNCTIONS.contains(&word) {
-            return Err(format!("unknown function {word:?} (functions: {})", FUNCTIONS.join(" ")));
-        }
-        rest = &rest[bracket + 1..];
-    }
-    Ok(())
 }
 
 /// Variables of a formula at most: they fit on the stack.
@@ -402,5 +385,58 @@ mod tests {
         assert_eq!(which, 0);
         let expected = -(-0.7f64 / tau).exp() * 0.7 / (tau * tau);
         assert!((derivative - expected).abs() < 1e-12);
+    }
+
+    /// A table that Python computed (tests/formulas/make.py).
+    fn table(text: &str) -> (serde_json::Value, Vec<(String, f64)>) {
+        let table: serde_json::Value = serde_json::from_str(text).unwrap();
+        let row = |r: &serde_json::Value| (r["formula"].as_str().unwrap().to_owned(), r["value"].as_f64().unwrap());
+        let rows = table["rows"].as_array().unwrap().iter().map(row).collect();
+        (table, rows)
+    }
+
+    fn state_of(variables: &serde_json::Value) -> State {
+        let mut state = [0.0; VARIABLES.len()];
+        for (name, value) in variables.as_object().unwrap() {
+            state[VARIABLES.iter().position(|v| v == name).unwrap()] = value.as_f64().unwrap();
+        }
+        state
+    }
+
+    #[test]
+    fn formulas_have_the_values_that_python_computes() {
+        let (table, rows) = table(include_str!("../../tests/formulas/expressions.json"));
+        let state = state_of(&table["variables"]);
+        assert_eq!(rows.len(), 300);
+        let mut wrong = Vec::new();
+        for (text, expected) in rows {
+            let value = Formula::parse(&text, &[]).unwrap_or_else(|e| panic!("{text}: {e}")).eval(&state, &[]);
+            if (value - expected).abs() > 1e-9 * expected.abs().max(1.0) {
+                wrong.push(format!("{text}: {value}, and {expected} in Python"));
+            }
+        }
+        assert!(wrong.is_empty(), "{wrong:#?}");
+    }
+
+    /// What the program was built with, and not what is read from a file.
+    #[test]
+    fn built_in_formulas_have_the_values_that_python_computes() {
+        let (table, rows) = table(include_str!("../../tests/formulas/built_in.json"));
+        let state = state_of(&table["variables"]);
+        let shapes = table["shapes"].as_object().unwrap();
+        let names: Arc<[String]> = shapes.keys().cloned().collect();
+        let values: Vec<f64> = shapes.values().map(|v| v.as_f64().unwrap()).collect();
+        let mut compared = 0;
+        for (text, expected) in &rows {
+            let bare = bare_number(text).is_some();
+            if !bare && Expression::built_in(text).is_none() {
+                // the catalogue has it no longer
+                continue;
+            }
+            let value = Formula::unchecked(text, &names).eval(&state, &values);
+            assert!((value - expected).abs() <= 1e-9 * expected.abs().max(1.0), "{text}: {value} {expected}");
+            compared += usize::from(!bare);
+        }
+        assert!(compared > rows.len() / 2, "{compared} of {}", rows.len());
     }
 }

@@ -36,16 +36,22 @@ pub(super) struct Placed {
     pub rigid: Rigid,
     /// Where the transform takes its centre.
     image: Vector3<f64>,
-    /// About which axes the angles a and b turn; c turns about z.
+    /// About which axes the angles a, b and c turn.
     axis_a: Vector3<f64>,
     axis_b: Vector3<f64>,
+    axis_c: Vector3<f64>,
+    /// Along which directions dx, dy and dz count (columns), where they are not those of R.
+    frame: Option<Matrix3<f64>>,
 }
+
+/// The centre of an error transform (mm in R), and the frame of its components where it is not R.
+pub(super) type Centre<'a> = (&'a Vector3<f64>, Option<&'a Matrix3<f64>>);
 
 impl Placed {
     #[inline]
-    pub fn new(by: &Displacement, centre: &Vector3<f64>) -> Self {
+    pub fn new(by: &Displacement, (centre, frame): Centre<'_>) -> Self {
         if by.w == Vector3::zeros() {
-            return Self::shift(by, centre);
+            return Self::shift(by, (centre, frame));
         }
         let ((sa, ca), (sb, cb), (sc, cc)) = (by.w.x.sin_cos(), by.w.y.sin_cos(), by.w.z.sin_cos());
         // Rz(c)·Ry(b)·Rx(a), as `Displacement::rotation`
@@ -60,29 +66,40 @@ impl Placed {
             cb * sa,
             cb * ca,
         );
-        let image = centre + by.d;
+        let (axis_a, axis_b, axis_c) = (r.column(0).into_owned(), Vector3::new(-sc, cc, 0.0), Vector3::z());
+        let Some(own) = frame else {
+            let image = centre + by.d;
+            return Self { rigid: Rigid { r, t: image - r * centre }, image, axis_a, axis_b, axis_c, frame: None };
+        };
+        let (r, image) = (own * r * own.transpose(), centre + own * by.d);
         Self {
             rigid: Rigid { r, t: image - r * centre },
             image,
-            axis_a: r.column(0).into_owned(),
-            axis_b: Vector3::new(-sc, cc, 0.0),
+            axis_a: own * axis_a,
+            axis_b: own * axis_b,
+            axis_c: own * axis_c,
+            frame: Some(*own),
         }
     }
 
     #[inline]
-    fn shift(by: &Displacement, centre: &Vector3<f64>) -> Self {
-        let rigid = Rigid { r: Matrix3::identity(), t: by.d };
-        Self { rigid, image: centre + by.d, axis_a: Vector3::x(), axis_b: Vector3::y() }
+    fn shift(by: &Displacement, (centre, frame): Centre<'_>) -> Self {
+        let t = frame.map_or(by.d, |own| own * by.d);
+        let own = frame.copied().unwrap_or_else(Matrix3::identity);
+        let column = |i: usize| own.column(i).into_owned();
+        let rigid = Rigid { r: Matrix3::identity(), t };
+        let (axis_a, axis_b, axis_c) = (column(0), column(1), column(2));
+        Self { rigid, image: centre + t, axis_a, axis_b, axis_c, frame: frame.copied() }
     }
 
     /// Makes it the transform of another displacement; cheap where neither turns.
     #[inline]
-    pub fn set(&mut self, by: &Displacement, centre: &Vector3<f64>) {
-        if by.w == Vector3::zeros() && self.rigid.r == Matrix3::identity() {
+    pub fn set(&mut self, by: &Displacement, (centre, frame): Centre<'_>) {
+        if by.w == Vector3::zeros() && self.rigid.r == Matrix3::identity() && frame.is_none() {
             self.rigid.t = by.d;
             self.image = centre + by.d;
         } else {
-            *self = Self::new(by, centre);
+            *self = Self::new(by, (centre, frame));
         }
     }
 
@@ -90,11 +107,12 @@ impl Placed {
     #[inline]
     pub fn slope(&self, g: &Vector3<f64>, moved: &Vector3<f64>, sign: f64, into: &mut [f64; 6]) {
         let turned = (moved - self.image).cross(g);
+        let along = self.frame.map_or(*g, |own| own.tr_mul(g));
         for k in 0..3 {
-            into[k] += sign * g[k];
+            into[k] += sign * along[k];
         }
         into[3] += sign * self.axis_a.dot(&turned);
         into[4] += sign * self.axis_b.dot(&turned);
-        into[5] += sign * turned.z;
+        into[5] += sign * self.axis_c.dot(&turned);
     }
 }

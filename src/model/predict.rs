@@ -12,11 +12,12 @@
 //! (recorded less nominal, along the outward normal), so g is "measured less model", mm. Errors stand in the chain as
 //! exact transforms; nothing is linearised and nothing is expanded for one machine.
 
-use super::catalogue::{Effect, Place, Term};
+use super::catalogue::{About, Effect, Place, Term};
 use super::formula::State;
+use super::stated::{Stated, own_frame, own_point, stated};
 use crate::axes::Position;
 use crate::machine::{Axis, Carrier, Machine, Side};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// One unknown of a model.
 #[derive(Debug, Clone)]
@@ -111,8 +112,12 @@ pub(super) struct Active {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot {
     pub place: Place,
+    /// Errors of a rotary axis on its own line act beside its location errors.
+    pub own_line: bool,
     /// The point at which its offsets are stated, mm in R at zero.
     pub centre: Vector3<f64>,
+    /// Along which directions its components count (columns, in R), where they are not those of R.
+    pub frame: Option<Matrix3<f64>>,
     /// What its displacement depends on.
     pub changes: Changes,
 }
@@ -128,20 +133,23 @@ pub(super) enum Changes {
     WithTouch,
 }
 
-/// An axis of the chain with the places in front of and behind its motion.
+/// An axis of the chain with the places in front of and behind its motion, from the base on:
+/// location errors · own line · motion · own line · location errors.
 #[derive(Debug, Clone)]
 pub(super) struct Link {
     pub axis: Axis,
-    pub before: Option<usize>,
-    pub after: Option<usize>,
+    pub before: [Option<usize>; 2],
+    pub after: [Option<usize>; 2],
 }
 
-/// What a turn about the ball's point is besides the same turn about the centre of its place, `lever` from the ball's point
-/// to that centre: displacements ω × lever, as (component, mm per rad).
+/// What a turn of a linear axis about the ball's point is besides the same turn about the centre of its place, `lever` from
+/// the ball's point to that centre: displacements ω × lever, as (component, mm per rad).
 fn lever_of(machine: &Machine, effect: &Effect, term: &Term, lever: &Vector3<f64>) -> Vec<(usize, f64)> {
-    let bears = |axis| machine.axis(axis).is_some_and(|a| a.side == Side::Workpiece);
+    let bears = |axis| machine.axis(axis).is_some_and(|a| a.side == Side::Workpiece && !a.name.is_rotary());
     match term.place {
-        Place::Before(axis) | Place::After(axis) if effect.about_ball && term.component >= 3 && bears(axis) => {
+        Place::Before(axis) | Place::After(axis)
+            if effect.about == Some(About::Ball) && term.component >= 3 && bears(axis) =>
+        {
             let mut turn = Vector3::zeros();
             turn[term.component - 3] = 1.0;
             let moved = turn.cross(lever);
@@ -206,7 +214,7 @@ impl Model {
     #[must_use]
     pub fn new(machine: &Machine, effects: &[&Effect], set_ups: &[SetUp], reference: Vector3<f64>) -> Self {
         let bare = |side| -> Vec<Link> {
-            machine.side(side).map(|axis| Link { axis: axis.clone(), before: None, after: None }).collect()
+            machine.side(side).map(|axis| Link { axis: axis.clone(), before: [None; 2], after: [None; 2] }).collect()
         };
         let mut model = Self {
             workpiece: bare(Side::Workpiece),
@@ -230,11 +238,12 @@ impl Model {
             }
             model.instances.push(own);
         }
-        let places: Vec<Place> = model.slots.iter().map(|s| s.place).collect();
-        let find = |place: Place| places.iter().position(|p| *p == place);
+        let places: Vec<(Place, bool)> = model.slots.iter().map(|s| (s.place, s.own_line)).collect();
+        let find = |place: Place, own_line: bool| places.iter().position(|p| *p == (place, own_line));
         for link in model.workpiece.iter_mut().chain(&mut model.tool) {
-            link.before = find(Place::Before(link.axis.name));
-            link.after = find(Place::After(link.axis.name));
+            let (before, after) = (Place::Before(link.axis.name), Place::After(link.axis.name));
+            link.before = [find(before, false), find(before, true)];
+            link.after = [find(after, true), find(after, false)];
         }
         model
     }
@@ -242,11 +251,8 @@ impl Model {
     fn put(&mut self, machine: &Machine, effect: &Effect, set_up: Option<usize>) {
         let first = self.unknowns.len();
         for (i, p) in effect.parameters.iter().enumerate() {
-            let at_reference = effect.terms.iter().any(|t| {
-                t.parameter == i
-                    && !(effect.about_ball && t.component >= 3)
-                    && matches!(t.place, Place::Before(a) if a.is_rotary() && machine.axis(a).is_some_and(|x| x.side == Side::Workpiece))
-            });
+            let at_reference =
+                effect.terms.iter().any(|t| t.parameter == i && stated(machine, effect, t) == Stated::Reference);
             let list = match set_up {
                 Some(s) => &mut self.layout.own[s],
                 None => &mut self.layout.common,
@@ -271,7 +277,7 @@ impl Model {
             });
         }
         for term in &effect.terms {
-            let slot = self.slot(machine, term.place);
+            let slot = self.slot(machine, term.place, stated(machine, effect, term));
             let changes = match (term.formula.constant(), set_up) {
                 (None, _) => Changes::WithTouch,
                 (Some(_), Some(_)) => Changes::WithSetUp,
@@ -299,23 +305,27 @@ impl Model {
         }
     }
 
-    fn slot(&mut self, machine: &Machine, place: Place) -> usize {
-        if let Some(i) = self.slots.iter().position(|s| s.place == place) {
+    fn slot(&mut self, machine: &Machine, place: Place, stated: Stated) -> usize {
+        let own_line = stated == Stated::OwnLine;
+        if let Some(i) = self.slots.iter().position(|s| (s.place, s.own_line) == (place, own_line)) {
             return i;
         }
-        let centre = match place {
-            Place::Before(name) | Place::After(name) if name.is_rotary() => match machine.axis(name) {
-                Some(axis) if axis.side == Side::Tool => axis.point,
-                _ => self.reference,
-            },
+        let axis = match place {
+            Place::Before(name) | Place::After(name) => machine.axis(name),
+            _ => None,
+        };
+        let (centre, frame) = match (stated, axis) {
+            (Stated::Reference, _) => (self.reference, None),
+            (Stated::AxisPoint, Some(axis)) => (axis.point, None),
+            (Stated::OwnLine, Some(axis)) => (own_point(machine, axis), own_frame(axis)),
             // a tilt of the tool is one of the tool in its holder
-            Place::Tool => machine.tool.pivot,
+            _ if place == Place::Tool => (machine.tool.pivot, None),
             // a carriage's own coordinates are those of R at zero
-            _ => Vector3::zeros(),
+            _ => (Vector3::zeros(), None),
         };
         // a block turns about its own centre
         let changes = if place == Place::Block { Changes::WithSetUp } else { Changes::Never };
-        self.slots.push(Slot { place, centre, changes });
+        self.slots.push(Slot { place, own_line, centre, frame, changes });
         self.slots.len() - 1
     }
 
@@ -388,7 +398,7 @@ impl Model {
     pub fn least_correlated(&self, observations: &[Observation]) -> Vec<(usize, usize, f64)> {
         let mut out = Vec::new();
         for link in self.workpiece.iter().filter(|l| l.axis.name.is_rotary()) {
-            let Some(slot) = link.before else { continue };
+            let [Some(slot), _] = link.before else { continue };
             let seen = |o: &&Observation| {
                 let carrier = self.set_ups[o.set_up].carrier;
                 self.workpiece[..self.carrier_length(carrier)].iter().any(|l| l.axis.name == link.axis.name)

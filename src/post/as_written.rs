@@ -49,6 +49,44 @@ pub struct File {
     pub log: Log,
     /// The compensation tables that the control has; absent: none are known.
     pub tables: Option<super::tables::Tables>,
+    /// Versions of LinuxCNC, which `export` writes kinematics pins for; the setting `version` names the one that is meant.
+    #[serde(default)]
+    pub release: Vec<Release>,
+}
+
+/// A version of LinuxCNC: what its kinematics modules take.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Release {
+    /// Its name, for the setting `version` and for `--target`.
+    pub name: String,
+    /// What it is, in words.
+    pub says: String,
+    /// Pins of each kinematics module that a compensation may set, without the name of the module. A pin that the module lacks
+    /// would stop LinuxCNC where its HAL file is loaded.
+    pub pins: BTreeMap<String, Vec<String>>,
+    /// The pin (bit) that turns positive angles round: 1 is the direction of ISO 841 (the table turns left-handed), 0 the other
+    /// one. Absent: there is no such pin, and positive angles turn the table right-handed.
+    pub direction_pin: Option<String>,
+    /// Faults of some builds of this version.
+    #[serde(default)]
+    pub fault: Vec<ModuleFault>,
+    /// Document and page.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
+/// A fault of a kinematics module in some builds of a version.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ModuleFault {
+    /// The module.
+    pub module: String,
+    /// It shows while the direction pin has this value.
+    pub conventional: bool,
+    /// What it does, and since when it is mended.
+    pub says: String,
 }
 
 /// The program file.
@@ -95,6 +133,10 @@ pub enum EndOfLine {
     Crlf,
     /// CR
     Cr,
+}
+
+fn dwell() -> Vec<String> {
+    vec!["G4".to_owned()]
 }
 
 fn name_characters() -> String {
@@ -417,6 +459,21 @@ pub struct Columns {
     /// The lines of one touch, in order.
     #[schemars(with = "Vec<Role>")]
     pub per_touch: Spanned<Vec<Role>>,
+    /// What stands before the first number of a row, e.g. `[PRB:`; lines without it are not read. Left out: a row begins with its first number.
+    #[schemars(with = "Option<String>")]
+    pub prefix: Option<Spanned<String>>,
+    /// What stands between two numbers, e.g. `,`. Left out: blanks.
+    #[schemars(with = "Option<String>")]
+    pub separator: Option<Spanned<String>>,
+    /// What stands between the last number and 1 (triggered) or 0 (not triggered), e.g. `:`. Left out: rows do not say it.
+    #[schemars(with = "Option<String>")]
+    pub status: Option<Spanned<String>>,
+    /// What ends a row, e.g. `]`; what follows in the line is not read. Left out: the end of the line.
+    #[schemars(with = "Option<String>")]
+    pub suffix: Option<Spanned<String>>,
+    /// What X, Y and Z of the rows are in.
+    #[serde(default)]
+    pub unit: LengthUnit,
     /// Document and page, public file, or observation.
     pub source: Option<String>,
     /// Why it is not verified.
@@ -450,6 +507,10 @@ pub struct Check {
     /// The control logs to a device that is always there: the program neither names nor opens a log.
     #[serde(default)]
     pub log_always_open: bool,
+    /// Words behind which macro statements wait until everything before them is done (`G4`, `G53`, `M0`): only of Fanuc and Haas.
+    /// M codes that stand in the setting `wait` do so too.
+    #[serde(default = "dwell")]
+    pub waits: Vec<String>,
     /// Settings that a run behind the last set-up gives back after a person has broken the program off.
     #[serde(default)]
     pub after_abort: Vec<String>,

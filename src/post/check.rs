@@ -71,6 +71,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
                 }
                 *g.get_ref()
             }),
+            waits: c.waits.clone(),
             after_abort: c.after_abort.clone(),
             field_overflow: c.field_overflow,
             calls: c.call.clone(),
@@ -83,6 +84,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
     {
         check.error(&rule.span(), "post::block_numbers", format!("block_numbers of [file]: {says}"), help);
     }
+    check.releases(&file);
     let templates = check.templates(&file, &comment, &number);
     let post = Postprocessor {
         name: file.name.get_ref().clone(),
@@ -107,6 +109,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         log,
         unverified: std::mem::take(&mut check.unverified),
         tables: file.tables.clone(),
+        releases: file.release.clone(),
         text: text.clone(),
         templates,
     };
@@ -257,6 +260,19 @@ impl Check<'_> {
         }
     }
 
+    /// The setting `version` names one of the versions, and each says where it comes from.
+    fn releases(&mut self, file: &w::File) {
+        for release in &file.release {
+            self.origin(&format!("release {}", release.name), &release.source, &release.unverified, &file.name.span());
+        }
+        let meant = file.settings.get(super::VERSION_SETTING).map_or("", String::as_str);
+        if !file.release.is_empty() && !file.release.iter().any(|r| r.name == meant) {
+            let names: Vec<&str> = file.release.iter().map(|r| r.name.as_str()).collect();
+            let help = format!("write one of these into [settings]: {}", names.join(", "));
+            self.error(&file.name.span(), "post::version", format!("version is {meant:?}"), &help);
+        }
+    }
+
     fn result(&mut self, result: &w::ResultPlaces) -> BTreeMap<AxisName, String> {
         self.origin("result", &result.source, &result.unverified, &(0..0));
         let places = [&result.x, &result.y, &result.z, &result.a, &result.b, &result.c];
@@ -331,7 +347,16 @@ impl Check<'_> {
                 let help = "for example [\"search\", \"release\", \"measure\"]";
                 self.error(&columns.per_touch.span(), "post::per_touch", message, help);
             }
-            ColumnRule { axes, decimals: columns.decimals, per_touch: columns.per_touch.get_ref().clone() }
+            ColumnRule {
+                axes,
+                decimals: columns.decimals,
+                per_touch: columns.per_touch.get_ref().clone(),
+                prefix: self.around_numbers("prefix", &columns.prefix, false),
+                separator: self.around_numbers("separator", &columns.separator, true),
+                status: self.around_numbers("status", &columns.status, true),
+                suffix: self.around_numbers("suffix", &columns.suffix, true),
+                unit: columns.unit,
+            }
         });
         LogRule {
             characters: log.characters.clone(),
@@ -353,6 +378,23 @@ impl Check<'_> {
             check_modulo,
             columns,
         }
+    }
+
+    /// What stands before, between or behind the numbers of a row. `behind`: it follows a number, and may not go on with it.
+    fn around_numbers(&mut self, key: &str, text: &Option<Spanned<String>>, behind: bool) -> String {
+        let Some(text) = text else { return String::new() };
+        let goes_on = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
+        let value = text.get_ref();
+        let bad = !value.bytes().all(|b| (b' '..=b'~').contains(&b))
+            || value.trim() != value
+            || (behind && value.starts_with(goes_on));
+        if bad {
+            let message = format!("[log.columns] {key} is {value:?}");
+            let help = "printable ASCII without blanks around it; what follows a number does not begin with a digit, a sign, a point or E";
+            self.error(&text.span(), "post::columns", message, help);
+            return String::new();
+        }
+        value.clone()
     }
 
     fn templates(&mut self, file: &w::File, comment: &CommentRule, number: &NumberRule) -> Environment<'static> {

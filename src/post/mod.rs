@@ -18,7 +18,7 @@ mod render;
 mod spelling;
 pub mod tables;
 
-pub use as_written::{CallRule, DialectName, Does, LengthUnit, Overflow};
+pub use as_written::{CallRule, DialectName, Does, LengthUnit, ModuleFault, Overflow, Release};
 pub use emit::TOOL_PLACE;
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
@@ -91,6 +91,8 @@ pub struct Postprocessor {
     pub unverified: Vec<(String, String)>,
     /// The compensation tables that the control has.
     pub tables: Option<tables::Tables>,
+    /// Versions of LinuxCNC.
+    pub releases: Vec<Release>,
     /// The file as it was read.
     pub text: String,
     templates: minijinja::Environment<'static>,
@@ -118,6 +120,8 @@ pub struct CheckRule {
     pub from: String,
     /// The program neither names nor opens a log.
     pub log_always_open: bool,
+    /// Words behind which macro statements wait.
+    pub waits: Vec<String>,
     /// Settings that a run behind the last set-up gives back after the program was broken off.
     pub after_abort: Vec<String>,
     /// What the macros of a package do.
@@ -182,9 +186,46 @@ pub struct ColumnRule {
     pub decimals: usize,
     /// The lines of one touch, in order.
     pub per_touch: Vec<Role>,
+    /// What stands before the first number; lines without it are no rows. Empty: a row begins with its first number.
+    pub prefix: String,
+    /// What stands between two numbers; empty: blanks.
+    pub separator: String,
+    /// What stands between the last number and the status; empty: rows say none.
+    pub status: String,
+    /// What ends the row; empty: the end of the line.
+    pub suffix: String,
+    /// What X, Y and Z are in.
+    pub unit: LengthUnit,
 }
 
+impl ColumnRule {
+    /// Something follows the last number.
+    pub(crate) fn has_tail(&self) -> bool {
+        !self.status.is_empty() || !self.suffix.is_empty()
+    }
+}
+
+/// The setting that names a version of the control.
+const VERSION_SETTING: &str = "version";
+
 impl Postprocessor {
+    /// The version of the control that is meant: the one of this name, or the one that the setting `version` names.
+    ///
+    /// # Errors
+    /// When the controller is not described with such a version; the message lists what there is.
+    pub fn release(&self, name: Option<&str>) -> Result<&Release> {
+        let name = name.or_else(|| self.settings.get(VERSION_SETTING).map(String::as_str)).unwrap_or_default();
+        let names: Vec<&str> = self.releases.iter().map(|r| r.name.as_str()).collect();
+        self.releases.iter().find(|r| r.name == name).ok_or_else(|| {
+            let says = format!("controller {} is not described with a version {name:?}", self.name);
+            let help = match names.as_slice() {
+                [] => "its tables do not depend on the version: leave it away".to_owned(),
+                _ => format!("there are: {}", names.join(", ")),
+            };
+            Failure::new("post::version", says).help(help)
+        })
+    }
+
     /// Whether a program may wait for a person.
     #[must_use]
     pub fn can_stop(&self) -> bool {
@@ -207,6 +248,14 @@ impl Postprocessor {
                 parse(&source(format!("postprocessors/{file} (built in)"), *text)).map(|(post, _)| post)
             })
             .collect()
+    }
+
+    /// The tables of a built-in one; none where it has none, or there is none of that name.
+    #[must_use]
+    pub fn built_in_tables(name: &str) -> Option<&'static tables::Tables> {
+        static ALL: std::sync::OnceLock<Vec<Postprocessor>> = std::sync::OnceLock::new();
+        let all = ALL.get_or_init(|| Self::built_in().unwrap_or_default());
+        all.iter().find(|p| p.name == name)?.tables.as_ref()
     }
 
     /// The postprocessor of a name, or of a file of the user's own when the word ends in `.toml` or holds a `/`.

@@ -80,19 +80,23 @@ impl Postprocessor {
         })
     }
 
-    /// Why the program cannot have this number: the one of the settings is meant, and none that the program calls.
+    /// Why no program of this control can have this number: out of range, or it would call itself.
     #[must_use]
-    pub fn wrong_program_number(&self, digits: &str) -> Option<String> {
+    pub fn impossible_program_number(&self, digits: &str) -> Option<String> {
         let last = self.last_program.unwrap_or(LAST_PROGRAM);
         let Some(number) = digits.parse().ok().filter(|n| (1..=last).contains(n)) else {
             return Some(format!("a program's number is 1 to {last} ([file] last_program)"));
         };
-        if self.check.as_ref().is_some_and(|rule| rule.calls.iter().any(|call| call.program == number)) {
-            return Some("this is a macro that the program calls: it would call itself".to_owned());
-        }
+        let calls = self.check.as_ref().is_some_and(|rule| rule.calls.iter().any(|call| call.program == number));
+        calls.then(|| "this is a macro that the program calls: it would call itself".to_owned())
+    }
+
+    /// The number is not the one of the settings.
+    #[must_use]
+    pub fn other_program_number(&self, digits: &str) -> Option<String> {
         let meant = self.settings.get("program_number")?;
-        (meant.trim().parse() != Ok(number))
-            .then(|| format!("the program has the number {meant} (program_number in [settings])"))
+        (meant.trim().parse::<u64>().ok() != digits.parse().ok())
+            .then(|| format!("the program was written with the number {meant} (program_number in [settings])"))
     }
 
     /// The number that the settings give a program is one that it can have.
@@ -101,7 +105,7 @@ impl Postprocessor {
     /// When it is not.
     pub(super) fn check_program_number(&self) -> Result<()> {
         let Some(number) = self.settings.get("program_number") else { return Ok(()) };
-        self.wrong_program_number(number).map_or(Ok(()), |wrong| {
+        self.impossible_program_number(number).map_or(Ok(()), |wrong| {
             Err(Failure::new(
                 "post::program_number",
                 format!("program_number {number:?} of controller {}: {wrong}", self.name),

@@ -102,6 +102,10 @@ pub struct Tables {
     pub limit_mm: f64,
     /// How the user's backup is read.
     pub backup: BackupForm,
+    /// The control's own description can have a rotary axis that is not along X, Y or Z, without a vector for its
+    /// direction here: an inclination angle, or what the machine's builder writes.
+    #[serde(default)]
+    pub inclined_axes: bool,
     /// The vectors for each kind of machine.
     #[serde(default)]
     pub kind: Vec<Kind>,
@@ -141,7 +145,7 @@ fn large() -> f64 {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BackupForm {
-    /// `assignments`: a name, `=`, a number on a line; `words`: `N19700Q1M-0.0123;`
+    /// `assignments`: a name, `=`, a number on a line; `words`: `N19700Q1L1M-0.0123 `
     pub form: BackupKind,
     /// What begins a remark, in `assignments`.
     #[serde(default)]
@@ -182,7 +186,7 @@ impl BackupForm {
 pub enum BackupKind {
     /// `NAME = 1.25 ; remark`, with or without a block number before.
     Assignments,
-    /// `N19700Q1M-0.0123;`: number, parameter data, unit letter (`M` mm, `I` inch), value.
+    /// `N19700Q1L1M-0.0123`: number, parameter data, path, unit letter (`M` mm, `I` inch), value; without `L1` and with `;` too.
     Words,
 }
 
@@ -277,6 +281,31 @@ pub struct GridForm {
     pub unverified: Option<String>,
 }
 
+/// What ends a line of a table's file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FileEnd {
+    /// LF
+    #[default]
+    Lf,
+    /// CR LF
+    Crlf,
+    /// LF CR CR: the end of a block in files that a Fanuc punches.
+    LfCrCr,
+}
+
+impl FileEnd {
+    /// The characters.
+    #[must_use]
+    pub fn characters(self) -> &'static str {
+        match self {
+            Self::Lf => "\n",
+            Self::Crlf => "\r\n",
+            Self::LfCrCr => "\n\r\r",
+        }
+    }
+}
+
 /// A file that is written.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -295,7 +324,7 @@ pub struct FileForm {
     pub variant: bool,
     /// What ends its lines.
     #[serde(default)]
-    pub crlf: bool,
+    pub end_of_line: FileEnd,
     /// minijinja.
     #[schemars(with = "String")]
     pub template: Spanned<String>,

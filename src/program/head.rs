@@ -5,6 +5,7 @@ use super::plan::{PlanTouch, Skipped};
 use super::route::Routed;
 use super::spec::ProgramSpec;
 use crate::axes::{AxisMap, AxisName, Position};
+use crate::machine::as_written::Toward;
 use crate::machine::{Block, Machine, Side};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -137,6 +138,9 @@ fn block_lines(machine: &Machine, block: &Block) -> Vec<String> {
     let mut line = format!("  block {}: {} x {} x {} mm", block.name, block.size.x, block.size.y, block.size.z);
     if let Some(riser) = &block.riser {
         line.push_str(&format!(", on a riser {} mm high", riser.height));
+        if let Some(toward) = riser.toward.filter(|t| *t != Toward::MinusZ) {
+            line.push_str(&format!(", which goes to {}", toward.as_str()));
+        }
     }
     let mut lines = vec![line];
     if let Some(at) = at {

@@ -126,6 +126,13 @@ impl<'a> Check<'a> {
         }
     }
 
+    /// One mistake in the file may show on every block, face and pose: it is said at its place, once.
+    fn push_once_per_place(&mut self, finding: Finding) {
+        if !self.findings.0.iter().any(|f| f.code == finding.code && f.span == finding.span) {
+            self.findings.push(finding);
+        }
+    }
+
     fn error<T>(&mut self, at: &At<T>, code: &'static str, message: String, help: String) {
         self.push_once(self.spec.error(&at.span, code, message, help));
     }
@@ -173,7 +180,7 @@ impl<'a> Check<'a> {
             .iter()
             .flat_map(|&b| spec.faces.iter().map(move |f| (b, f)))
             .flat_map(|(b, faces)| match &mounting.blocks.get(b) {
-                Some(block) => self.face(b, block, faces, &to_carrier(block)),
+                Some(block) => self.face(b, block, faces, &to_carrier(block), spec),
                 None => Vec::new(),
             })
             .collect();
@@ -201,27 +208,41 @@ impl<'a> Check<'a> {
     }
 
     /// The targets on a face that is named in a frame, `to_carrier` turning that frame's directions into the carrier's.
-    fn face(&mut self, b: usize, block: &Block, named: &FaceGrid, to_carrier: &Rotation3<f64>) -> Vec<Target> {
+    fn face(
+        &mut self,
+        b: usize,
+        block: &Block,
+        named: &FaceGrid,
+        to_carrier: &Rotation3<f64>,
+        setup: &SetupSpec,
+    ) -> Vec<Target> {
         let face = named.face.value;
         let (u, v) = face.tangents();
         let along = [face.normal(), u, v].map(|d| axis_of(&(to_carrier * d)));
         let [Some(normal), Some(u), Some(v)] = along else {
             let message = match along[0] {
-                None => format!("no face of block {:?} looks along machine {face} in this pose", block.name),
+                None => format!(
+                    "no face of block {:?} looks along machine {face} in a pose of this set-up: faces cannot be named in \
+                     machine directions there",
+                    block.name
+                ),
                 Some(own) => format!(
-                    "face {} of block {:?} looks along machine {face} in this pose, but its edges do not run along \
-                     machine directions: the grid cannot be laid on it",
+                    "face {} of block {:?} looks along machine {face} in a pose of this set-up, but its edges do not run \
+                     along machine directions: the grid cannot be laid on it",
                     Face::from_normal(&own),
                     block.name
                 ),
             };
-            self.error(
-                &named.face,
-                "program::skew_face",
-                message,
-                "name faces in machine directions only where the carrier stands at a multiple of 90 degrees, \
-                 else write faces_in = \"block\""
-                    .to_owned(),
+            // the pose is what does not go together with machine directions, whichever block and face shows it
+            self.push_once_per_place(
+                self.spec.error(
+                    &setup.pose.span,
+                    "program::skew_face",
+                    message,
+                    "name faces in machine directions only where the carrier stands at a multiple of 90 degrees, \
+                     else write faces_in = \"block\""
+                        .to_owned(),
+                ),
             );
             return Vec::new();
         };
@@ -235,12 +256,12 @@ impl<'a> Check<'a> {
             let to_edge = (half(&u) - along_u.abs()).min(half(&v) - along_v.abs());
             if to_edge < 0.0 {
                 let past = if to_edge < -1e9 { format!("{:e}", -to_edge) } else { format!("{:.3}", -to_edge) };
-                self.error(
-                    &named.grid,
+                self.push_once_per_place(self.spec.error(
+                    &named.grid.span,
                     "program::off_face",
                     format!("grid {:?} reaches {past} mm past the edge of face {face}", named.grid.value),
                     format!("block {:?} measures {:?} mm: keep the points on it", block.name, block.size.as_slice()),
-                );
+                ));
                 continue;
             }
             if to_edge < self.machine.probe.placement_tolerance {
@@ -253,7 +274,7 @@ impl<'a> Check<'a> {
                     self.machine.probe.placement_tolerance
                 ))
                 .at(&self.spec.source, named.grid.span.clone());
-                self.push_once(finding);
+                self.push_once_per_place(finding);
             }
             let point = block.centre + normal * half(&normal) + u * along_u + v * along_v;
             out.push(Target { block: b, face: Face::from_normal(&normal), point, normal });

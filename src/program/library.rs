@@ -6,16 +6,20 @@ use crate::diag::{Failure, Result, source};
 use crate::machine::Machine;
 
 /// The programs that are built in: file name and text.
-const BUILT_IN: [(&str, &str); 9] = [
+const BUILT_IN: [(&str, &str); 13] = [
     ("programs/head.toml", include_str!("../../programs/head.toml")),
     ("programs/table.toml", include_str!("../../programs/table.toml")),
     ("programs/double-head.toml", include_str!("../../programs/double-head.toml")),
     ("programs/basic-trunnion.toml", include_str!("../../programs/basic-trunnion.toml")),
     ("programs/basic-swivel-table-b.toml", include_str!("../../programs/basic-swivel-table-b.toml")),
+    ("programs/basic-nutating-b.toml", include_str!("../../programs/basic-nutating-b.toml")),
+    ("programs/basic-trunnion-offset.toml", include_str!("../../programs/basic-trunnion-offset.toml")),
     ("programs/full-swivel-head.toml", include_str!("../../programs/full-swivel-head.toml")),
     ("programs/full-double-head.toml", include_str!("../../programs/full-double-head.toml")),
     ("programs/full-trunnion.toml", include_str!("../../programs/full-trunnion.toml")),
     ("programs/full-swivel-table-b.toml", include_str!("../../programs/full-swivel-table-b.toml")),
+    ("programs/full-nutating-b.toml", include_str!("../../programs/full-nutating-b.toml")),
+    ("programs/full-trunnion-offset.toml", include_str!("../../programs/full-trunnion-offset.toml")),
 ];
 
 /// The programs that are built in.

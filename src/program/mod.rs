@@ -14,6 +14,7 @@ mod library;
 pub mod parts;
 pub mod path;
 pub mod plan;
+pub mod plan_check;
 mod plan_lines;
 mod reach;
 mod route;

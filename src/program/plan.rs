@@ -1,7 +1,7 @@
 //! The plan: the touches of a program with their nominal places (`axiscal-plan/1`, docs/formats.md).
 
 use crate::axes::{AxisMap, Position};
-use crate::diag::{Finding, Findings, Result, Source, from_json};
+use crate::diag::{Findings, Result, Source, from_json};
 use compact_str::CompactString;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -210,7 +210,7 @@ impl Plan {
     /// Reads a plan.
     ///
     /// # Errors
-    /// When the text is not JSON of this form, or a touch contradicts itself.
+    /// When the text is not JSON of this form, or holds what cannot be so on any machine.
     pub fn parse(source: &Source) -> Result<(Self, Findings)> {
         let by_the_library = || {
             serde_json::from_str(source.inner()).map_err(|e| {
@@ -218,48 +218,7 @@ impl Plan {
             })
         };
         let plan: Self = super::plan_lines::read(source.inner()).map_or_else(by_the_library, Ok)?;
-        let mut findings = Findings::default();
-        if plan.format != FORMAT {
-            findings.push(
-                Finding::error("plan::format", format!("format is {:?}, expected {FORMAT:?}", plan.format))
-                    .help("is this a plan? `axiscal generate` writes NAME.plan.json")
-                    .at(source, 0..0),
-            );
-        }
-        // plans of our own count upwards: then no number stands twice
-        let ascending = plan.touches.is_sorted_by(|a, b| a.id < b.id);
-        let mut seen = std::collections::BTreeSet::new();
-        for touch in &plan.touches {
-            let mut bad = |code, message: String, help: &str| {
-                findings.push(Finding::error(code, message).help(help).at(source, 0..0));
-            };
-            if !ascending && !seen.insert(touch.id) {
-                bad(
-                    "plan::id_twice",
-                    format!("touch {} stands twice in the plan", touch.id),
-                    "ids are unique: make the plan again",
-                );
-            }
-            if plan.block_of(touch).is_none() {
-                bad(
-                    "plan::no_block",
-                    format!("touch {} names block {:?}, which the plan lacks", touch.id, touch.block),
-                    "make the plan again",
-                );
-            }
-            let norm = touch.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if norm.is_nan() || (norm - 1.0).abs() >= 1e-6 {
-                bad(
-                    "plan::normal",
-                    format!("normal of touch {} has length {norm}", touch.id),
-                    "an outward unit normal is expected",
-                );
-            }
-            if touch.point.iter().any(|x| !x.is_finite()) {
-                bad("plan::point", format!("point of touch {} is not finite", touch.id), "make the plan again");
-            }
-        }
-        findings.finish(plan)
+        super::plan_check::by_itself(&plan).findings(&plan, source).finish(plan)
     }
 
     /// The plan as JSON, the same bytes for the same plan; each touch in a line of its own.

@@ -233,7 +233,9 @@ impl<'m> Scene<'m> {
             return 0.0; // a linear axis can bring anything anywhere
         }
         // solids of one carrier never move against each other
-        let Some(innermost) = between.last() else { return f64::MAX };
+        if between.is_empty() {
+            return f64::MAX;
+        }
         let (turning, standing) = if b.len() > shared { (other, one) } else { (one, other) };
         if let [axis] = between[..] {
             return self.least_gap_about(axis, turning, standing);
@@ -241,15 +243,17 @@ impl<'m> Scene<'m> {
         if a.len() > shared && b.len() > shared {
             return 0.0; // both turn
         }
-        // any angles of several axes: inside the sphere about the outer axis's point that holds all of them
-        let outer = between.first().unwrap_or(innermost);
+        // any angles of several axes: inside the sphere about a point of the outer axis's line that holds all of them.
+        // A turn moves nothing along its line, so the nearest point of each line gives the smallest sphere
         let mut reach = turning.solid.reach();
         let mut centre = turning.solid.centre(&Transform::identity());
         for axis in between.iter().rev() {
-            reach += (centre - axis.point).norm();
-            centre = axis.point;
+            let direction = axis.direction.into_inner();
+            let nearest = axis.point + direction * direction.dot(&(centre - axis.point));
+            reach += (centre - nearest).norm();
+            centre = nearest;
         }
-        let ball = Solid::ball(outer.point, reach);
+        let ball = Solid::ball(centre, reach);
         self.distance(&ball, &Transform::identity(), &standing.solid, &Transform::identity())
     }
 

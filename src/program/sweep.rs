@@ -44,11 +44,25 @@ pub struct Hit {
     pub needed_mm: f64,
 }
 
+/// Two lengths in as many digits as it takes to see the difference, two at least. A gap that is less by no more than the proof resolves, or
+/// that is proven too late to count, is shown just below what is needed.
+pub(crate) fn told_apart(gap_mm: f64, needed_mm: f64) -> (String, String) {
+    const MOST: usize = 4;
+    let shown = |decimals: usize| (format!("{gap_mm:.decimals$}"), format!("{needed_mm:.decimals$}"));
+    let apart = (2..=MOST).map(shown).find(|(gap, needed)| gap != needed && gap_mm < needed_mm);
+    apart.unwrap_or_else(|| {
+        let needed = format!("{needed_mm:.MOST$}");
+        let step = 0.1_f64.powi(4);
+        (format!("{:.MOST$}", (needed_mm - step).max(0.0)), needed)
+    })
+}
+
 impl std::fmt::Display for Hit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { part, obstacle, gap_mm, needed_mm } = self;
         if *gap_mm > 0.0 {
-            write!(f, "the {part} would come within {gap_mm:.2} mm of {obstacle} ({needed_mm:.2} mm is needed)")
+            let (gap, needed) = told_apart(*gap_mm, *needed_mm);
+            write!(f, "the {part} would come within {gap} mm of {obstacle} ({needed} mm is needed)")
         } else {
             write!(f, "the {part} would hit {obstacle}")
         }

@@ -10,6 +10,7 @@ use super::moments::{Block, Moments};
 use super::score::{Question, leader, score};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Touches whose prediction has a variance above this (in variances of a touch) judge nothing.
 pub const LARGEST_VARIANCE: f64 = 9.0;
@@ -18,27 +19,29 @@ pub const LARGEST_VARIANCE: f64 = 9.0;
 const LOST: f64 = 1e-8;
 
 /// Which term is put to the test.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Choice {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Choice<'a> {
     /// The choice is redone in each training set: the leader with a name that passes Holm, or none.
     Redone,
     /// The same among generic shapes.
     ShapeRedone,
     /// A given candidate, with the variant that fits the training set best; the choice is not tested.
     Given(usize),
+    /// As these folds chose, with the variants that fit best here.
+    AsIn(&'a [Fold]),
 }
 
 /// Squared error on held-out touches, with and without the term.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
-    /// Root mean square error of the base model on held-out touches, in the unit of [`Colour`] (standard deviations of a
-    /// whitened row without one); not a number where no touch could be predicted.
+    /// Root mean square error of the base model on the held-out touches that it can predict, in the unit of [`Colours`] (standard
+    /// deviations of a whitened row without them); not a number where no touch could be predicted.
     pub before: f64,
-    /// The same with the chosen terms.
+    /// The same with the chosen terms, on the same touches: one that they make unpredictable is predicted without them.
     pub after: f64,
     /// Standard error of before less after, from its spread over groups.
     pub fall_error: f64,
-    /// Touches that could be predicted by both.
+    /// Touches that the base model could predict.
     pub scored: usize,
     /// Touches in groups.
     pub touches: usize,
@@ -59,9 +62,9 @@ pub struct Fold {
     pub chosen: Option<usize>,
     /// By how much the sum of squared whitened errors of its touches falls.
     pub gain: f64,
-    /// The same in the unit of [`Colour`].
+    /// By how much that of its touches falls, in the unit of [`Colours`].
     pub gain_coloured: f64,
-    /// Touches of it that could be predicted by both.
+    /// Touches of it that the base model could predict.
     pub scored: usize,
 }
 
@@ -73,19 +76,44 @@ impl HeldOut {
     }
 }
 
-/// Turns the whitened errors of a group's rows back into those of its touches: group number, errors.
-pub type Colour<'a> = &'a (dyn Fn(usize, &DVector<f64>) -> DVector<f64> + Sync);
+/// What turns whitened rows of a group back into its touches.
+#[derive(Debug, Clone)]
+pub struct Colours {
+    /// A square matrix for each group; rows of a group without one stay as they are.
+    pub by_group: HashMap<usize, DMatrix<f64>>,
+    /// Standard deviation of a touch in the unit of the touches.
+    pub sigma: f64,
+}
+
+impl Default for Colours {
+    fn default() -> Self {
+        Self { by_group: HashMap::new(), sigma: 1.0 }
+    }
+}
+
+impl Colours {
+    /// Rows of a group as those of its touches.
+    fn touches(&self, group: usize, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        self.by_group.get(&group).map_or_else(|| rows.clone(), |c| c * rows)
+    }
+}
 
 /// Errors as they are.
 #[must_use]
 pub fn held_out(question: Question, library: &Library, groups: &[usize], choice: Choice) -> HeldOut {
-    held_out_in(question, library, groups, choice, &|_, e| e.clone())
+    held_out_in(question, library, groups, choice, &Colours::default())
 }
 
 /// Leaves out each group in turn. `groups[i]` is the group of row i; rows beyond its end (priors) are always known.
 /// Rows that whitening has mixed must stand in one group.
 #[must_use]
-pub fn held_out_in(question: Question, library: &Library, groups: &[usize], choice: Choice, colour: Colour) -> HeldOut {
+pub fn held_out_in(
+    question: Question,
+    library: &Library,
+    groups: &[usize],
+    choice: Choice,
+    colours: &Colours,
+) -> HeldOut {
     let moments = Moments::new(question.residual, question.base, library);
     let residual = question.base.project(question.residual);
     let mut numbers: Vec<usize> = groups.to_vec();
@@ -95,7 +123,7 @@ pub fn held_out_in(question: Question, library: &Library, groups: &[usize], choi
         .par_iter()
         .map(|&group| {
             let rows: Vec<usize> = (0..groups.len()).filter(|&i| groups[i] == group).collect();
-            fold(question, library, (&moments, &residual), (group, &rows), choice, colour)
+            fold(question, library, (&moments, &residual), (group, &rows), choice, colours)
         })
         .collect();
     let scored: usize = results.iter().map(|r| r.fold.scored).sum();
@@ -147,7 +175,7 @@ fn fold(
     (whole, residual): (&Moments, &DVector<f64>),
     (group, rows): (usize, &[usize]),
     choice: Choice,
-    colour: Colour,
+    colours: &Colours,
 ) -> Result {
     let base: &Basis = question.base;
     let p = base.rank();
@@ -190,6 +218,9 @@ fn fold(
         Choice::Redone => leader(&scores, library, false),
         Choice::ShapeRedone => leader(&scores, library, true),
         Choice::Given(c) => scores[c].visible().then_some(c),
+        Choice::AsIn(folds) => {
+            folds.iter().find(|f| f.group == group).and_then(|f| f.chosen).filter(|&c| scores[c].visible())
+        }
     };
 
     // each touch of the group in the training basis: prediction r̂ = −… of the residual, and its variance
@@ -199,9 +230,23 @@ fn fold(
         .map(|i| lost_g.column(i).norm_squared() < 1e-12 && seen_g.column(i).norm_squared() < LARGEST_VARIANCE)
         .collect();
     let base_error = &r_g - seen_g.tr_mul(&qr);
+    // the same touch by touch: rows that whitening has mixed are no touches, and what one of them lacks all of them would lack
+    let s2 = colours.sigma.powi(2);
+    let [seen_t, lost_t] = [&seen_g, &lost_g].map(|rows| colours.touches(group, &rows.transpose()));
+    let error_of = |e: &DVector<f64>| {
+        let column = DMatrix::from_column_slice(e.len(), 1, e.as_slice());
+        colours.touches(group, &column).column(0).into_owned()
+    };
+    let predicted: Vec<bool> = (0..rows.len())
+        .map(|i| {
+            let variance = seen_t.row(i).norm_squared();
+            lost_t.row(i).norm_squared() < 1e-12 * s2 && variance < LARGEST_VARIANCE * s2
+        })
+        .collect();
+    let base_error_t = error_of(&base_error);
+    let (before_t, scored) = sum(&base_error_t, &predicted);
     let Some(c) = chosen else {
-        let (before, scored) = sum(&colour(group, &base_error), &known);
-        return Result { fold: Fold { group, chosen, gain: 0.0, gain_coloured: 0.0, scored }, before };
+        return Result { fold: Fold { group, chosen, gain: 0.0, gain_coloured: 0.0, scored }, before: before_t };
     };
     let variant = scores[c].variant;
     let span = library.candidates()[c].variants[variant].columns.clone();
@@ -217,12 +262,19 @@ fn fold(
         .enumerate()
         .map(|(i, &k)| k && seen_g.column(i).norm_squared() + own.row(i).norm_squared() < LARGEST_VARIANCE)
         .collect();
-    let (before, scored) = sum(&base_error, &known);
+    let (before, _) = sum(&base_error, &known);
     let (after, _) = sum(&error, &known);
-    let coloured = |e: &DVector<f64>| sum(&colour(group, e), &known).0;
-    let (before_coloured, after_coloured) = (coloured(&base_error), coloured(&error));
-    let fold = Fold { group, chosen, gain: before - after, gain_coloured: before_coloured - after_coloured, scored };
-    Result { fold, before: before_coloured }
+    // a touch that the term makes unpredictable is predicted without it, so that both errors are of the same touches
+    let own_t = colours.touches(group, &own);
+    let mut error_t = error_of(&error);
+    for i in 0..rows.len() {
+        if seen_t.row(i).norm_squared() + own_t.row(i).norm_squared() >= LARGEST_VARIANCE * s2 {
+            error_t[i] = base_error_t[i];
+        }
+    }
+    let (after_t, _) = sum(&error_t, &predicted);
+    let fold = Fold { group, chosen, gain: before - after, gain_coloured: before_t - after_t, scored };
+    Result { fold, before: before_t }
 }
 
 fn sum(error: &DVector<f64>, known: &[bool]) -> (f64, usize) {

@@ -170,6 +170,18 @@ impl Library {
         DMatrixView::from_slice(&self.data, self.n_rows, self.n_columns())
     }
 
+    /// The same candidates with columns that were whitened otherwise, in the same order; `None` for a matrix of another shape.
+    #[must_use]
+    pub fn with_columns(&self, columns: DMatrix<f64>) -> Option<Self> {
+        if columns.ncols() != self.n_columns() {
+            return None;
+        }
+        let mut data = Vec::from(columns.data);
+        let n_rows = data.len().checked_div(self.n_columns()).unwrap_or(0);
+        clear_rounding(&mut data, n_rows);
+        Some(Self { n_rows, data, candidates: self.candidates.clone() })
+    }
+
     /// A library of one of the candidates, with all its variants.
     #[must_use]
     pub fn only(&self, candidate: usize) -> Self {

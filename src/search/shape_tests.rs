@@ -111,7 +111,7 @@ fn shapes_of_no_catalogue_are_named_by_their_variable() {
     let r = noise(&mut rng, n) - &tooth;
     let first = &found(&f, &g, &base, &r)[0];
     assert_eq!((first.scanned, first.direction.as_str(), first.dof.as_str()), (7.0, "machine-Z", "dz"));
-    assert_eq!(first.terms[0].formula.as_deref(), Some("cos(7*C)"));
+    assert_eq!(first.terms[0].formula.as_deref(), Some("cos(7*C) - 1"));
     let amplitude = first.terms[0].size.hypot(first.terms[1].size);
     assert!((amplitude - 5.0).abs() < 0.5, "{amplitude}");
     assert!(first.share > 0.6 && first.curve.len() > 100);

@@ -103,9 +103,55 @@ impl Function {
         }
     }
 
-    /// Text in the formula language; `free` writes the scanned number as a shape parameter of that name. `None` where
-    /// formulas have no word for it.
+    /// Text in the formula language, 0 at the home position (all axes at 0): a part that is there at home is a location error,
+    /// and an effect that held it would move that. `free` writes the scanned number as a shape parameter of that name.
+    /// `None` where formulas have no word for it.
     pub fn formula(&self, features: &Features, free: Option<&str>) -> Option<String> {
+        let less_home = |of: &Self| -> Option<String> {
+            let text = of.as_it_is(features, free)?;
+            Some(match of.at_home(features, free) {
+                Some(home) if home != "0" => format!("{text} - {home}"),
+                _ => text,
+            })
+        };
+        match self {
+            Self::Along { of, .. } => of.formula(features, free),
+            // what does not depend on axes multiplies the part that does, less its value at home
+            Self::Product(a, b) if a.of_axes(features) != b.of_axes(features) => {
+                Some(format!("({})*({})", a.formula(features, None)?, b.formula(features, None)?))
+            }
+            of => less_home(of),
+        }
+    }
+
+    /// Is it a function of axis positions alone?
+    fn of_axes(&self, features: &Features) -> bool {
+        match self {
+            Self::Product(a, b) => a.of_axes(features) && b.of_axes(features),
+            _ => self.variable().is_some_and(|v| matches!(features.variables[v].kind, Kind::Linear | Kind::Rotary)),
+        }
+    }
+
+    /// Its value at the home position, for a formula; `None` where that is no number: it does not depend on axes alone.
+    fn at_home(&self, features: &Features, free: Option<&str>) -> Option<String> {
+        if !self.of_axes(features) {
+            return None;
+        }
+        Some(match (self, free) {
+            (Self::Kink { scale, .. }, Some(name)) => format!("abs({name})/{}", number(*scale)),
+            _ => number(self.value_at_home() + 0.0),
+        })
+    }
+
+    fn value_at_home(&self) -> f64 {
+        match self {
+            Self::Product(a, b) => a.value_at_home() * b.value_at_home(),
+            _ => self.at(0.0),
+        }
+    }
+
+    /// Text in the formula language, as [`Self::at`] has it.
+    fn as_it_is(&self, features: &Features, free: Option<&str>) -> Option<String> {
         let word = |v: usize| features.variables[v].word.clone();
         let given = |x: f64| free.map_or_else(|| number(x), str::to_owned);
         let less = |word: String, x: f64| if x == 0.0 { word } else { format!("({word} - {})", number(x)) };
@@ -131,8 +177,8 @@ impl Function {
             Self::Exponential { variable, from, constant } => {
                 format!("1 - exp(0 - {}/{})", less(word(*variable)?, *from), given(*constant))
             }
-            Self::Product(a, b) => format!("({})*({})", a.formula(features, None)?, b.formula(features, None)?),
-            Self::Along { of, .. } => return of.formula(features, free),
+            Self::Product(a, b) => format!("({})*({})", a.as_it_is(features, None)?, b.as_it_is(features, None)?),
+            Self::Along { of, .. } => return of.as_it_is(features, free),
             Self::Member { .. } => return None,
         })
     }
@@ -192,14 +238,55 @@ mod tests {
             Function::Exponential { variable: 2, from: 0.25, constant: 0.5 },
             Function::Product(Box::new(x_power), Box::new(Function::Harmonic { variable: 0, k: 2, sine: false })),
         ] {
+            let home: State = [0.0; VARIABLES.len()];
+            let of_axes = function.of_axes(&features);
+            let level = if of_axes { function.value_at_home() } else { 0.0 };
             let text = function.formula(&features, None).unwrap();
-            let value = Formula::parse(&text, &[]).unwrap().eval(&state, &[]);
-            assert!((value - function.at_row(&features, 0)).abs() < 1e-12, "{text}: {value}");
+            let formula = Formula::parse(&text, &[]).unwrap();
+            let value = formula.eval(&state, &[]);
+            // six digits of what it is at home
+            assert!(
+                (value - function.at_row(&features, 0) + level).abs() < 1e-5 * level.abs().max(1e-7),
+                "{text}: {value}"
+            );
+            assert!(!of_axes || formula.eval(&home, &[]).abs() < 1e-5, "{text}");
             if let Some((name, _, start)) = function.free_parameter(&features) {
                 let text = function.formula(&features, Some(name)).unwrap();
-                let value = Formula::parse(&text, &[name]).unwrap().eval(&state, &[start]);
-                assert!((value - function.at_row(&features, 0)).abs() < 1e-12, "{text}");
+                let formula = Formula::parse(&text, &[name]).unwrap();
+                let value = formula.eval(&state, &[start]);
+                assert!((value - function.at_row(&features, 0) + level).abs() < 1e-12, "{text}");
+                assert!(!of_axes || formula.eval(&home, &[start]).abs() < 1e-12, "{text}");
             }
         }
+    }
+
+    #[test]
+    fn what_depends_on_an_axis_is_nothing_at_home() {
+        let features = Features {
+            variables: vec![
+                Variable::new("C", Kind::Rotary, vec![2.0]),
+                Variable::new("X", Kind::Linear, vec![50.0]),
+                Variable::new("t", Kind::Time, vec![1.3]),
+            ],
+            ..Features::default()
+        };
+        let cos = || Box::new(Function::Harmonic { variable: 0, k: 2, sine: false });
+        let far = || Box::new(Function::Power { variable: 1, centre: 100.0, scale: 50.0, k: 2 });
+        let hours = || Box::new(Function::Exponential { variable: 2, from: 0.5, constant: 2.0 });
+        for (function, expected) in [
+            (*cos(), "cos(2*C) - 1"),
+            (*far(), "((X - 100)/50)^2 - 4"),
+            (Function::Product(cos(), far()), "(cos(2*C))*(((X - 100)/50)^2) - 4"),
+            // what changes with the time keeps its own level
+            (Function::Product(cos(), hours()), "(cos(2*C) - 1)*(1 - exp(0 - (t - 0.5)/2))"),
+            (*hours(), "1 - exp(0 - (t - 0.5)/2)"),
+            (Function::Step { variable: 0, at: -1.0 }, "step(C - (-1)) - 1"),
+            (Function::Step { variable: 0, at: 1.0 }, "step(C - 1)"),
+            (Function::Harmonic { variable: 0, k: 3, sine: true }, "sin(3*C)"),
+        ] {
+            assert_eq!(function.formula(&features, None).as_deref(), Some(expected));
+        }
+        let corner = Function::Kink { variable: 1, at: 20.0, scale: 100.0 };
+        assert_eq!(corner.formula(&features, Some("corner")).as_deref(), Some("abs(X - corner)/100 - abs(corner)/100"));
     }
 }

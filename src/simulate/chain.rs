@@ -1,9 +1,9 @@
 //! The real chain, evaluated forward: base → axes with their errors → ball, and base → axes with theirs → block.
 
-use super::rigid::{Rigid, Vec3, minus, norm, plus, sin_cos_deg, unit};
+use super::rigid::{Rigid, Vec3, cross, dot, minus, norm, plus, sin_cos_deg, unit};
 use super::terms::Shifts;
 use crate::axes::{AxisName, Position};
-use crate::machine::{Carrier, Machine, Side};
+use crate::machine::{self, Carrier, Machine, Side};
 use crate::units::deg_from_rad;
 
 /// One axis on the way from the base.
@@ -16,8 +16,10 @@ struct Link {
     /// What a positive coordinate does: the sense of a rotary axis; a linear axis of the workpiece side moves backwards
     /// because its coordinate says where the tool is over the workpiece.
     sign: f64,
-    /// About which point its error motion turns, mm.
-    error_point: Vec3,
+    /// About which points its errors before and after its motion turn, mm.
+    error_points: [Vec3; 2],
+    /// Of a rotary axis: its own frame, with the origin at the point of its own line where its error motions are stated.
+    own: Rigid,
 }
 
 impl Link {
@@ -36,6 +38,32 @@ impl Link {
             Rigid::shift(plus([0.0; 3], self.sign * (q + reading), self.direction))
         }
     }
+
+    /// An error motion on the axis's own line: out of R into the axis's frame, the error there, and back.
+    fn on_own_line(&self, six: &[f64; 6]) -> Rigid {
+        self.own.then(&Rigid::error(six, [0.0; 3])).then(&self.own.inverse())
+    }
+}
+
+/// The frame in which the error motions of a rotary axis count, with its origin on the axis's line: where the line passes
+/// nearest to the ball at zero for an axis that bears the workpiece, at the axis's own point in the head.
+fn own_frame(axis: &machine::Axis, ball: Vec3) -> Rigid {
+    let line = [axis.direction.x, axis.direction.y, axis.direction.z];
+    let point = [axis.point.x, axis.point.y, axis.point.z];
+    let origin = match axis.side {
+        Side::Tool => point,
+        Side::Workpiece => plus(point, dot(line, minus(ball, point)), line),
+    };
+    let mut letter = [0.0; 3];
+    letter[axis.name.index() % 3] = 1.0;
+    // the letter's direction is turned onto the line by the smaller of the two ways, over the edge that both enclose
+    let line = if dot(letter, line) < 0.0 { plus([0.0; 3], -1.0, line) } else { line };
+    let edge = cross(letter, line);
+    let sine = norm(edge);
+    if sine < 1e-9 {
+        return Rigid::shift(origin);
+    }
+    Rigid::shift(origin).then(&Rigid::turn(unit(edge), [0.0; 3], (sine, dot(letter, line))))
 }
 
 /// Where ball and carrier really are.
@@ -62,24 +90,28 @@ impl Chain {
     /// The chain of a machine; `reference` is the point (mm in R) at which errors of workpiece-side rotary axes are
     /// stated.
     pub fn new(machine: &Machine, reference: Vec3) -> Self {
+        let ball = [machine.reference.ball.x, machine.reference.ball.y, machine.reference.ball.z];
         let links = |side: Side| {
             let axes = machine.axes.iter().filter(move |a| a.side == side);
             axes.map(move |a| {
                 let rotary = a.name.is_rotary();
                 let point = [a.point.x, a.point.y, a.point.z];
                 let backwards = !rotary && side == Side::Workpiece;
-                let error_point = match (rotary, side) {
-                    (false, _) => [0.0; 3],
-                    (true, Side::Workpiece) => reference,
-                    (true, Side::Tool) => point,
+                let error_points = match (rotary, side) {
+                    (false, _) => [[0.0; 3]; 2],
+                    // what moves with the table is stated at the axis, not at a point that stands still
+                    (true, Side::Workpiece) => [reference, point],
+                    (true, Side::Tool) => [point; 2],
                 };
+                let own = if rotary { own_frame(a, ball) } else { Rigid::STILL };
                 let sign = if backwards { -1.0 } else { a.sense };
                 Link {
                     axis: a.name,
                     direction: [a.direction.x, a.direction.y, a.direction.z],
                     point,
                     sign,
-                    error_point,
+                    error_points,
+                    own,
                 }
             })
             .collect()
@@ -117,11 +149,17 @@ impl Chain {
         for link in links {
             let i = link.axis.index();
             if shifts.before[i] != [0.0; 6] {
-                out = out.then(&Rigid::error(&shifts.before[i], link.error_point));
+                out = out.then(&Rigid::error(&shifts.before[i], link.error_points[0]));
+            }
+            if shifts.line_before[i] != [0.0; 6] {
+                out = out.then(&link.on_own_line(&shifts.line_before[i]));
             }
             out = out.then(&link.motion(joints, shifts.reading[i]));
+            if shifts.line_after[i] != [0.0; 6] {
+                out = out.then(&link.on_own_line(&shifts.line_after[i]));
+            }
             if shifts.after[i] != [0.0; 6] {
-                out = out.then(&Rigid::error(&shifts.after[i], link.error_point));
+                out = out.then(&Rigid::error(&shifts.after[i], link.error_points[1]));
             }
         }
         out
@@ -173,7 +211,7 @@ impl Chain {
         let last = self.workpiece[..n_links.min(self.workpiece.len())].last().filter(|l| l.axis.is_rotary());
         let (foot, along) = last.map_or(([0.0; 3], [0.0, 0.0, 1.0]), |l| (l.point, l.direction));
         let arm = minus(place, foot);
-        let across = plus(arm, -super::rigid::dot(arm, along), along);
+        let across = plus(arm, -dot(arm, along), along);
         if norm(across) > 1e-9 { unit(across) } else { [0.0; 3] }
     }
 }

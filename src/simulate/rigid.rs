@@ -105,6 +105,14 @@ impl Rigid {
         Self([row(0), row(1), row(2)])
     }
 
+    /// The motion that undoes this one.
+    pub fn inverse(&self) -> Self {
+        let row = |i: usize| [self.0[0][i], self.0[1][i], self.0[2][i]];
+        let shift = [self.0[0][3], self.0[1][3], self.0[2][3]];
+        let cells = |i: usize| [row(i)[0], row(i)[1], row(i)[2], -dot(row(i), shift)];
+        Self([cells(0), cells(1), cells(2)])
+    }
+
     /// The place in the outer frame of a place in the inner one.
     pub fn outward(&self, p: Vec3) -> Vec3 {
         let row = |i: usize| self.0[i][0] * p[0] + self.0[i][1] * p[1] + self.0[i][2] * p[2] + self.0[i][3];

@@ -337,7 +337,7 @@ impl Parameter {
 }
 
 /// Up to ten of the names, the likeliest meant first.
-fn nearest(word: &str, mut names: Vec<String>) -> Vec<String> {
+pub(crate) fn nearest(word: &str, mut names: Vec<String>) -> Vec<String> {
     const SHOWN: usize = 10;
     let likeness = |name: &String| strsim::jaro_winkler(word, name);
     names.sort_by(|a, b| likeness(b).total_cmp(&likeness(a)));

@@ -84,13 +84,23 @@ impl Default for TouchState {
 /// Where a term acts. `dof` 0, 1, 2: displacement along x, y, z (mm); 3, 4, 5: turn about x, y, z (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
-    /// The error motion of an axis, before or after its own motion.
+    /// An error of an axis, before or after its own motion, along and about the directions of R. Of a rotary axis these
+    /// are the constant ones, which say where its line lies.
     Axis {
         /// Which axis.
         axis: AxisName,
         /// After its motion (the error moves with the axis) instead of before.
         after: bool,
         /// Component, 0 to 5.
+        dof: usize,
+    },
+    /// How a rotary axis runs on its own line: along and about the directions of the axis's own frame, at its own line.
+    OwnLine {
+        /// Which axis.
+        axis: AxisName,
+        /// After its motion (the error moves with the axis) instead of before.
+        after: bool,
+        /// Component, 0 to 5, in the axis's own frame.
         dof: usize,
     },
     /// The ball, along an axis of R.
@@ -244,6 +254,10 @@ pub struct Shifts {
     pub before: [[f64; 6]; 6],
     /// And after it.
     pub after: [[f64; 6]; 6],
+    /// Of a rotary axis on its own line, in its own frame, before its motion.
+    pub line_before: [[f64; 6]; 6],
+    /// And after it.
+    pub line_after: [[f64; 6]; 6],
     /// Displacement of the ball in R, mm.
     pub ball_machine: Vec3,
     /// Displacement of the tool's side in R, mm and rad.
@@ -277,6 +291,8 @@ impl Shifts {
         match target {
             Target::Axis { axis, after: false, dof } => self.before[axis.index()][dof] += value,
             Target::Axis { axis, after: true, dof } => self.after[axis.index()][dof] += value,
+            Target::OwnLine { axis, after: false, dof } => self.line_before[axis.index()][dof] += value,
+            Target::OwnLine { axis, after: true, dof } => self.line_after[axis.index()][dof] += value,
             Target::Base(i) => self.base[i] += value,
             Target::Tool(i) => self.tool[i] += value,
             Target::Workpiece(i) => self.workpiece[i] += value,

@@ -452,7 +452,7 @@ impl Reader<'_> {
             return;
         }
         let (c, s) = given.unwrap_or_default();
-        let target = Target::Axis { axis, after: false, dof };
+        let target = Target::OwnLine { axis, after: false, dof };
         out.terms.push(Term { target, shape: Shape::Cosine(axis, k), amount: c });
         out.terms.push(Term { target, shape: Shape::Sine(axis, k), amount: s });
     }

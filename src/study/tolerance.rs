@@ -49,6 +49,15 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
+    /// How large a parameter of this unit may be: its own tolerance, or what makes the error at the radius; none where its unit
+    /// says nothing about that.
+    #[must_use]
+    pub fn limit(&self, name: &str, unit: &str) -> Option<f64> {
+        let own = self.parameters.iter().find(|(own, _)| crate::symbols::same(own, name)).map(|(_, v)| *v);
+        let per_unit = crate::tables::correction::left_um(1.0, unit, self.radius_mm).filter(|um| *um > 0.0);
+        own.or_else(|| per_unit.map(|um| self.error_um / um))
+    }
+
     /// From the study's text; what is unusable becomes a finding with its place.
     pub(super) fn read(written: Option<AsWritten>, source: &Source, findings: &mut Findings) -> Self {
         let Some(w) = written else { return Self::default() };

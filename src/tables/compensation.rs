@@ -3,16 +3,25 @@
 //! It is written beside the controller's own files, read back as "what was active during the measurement", and read by the
 //! virtual machine. It holds no sign or unit that the controller's own files do not hold.
 
-use super::place::{Dof, Place, Spot, along};
+use super::place::{Dof, Place, Spot, turns_about_itself};
+use super::rows::TableError;
 use crate::axes::AxisName;
-use crate::diag::{Failure, Finding, Findings, Result, Source, from_json};
+use crate::diag::{Failure, Finding, Findings, Result, Source, from_json, in_json};
 use crate::machine::Machine;
 use crate::post::tables::{LengthUnit, Point, Turn};
+use crate::units::Plain;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The format line.
 pub const FORMAT: &str = "axiscal-compensation/1";
+
+/// No length (mm) or angle (deg) of a compensation is larger: more is a slip of the pen.
+const LARGEST_MM: f64 = 1e5;
+const LARGEST_DEG: f64 = 3600.0;
+/// A location error beyond these is none: also a forced export stays far below.
+const LARGEST_ERROR_MM: f64 = 10.0;
+const LARGEST_ERROR_DEG: f64 = 5.0;
 
 /// How the control applies it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,6 +88,12 @@ pub struct Stock {
     /// Its pins, mm.
     #[serde(default)]
     pub pins: BTreeMap<String, f64>,
+    /// The version of LinuxCNC that they are written for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub version: Option<String>,
+    /// Its direction pin: positive angles turn the table left-handed. Absent: the version has none, they turn it right-handed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conventional_directions: Option<bool>,
     /// How far the workpiece's zero stands off the nominal one in the module's world coordinates, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub workpiece_shift_mm: Option<[f64; 3]>,
@@ -88,6 +103,20 @@ pub struct Stock {
     /// Axis compensation tables.
     #[serde(default)]
     pub axis_tables: BTreeMap<AxisName, AxisTable>,
+    /// The pins were given as changes, because the present ones are not known.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub pins_by_change: bool,
+    /// Axes whose tables were given as changes, because the present ones are not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tables_by_change: Vec<AxisName>,
+}
+
+impl Stock {
+    /// The table that was loaded for an axis, where a file of it was written.
+    #[must_use]
+    pub fn loaded_table(&self, axis: AxisName) -> Option<&AxisTable> {
+        self.axis_tables.get(&axis).filter(|_| !self.tables_by_change.contains(&axis))
+    }
 }
 
 /// A table of one axis's own position: LinuxCNC's type 1.
@@ -136,6 +165,10 @@ pub struct Tables {
     /// By the control's name: what the files hold, in their unit. A later backup must hold the same.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<String, f64>,
+    /// By the control's name: by how much a value changes, in the unit of the files, where its present value is not known. No file
+    /// holds such a value; `vectors` and `grids` then say what the control would hold if it held the machine's description before.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub changes: BTreeMap<String, f64>,
     /// By rotary axis: the coordinate at which it really stands at zero, deg.
     #[serde(default)]
     pub zero_deg: BTreeMap<AxisName, f64>,
@@ -248,6 +281,9 @@ pub struct Compensation {
     /// What the control's own tables hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tables: Option<Tables>,
+    /// What each table of rows leaves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub table_errors: Vec<TableError>,
     /// Version of the program that wrote it.
     #[serde(default)]
     pub program: String,
@@ -257,7 +293,8 @@ pub struct Compensation {
 }
 
 impl Compensation {
-    /// Reads the file; nothing in it can be a NaN, an unsorted table or a term that stands twice.
+    /// Reads the file: the one check of it. Nothing in it can be a NaN, an absurd number, an unsorted table or a term that stands
+    /// twice.
     ///
     /// # Errors
     /// When it is not JSON of this form, with its place.
@@ -267,51 +304,98 @@ impl Compensation {
                 .help("give the compensation.json that `axiscal export` wrote, unedited")
         })?;
         let mut findings = Findings::default();
-        let mut wrong = |message: String| {
+        let mut wrong = |(entry, field): (Option<(&str, usize)>, &str), message: String| {
             findings.push(
                 Finding::error("compensation::damaged", message)
-                    .at(source, 0..0)
+                    .at(source, in_json(source.inner(), entry, field).unwrap_or(0..0))
                     .help("was it edited by hand? take the file that `axiscal export` wrote"),
             );
         };
         if read.format != FORMAT {
-            wrong(format!("format is {:?}, expected {FORMAT:?}", read.format));
+            wrong((None, "format"), format!("format is {:?}, expected {FORMAT:?}", read.format));
         }
         let mut seen = std::collections::BTreeSet::new();
-        for term in &read.terms {
+        for (i, term) in read.terms.iter().enumerate() {
             let name = format!("{} {} {}", term.axis, term.place, term.dof);
+            let mut wrong = |field: &str, message: String| wrong((Some(("terms", i)), field), message);
             if !seen.insert(term.spot()) {
-                wrong(format!("term {name} stands twice"));
+                wrong("axis", format!("term {name} stands twice"));
             }
             if !term.axis.is_rotary() {
-                wrong(format!("term {name}: {} is no rotary axis", term.axis));
+                wrong("axis", format!("term {name}: {} is no rotary axis", term.axis));
             }
             if term.unit != term.dof.unit() {
-                wrong(format!("term {name} is in {:?}, expected {:?}", term.unit, term.dof.unit()));
+                wrong("unit", format!("term {name} is in {:?}, expected {:?}", term.unit, term.dof.unit()));
             }
             if term.place == Place::Zero && !term.dof.is_angle() {
-                wrong(format!("term {name}: a zero position is an angle"));
+                wrong("dof", format!("term {name}: a zero position is an angle"));
             }
-            if !(term.value.is_finite() && term.active_before.is_finite() && term.identified.is_finite()) {
-                wrong(format!("term {name} is not a number"));
+            let values =
+                [("value", term.value), ("active_before", term.active_before), ("identified", term.identified)];
+            let largest = if term.dof.is_angle() { LARGEST_ERROR_DEG } else { LARGEST_ERROR_MM };
+            for (field, value) in values {
+                if !(-largest..=largest).contains(&value) {
+                    let unit = &term.unit;
+                    wrong(
+                        field,
+                        format!("{field} of term {name} is {}, expected up to {largest} {unit}", Plain(value)),
+                    );
+                }
+            }
+            if term.sigma.is_some_and(|s| !(0.0..=largest).contains(&s)) {
+                wrong("sigma", format!("sigma of term {name} is no standard uncertainty"));
             }
         }
-        if !read.reference_mm.iter().all(|v| v.is_finite()) {
-            wrong("reference_mm is not a point".to_owned());
+        let lengths = |all: &[f64]| all.iter().all(|v| v.abs() <= LARGEST_MM);
+        let angles =
+            |mut all: std::collections::btree_map::Values<'_, AxisName, f64>| all.all(|v| v.abs() <= LARGEST_DEG);
+        if !lengths(&read.reference_mm) {
+            wrong((None, "reference_mm"), format!("reference_mm is no point within {LARGEST_MM} mm"));
         }
-        if !read.tables.iter().flat_map(|t| t.values.values()).all(|v| v.is_finite()) {
-            wrong("a value of the tables is not a number".to_owned());
-        }
-        for grid in read.tables.iter().flat_map(|t| &t.grids) {
-            let numbers = [grid.min, grid.step].iter().chain(&grid.values).all(|v| v.is_finite());
-            if grid.values.len() < 2 || grid.step <= 0.0 || !numbers {
-                wrong(format!("position table {} is too short, not ascending or not of numbers", grid.number));
+        if let Some(tables) = &read.tables {
+            let mut wrong = |message: String| wrong((None, "tables"), message);
+            if !tables.values.values().all(|v| v.abs() <= LARGEST_MM) {
+                wrong(format!("a value of the tables is no number up to {LARGEST_MM}"));
+            }
+            if !angles(tables.zero_deg.values()) {
+                wrong(format!("a zero position of the tables is no angle up to {LARGEST_DEG} deg"));
+            }
+            if !lengths(&tables.workpiece_shift_mm) {
+                wrong("workpiece_shift_mm of the tables is no shift".to_owned());
+            }
+            for vector in &tables.vectors {
+                let largest = if vector.direction.is_some() { 1.0 + 1e-6 } else { LARGEST_MM };
+                if !vector.value.iter().all(|v| v.abs() <= largest) {
+                    wrong(format!("vector {:?} of the tables has a component beyond {largest}", vector.id));
+                }
+                let length = vector.value.iter().map(|v| v * v).sum::<f64>().sqrt();
+                if vector.direction.is_some() && (length - 1.0).abs() > 1e-3 {
+                    wrong(format!("direction {:?} of the tables has the length {}, not 1", vector.id, Plain(length)));
+                }
+            }
+            for grid in &tables.grids {
+                let numbers = [grid.min, grid.step].iter().chain(&grid.values).all(|v| v.abs() <= LARGEST_MM);
+                if grid.values.len() < 2 || grid.step <= 0.0 || !numbers {
+                    wrong(format!("position table {} is too short, not ascending or not of numbers", grid.number));
+                }
             }
         }
-        for (axis, table) in read.stock.iter().flat_map(|s| &s.axis_tables) {
-            let ascending = table.rows.windows(2).all(|w| w[0][0] < w[1][0]);
-            if table.rows.is_empty() || !ascending || !table.rows.iter().flatten().all(|v| v.is_finite()) {
-                wrong(format!("axis table of {axis} is empty, not ascending or not of numbers"));
+        if let Some(stock) = &read.stock {
+            let mut wrong = |message: String| wrong((None, "stock"), message);
+            if !stock.pins.values().all(|v| v.abs() <= LARGEST_MM) {
+                wrong(format!("a pin is no number up to {LARGEST_MM} mm"));
+            }
+            if !angles(stock.home_offset_deg.values()) {
+                wrong(format!("a home offset is no angle up to {LARGEST_DEG} deg"));
+            }
+            if stock.workpiece_shift_mm.is_some_and(|shift| !lengths(&shift)) {
+                wrong("workpiece_shift_mm is no shift".to_owned());
+            }
+            for (axis, table) in &stock.axis_tables {
+                let ascending = table.rows.windows(2).all(|w| w[0][0] < w[1][0]);
+                if table.rows.is_empty() || !ascending || !table.rows.iter().flatten().all(|v| v.abs() <= LARGEST_MM) {
+                    wrong(format!("axis table of {axis} is empty, not ascending or not of numbers"));
+                }
             }
         }
         Ok(findings.finish(read)?.0)
@@ -373,10 +457,7 @@ impl Compensation {
     /// transformation act under that only; zero positions of axes act always, and so does the kinematics component.
     #[must_use]
     pub fn acts_without_transformation(&self, machine: &Machine, term: &Term) -> bool {
-        let own_turn = term.place == Place::Zero
-            || (term.place == Place::Before
-                && term.dof.is_angle()
-                && machine.axis(term.axis).is_some_and(|a| along(a, term.dof).is_some()));
+        let own_turn = turns_about_itself(machine, term.spot());
         match self.mode {
             Mode::Component => true,
             Mode::Stock => own_turn,

@@ -60,7 +60,7 @@ pub struct LeftOut {
 }
 
 /// Corrections of a machine. Displacements in mm, tilts in deg.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Correction {
     /// Location and zero errors, by axis, place and component.
     pub terms: Vec<Term>,
@@ -84,6 +84,9 @@ pub struct Correction {
     pub active: Option<Compensation>,
     /// The control's own transformation was on while the touches were made: what it held acted on them.
     pub transformation: bool,
+    /// From where to where the programs of the study moved each axis, relative to R's origin, mm or deg; empty where that is
+    /// not known.
+    pub used: BTreeMap<AxisName, [f64; 2]>,
     /// Where it comes from.
     pub provenance: Provenance,
 }
@@ -136,6 +139,9 @@ pub fn left_um(value: f64, unit: &str, lever_mm: f64) -> Option<f64> {
     })
 }
 
+/// A formula must have a value at so many points along its axis.
+const FORMULA_STEPS: u32 = 1001;
+
 struct Collector<'a> {
     machine: &'a Machine,
     outcome: &'a Outcome,
@@ -176,6 +182,7 @@ impl Correction {
                 found: BTreeSet::new(),
                 active: during.loaded.cloned(),
                 transformation: during.transformation,
+                used: BTreeMap::new(),
                 provenance,
             },
         };
@@ -199,6 +206,7 @@ impl Correction {
                 ),
             }
         }
+        collector.combinations(catalogue);
         collector.finish()
     }
 
@@ -247,6 +255,54 @@ impl Collector<'_> {
             why: why.into(),
             known,
         });
+    }
+
+    /// Several errors of the machine of which only a combination can be measured: without any of them the compensation would
+    /// leave an error that the touches show. One that is told apart from the block positions only does no harm.
+    fn combinations(&mut self, catalogue: &Catalogue) {
+        for undetermined in &self.outcome.undetermined {
+            let members: Vec<&Parameter> = self
+                .outcome
+                .parameters
+                .iter()
+                .filter(|p| p.status == Status::Undetermined && undetermined.combination.contains_key(&p.name))
+                .filter(|p| {
+                    let effect = catalogue.get(&p.effect, self.machine);
+                    let index = |e: &Effect| e.parameters.iter().position(|known| known.name == p.name);
+                    let meant = effect.and_then(|e| Some(meaning(e, index(e)?, self.machine)));
+                    matches!(meant, Some(Meaning::Location(_) | Meaning::Position(_) | Meaning::ToolLength(_)))
+                })
+                .collect();
+            if members.len() < 2 {
+                continue;
+            }
+            let names: Vec<String> = members.iter().map(|p| format!("{} ({})", p.name, p.effect)).collect();
+            let last = members.last().map_or_else(String::new, |p| p.effect.clone());
+            if let Some(um) = undetermined.moves_um {
+                self.correction.left_out.push(LeftOut {
+                    parameter: members.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(" with "),
+                    effect: last.clone(),
+                    value: rounded(um),
+                    unit: "um".to_owned(),
+                    why: "the touches determine only a combination of these errors; the value is its largest effect on a touch"
+                        .to_owned(),
+                    known: true,
+                });
+            }
+            self.findings.push(
+                Finding::warning(
+                    "tables::combination",
+                    format!(
+                        "only a combination of {} can be measured with these touches: none of them is exported",
+                        names.join(", ")
+                    ),
+                )
+                .help(format!(
+                    "take one of these effects out of the model (`axiscal remove STUDY {last}`), or hold one value in \
+                     [model.parameters]: the others then include it"
+                )),
+            );
+        }
     }
 
     fn take(&mut self, p: &Parameter, effect: &Effect) {
@@ -365,8 +421,13 @@ impl Collector<'_> {
                 terms.iter().map(|t| coordinate_off(t, &mends, amount * t.formula.eval(&state, &values))).sum();
             if mends.name.is_rotary() { deg_from_rad(off) } else { off }
         };
-        if !error(0.0, 1.0).is_finite() {
-            return Err("its formula has no value at 0".to_owned());
+        let range = self.machine.axis(input).map_or([0.0, 0.0], |a| a.range);
+        // an odd count of steps: 0 is looked at by itself
+        let along =
+            (0..=FORMULA_STEPS).map(|i| range[0] + (range[1] - range[0]) * f64::from(i) / f64::from(FORMULA_STEPS));
+        let no_value = |q: &f64| ![1.0, -1.0].iter().all(|sense| error(*q, *sense).is_finite());
+        if let Some(q) = std::iter::once(0.0).chain(along).find(no_value) {
+            return Err(format!("its formula has no value at {input} = {q}"));
         }
         Ok(AxisShape {
             parameter: p.name.clone(),

@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn without_errors_it_is_the_identity_to_the_last_bit() {
-        for name in ["swivel-head", "double-head", "trunnion", "swivel-table-b"] {
+        for name in ["swivel-head", "double-head", "trunnion", "swivel-table-b", "nutating-b", "trunnion-offset"] {
             let machine = machine(name);
             let kins = Kins::new(&machine, Errors::from_terms(&[], [0.1, 0.2, -250.3]), 202.684);
             let world = at([12.3, -45.6, 78.9, 33.0, -71.0, 123.0]);

@@ -199,7 +199,7 @@ mod tests {
     /// Every constant error at once: the ball stands where it should, but for one shift of the workpiece.
     #[test]
     fn lines_say_everything_but_where_the_workpiece_is() {
-        for name in ["swivel-head", "double-head", "trunnion", "swivel-table-b"] {
+        for name in ["swivel-head", "double-head", "trunnion", "swivel-table-b", "nutating-b", "trunnion-offset"] {
             let machine = machine(name);
             let mut terms = Vec::new();
             let mut size = 0.03;

@@ -1,10 +1,11 @@
 //! Where an error stands in the chain, and what of an effect a correction can hold.
 //!
-//! The effects say it (`at`, `frame`, `dof`, `formula`); nothing here knows one by name but the `zero-…` family.
+//! The effects say it (`at`, `about`, `frame`, `dof`, `formula`); nothing here knows one by name.
 
 use crate::axes::AxisName;
 use crate::machine::{Axis, Machine, Side};
 use crate::model::catalogue::{Effect, Place as At, Term};
+use crate::model::stated::{Stated, direction_sign, own_turn, stated};
 use crate::units::deg_from_rad;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -113,8 +114,8 @@ pub enum Meaning {
 
 /// The meaning of a parameter, by the places and formulas of its effect.
 ///
-/// A constant displacement at a rotary axis is a location error, before or after the rotation as the effect says; a turn
-/// of a `zero-…` effect about the axis itself is one of its angle. A displacement of an axis along (about) its own
+/// A constant displacement at a rotary axis is a location error, before or after the rotation as the effect says; a
+/// constant turn of the axis about its own line is one of its angle. A displacement of an axis along (about) its own
 /// direction that depends on nothing but its own position and sense is an error of that position.
 #[must_use]
 pub fn meaning(effect: &Effect, parameter: usize, machine: &Machine) -> Meaning {
@@ -137,7 +138,7 @@ pub fn meaning(effect: &Effect, parameter: usize, machine: &Machine) -> Meaning 
         // dz of the tool's frame points from the ball to the spindle
         return Meaning::ToolLength(-k * factor);
     }
-    let mut axes = terms.iter().map(|t| own_position(t, machine));
+    let mut axes = terms.iter().map(|t| own_position(effect, t, machine));
     match axes.next() {
         Some(Ok(first)) => match axes.find(|a| *a != Ok(first)) {
             None => Meaning::Position(first),
@@ -166,9 +167,25 @@ fn location(effect: &Effect, term: &Term, factor: f64, machine: &Machine) -> Opt
     let dof = *Dof::ALL.get(term.component)?;
     let amount = term.formula.constant()? * factor;
     let amount = if dof.is_angle() { deg_from_rad(amount) } else { amount };
-    match along(axis, dof).filter(|_| dof.is_angle() && effect.id.starts_with("zero-")) {
-        Some(sign) => Some((Spot { axis: name, place: Place::Zero, dof }, sign * amount)),
-        None => Some((Spot { axis: name, place, dof }, amount)),
+    match stated(machine, effect, term) {
+        Stated::OwnLine if term.component == own_turn(name) => {
+            Some((Spot { axis: name, place: Place::Zero, dof }, direction_sign(axis) * amount))
+        }
+        // a tilt about a point of the line, or an offset along a direction that is not one of R, is no location error
+        Stated::OwnLine if dof.is_angle() || along(axis, Dof::ALL[own_turn(name)]).is_none() => None,
+        _ => Some((Spot { axis: name, place, dof }, amount)),
+    }
+}
+
+/// Is it a turn of a rotary axis about its own line? A table's is one only where it is stated there; in the head a turn
+/// about the axis's direction before its motion is the same.
+#[must_use]
+pub fn turns_about_itself(machine: &Machine, spot: Spot) -> bool {
+    let Some(axis) = machine.axis(spot.axis) else { return false };
+    match spot.place {
+        Place::Zero => true,
+        Place::Before => axis.side == Side::Tool && spot.dof.is_angle() && along(axis, spot.dof).is_some(),
+        Place::After => false,
     }
 }
 
@@ -203,7 +220,7 @@ pub fn across(effect: &Effect, parameter: usize, machine: &Machine) -> Option<(A
 }
 
 /// The axis whose own position a term is an error of, or why it is none.
-fn own_position(term: &Term, machine: &Machine) -> Result<AxisName, String> {
+fn own_position(effect: &Effect, term: &Term, machine: &Machine) -> Result<AxisName, String> {
     let name = match term.place {
         At::Before(name) | At::After(name) => name,
         At::Reading => *AxisName::ALL.get(term.component).ok_or("it is read on no axis")?,
@@ -212,7 +229,9 @@ fn own_position(term: &Term, machine: &Machine) -> Result<AxisName, String> {
     let axis = machine.axis(name).ok_or_else(|| format!("the machine has no axis {name}"))?;
     if term.place != At::Reading {
         let dof = Dof::ALL.get(term.component).copied().ok_or("it has no direction")?;
-        if dof.is_angle() != name.is_rotary() || along(axis, dof).is_none() {
+        let about_itself = stated(machine, effect, term) == Stated::OwnLine && term.component == own_turn(name);
+        let own = if name.is_rotary() { about_itself } else { !dof.is_angle() && along(axis, dof).is_some() };
+        if !own {
             return Err(format!("it moves {name} in {dof}, across its own motion"));
         }
     }
@@ -235,7 +254,7 @@ pub fn coordinate_off(term: &Term, axis: &Axis, displacement: f64) -> f64 {
     }
     let sign = Dof::ALL.get(term.component).and_then(|dof| along(axis, *dof)).unwrap_or(1.0);
     match (axis.name.is_rotary(), axis.side) {
-        (true, _) => sign * axis.sense * displacement,
+        (true, _) => direction_sign(axis) * axis.sense * displacement,
         // a table that stands further in R has the tool less far over the workpiece
         (false, Side::Workpiece) => -sign * displacement,
         (false, Side::Tool) => sign * displacement,

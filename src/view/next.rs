@@ -5,6 +5,9 @@ use super::headline::{Headline, Level, capital, in_question, named, size, um, un
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
+use crate::diagnose::consequence::Consequence;
+use crate::post::Postprocessor;
+use crate::tables::control;
 use crate::units::um_from_mm;
 use serde::Serialize;
 
@@ -43,11 +46,18 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, c, &mut out);
             }
         }
-        Verdict::Unexplained if d.faint && (d.leaves_open() || d.touches_would_tell()) => out.push(Next::new(
-            "Measure more touches",
-            "Repeats and further poses say whether the weak pattern is there at all.",
-            plan_next.clone(),
-        )),
+        Verdict::Unexplained if d.faint && (d.leaves_open() || d.touches_would_tell()) => {
+            out.push(Next::new(
+                "Measure more touches",
+                "Repeats and further poses say whether the weak pattern is there at all.",
+                plan_next.clone(),
+            ));
+            // what could be wrong by more than its tolerance would be refused
+            let within = |c: &Consequence| m.tolerance.limit(&c.parameter, &c.unit).is_none_or(|limit| c.off <= limit);
+            if d.consequences.iter().all(within) && c.refused.is_none() {
+                compensate(m, parameters, c, &mut out);
+            }
+        }
         Verdict::Unexplained if !untried(d).is_empty() => {
             which(m, &untried(d), &plan_next, controller, &mut out);
         }
@@ -188,18 +198,7 @@ fn settled(
         return;
     }
     let beyond: Vec<&ParameterRecord> = parameters.iter().filter(|p| p.judgement == Judgement::Beyond).collect();
-    if beyond.iter().any(|p| is_carried(c, p)) {
-        out.push(Next::new(
-            "Load the compensation",
-            "The values go into the control as its own tables; the README beside them says how, and what must be set again.",
-            format!("axiscal export {} --controller {controller} --out compensation", m.study),
-        ));
-        out.push(Next::new(
-            "Measure again and compare",
-            "Run the same program with the compensation loaded; the two studies side by side say whether it works.",
-            format!("axiscal verify {} again.toml", m.study),
-        ));
-    }
+    compensate(m, parameters, c, out);
     for p in beyond.iter().filter(|p| !is_carried(c, p)).take(2) {
         out.push(Next::new(format!("Mend {}", p.says), p.mends.clone(), ""));
     }
@@ -217,6 +216,58 @@ fn settled(
             format!("axiscal plan-next {} --controller {controller} --out next", m.study),
         ));
     }
+}
+
+/// The command that writes the compensation, where it carries an error that is larger than its tolerance.
+fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, out: &mut Vec<Next>) {
+    if !parameters.iter().any(|p| p.judgement == Judgement::Beyond && is_carried(c, p)) {
+        return;
+    }
+    let (controller, accepts) = export_to(m);
+    let mut how = "The values go into the control as its own tables; the README beside them says how, and what must be set again.".to_owned();
+    if !accepts.is_empty() {
+        how += &format!(
+            " With --accept-unverified you accept table entries that were not tried on a real control ({}): compare each with the control's manual before you load it.",
+            few(&accepts)
+        );
+    }
+    if controller == crate::tables::linuxcnc::CONTROLLER {
+        how += " With --ini FILE, the machine's INI file, its present values are added to; without it changes are listed in place of some values.";
+    } else {
+        how += " With --backup FILE, the control's own backup, its present values are added to; without it a sheet lists by how much each value changes.";
+    }
+    let flag = if accepts.is_empty() { "" } else { " --accept-unverified" };
+    out.push(Next::new(
+        "Load the compensation",
+        how,
+        format!("axiscal export {} --controller {controller} --out compensation{flag}", m.study),
+    ));
+    out.push(Next::new(
+        "Measure again and compare",
+        "Run the same program with the compensation loaded; the two studies side by side say whether it works.",
+        format!("axiscal verify {} again.toml", m.study),
+    ));
+}
+
+/// Names in a sentence, most of them counted.
+fn few(names: &[String]) -> String {
+    const MOST: usize = 4;
+    let shown = names.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > MOST { format!("{shown} and {} more", names.len() - MOST) } else { shown }
+}
+
+/// The controller of the runs that has tables, and its entries that were not run on a real control.
+fn export_to<'a>(m: &Material<'a>) -> (&'a str, Vec<String>) {
+    let linuxcnc = crate::tables::linuxcnc::CONTROLLER;
+    let of_runs = || m.runs.iter().map(|r| r.controller);
+    let tables = |name: &str| Postprocessor::built_in_tables(name);
+    let by_position = m.correction.is_ok_and(|c| !(c.shapes.is_empty() && c.across.is_empty()));
+    if let Some(name) = of_runs().find(|name| *name == linuxcnc || tables(name).is_some()) {
+        return (name, tables(name).map_or_else(Vec::new, |t| control::not_run(m.machine, t, by_position)));
+    }
+    // a file of the user's own: what it holds is not known here
+    let own = of_runs().find(|name| name.ends_with(".toml") || name.contains('/'));
+    own.map_or(("YOUR-CONTROLLER", Vec::new()), |name| (name, vec![format!("entries of {name} that name no document")]))
 }
 
 /// Touches that do not belong to the rest are a finding of their own.

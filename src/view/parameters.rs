@@ -30,9 +30,8 @@ fn record(t: &Tolerance, p: &Parameter, meaning: &str, effects: &[&Effect]) -> P
     // a shape parameter (a period, a time constant) scales nothing: it has no size as an error
     let is_shape = effect.is_some_and(|e| e.parameters.iter().any(|q| q.name == p.name && q.shape.is_some()));
     let size = |value: f64| left_um(value, &p.unit, t.radius_mm).filter(|_| !is_shape);
-    let per_unit = size(1.0).filter(|s| *s > 0.0);
-    let own = t.parameters.iter().find(|(name, _)| crate::symbols::same(name, &p.name)).map(|(_, v)| *v);
-    let tolerance = own.or_else(|| per_unit.map(|s| t.error_um / s));
+    let own = t.parameters.keys().any(|name| crate::symbols::same(name, &p.name));
+    let tolerance = t.limit(&p.name, &p.unit).filter(|_| own || !is_shape);
     let expanded = p.expanded.filter(|e| e.is_finite());
     let told = matches!(p.status, Status::Identified | Status::PriorDominated);
     let judgement = match (tolerance, expanded) {

@@ -4,7 +4,7 @@ use super::session::Refused;
 use crate::diag::{Failure, Finding, source};
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::{Formula, VARIABLES};
-use crate::model::mistake;
+use crate::model::{degrees, mistake};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
@@ -201,6 +201,8 @@ pub struct Typed {
     pub id: String,
     /// Is it a new form of an effect of the user's own?
     pub replaces: bool,
+    /// What can be fitted and may not be what is meant: degrees where radians are.
+    pub hints: Vec<Mistake>,
 }
 
 /// The catalogue with the draft in it. An effect of the user's own that is not in the model may be typed anew: it then
@@ -242,9 +244,17 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
     let text = row(&Draft { id: id.clone(), ..draft.clone() });
     let mut all = catalogue.clone();
     match all.add_file(&source("formula box", text.clone())) {
-        Ok(_) => Ok(Typed { catalogue: all, id, replaces }),
+        Ok(_) => Ok(Typed { catalogue: all, id, replaces, hints: hints(draft, &shapes) }),
         Err(Failure(findings)) => Err(findings.iter().map(|f| from_finding(f, &text, draft)).collect()),
     }
+}
+
+fn hints(draft: &Draft, shapes: &[&str]) -> Vec<Mistake> {
+    let of = |(i, t): (usize, &DraftTerm)| {
+        let found = degrees::find(t.formula.trim(), shapes)?;
+        Some(Mistake::of(format!("terms.{i}.formula"), found.to_string(), &found.remedy()))
+    };
+    draft.terms.iter().enumerate().filter_map(of).collect()
 }
 
 /// Why a draft cannot be fitted: a formula without a value at some touches is a mistake in its field.

@@ -498,6 +498,8 @@ struct Tried<'a> {
     /// What the effect takes away from the residual of each touch.
     curve_um: Vec<f64>,
     row: Option<String>,
+    /// What of a formula that was typed may not be meant.
+    hints: &'a [draft::Mistake],
 }
 
 /// What an effect of the catalogue, or one that was typed, would do at each touch.
@@ -539,5 +541,6 @@ pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<
         parameters: own.take(12).collect(),
         curve_um: before.iter().zip(&fit.residual_mm).map(|(b, a)| short(um_from_mm(b - a), 1e4)).collect(),
         row: draft.map(draft::row),
+        hints: typed.as_ref().map_or(&[], |t| &t.hints),
     }))
 }

@@ -36,6 +36,8 @@ const HEAD_TIME: Duration = Duration::from_secs(10);
 const ANSWER_TIME: Duration = Duration::from_secs(120);
 /// How often the disk is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(300);
+/// How long what is worked out behind the fit waits after a step.
+const PAINTS_FIRST: Duration = Duration::from_millis(100);
 
 /// What all requests share.
 pub struct Shared {
@@ -480,7 +482,8 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n).thread_name(|i| format!("evidence-{i}")).build();
     let mut done = 0;
     while woken.recv().is_ok() {
-        while woken.try_recv().is_ok() {}
+        // the page paints first, and of quick clicks only the last one is worked out
+        while woken.recv_timeout(PAINTS_FIRST).is_ok() {}
         let now = snapshot(shared);
         if now.version == done {
             continue;

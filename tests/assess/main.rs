@@ -134,7 +134,9 @@ fn rank_does_not_depend_on_the_scaling() {
         ("swivel-head", &[&["head", "table"][..], &["full"]][..]),
         ("double-head", &[&["double-head"], &["full"]]),
         ("trunnion", &[&["basic"], &["full"]]),
-        ("swivel-table-b", &[&["basic"], &["full"]]),
+        ("swivel-table-b", &[&["basic"]]),
+        ("nutating-b", &[&["basic"], &["full"]]),
+        ("trunnion-offset", &[&["basic"], &["full"]]),
     ] {
         let machine = common::machine(name);
         let fits = |id: &str| catalogue.get(id, &machine).is_some_and(|e| e.applies_to(&machine) && !e.paper);
@@ -448,6 +450,42 @@ fn full_leaves_only_what_no_touch_can_show() {
                 SAG,
             ],
             18,
+        ),
+        (
+            "nutating-b",
+            ["location-b", "location-c"],
+            // on a table that is nearly upright side faces look down by some degrees: backlash of Z is seen
+            &[
+                (
+                    "zero-b",
+                    "R(B + ζ): what B carries turns by ζ about B's line: the line of C by its four errors, and the blocks",
+                ),
+                ZERO_C,
+                TABLE_LOAD,
+                ("tool-length", "EZ0B, and the heights of blocks that B does not carry"),
+                YAW[0],
+                YAW[1],
+                SAG,
+            ],
+            18,
+        ),
+        (
+            "trunnion-offset",
+            ["location-a", "location-c"],
+            // side faces look down by some degrees at A = 75: backlash of Z is seen
+            &[
+                (
+                    "zero-a",
+                    "Rx(A + ζ): EA0C grows by ζ, EY0C by ζ times the height of C's point over A's line; heights of blocks",
+                ),
+                ZERO_C,
+                TABLE_LOAD,
+                ("tool-length", "EZ0A, and the heights of blocks that A does not carry"),
+                YAW[0],
+                YAW[1],
+                SAG,
+            ],
+            20,
         ),
     ] {
         let machine = common::machine(name);

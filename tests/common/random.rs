@@ -32,7 +32,8 @@ pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng
         let mut pose = AxisMap::default();
         let mut from = AxisMap::default();
         for axis in machine.rotary() {
-            pose.set(axis.name, rng.random_range(-80.0..80.0));
+            let [low, high] = axis.range;
+            pose.set(axis.name, rng.random_range(low.max(-80.0)..high.min(80.0)));
             from.set(axis.name, if rng.random_bool(0.5) { 1.0 } else { -1.0 });
         }
         let length_mm = machine.tool.length_mm + [0.0, 60.0][i % 2];

@@ -94,7 +94,8 @@ class Rig:
         here = os.path.join(self.folder, str(self.runs))
         os.mkdir(here)
         paths = {name: os.path.join(here, name) for name in ("p.ngc", "p.plan.json", "s.toml", "out")}
-        letters = {"swivel-head": "BC", "trunnion": "AC", "swivel-table-b": "BC", "double-head": "AB"}[machine]
+        letters = {"swivel-head": "BC", "trunnion": "AC", "swivel-table-b": "BC", "double-head": "AB",
+                   "nutating-b": "BC", "trunnion-offset": "AC"}[machine]
         text = program if isinstance(program, str) else program.text()
         for letter in "ABC":
             if letter not in letters:

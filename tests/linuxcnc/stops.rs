@@ -139,10 +139,14 @@ pub fn rs274_accepts_every_program() {
         ("double-head", "double-head", &[]),
         ("trunnion", "basic", &[]),
         ("swivel-table-b", "basic", &["--tcp"]),
+        ("nutating-b", "basic", &[]),
+        ("trunnion-offset", "basic", &[]),
         ("swivel-head", "full", &[]),
         ("double-head", "full", &[]),
         ("trunnion", "full", &["--tcp"]),
         ("swivel-table-b", "full", &[]),
+        ("nutating-b", "full", &[]),
+        ("trunnion-offset", "full", &[]),
     ];
     for (machine, program, more) in programs {
         let (folder, text) = generate(machine, program, more);

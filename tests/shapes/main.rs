@@ -292,7 +292,7 @@ fn each_block_may_have_a_time_constant_of_its_own() {
 #[test]
 fn what_is_unseen_stays_unseen_beside_something_large() {
     for (name, program) in
-        [("swivel-head", "head"), ("swivel-head", "table"), ("trunnion", "basic"), ("double-head", "double-head")]
+        [("swivel-head", "head"), ("nutating-b", "basic"), ("trunnion-offset", "basic"), ("double-head", "double-head")]
     {
         let machine = machine(name);
         let plan = plan(&machine, program);

@@ -1,8 +1,8 @@
 //! Measured again: what acted on the touches is added to, what did not act is replaced, what the touches do not tell stays.
 
 use crate::controls::{
-    CONTROLS, Planted, accepting, correction, found_during, found_with_held, left, loaded, plan, readings, scenario,
-    tables, text,
+    CONTROLS, Planted, accepting, correction, described, found_during, found_with_held, left, loaded, plan, readings,
+    scenario, tables, text,
 };
 use crate::support::machine;
 use axiscal::diag::source;
@@ -27,7 +27,10 @@ fn errors() -> Planted<'static> {
 
 fn during(machine: &Machine, control: &str, planted: &Planted, during: During, old: Old) -> Export {
     let found = found_during(machine, planted, during);
-    control::export(machine, control, &tables(control), &found, &Options { old, ..accepting() }).unwrap().0
+    let options = Options { old, ..accepting() };
+    let unknown = during.loaded.is_none() && options.old.values.is_empty();
+    let options = if unknown { described(machine, control, &found, &options) } else { options };
+    control::export(machine, control, &tables(control), &found, &options).unwrap().0
 }
 
 fn values(export: &Export) -> Vec<(String, f64, f64)> {
@@ -121,7 +124,7 @@ fn old_values_that_did_not_act_are_no_base() {
     );
     assert!(reads(&machine, &planted, &export) < 1.5);
     assert!(
-        text(&export, "restore_parameters.txt").contains("N19701Q1M0.120"),
+        text(&export, "restore_parameters.txt").contains("N19701Q1L1M0.120"),
         "{:?}",
         export.files.iter().map(|f| &f.0).collect::<Vec<_>>()
     );
@@ -157,7 +160,7 @@ fn the_next_export_starts_from_what_was_written() {
         assert_eq!((of(&next, "N19701").old, of(&next, "N19702").old), (0.010, -250.101), "{round}");
         assert_eq!((of(&next, "N19701").new, of(&next, "N19702").new), (0.010, -250.101), "{round}");
         assert!(next.values.iter().all(|v| v.known));
-        assert!(text(&next, "restore_parameters.txt").contains("N19702Q1M-250.101;"));
+        assert!(text(&next, "restore_parameters.txt").contains("N19702Q1L1M-250.101 "));
         last = next;
     }
 }

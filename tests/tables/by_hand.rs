@@ -33,6 +33,17 @@ pub fn rot(about: usize, rad: f64) -> M {
     out
 }
 
+/// About a unit direction, rad (Rodrigues).
+pub fn turn([x, y, z]: [f64; 3], rad: f64) -> M {
+    let ((s, c), u) = (rad.sin_cos(), 1.0 - rad.cos());
+    [
+        [x * x * u + c, x * y * u - z * s, x * z * u + y * s, 0.0],
+        [y * x * u + z * s, y * y * u + c, y * z * u - x * s, 0.0],
+        [z * x * u - y * s, z * y * u + x * s, z * z * u + c, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+}
+
 /// Inverse of a rigid transform.
 pub fn inverse(m: &M) -> M {
     let mut out = trans([0.0; 3]);
@@ -59,7 +70,7 @@ fn error(terms: &[Term], axis: AxisName, place: Place, point: [f64; 3]) -> M {
     times(&trans([sum(Dof::Dx), sum(Dof::Dy), sum(Dof::Dz)]), &about(point, &turned))
 }
 
-/// One side of the chain. Directions of built-in machines are along x, y or z.
+/// One side of the chain.
 fn side(machine: &Machine, side: Side, at: &Position, terms: &[Term], reference: [f64; 3]) -> M {
     let mut frame = trans([0.0; 3]);
     for axis in machine.side(side) {
@@ -72,7 +83,7 @@ fn side(machine: &Machine, side: Side, at: &Position, terms: &[Term], reference:
                 terms.iter().filter(|t| t.axis == axis.name && t.place == Place::Zero).map(|t| t.value).sum();
             let angle = (q * axis.sense + zero) * std::f64::consts::PI / 180.0;
             frame = times(&frame, &error(terms, axis.name, Place::Before, centre));
-            frame = times(&frame, &about(point, &rot(k, angle)));
+            frame = times(&frame, &about(point, &turn(axis.direction.into_inner().into(), angle)));
             frame = times(&frame, &error(terms, axis.name, Place::After, point));
         } else {
             let mut by = [0.0; 3];

@@ -233,11 +233,27 @@ fn what_belongs_to_another_machine_is_refused() {
     assert_eq!(wrong.unwrap_err().0[0].code, "tables::not_a_number");
 }
 
+/// An INI file of the machine as it is before anything is loaded.
+fn plain_ini(letters: &str) -> UserIni {
+    let joints: String = letters
+        .chars()
+        .enumerate()
+        .map(|(n, letter)| {
+            format!("[JOINT_{n}]\nTYPE = {}\n", if "ABC".contains(letter) { "ANGULAR" } else { "LINEAR" })
+        })
+        .collect();
+    let count = letters.len();
+    let text = format!(
+        "[KINS]\nKINEMATICS = trivkins coordinates={letters}\nJOINTS = {count}\n[TRAJ]\nCOORDINATES = {letters}\nLINEAR_UNITS = mm\n{joints}"
+    );
+    UserIni::read(&source("plain.ini", text)).unwrap()
+}
+
 /// 30 µrad = 0.00171887° at 300 mm leave 9 µm.
 #[test]
 fn the_error_that_is_left_is_stated_at_the_radius() {
     let found = [("EX0C", "location-c", 0.02, "mm", ID), ("EA0C", "location-c", 30e-6_f64.to_degrees(), "deg", ID)];
-    let options = Options { radius_mm: 300.0, ..Options::default() };
+    let options = Options { radius_mm: 300.0, ini: Some(plain_ini("XYZAC")), ..Options::default() };
     let export = export("trunnion", &found, None, &options);
     assert!(export.component.left.is_empty());
     let left = &export.stock.left;
@@ -271,7 +287,8 @@ fn stock_offsets_are_taken_at_the_workpiece() {
 
 #[test]
 fn a_head_s_tilt_is_left_at_the_tool_s_length() {
-    let export = export("swivel-head", &HEAD, None, &Options::default());
+    let options = Options { ini: Some(plain_ini("XYZBC")), ..Options::default() };
+    let export = export("swivel-head", &HEAD, None, &options);
     let left = |name: &str| export.stock.left.iter().find(|l| l.parameter == name);
     // by hand: 0.015° · π/180 · 202.684 mm
     assert!((left("EA0B").unwrap().left_um.unwrap() - 53.062_5).abs() < 1e-3);
@@ -327,7 +344,15 @@ fn the_old_values_come_from_the_ini() {
 fn a_home_offset_is_taken_back_when_the_way_changes() {
     let zero = [("EC0C", "zero-c", 0.05, "deg", ID)];
     let stock = export("trunnion", &zero, None, &Options::default()).stock.compensation;
-    let next = export("trunnion", &[("EC0C", "zero-c", 0.01, "deg", ID)], Some(&stock), &Options::default());
+    let again = [("EC0C", "zero-c", 0.01, "deg", ID)];
+    // without the INI file the present value is not known: it changes by so much
+    let next = export("trunnion", &again, Some(&stock), &Options::default());
+    let change = |file: &str| next.changes.iter().find(|c| c.file == file && c.name == "[JOINT_4] HOME_OFFSET");
+    assert!((change("axiscal_changes.txt").unwrap().change + 0.05).abs() < 1e-9, "{:?}", next.changes);
+    assert!((change("stock/axiscal_changes.txt").unwrap().change - 0.01).abs() < 1e-9, "{:?}", next.changes);
+    let mut ini = plain_ini("XYZAC");
+    ini.home_offset.insert(4, 0.05);
+    let next = export("trunnion", &again, Some(&stock), &Options { ini: Some(ini), ..Options::default() });
     let files = files(&next);
     assert!(lines(files["axiscal.hal"]).contains(&"setp axiscal_trunnion_kins.c-zero 0.06"));
     assert!(lines(files["axiscal.ini"]).contains(&"HOME_OFFSET = 0"));
@@ -374,7 +399,8 @@ fn errors_of_an_axis_s_own_position_become_its_table() {
     let (correction, _) =
         Correction::collect(&machine, &catalogue, &fit, During { loaded: None, transformation: true }, provenance())
             .unwrap();
-    let (export, _) = linuxcnc::export(&machine, &correction, &Options::default()).unwrap();
+    let options = Options { ini: Some(plain_ini("XYZBC")), ..Options::default() };
+    let (export, _) = linuxcnc::export(&machine, &correction, &options).unwrap();
     let tables = &export.stock.compensation.stock.as_ref().unwrap().axis_tables;
     let (x, y, c) = (&tables[&AxisName::X], &tables[&AxisName::Y], &tables[&AxisName::C]);
     assert_eq!((x.rows.first().unwrap()[1], x.rows.last().unwrap()[1]), (-0.045, 0.045));

@@ -69,25 +69,16 @@ fn fanuc_by_hand() {
     let planted = vec![("location-a", "EY0A", 0.0204), ("location-c", "EX0C", 0.0106)];
     let export = export(&machine, "fanuc", &planted, &accepting());
     let text = text(&export, "axiscal_parameters.txt");
-    let (title, text) = text.split_once('\n').unwrap();
+    let (title, text) = text.split_once("\n\r\r").unwrap();
     for word in ["%", "STUDY.TOML", "0123ABCD", "2026-11-20", "NOT VERIFIED, SEE README.TXT: FILE AXISCAL_G10.NC, "] {
         assert!(title.contains(word), "{title}");
     }
-    let expected =
-        "N19700Q1M0.000;\nN19701Q1M0.020;\nN19702Q1M-250.000;\nN19703Q1M0.011;\nN19704Q1M0.000;\nN19705Q1M0.000;\n%\n";
+    let expected = "N19700Q1L1M0.000 \n\r\rN19701Q1L1M0.020 \n\r\rN19702Q1L1M-250.000 \n\r\rN19703Q1L1M0.011 \n\r\rN19704Q1L1M0.000 \n\r\rN19705Q1L1M0.000 \n\r\r%\n\r\r";
     assert_eq!(text, expected);
     assert!(self::text(&export, "axiscal_g10.nc").contains("G10 L52\nN19700 R0.000\n"));
     // inch: the letter says it, and the control reads the same place
-    let inch = control::export(
-        &machine,
-        "fanuc",
-        &tables("fanuc"),
-        &correction(&machine, &planted, None),
-        &Options { unit: LengthUnit::Inch, ..accepting() },
-    )
-    .unwrap()
-    .0;
-    assert!(self::text(&inch, "axiscal_parameters.txt").contains("N19702Q1I-9.8425;"));
+    let inch = self::export(&machine, "fanuc", &planted, &Options { unit: LengthUnit::Inch, ..accepting() });
+    assert!(self::text(&inch, "axiscal_parameters.txt").contains("N19702Q1L1I-9.8425 \n\r\r"));
 }
 
 /// By hand from IM9 03/2013 p. 502, type T (double-head: B carries A, both through (0, 0, 0), the adapter there). EZ0A = 0.03
@@ -107,9 +98,8 @@ fn a_head_of_two_axes_by_hand() {
     assert!(carrier.contains("$TC_CARR23[1]=\"T\""));
     // A-78712E pp. 61, 62, type 2: 19709.. tool axis to the tool's rotary axis, 19712.. from there to the first one
     let fanuc = of("fanuc", "axiscal_parameters.txt");
-    let expected =
-        "N19709Q1M0.000;\nN19710Q1M0.000;\nN19711Q1M-0.030;\nN19712Q1M-0.020;\nN19713Q1M0.000;\nN19714Q1M0.000;\n%\n";
-    assert_eq!(fanuc.split_once('\n').unwrap().1, expected);
+    let expected = "N19709Q1L1M0.000 \n\r\rN19710Q1L1M0.000 \n\r\rN19711Q1L1M-0.030 \n\r\rN19712Q1L1M-0.020 \n\r\rN19713Q1L1M0.000 \n\r\rN19714Q1L1M0.000 \n\r\r%\n\r\r";
+    assert_eq!(fanuc.split_once("\n\r\r").unwrap().1, expected);
 }
 
 /// By hand from A-79348E p. 82 and A-78712E p. 61, type 21, the machine and errors of [`a_head_and_a_table_by_hand`]: the table's
@@ -118,9 +108,8 @@ fn a_head_of_two_axes_by_hand() {
 fn fanuc_head_and_table_by_hand() {
     let planted = vec![("location-b", "EX0B", 0.02), ("location-c", "EX0C", 0.05)];
     let text = text(&export(&machine("swivel-head"), "fanuc", &planted, &accepting()), "axiscal_parameters.txt");
-    let expected =
-        "N19700Q1M0.030;\nN19701Q1M0.000;\nN19702Q1M0.000;\nN19709Q1M-0.020;\nN19710Q1M0.000;\nN19711Q1M0.000;\n%\n";
-    assert_eq!(text.split_once('\n').unwrap().1, expected);
+    let expected = "N19700Q1L1M0.030 \n\r\rN19701Q1L1M0.000 \n\r\rN19702Q1L1M0.000 \n\r\rN19709Q1L1M-0.020 \n\r\rN19710Q1L1M0.000 \n\r\rN19711Q1L1M0.000 \n\r\r%\n\r\r";
+    assert_eq!(text.split_once("\n\r\r").unwrap().1, expected);
 }
 
 /// By hand: A tilted by 0.02 deg about Z points along (cos, sin, 0) = (0.999999939, 0.000349066, 0). C tilted by 0.01 deg about Y
@@ -200,9 +189,7 @@ fn fanuc_s_forms_are_read_back() {
         }];
         let of = |unit: LengthUnit| -> Export {
             let options = Options { unit, ..accepting() };
-            control::export(&machine, "fanuc", &tables("fanuc"), &correction(&machine, &planted, None), &options)
-                .unwrap()
-                .0
+            export(&machine, "fanuc", &planted, &options)
         };
         let (mm, inch) = (of(LengthUnit::Mm), of(LengthUnit::Inch));
         let values = |e: &Export, unit: f64| e.values.iter().map(|v| v.new * unit).collect::<Vec<_>>();
@@ -265,9 +252,7 @@ fn points_of_a_position_table_by_hand() {
 /// Whoever loads a file has not seen the screen: what is not verified is named in each of them.
 #[test]
 fn what_is_not_verified_is_named_in_every_file() {
-    for (control, name) in
-        [("fanuc", "trunnion"), ("sinumerik", "trunnion"), ("haas", "trunnion"), ("heidenhain", "swivel-head")]
-    {
+    for (control, name) in [("fanuc", "trunnion"), ("haas", "trunnion"), ("heidenhain", "swivel-head")] {
         let machine = machine(name);
         let effect = if name == "trunnion" { ("location-a", "EY0A", 0.02) } else { ("location-b", "EX0B", 0.01) };
         let export = export(&machine, control, &vec![effect], &accepting());

@@ -15,6 +15,7 @@ mod export;
 mod hand;
 mod mapping;
 mod old_values;
+mod rows;
 mod said;
 mod stock;
 mod support;

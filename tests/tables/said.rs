@@ -3,6 +3,7 @@
 
 use crate::controls::{CONTROLS, accepting, tables, text};
 use crate::support::{MACHINES, catalogue, machine};
+use axiscal::diag::{Failure, Severity};
 use axiscal::fit::outcome::Status;
 use axiscal::machine::Machine;
 use axiscal::model::catalogue::Effect;
@@ -66,6 +67,13 @@ impl Said<'_> {
     }
 }
 
+/// What goes with the turns of a screw is too fine for the rows of a table over the whole travel: that export is refused, for
+/// this reason alone, and the forced one is looked at.
+fn too_coarse<T>(refused: Failure, forced: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    let mut errors = refused.0.iter().filter(|f| f.severity == Severity::Error);
+    if errors.all(|f| f.code == "tables::too_coarse") { forced() } else { Err(refused) }
+}
+
 #[test]
 fn every_parameter_is_carried_or_said_to_stay() {
     let catalogue = catalogue();
@@ -97,7 +105,9 @@ fn every_parameter_is_carried_or_said_to_stay() {
                 if control::kind_of(&machine, &sheet).is_err() {
                     continue;
                 }
-                let (export, _) = control::export(&machine, control, &sheet, &correction, &accepting()).unwrap();
+                let with =
+                    |force| control::export(&machine, control, &sheet, &correction, &Options { force, ..accepting() });
+                let (export, _) = with(false).or_else(|refused| too_coarse(refused, || with(true))).unwrap();
                 let has_grids = export.compensation.tables.as_ref().is_some_and(|t| !t.grids.is_empty());
                 let in_tables = if has_grids { shapes.clone() } else { Vec::new() };
                 let readme = text(&export, "README.txt");
@@ -106,7 +116,9 @@ fn every_parameter_is_carried_or_said_to_stay() {
                     &Said { terms: &export.compensation.terms, in_tables, left: &export.left, readme: &readme },
                 );
             }
-            let (export, _) = linuxcnc::export(&machine, &correction, &linuxcnc::Options::default()).unwrap();
+            let with =
+                |force| linuxcnc::export(&machine, &correction, &linuxcnc::Options { force, ..Default::default() });
+            let (export, _) = with(false).or_else(|refused| too_coarse(refused, || with(true))).unwrap();
             let own = |c: &Compensation| c.stock.as_ref().is_some_and(|s| !s.axis_tables.is_empty());
             let readme = export.files.iter().find(|(n, _)| n == "README.txt").unwrap();
             let readme = String::from_utf8(readme.1.clone()).unwrap();

@@ -3,11 +3,18 @@
 use crate::by_hand::tip;
 use crate::support::{Spread, ask, harness, have, machine, pose, term};
 use axiscal::axes::{AxisName, Position};
-use axiscal::machine::Machine;
+use axiscal::machine::{Carrier, Machine};
+use axiscal::post::Postprocessor;
 use axiscal::tables::compensation::Term;
-use axiscal::tables::linuxcnc::stock::{Module, module_of, pins};
+use axiscal::tables::linuxcnc::stock::{self, Module, pins};
 use axiscal::tables::place::{Dof, Place};
 use std::path::PathBuf;
+
+/// The module in the version that Debian's package has.
+fn module_of(machine: &Machine) -> Module {
+    let (post, _) = Postprocessor::load_built_in_or_file("linuxcnc").unwrap();
+    stock::module_of(machine, post.release(Some("2.9")).unwrap()).unwrap()
+}
 
 /// Where Debian's package puts the modules.
 fn installed(module: Module) -> Option<PathBuf> {
@@ -42,7 +49,7 @@ fn offsets(module: Module, spread: &mut Spread) -> Vec<Term> {
 fn pins_say_where_the_real_axes_are() {
     for name in ["trunnion", "swivel-table-b"] {
         let mut machine = machine(name);
-        let Some(so) = installed(module_of(&machine).unwrap()) else { return };
+        let Some(so) = installed(module_of(&machine)) else { return };
         let folder = tempfile::tempdir().unwrap();
         let harness = harness(folder.path());
         for seed in 0..10 {
@@ -55,7 +62,7 @@ fn pins_say_where_the_real_axes_are() {
             for axis in [AxisName::X, AxisName::Y, AxisName::Z] {
                 machine.origin.set(axis, spread.next(100.0));
             }
-            let module = module_of(&machine).unwrap();
+            let module = module_of(&machine);
             let terms = offsets(module, &mut spread);
             let found = pins(&machine, module, &terms);
             let mut lines: Vec<String> =
@@ -85,5 +92,31 @@ fn pins_say_where_the_real_axes_are() {
                 }
             }
         }
+    }
+}
+
+/// A machine whose positive angles turn the table left-handed is one with conventional directions: the joints that its own chain
+/// needs are those that LinuxCNC issue 2435 expects, with both axes through the machine's zero and no tool.
+#[test]
+fn a_left_handed_table_needs_the_joints_that_others_expect() {
+    let mut machine = machine("swivel-table-b");
+    for axis in machine.axes.iter_mut().filter(|a| a.name.is_rotary()) {
+        (axis.point, axis.sense) = (nalgebra::Vector3::zeros(), -1.0);
+    }
+    machine.tool.pivot = nalgebra::Vector3::zeros();
+    let (post, _) = Postprocessor::load_built_in_or_file("linuxcnc").unwrap();
+    let module = stock::module_of(&machine, post.release(Some("master")).unwrap()).unwrap();
+    assert_eq!((module.name, module.conventional), ("xyzbc-trt-kins", Some(true)));
+    let table = include_str!("../linuxcnc_kins/expected_xyzbc_trt.csv");
+    assert_eq!(table.lines().count(), 4);
+    for line in table.lines().skip(1) {
+        let v: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+        let mut pose = Position::default();
+        pose.set(AxisName::B, v[3]);
+        pose.set(AxisName::C, v[4]);
+        let point = nalgebra::Vector3::new(v[0], v[1], v[2]);
+        let joints = machine.linear_for_ball(Carrier::Axis(AxisName::C), &pose, &point, 0.0).unwrap().xyz_mm();
+        let expected = nalgebra::Vector3::new(v[5], v[6], v[7]);
+        assert!((joints - expected).amax() < 1e-12, "{line}: {joints}");
     }
 }

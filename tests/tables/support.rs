@@ -9,7 +9,8 @@ use axiscal::tables::place::{Dof, Place};
 use std::path::PathBuf;
 use std::process::Command;
 
-pub const MACHINES: [&str; 4] = ["swivel-head", "double-head", "trunnion", "swivel-table-b"];
+pub const MACHINES: [&str; 6] =
+    ["swivel-head", "double-head", "trunnion", "swivel-table-b", "nutating-b", "trunnion-offset"];
 
 pub fn machine(name: &str) -> Machine {
     let (machines, _) = machine::load(&source("machines.toml", machine::BUILT_IN)).unwrap();

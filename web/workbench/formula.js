@@ -104,6 +104,14 @@ function mark(mistakes) {
   show("draft-answer", rest.join("\n"));
 }
 
+/** What can be fitted and may not be what is meant stands below its row. */
+function hint(hints) {
+  for (const h of hints) {
+    const [, n] = h.field.split(".");
+    byId("draft-terms").children[Number(n)].querySelector(".mistake").textContent = `${h.message}: ${h.help}`;
+  }
+}
+
 function failed(error) {
   if (error.mistakes) mark(error.mistakes);
   else show("draft-answer", (error.messages ?? [{ message: String(error) }]).map((m) => (m.help ? `${m.message}: ${m.help}` : m.message)).join("\n"));
@@ -120,6 +128,7 @@ async function look() {
     const found = await tryOut({ draft: draft() });
     if (mine !== looks) return;
     const sizes = found.parameters.map(sized);
+    hint(found.hints);
     show("draft-answer", `with it ${significant(found.rms_before_um)} → ${significant(found.rms_after_um)} µm RMS; ${sizes.join(", ")}`);
   } catch (error) {
     if (mine === looks) failed(error);

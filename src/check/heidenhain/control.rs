@@ -222,7 +222,7 @@ impl Heidenhain {
             128 => self.tcpm = Tcpm::On,
             129 => self.tcpm = Tcpm::Off,
             _ if self.builder.contains(&m) => vm.note(Event::Other(format!("M{m}"))),
-            _ => return Err(format!("M{m} is not known here")),
+            _ => return Err(format!("M{m} is not known to axiscal")),
         }
         Ok(Next::On)
     }
@@ -289,6 +289,13 @@ impl Dialect for Heidenhain {
         }
     }
 
+    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+        const KNOWN: [f64; 9] = [0.0, 5.0, 9.0, 19.0, 30.0, 126.0, 127.0, 128.0, 129.0];
+        let known = |m: &f64| KNOWN.contains(m) || self.builder.contains(m);
+        let numbers = words.iter().filter(|w| w.address == "M" && w.value.is_finite()).map(|w| w.value);
+        numbers.filter(|m| !known(m)).map(|m| format!("M{m}")).collect()
+    }
+
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
         let Some(head) = words.first() else { return Ok(Next::On) };
         self.skew.reckon(&vm.at);
@@ -305,7 +312,7 @@ impl Dialect for Heidenhain {
             "NO SHIFT" => self.shift = [0.0; 6],
             "SHIFT" => {
                 if words.iter().any(|w| w.address.starts_with('I')) {
-                    return Err("a datum shift by a step is not known here".to_owned());
+                    return Err("a datum shift by a step is not known to axiscal".to_owned());
                 }
                 for axis in AxisName::ALL {
                     if let Some(word) = words.iter().find(|w| w.address.starts_with(axis.letter())) {
@@ -313,7 +320,7 @@ impl Dialect for Heidenhain {
                     }
                 }
             }
-            other => return Err(format!("{other} is not known here")),
+            other => return Err(format!("{other} is not known to axiscal")),
         }
         Ok(Next::On)
     }
@@ -321,7 +328,7 @@ impl Dialect for Heidenhain {
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
         match var {
             Var::Number(n) if OWN.contains(n) => own(&self.own, var).map_err(|_| format!("Q{n} has no value")),
-            Var::Number(n) => Err(format!("what Q{n} holds is not known here")),
+            Var::Number(n) => Err(format!("what Q{n} holds is not known to axiscal")),
             Var::Name(data) => self.system(data, vm).ok_or_else(|| format!("{data} is no system data of this machine")),
         }
     }

@@ -21,12 +21,14 @@ use std::sync::Arc;
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fault> {
     let mut reader = Reader::new(post, masks);
-    for (number, line) in (0..).zip(lines(text)) {
-        if line.text.is_empty() && line.start == text.len() {
-            break;
-        }
-        reader.line(&line, number)?;
+    let is_end = |line: &Line<'_>| line.text.is_empty() && line.start == text.len();
+    let mut numbered = (0..).zip(lines(text)).take_while(|(_, line)| !is_end(line));
+    let read = numbered.try_for_each(|(number, line)| reader.line(&line, number));
+    // what is not known may be why the rest is not understood: it is said first
+    if !reader.code.unknown.is_empty() {
+        return Ok(reader.code);
     }
+    read?;
     reader.finish(text.len())
 }
 
@@ -172,7 +174,9 @@ impl<'a> Reader<'a> {
                 ("19.0 WORKING PLANE", Cycle::WorkingPlane),
             ];
             let Some((_, kind)) = kinds.into_iter().find(|(name, _)| scan.take(name)) else {
-                return Err(scan.expected("a cycle that axiscal knows"));
+                // its further blocks are told apart by what stands behind the point
+                let number: String = scan.rest().chars().take_while(char::is_ascii_digit).collect();
+                return self.stranger(scan, at, format!("CYCL DEF {number}"));
             };
             self.opened(at, kind);
             scan.end()?;
@@ -198,8 +202,20 @@ impl<'a> Reader<'a> {
             let m = scan.whole("the number of an M function")?;
             self.code.push(at, What::Block(vec![number("M", f64::from(m))]));
         } else {
-            return Err(scan.expected("a block that axiscal knows"));
+            let words: Vec<&str> = scan.rest().split_whitespace().take(3).collect();
+            let name: String = words.join(" ").chars().take(24).collect();
+            return self.stranger(scan, at, name);
         }
+        Ok(())
+    }
+
+    /// A block that is not known to axiscal is noted.
+    fn stranger(&mut self, scan: &mut Scan<'_>, at: Range<usize>, name: String) -> Result<(), Fault> {
+        if scan.rest().is_empty() {
+            return Err(scan.expected("a block"));
+        }
+        self.code.is_unknown(at, name);
+        scan.all();
         Ok(())
     }
 
@@ -271,7 +287,7 @@ impl<'a> Reader<'a> {
             }
             16 => self.print(scan, at),
             18 => self.system(scan, at),
-            _ => Err(Fault { at: place, says: format!("FN {n} is not known here") }),
+            _ => self.stranger(scan, place, format!("FN {n}")),
         }
     }
 
@@ -329,7 +345,7 @@ impl<'a> Reader<'a> {
         scan.need(" IDX", WHAT)?;
         let index = scan.whole(WHAT)?;
         if !matches!((id, nr, index), (240 | 270, 1, 1..=6) | (320, 1, 0) | (210, 1 | 2, 0)) {
-            return Err(Fault { at: place, says: format!("ID{id} NR{nr} IDX{index} is not known here") });
+            return Err(Fault { at: place, says: format!("ID{id} NR{nr} IDX{index} is not known to axiscal") });
         }
         let several = if id == 210 { format!(" NR{nr}") } else { String::new() };
         let data = Var::Name(Arc::from(format!("ID{id}{several} IDX{index}")));

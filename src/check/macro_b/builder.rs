@@ -14,8 +14,10 @@ const ANGLES: [&str; 3] = ["R", "S", "P"];
 pub struct Builder {
     /// Blocks that switch the probe: letters with their numbers.
     switches: Vec<Vec<(char, f64)>>,
-    /// M functions that let macro statements wait until the moves before them are done.
-    waits: Vec<f64>,
+    /// Words behind which macro statements wait until the moves before them are done.
+    waits: Vec<(char, f64)>,
+    /// The first of them, for messages.
+    wait_word: String,
     /// M function that turns the spindle, and the word with its angle.
     orient: (f64, &'static str),
     /// Variable that is 1 while the probe is deflected.
@@ -29,16 +31,19 @@ impl Builder {
         let setting = |name: &str| post.settings.get(name).map_or("", String::as_str);
         let switches =
             ["probe_on", "probe_off"].into_iter().flat_map(|name| setting(name).lines()).map(block).collect();
-        let m = |words: &[(char, f64)]| {
-            words.iter().filter(|(letter, m)| *letter == 'M' && !EVERYBODY_S.contains(m)).map(|(_, m)| *m).collect()
+        let builder_s = |words: Vec<(char, f64)>| {
+            words.into_iter().filter(|(letter, m)| *letter == 'M' && !EVERYBODY_S.contains(m)).collect::<Vec<_>>()
         };
+        let words: &[String] = post.check.as_ref().map_or(&[], |c| &c.waits);
+        let known = words.iter().flat_map(|word| block(word));
         let orient = setting("orient").split_once(char::is_whitespace).and_then(|(function, letter)| {
             let number = block(function).first().filter(|(l, m)| *l == 'M' && !EVERYBODY_S.contains(m))?.1;
             Some((number, ANGLES.into_iter().find(|a| *a == letter.trim())?))
         });
         Self {
             switches,
-            waits: setting("wait").lines().flat_map(|line| -> Vec<f64> { m(&block(line)) }).collect(),
+            waits: setting("wait").lines().flat_map(|line| builder_s(block(line))).chain(known).collect(),
+            wait_word: words.first().cloned().unwrap_or_default(),
             orient: orient.unwrap_or((19.0, "R")),
             probe_input: setting("probe_input").trim().strip_prefix('#').and_then(|n| n.parse().ok()),
             cuts: post.check.as_ref().is_some_and(|c| c.field_overflow == Overflow::Cut),
@@ -50,9 +55,19 @@ impl Builder {
         !EVERYBODY_S.contains(&m) && self.switches.iter().flatten().any(|word| *word == ('M', m))
     }
 
-    /// Does this M function make macro statements wait?
-    pub fn waits(&self, m: f64) -> bool {
-        self.waits.contains(&m)
+    /// Does this word make macro statements wait?
+    pub fn waits(&self, letter: char, number: f64) -> bool {
+        self.waits.contains(&(letter, number))
+    }
+
+    /// A word that makes them wait, for messages.
+    pub fn wait_word(&self) -> &str {
+        &self.wait_word
+    }
+
+    /// Is it an M function of the builder's that makes macro statements wait?
+    pub fn is_waiting_function(&self, m: f64) -> bool {
+        !EVERYBODY_S.contains(&m) && self.waits('M', m)
     }
 
     /// The word with the angle, where this M function turns the spindle.

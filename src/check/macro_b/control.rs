@@ -2,7 +2,7 @@
 //!
 //! What a skip move leaves in #5061 … where no signal came (the end point), what #5021 and #5041 mean, and that a number
 //! without its point counts thousandths, is as the postprocessor files say: unverified on a real control. Macro statements
-//! are read ahead of the blocks before them: what the control shows of its position is refused until a block has made them wait.
+//! are read ahead of the blocks before them: what the control shows of its position is refused until a block has made them wait: which blocks do is said under `[check]` (`waits`).
 
 mod places;
 mod variables;
@@ -78,7 +78,8 @@ pub struct MacroB {
 impl MacroB {
     fn mode(&mut self, tenth: i64, words: &[Spoken]) -> Result<(), String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
-        self.ahead |= tenth != 40;
+        let waits = self.builder.waits('G', tenth as f64 / 10.0);
+        self.ahead = !waits;
         if tenth == 544 {
             if value("P") != Some(0.0) {
                 return Err("G54.4 is known with P0 only, which ends it".to_owned());
@@ -107,9 +108,10 @@ impl MacroB {
             1030 => self.lookahead = value("P").ok_or("G103 needs P")?,
             40 => {
                 value("P").ok_or("G4 needs P")?;
-                self.ahead = false;
             }
-            _ => return Err(format!("G{} is not known here", tenth as f64 / 10.0)),
+            // without an axis it moves nothing; with one its block is refused: no move of ours is one
+            530 => {}
+            _ => return Err(format!("G{} is not known to axiscal", tenth as f64 / 10.0)),
         }
         Ok(())
     }
@@ -117,10 +119,11 @@ impl MacroB {
     /// An M function that is not known says so before a word that goes with it.
     fn knows(&self, m: f64) -> Result<(), String> {
         let known = [0.0, 5.0, 9.0, 30.0].contains(&m);
-        if known || self.builder.orients(m).is_some() || self.builder.waits(m) || self.builder.switches(m) {
+        if known || self.builder.orients(m).is_some() || self.builder.is_waiting_function(m) || self.builder.switches(m)
+        {
             return Ok(());
         }
-        Err(format!("M{m} is not known here"))
+        Err(format!("M{m} is not known to axiscal"))
     }
 
     fn auxiliary(&mut self, m: f64, words: &[Spoken], vm: &mut Vm) -> Result<bool, String> {
@@ -130,8 +133,10 @@ impl MacroB {
             vm.note(Event::Orient(value(word).ok_or_else(|| format!("M{m} needs {word}"))?));
             return Ok(false);
         }
-        if self.builder.waits(m) {
+        if self.builder.waits('M', m) {
             self.ahead = false;
+        }
+        if self.builder.is_waiting_function(m) {
             return Ok(false);
         }
         if self.builder.switches(m) {
@@ -139,14 +144,14 @@ impl MacroB {
             return Ok(false);
         }
         if (m - m.round()).abs() > 1e-9 {
-            return Err(format!("M{m} is not known here"));
+            return Err(format!("M{m} is not known to axiscal"));
         }
         match whole {
             30 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
             5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
-            _ => return Err(format!("M{m} is not known here")),
+            _ => return Err(format!("M{m} is not known to axiscal")),
         }
         Ok(false)
     }
@@ -157,7 +162,9 @@ impl MacroB {
         let number = value("P").ok_or("G65 needs P")?;
         let calls = Arc::clone(&self.calls);
         let rule = calls.iter().find(|c| f64::from(c.program) == number).ok_or_else(|| {
-            format!("what G65 P{number} does is not known here: [[check.call]] of the postprocessor file may say it")
+            format!(
+                "what G65 P{number} does is not known to axiscal: [[check.call]] of the postprocessor file may say it"
+            )
         })?;
         let given = |w: &&Spoken| !matches!(w.address, "G" | "P");
         match rule.does {
@@ -237,23 +244,18 @@ impl MacroB {
         Ok(())
     }
 
-    fn unused(&self, words: &[Spoken], gs: &[i64]) -> Result<(), String> {
+    fn unused(&self, words: &[Spoken], gs: &[i64]) -> Option<&'static str> {
         let moves = gs.iter().any(|g| matches!(g, 0 | 10 | 310));
-        for word in words {
-            let used = match word.address {
-                _ if self.builder.uses(word, words) => true,
-                "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 542 | 544 | 1540)),
-                "R" | "S" => false,
-                "H" => gs.iter().any(|g| matches!(g, 434 | 2340)),
-                "F" => moves,
-                "G" | "M" => true,
-                _ => moves || gs.iter().any(|g| matches!(g, 520 | 434 | 2340)),
-            };
-            if !used {
-                return Err(format!("nothing in the block uses the word {}", word.address));
-            }
-        }
-        Ok(())
+        let used = |word: &Spoken| match word.address {
+            _ if self.builder.uses(word, words) => true,
+            "P" => gs.iter().any(|g| matches!(g, 40 | 1030 | 541 | 542 | 544 | 1540)),
+            "R" | "S" => false,
+            "H" => gs.iter().any(|g| matches!(g, 434 | 2340)),
+            "F" => moves,
+            "G" | "M" => true,
+            _ => moves || gs.iter().any(|g| matches!(g, 520 | 434 | 2340)),
+        };
+        words.iter().find(|word| !used(word)).map(|word| word.address)
     }
 }
 
@@ -348,12 +350,26 @@ impl Dialect for MacroB {
         }
     }
 
+    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+        let tenth = |value: f64| (value * 10.0).round() as i64;
+        let of = |address: &'static str| words.iter().filter(move |w| w.address == address && w.value.is_finite());
+        // a G number that needs a P has one
+        let given = [Spoken { address: "P", value: 0.0, point: true }];
+        let known_g = |g: f64| {
+            (g * 10.0 - (g * 10.0).round()).abs() < 1e-6
+                && (matches!(tenth(g), 0 | 10 | 310 | 434 | 520 | 650 | 2340)
+                    || self.clone().mode(tenth(g), &given).is_ok())
+        };
+        let gs = of("G").filter(|w| !known_g(w.value)).map(|w| format!("G{}", w.value));
+        gs.chain(of("M").filter(|w| self.knows(w.value).is_err()).map(|w| format!("M{}", w.value))).collect()
+    }
+
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
         self.skew.reckon(&vm.at);
         let numbers = |address: &'static str| words.iter().filter(move |w| w.address == address).map(|w| w.value);
         let tenth = |g: f64| {
             let t = (g * 10.0).round();
-            if (g * 10.0 - t).abs() > 1e-6 { Err(format!("G{g} is not known here")) } else { Ok(t as i64) }
+            if (g * 10.0 - t).abs() > 1e-6 { Err(format!("G{g} is not known to axiscal")) } else { Ok(t as i64) }
         };
         let gs: Vec<i64> = numbers("G").map(tenth).collect::<Result<_, _>>()?;
         for group in GROUPS {
@@ -379,7 +395,9 @@ impl Dialect for MacroB {
             return Err("axis words stand without a G word that uses them".to_owned());
         }
         numbers("M").try_for_each(|m| self.knows(m))?;
-        self.unused(words, &gs)?;
+        if let Some(letter) = self.unused(words, &gs) {
+            return Err(format!("what the word {letter} does in the block is not known to axiscal"));
+        }
         let mut over = false;
         for m in numbers("M").collect::<Vec<_>>() {
             over |= self.auxiliary(m, words, vm)?;
@@ -442,7 +460,8 @@ impl Dialect for MacroB {
                 if self.ahead && (matches!(n, 5021..=5026 | 5041..=5046) || self.builder.is_probe_input(*n)) =>
             {
                 Err(format!(
-                    "{var} is read while blocks before it may not be done yet: a block to wait (G4) is missing"
+                    "{var} is read while blocks before it may not be done yet: a block to wait ({}) is missing",
+                    self.builder.wait_word()
                 ))
             }
             // what is a tool offset at a Fanuc is an input at a Haas
@@ -452,7 +471,9 @@ impl Dialect for MacroB {
             {
                 Ok(f64::from(vm.deflected()))
             }
-            Var::Number(n) => self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known here")),
+            Var::Number(n) => {
+                self.system_variable(*n, vm).ok_or_else(|| format!("what {var} holds is not known to axiscal"))
+            }
             Var::Name(_) => Err(format!("{var} is no variable")),
         }
     }
@@ -471,7 +492,7 @@ impl Dialect for MacroB {
             // bit 0 takes feed hold away, bit 2 exact stop
             Var::Number(3004) if value != 0.0 && value != 2.0 => {
                 return Err(format!(
-                    "#3004={value} is not known here: 2 takes the feed override away, 0 gives it back"
+                    "#3004={value} is not known to axiscal: 2 takes the feed override away, 0 gives it back"
                 ));
             }
             Var::Number(3004) => self.holds = value,

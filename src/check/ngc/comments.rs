@@ -46,18 +46,35 @@ fn active(body: &str) -> Option<&'static str> {
     ACTIVE.iter().find(acts).map(|(word, _)| *word)
 }
 
+/// A comment that acts.
+pub enum Acting {
+    /// What it does, and where it stands.
+    Does(Range<usize>, What),
+    /// It does something that is not known to axiscal, of this name.
+    Unknown(Range<usize>, String),
+}
+
 /// Reads the comments that end a line; gives what the one that acts does. The control acts on the last one of a line only,
 /// and before everything else in it: one that acts stands alone (`alone`: nothing but a line number stands before them).
 ///
 /// # Errors
 /// What is no comment, and what acts otherwise than it looks.
-pub fn comments(line: &Line<'_>, rest: &str, alone: bool) -> Result<Option<(Range<usize>, What)>, Fault> {
+pub fn comments(line: &Line<'_>, rest: &str, alone: bool) -> Result<Option<Acting>, Fault> {
     let mut rest = rest;
     let (mut seen, mut acting) = (0, None);
     loop {
         let (after, _) = blanks(rest).map_err(|e| line.unread(&e, "a comment"))?;
         if after.is_empty() {
             break;
+        }
+        // to the end of the line; the control looks into it for words that act
+        if let Some(body) = after.strip_prefix(';') {
+            match active(body) {
+                Some(word) => {
+                    return Ok(Some(Acting::Unknown(line.rest(after), format!("a remark that begins with {word}"))));
+                }
+                None => break,
+            }
         }
         let (next, body) = delimited(char('('), take_till(|c| c == '(' || c == ')'), char(')'))
             .parse(after)
@@ -76,10 +93,19 @@ pub fn comments(line: &Line<'_>, rest: &str, alone: bool) -> Result<Option<(Rang
     if !alone {
         return Err(line.fault(place, format!("({word}) acts: it stands alone in its line")));
     }
-    does(line, place, body, word).map(|what| Some((line.rest(place), what)))
+    let at = line.rest(place);
+    does(line, place, body, word).map(|what| {
+        Some(
+            what.map_or_else(
+                || Acting::Unknown(at.clone(), format!("({word})")),
+                |what| Acting::Does(at.clone(), what),
+            ),
+        )
+    })
 }
 
-fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<What, Fault> {
+/// `None`: something that is not known to axiscal.
+fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<Option<What>, Fault> {
     let (head, tail) = body.split_once(',').map_or((body, None), |(h, t)| (h, Some(t)));
     let text = |fixed: bool| -> Result<Text, Fault> {
         let tail = tail
@@ -87,7 +113,7 @@ fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<What, Fa
             .ok_or_else(|| line.fault(place, format!("({word}) needs a comma right behind the word, and a text")))?;
         if fixed { Ok(vec![Piece::Text(Arc::from(tail))]) } else { expanded(line, tail) }
     };
-    Ok(match word {
+    Ok(Some(match word {
         "MSG" => What::Message(text(true)?),
         "DEBUG" => What::Message(text(false)?),
         "ABORT" => What::Abort(text(false)?),
@@ -95,10 +121,8 @@ fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<What, Fa
         "LOGOPEN" => What::LogOpen { name: text(true)?, append: false },
         "LOGAPPEND" => What::LogOpen { name: text(true)?, append: true },
         "LOGCLOSE" if body.trim_start().eq_ignore_ascii_case("LOGCLOSE") => What::LogClose,
-        other => {
-            return Err(line.fault(place, format!("a comment that begins with {other} acts on the control")));
-        }
-    })
+        _ => return Ok(None),
+    }))
 }
 
 /// Text with `%f`, `%.3f` and parameters in it.

@@ -281,7 +281,7 @@ impl Ngc {
                 None => return Err("M73 outside of a subroutine".to_owned()),
             },
             1000..=1990 if tenth % 10 == 0 => vm.note(Event::Other(format!("M{m}"))),
-            _ => return Err(format!("M{m} is not known here")),
+            _ => return Err(format!("M{m} is not known to axiscal")),
         }
         Ok(false)
     }
@@ -313,7 +313,7 @@ impl Ngc {
             922 => self.g92_on = false,
             923 => self.g92_on = true,
             930 | 940 | 950 => self.modes.feed_mode = (tenth / 10) as u32,
-            _ => return Err(format!("G{} is not known here", tenth as f64 / 10.0)),
+            _ => return Err(format!("G{} is not known to axiscal", tenth as f64 / 10.0)),
         }
         Ok(())
     }
@@ -356,6 +356,40 @@ const READ_ONLY: [&str; 18] = [
 ];
 
 impl Dialect for Ngc {
+    fn unknown(&self, words: &[Spoken], post: &Postprocessor) -> Vec<String> {
+        let tenth = |value: f64| (value * 10.0).round();
+        let whole = |value: f64| (value * 10.0 - tenth(value)).abs() < 1e-6;
+        let known_g = |g: i64| matches!(g, 0 | 10 | 100 | 382..=385) || self.clone().mode(g, &[]).is_ok();
+        let switches = |m: f64| {
+            let lines = ["probe_on", "probe_off"].into_iter().filter_map(|name| post.settings.get(name));
+            let mut words = lines.flat_map(|line| line.split_whitespace());
+            words.any(|word| word.strip_prefix(['M', 'm']).and_then(|n| n.parse().ok()) == Some(m))
+        };
+        let known_m = |m: f64| match m {
+            // what they do stands outside of the program: outputs of the machine, programs of the user
+            62.0..=65.0 | 100.0..=199.0 => switches(m),
+            _ => [0.0, 2.0, 5.0, 9.0, 19.0, 30.0, 50.0, 66.0, 73.0].contains(&m) || switches(m),
+        };
+        let mut unknown = Vec::new();
+        for word in words.iter().filter(|w| w.value.is_finite()) {
+            let known = match word.address {
+                "G" => whole(word.value) && known_g(tenth(word.value) as i64),
+                "M" => known_m(word.value),
+                _ => true,
+            };
+            if !known {
+                unknown.push(format!("{}{}", word.address, word.value));
+            }
+        }
+        let functions = || words.iter().filter(|w| matches!(w.address, "G" | "M"));
+        if unknown.is_empty() && functions().all(|w| w.value.is_finite()) {
+            let gs: Vec<i64> = words.iter().filter(|w| w.address == "G").map(|w| tenth(w.value) as i64).collect();
+            let with = functions().next_back().map_or_else(String::new, |w| format!(" with {}{}", w.address, w.value));
+            unknown.extend(Self::unused(words, &gs).map(|letter| format!("the word {letter}{with}")));
+        }
+        unknown
+    }
+
     fn begin(start: Start, _post: &Postprocessor, _machine: &Machine) -> Self {
         Self::new(start)
     }
@@ -371,7 +405,7 @@ impl Dialect for Ngc {
         let numbers = |address: &'static str| words.iter().filter(move |w| w.address == address).map(|w| w.value);
         let tenth = |g: f64| {
             let t = (g * 10.0).round();
-            if (g * 10.0 - t).abs() > 1e-6 { Err(format!("G{g} is not known here")) } else { Ok(t as i64) }
+            if (g * 10.0 - t).abs() > 1e-6 { Err(format!("G{g} is not known to axiscal")) } else { Ok(t as i64) }
         };
         let gs: Vec<i64> = numbers("G").map(tenth).collect::<Result<_, _>>()?;
         for group in GROUPS {
@@ -389,7 +423,9 @@ impl Dialect for Ngc {
                 "axis words stand without a G word that uses them".to_owned()
             });
         }
-        self.unused(words, &gs)?;
+        if let Some(letter) = Self::unused(words, &gs) {
+            return Err(format!("what the word {letter} does in the line is not known to axiscal"));
+        }
         for g in gs.iter().filter(|g| matches!(g, 930 | 940 | 950)) {
             self.mode(*g, words)?;
         }
@@ -448,7 +484,7 @@ impl Dialect for Ngc {
             Var::Number(n) => match self.parameter(*n, vm) {
                 Some(x) => Ok(x),
                 None if *n < 5000 => own(&self.globals, var),
-                None => Err(format!("what {var} holds is not known here")),
+                None => Err(format!("what {var} holds is not known to axiscal")),
             },
             Var::Name(name) if name.starts_with('_') => match self.globals.get(var) {
                 Some(x) => Ok(*x),
@@ -539,22 +575,17 @@ impl Dialect for Ngc {
 }
 
 impl Ngc {
-    /// A word that nothing in its block uses is a slip.
-    fn unused(&self, words: &[Spoken], gs: &[i64]) -> Result<(), String> {
+    /// A word that nothing in its block uses, as far as axiscal knows.
+    fn unused(words: &[Spoken], gs: &[i64]) -> Option<&'static str> {
         let m = |n: f64| words.iter().any(|w| w.address == "M" && w.value == n);
-        for word in words {
-            let used = match word.address {
-                "P" => gs.contains(&100) || m(50.0) || [62.0, 63.0, 64.0, 65.0].into_iter().any(m),
-                "L" => gs.contains(&100) || m(66.0),
-                "R" => gs.contains(&100) || m(19.0),
-                "E" => m(66.0),
-                "S" | "D" | "Q" => false,
-                _ => true,
-            };
-            if !used {
-                return Err(format!("nothing in the line uses the word {}", word.address));
-            }
-        }
-        Ok(())
+        let used = |word: &Spoken| match word.address {
+            "P" => gs.contains(&100) || m(50.0) || [62.0, 63.0, 64.0, 65.0].into_iter().any(m),
+            "L" => gs.contains(&100) || m(66.0),
+            "R" => gs.contains(&100) || m(19.0),
+            "E" => m(66.0),
+            "S" | "D" | "Q" => false,
+            _ => true,
+        };
+        words.iter().find(|word| !used(word)).map(|word| word.address)
     }
 }

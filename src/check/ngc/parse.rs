@@ -2,7 +2,7 @@
 //!
 //! Source: LinuxCNC 2.9 manual, chapters 11.3 (lines, words, expressions), 11.4 (comments), 11.7 (O-codes).
 
-use super::comments::comments;
+use super::comments::{Acting, comments};
 use crate::check::code::{Code, Expr, Function, Op, Var, What, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
@@ -19,17 +19,23 @@ use std::sync::Arc;
 /// The letters that a block may hold.
 const ADDRESSES: [&str; 16] = ["G", "M", "X", "Y", "Z", "A", "B", "C", "F", "S", "P", "L", "R", "E", "D", "Q"];
 
-/// Reads a program.
+/// Reads a program. What is of LinuxCNC's language and not known to axiscal is in [`Code::unknown`], all of it.
 ///
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str) -> Result<Code, Fault> {
     let mut reader = Reader::default();
-    for line in lines(text) {
-        reader.line(&line)?;
+    let read = lines(text).try_for_each(|line| reader.line(&line));
+    // what is not known may be why the rest is not understood: it is said first
+    if !reader.code.unknown.is_empty() {
+        return Ok(reader.code);
     }
+    read?;
     reader.finish(text.len())
 }
+
+/// O-words of the language that are not read (manual 11.7).
+const FURTHER_O_WORDS: [&str; 7] = ["while", "endwhile", "do", "repeat", "endrepeat", "break", "continue"];
 
 #[derive(Default)]
 struct Reader {
@@ -101,8 +107,10 @@ impl Reader {
     /// The comments that end a line.
     fn comments(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
         let alone = line_number(line.text.trim_start_matches([' ', '\t'])).len() == rest.len();
-        if let Some((at, what)) = comments(line, rest, alone)? {
-            self.code.push(at, what);
+        match comments(line, rest, alone)? {
+            Some(Acting::Does(at, what)) => drop(self.code.push(at, what)),
+            Some(Acting::Unknown(at, name)) => self.code.is_unknown(at, name),
+            None => {}
         }
         Ok(())
     }
@@ -127,7 +135,12 @@ impl Reader {
         while left.starts_with(|c: char| c.is_ascii_alphabetic()) {
             let letter = left[..1].to_ascii_uppercase();
             let Some(address) = ADDRESSES.into_iter().find(|a| *a == letter) else {
-                return Err(line.not_understood(left, "a word that axiscal knows"));
+                let Ok((after, _)) = word_value(&left[1..]) else {
+                    return Err(line.not_understood(left, "a word that axiscal knows"));
+                };
+                self.code.is_unknown(line.rest(left), format!("the word {letter}"));
+                left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;
+                continue;
             };
             if "GMPL".contains(address) && left[1..].starts_with(['+', '-']) {
                 return Err(line.fault(left, format!("the number behind {address} has no sign")));
@@ -215,12 +228,20 @@ impl Reader {
                 }
                 left
             }
+            "call" if after.trim_start().starts_with('[') => {
+                self.code.is_unknown(at, "o call with arguments");
+                return Ok(());
+            }
             "call" => {
                 let call = self.code.push(at.clone(), What::Call(0));
                 self.calls.push((call, label, at));
                 after
             }
-            other => return Err(line.fault(rest, format!("{other:?} is no O-word that axiscal knows"))),
+            other if FURTHER_O_WORDS.contains(&other) => {
+                self.code.is_unknown(at, format!("o {other}"));
+                return Ok(());
+            }
+            other => return Err(line.fault(rest, format!("{other:?} is no O-word"))),
         };
         self.comments(line, left)
     }
@@ -292,7 +313,9 @@ impl Reader {
 }
 
 fn bracketed_name(input: &str) -> IResult<&str, &str> {
-    delimited(char('<'), take_while1(|c: char| c.is_ascii_alphanumeric() || c == '_'), char('>')).parse(input)
+    // the control takes whatever stands between the brackets; blanks it takes out
+    let part = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    delimited(char('<'), take_while1(part), char('>')).parse(input)
 }
 
 /// What follows `#`.
@@ -404,8 +427,38 @@ mod tests {
         assert_eq!(words[2].value, Expr::Number(0.25));
     }
 
+    /// Where a program is refused first, and why.
+    fn refused(text: &str) -> Fault {
+        match parse(text) {
+            Err(fault) => fault,
+            Ok(code) => {
+                let first = code.unknown.first().unwrap_or_else(|| panic!("{text:?} is read"));
+                Fault { at: first.at.clone(), says: first.name.clone() }
+            }
+        }
+    }
+
     #[test]
-    fn what_is_not_known_is_an_error_with_its_place() {
+    fn what_is_not_known_is_named_all_at_once() {
+        let names = |text: &str| parse(text).unwrap().unknown.into_iter().map(|u| u.name).collect::<Vec<_>>();
+        assert_eq!(
+            names("o10 repeat [2]\nG5 I1 J-2\no10 endrepeat\n"),
+            ["o repeat", "the word I", "the word J", "o endrepeat"]
+        );
+        assert_eq!(
+            names("o<t> sub\no<t> endsub\no<t> call [5] [2]\n(PROBEOPEN a.txt)\n"),
+            ["o call with arguments", "(PROBEOPEN)"]
+        );
+        assert_eq!(
+            names("; a remark\nG21 ; another\no<my-touch> sub\no<my-touch> endsub\no<my-touch> call ; third\n"),
+            [""; 0]
+        );
+        // nor is what may act behind a semicolon a remark
+        assert_eq!(names("G21 ;LOG,one\n"), ["a remark that begins with LOG"]);
+    }
+
+    #[test]
+    fn what_is_not_of_the_language_is_an_error_with_its_place() {
         let mut wrong = Vec::new();
         for (text, place) in [
             ("G0 X1 K3\n", 6),
@@ -452,7 +505,7 @@ mod tests {
             ("(A)\n%\nG0 X1\n%\n", 4),
             ("N10\n%\nG0 X1\n%\n", 4),
         ] {
-            let fault = parse(text).unwrap_err();
+            let fault = refused(text);
             if fault.at.start != place {
                 wrong.push(format!("{text:?}, not {place} but {}: {}", fault.at.start, fault.says));
             }

@@ -22,6 +22,10 @@ const TURN: f64 = 360.0;
 const SAME_DEG: f64 = 1e-6;
 /// What a timer counts, s.
 const TIMER_S: f64 = 0.001;
+/// A program begins at two minutes before midnight, s since midnight: its run goes over the end of the day.
+const BEGINS_S: f64 = 86_280.0;
+/// A day, s.
+const DAY_S: f64 = 86_400.0;
 
 /// What MEAS has kept.
 #[derive(Debug, Clone)]
@@ -170,7 +174,7 @@ impl Sinumerik {
             90 | 91 => self.incremental = g == 91.0,
             93..=95 => self.feed_mode = g,
             700 | 710 => self.inch = g == 700.0,
-            _ => return Err(format!("G{g} is not known here")),
+            _ => return Err(format!("G{g} is not known to axiscal")),
         }
         Ok(())
     }
@@ -182,7 +186,7 @@ impl Sinumerik {
             5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
             _ if self.builder.contains(&m) => vm.note(Event::Other(format!("M{m}"))),
-            _ => return Err(format!("M{m} is not known here")),
+            _ => return Err(format!("M{m} is not known to axiscal")),
         }
         Ok(false)
     }
@@ -301,7 +305,11 @@ impl Sinumerik {
                 )
             })
         };
+        let of_day = (BEGINS_S + vm.clock_s(1.0)).rem_euclid(DAY_S);
         match name {
+            "$A_HOUR" => Ok((of_day / 3600.0).floor()),
+            "$A_MINUTE" => Ok((of_day / 60.0).floor().rem_euclid(60.0)),
+            "$A_SECOND" => Ok(of_day.floor().rem_euclid(60.0)),
             "$AC_MEA" => input(truth(self.triggered)),
             "$A_PROBE" => input(truth(vm.deflected())),
             "$P_ACTFRAME" => {
@@ -322,7 +330,7 @@ impl Sinumerik {
                 let axis = axis()?;
                 Ok(self.counted(axis, latched(axis)?.work[axis.index()]) / self.unit(axis))
             }
-            _ => Err(format!("what {name} holds is not known here")),
+            _ => Err(format!("what {name} holds is not known to axiscal")),
         }
     }
 }
@@ -405,12 +413,24 @@ impl Dialect for Sinumerik {
         }
     }
 
+    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+        let known_g = |g: f64| g.fract() == 0.0 && (matches!(g as i64, 0 | 1) || self.clone().mode(g).is_ok());
+        let known_m = |m: f64| [0.0, 5.0, 9.0, 30.0].contains(&m) || self.builder.contains(&m);
+        let is_unknown = |w: &&Spoken| match w.address {
+            "G" => !known_g(w.value),
+            "M" => !known_m(w.value),
+            _ => false,
+        };
+        let numbers = words.iter().filter(|w| w.value.is_finite());
+        numbers.filter(is_unknown).map(|w| format!("{}{}", w.address, w.value)).collect()
+    }
+
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
         let numbers = |address: &'static str| words.iter().filter(move |w| w.address == address).map(|w| w.value);
         let value = |address: &'static str| numbers(address).next();
         let gs: Vec<f64> = numbers("G").collect();
         if let Some(g) = gs.iter().find(|g| g.fract() != 0.0) {
-            return Err(format!("G{g} is not known here"));
+            return Err(format!("G{g} is not known to axiscal"));
         }
         for group in GROUPS {
             if gs.iter().filter(|g| group.contains(&(**g as i64))).count() > 1 {
@@ -478,8 +498,10 @@ impl Dialect for Sinumerik {
 
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
         let Var::Name(name) = var else { return Err(format!("{var} is no variable")) };
-        let Some((name, index)) = name.strip_suffix(']').and_then(|n| n.split_once('[')) else {
-            return own(&self.own, var);
+        let (name, index) = match name.strip_suffix(']').and_then(|n| n.split_once('[')) {
+            Some(parts) => parts,
+            None if name.starts_with('$') => (name.as_ref(), ""),
+            None => return own(&self.own, var),
         };
         if self.ahead {
             return Err(format!("STOPRE is missing: {var} would be read before the block before it has ended"));

@@ -41,6 +41,8 @@ const OF_AXIS: [&str; 4] = ["$AA_IM", "$AA_IW", "$AA_MM", "$AA_MW"];
 /// All frames together, whose components can be read: NC Programming 12/2019, 6FC5398-2EP40-0BA0, p. 631.
 const FRAME: &str = "$P_ACTFRAME";
 const NUMBERED: [&str; 3] = ["$AC_MEA", "$A_PROBE", "$AC_TIMER"];
+/// The time of day: without an index.
+const CLOCK: [&str; 3] = ["$A_HOUR", "$A_MINUTE", "$A_SECOND"];
 
 fn refuse<T>(input: &str) -> IResult<&str, T> {
     Err(nom::Err::Failure(nom::error::Error::new(input, nom::error::ErrorKind::Verify)))
@@ -85,6 +87,9 @@ impl Names {
         let (after, name) = recognize((char('$'), identifier)).parse(input)?;
         if name == FRAME {
             return self.frame(input, after);
+        }
+        if CLOCK.contains(&name) {
+            return Ok((after, Var::Name(Arc::from(name))));
         }
         let (after, index) = delimited(
             char('['),

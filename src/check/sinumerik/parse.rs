@@ -27,9 +27,12 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 pub fn parse(text: &str, post: &Postprocessor) -> Result<Code, Fault> {
     let axes = AxisName::ALL.into_iter().map(|a| (post.number.name(a), a)).collect();
     let mut reader = Reader { names: Names { types: BTreeMap::new(), axes }, ..Reader::default() };
-    for line in lines(text) {
-        reader.line(&line)?;
+    let read = lines(text).try_for_each(|line| reader.line(&line));
+    // what is not known may be why the rest is not understood: it is said first
+    if !reader.code.unknown.is_empty() {
+        return Ok(reader.code);
     }
+    read?;
     reader.finish(text.len())
 }
 
@@ -171,7 +174,7 @@ impl Reader {
     }
 
     fn block(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
-        let words = words(&self.names, line, rest)?;
+        let words = words(&self.names, line, rest, &mut self.code)?;
         let ends = |w: &crate::check::code::Word| w.address == "M" && w.value == Expr::Number(30.0);
         self.ended |= words.iter().any(ends);
         self.code.push(line.rest(rest), What::Block(words));

@@ -2,7 +2,7 @@
 
 use super::expression::{Names, identifier};
 use crate::axes::AxisName;
-use crate::check::code::{Expr, Word};
+use crate::check::code::{Code, Expr, Word};
 use crate::check::lines::{Line, blanks, number, unsigned};
 use crate::check::run::Fault;
 use nom::Parser;
@@ -166,14 +166,48 @@ fn address(axis: AxisName, way: Way) -> &'static str {
     ADDRESSES.get(axis.index()).and_then(|row| row.get(place)).copied().unwrap_or("")
 }
 
-/// Reads the words of a block up to the end of the line.
+/// A word of the language, or a cycle with its values, that is not known to axiscal: what follows it, and its name. Letters that have a
+/// meaning are none, whatever stands behind them.
+fn stranger<'a>(names: &Names, left: &'a str) -> Option<(&'a str, &'a str)> {
+    let (after, name) = identifier(left).ok()?;
+    let is_address = name.as_bytes().get(1).is_none_or(u8::is_ascii_digit);
+    let is_known = match after.strip_prefix('=') {
+        // a user's axis may be called C1
+        Some(_) if names.axis(name).is_some() => true,
+        // the number of a block stands at its beginning, where it has been taken: another one is a mistake
+        _ if is_address => name.get(..1).is_none_or(|l| l == "N" || LETTERS.contains(&l) || names.axis(l).is_some()),
+        Some(_) => NAMED.contains(&name),
+        None => BARE.contains(&name),
+    };
+    if is_known {
+        return None;
+    }
+    let (mut depth, mut quoted) = (0_usize, false);
+    let end = after.find(|c: char| {
+        match c {
+            '"' => quoted = !quoted,
+            '(' if !quoted => depth += 1,
+            ')' if !quoted => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        !quoted && depth == 0 && (c == ' ' || c == '\t')
+    });
+    Some((after.get(end.unwrap_or(after.len())..)?, name))
+}
+
+/// Reads the words of a block up to the end of the line. Those that are not known to axiscal are noted in the code.
 ///
 /// # Errors
-/// A word that is not known here, one that stands twice, two without a blank between them.
-pub fn words(names: &Names, line: &Line<'_>, rest: &str) -> Result<Vec<Word>, Fault> {
+/// A word that cannot be read, one that stands twice, two without a blank between them.
+pub fn words(names: &Names, line: &Line<'_>, rest: &str, code: &mut Code) -> Result<Vec<Word>, Fault> {
     let mut words: Vec<Word> = Vec::new();
     let mut left = rest;
     while !left.is_empty() {
+        if let Some((after, name)) = stranger(names, left) {
+            code.is_unknown(line.rest(left), name);
+            left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;
+            continue;
+        }
         let (after, word) = word(names, line, left)?;
         let is_twice = |w: &Word| {
             w.address == word.address

@@ -17,7 +17,7 @@ use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
 use rayon::prelude::*;
 use run::{ReadLog, ReadPlan, ReadRun};
-pub use run::{load_plan, read_log};
+pub use run::{load_plan, load_plan_and_machine, read_log};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 

@@ -1,12 +1,13 @@
 //! A run's plan and log, read: what is to be said of them is kept for who says it in the order of the study.
 
 use super::controller_path;
-use crate::cli::common::Io;
+use crate::cli::common::{Io, load_machine};
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
 use crate::log::{self, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
+use crate::program::plan_check;
 use crate::study::DataEntry;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -20,6 +21,18 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
     read.check_belongs(path, machine)?;
     io.report(&read.findings);
     Ok(read.plan)
+}
+
+/// Reads a plan and, from the machines file, the machine that it names.
+///
+/// # Errors
+/// When one of them is unusable.
+pub fn load_plan_and_machine(path: &Path, machines: Option<&Path>, io: &Io) -> Result<(Plan, Machine)> {
+    let mut read = ReadPlan::of(path)?;
+    let machine = load_machine(&read.plan.machine, machines, io)?;
+    read.check_belongs(path, &machine)?;
+    io.report(&read.findings);
+    Ok((read.plan, machine))
 }
 
 /// A plan as it was read.
@@ -60,6 +73,12 @@ impl ReadPlan {
                 )
                 .help("if the change moves the chain, the blocks or the probe, generate the plan again"),
             );
+        }
+        let faults = plan_check::on_machine(plan, machine);
+        if !faults.is_empty() {
+            // the text was not kept: it is read once more for the places
+            let src = source(path.display().to_string(), files::read_text(path)?);
+            self.findings.extend(faults.findings(plan, &src).finish(())?.1.0);
         }
         Ok(())
     }

@@ -6,6 +6,8 @@ use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::log::matching::ranges;
 use crate::log::place::{Capped, Places};
+use crate::log::shift::common_shift;
+use crate::log::swaps::shift_says;
 use crate::log::touch::{RawTouch, Status};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Plan, PlanTouch};
@@ -155,6 +157,10 @@ fn none_fits(plan: &Plan, points: &[Point], form: &PointsForm, places: &Places<'
         );
         return places.at_line(Finding::error("log::swapped", message).help(help), line);
     }
+    if let Some(by) = shift(plan, points) {
+        let message = format!("no point of the file is one of the plan; most would be if {}", shift_says(&by));
+        return places.at_line(Finding::error("log::swapped", message).help(OTHER_ZERO), line);
+    }
     let distance = |p: &Point, t: &PlanTouch| (p.in_part(&p.nominal) - Vector3::from(t.point)).norm();
     let nearest = points
         .iter()
@@ -167,7 +173,19 @@ fn none_fits(plan: &Plan, points: &[Point], form: &PointsForm, places: &Places<'
         ),
         None => "no point of the file is one of the plan".to_owned(),
     };
-    places.at_line(Finding::error("log::other_plan", message), line).help(
-        "the file's zero must be the origin of R (where the ball's carrier frame lies), its nominal points those of the plan",
-    )
+    places.at_line(Finding::error("log::other_plan", message), line).help(OTHER_ZERO)
+}
+
+const OTHER_ZERO: &str = "the file's zero must be the origin of R (where the ball's carrier frame lies), its nominal points those of the plan";
+
+/// The shift with which most nominal points of the file are the plan's.
+fn shift(plan: &Plan, points: &[Point]) -> Option<Vector3<f64>> {
+    let found: Vec<Vector3<f64>> = points.iter().map(|p| p.in_part(&p.nominal)).collect();
+    let normals: Vec<Vector3<f64>> = points.iter().map(|p| p.in_part(&p.normal)).collect();
+    let planned: Vec<Vector3<f64>> = plan.touches.iter().map(|t| Vector3::from(t.point)).collect();
+    let alike = |i: usize, j: usize| (normals[i] - Vector3::from(plan.touches[j].normal)).norm() <= SAME_NORMAL;
+    let lies = |i: usize, by: &Vector3<f64>| {
+        (0..planned.len()).find(|j| alike(i, *j) && (found[i] - by - planned[*j]).norm() <= SAME_POINT_MM)
+    };
+    common_shift(&found, &planned, &alike, &lies)
 }

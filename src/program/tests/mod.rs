@@ -58,11 +58,15 @@ fn double_head_has_the_touches_of_the_paper() {
 }
 
 #[test]
-fn basic_is_complete_on_both_table_machines() {
-    for name in ["trunnion", "swivel-table-b"] {
+fn basic_is_complete_on_the_table_machines() {
+    let tilting = 4 * 48 + 2 * 40 + 2 * 30;
+    let nutating = 4 * 48 + 3 * 32 + 2 * 30;
+    for (name, touches) in
+        [("trunnion", tilting), ("swivel-table-b", tilting), ("trunnion-offset", tilting), ("nutating-b", nutating)]
+    {
         let (_, g) = built_in(name, "basic");
         assert!(g.plan.skipped.is_empty(), "{:?}", super::skipped_groups(&g.plan.skipped));
-        assert_eq!(g.plan.touches.len(), 4 * 48 + 2 * 40 + 2 * 30);
+        assert_eq!(g.plan.touches.len(), touches, "{name}");
     }
 }
 

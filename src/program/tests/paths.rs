@@ -230,7 +230,7 @@ fn a_path_that_ends_in_contact() {
 #[test]
 fn rapids_move_one_axis_and_each_turn_has_its_sense() {
     for (machine, program) in
-        [("swivel-head", "head"), ("swivel-head", "table"), ("double-head", "double-head"), ("trunnion", "basic")]
+        [("swivel-head", "head"), ("swivel-head", "table"), ("double-head", "double-head"), ("nutating-b", "basic")]
     {
         let (_, g) = built_in(machine, program);
         let first_touch = place(&g.path.steps, 0, |s| matches!(s, Step::Touch(_)));
@@ -311,6 +311,8 @@ fn every_set_up_of_the_built_in_programs_can_be_taken_up_again() {
         ("double-head", "double-head"),
         ("trunnion", "basic"),
         ("swivel-table-b", "basic"),
+        ("nutating-b", "basic"),
+        ("trunnion-offset", "basic"),
     ] {
         let (_, g) = built_in(machine, program);
         assert!(g.path.steps.iter().all(|s| !matches!(s, Step::Setup { resume: None, .. })), "{machine} {program}");

@@ -1,9 +1,9 @@
 //! Errors that depend on where an axis stands or from where it came: squareness, scale, straightness, angular errors,
 //! harmonics of rotary axes, backlash, gross mistakes.
 //!
-//! A displacement is that of what the axis carries, in R, as a function of the axis's NC coordinate; for rotary axes
-//! it stands before the axis's motion (it does not turn with it), for linear axes after (lever arms are counted in
-//! the frame that moves). Polynomials are scaled to [`SPAN_MM`].
+//! A displacement is that of what the axis carries, as a function of the axis's NC coordinate; for rotary axes it stands
+//! before the axis's motion (it does not turn with it), on the axis's own line and in the axis's own frame; for linear
+//! axes after, in R (lever arms are counted in the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
 use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
@@ -113,8 +113,8 @@ fn pair_in(pair: &str, machine: &Machine) -> Result<(usize, AxisName), Refusal> 
     Ok((axis_in(dof)?.index(), linear_in(axis, machine)?))
 }
 
-/// A lean of what bears the workpiece, such that the place of the ball's centre at zero stays where it is: the chain leans
-/// it about the reference point (rotary axes) or the origin of R (linear ones), and a shift brings it back.
+/// A lean of a carriage that bears the workpiece, such that the place of the ball's centre at zero stays where it is: the
+/// chain leans it about the origin of R, and a shift brings it back.
 fn at_the_ball(mut parameter: Parameter, machine: &Machine) -> Parameter {
     if let Role::Amount(acts) = &mut parameter.role
         && let Some(&(target, shape, factor)) = acts.first()
@@ -125,22 +125,21 @@ fn at_the_ball(mut parameter: Parameter, machine: &Machine) -> Parameter {
 }
 
 /// The shifts, mm per rad, that bring the place of the ball's centre at zero back where a lean has moved it; none where the
-/// axis does not bear the workpiece.
+/// axis is no linear one that bears the workpiece (a rotary axis leans on its own line).
 pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)> {
     let Target::Axis { axis, after, dof } = target else { return Vec::new() };
-    if dof < 3 || !axis_here(axis, machine).is_ok_and(|a| a.side == Side::Workpiece) {
+    if dof < 3 || axis.is_rotary() || !axis_here(axis, machine).is_ok_and(|a| a.side == Side::Workpiece) {
         return Vec::new();
     }
-    let (pivot, ball) = (&machine.reference.pivot, &machine.reference.ball);
-    let leans_at = if axis.is_rotary() { [pivot.x, pivot.y, pivot.z] } else { [0.0; 3] };
-    let arm = [ball.x - leans_at[0], ball.y - leans_at[1], ball.z - leans_at[2]];
+    let ball = &machine.reference.ball;
+    let arm = [ball.x, ball.y, ball.z];
     // a small turn about axis d moves the ball's place by -arm[n] towards m and by arm[m] towards n (d, m, n right-handed)
     let (m, n) = ((dof - 2) % 3, (dof - 1) % 3);
     vec![(Target::Axis { axis, after, dof: m }, arm[n]), (Target::Axis { axis, after, dof: n }, -arm[m])]
 }
 
 fn moved(axis: AxisName, dof: usize) -> Target {
-    Target::Axis { axis, after: !axis.is_rotary(), dof }
+    if axis.is_rotary() { Target::OwnLine { axis, after: false, dof } } else { Target::Axis { axis, after: true, dof } }
 }
 
 /// The axis moves askew: across its way in proportion to its coordinate.
@@ -202,8 +201,7 @@ fn harmonic(family: &str, axis: AxisName, k: &str, machine: &Machine) -> Result<
     axis_here(axis, machine)?;
     let row = |dof: usize, letter: char, shape: Shape| {
         let unit = if dof < 3 { Um } else { Urad };
-        let row = Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape);
-        if family == "tilt" { at_the_ball(row, machine) } else { row }
+        Parameter::at(format!("E{}{axis}{k}{letter}", dof_letter(dof)), unit, moved(axis, dof), shape)
     };
     let pair = |dof: usize| [row(dof, 'c', Shape::Cosine(axis, order)), row(dof, 's', Shape::Sine(axis, order))];
     Ok(dofs.into_iter().flat_map(pair).collect())

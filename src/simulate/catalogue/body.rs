@@ -26,7 +26,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         // and its weight turns it further about its own axis
         "head-tilt" => {
             let axis = tilting_head(machine)?;
-            let target = Target::Axis { axis, after: false, dof: along(axis) + 3 };
+            let target = Target::OwnLine { axis, after: false, dof: along(axis) + 3 };
             let name = format!("E{}{axis}s", dof_letter(along(axis) + 3));
             Ok(vec![Parameter::at(name, Urad, target, Shape::Sine(axis, 1.0)).alias("head_tilt").alias("k")])
         }
@@ -75,8 +75,16 @@ fn table_load(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
     let Some(axis) = [AxisName::C, AxisName::B, AxisName::A].into_iter().find(here) else {
         return Err(Refusal::NotHere(format!("{:?} has no rotary table", machine.name)));
     };
-    let row =
-        |name: &str, dof: usize| Parameter::at(name, Urad, Target::Axis { axis, after: true, dof }, Shape::Constant);
+    let row = |name: &str, dof: usize| {
+        // a load that turns the axis about itself does so about its own line
+        let about_itself = dof == along(axis) + 3;
+        let target = if about_itself {
+            Target::OwnLine { axis, after: true, dof }
+        } else {
+            Target::Axis { axis, after: true, dof }
+        };
+        Parameter::at(name, Urad, target, Shape::Constant)
+    };
     Ok(vec![row("load_a", 3), row("load_b", 4)])
 }
 

@@ -22,7 +22,11 @@ pub fn parameters(id: &str, machine: &Machine, _: Settings<'_>) -> Result<Vec<Pa
     if let Some(found) = axis_of(id, "zero", machine) {
         let (_, name) = found?;
         must_be_rotary(name)?;
-        return Ok(vec![iso(name, along(name) + 3, false)]);
+        // the axis stands further round its own line than it shows
+        let dof = along(name) + 3;
+        let bare = format!("{}0{name}", dof_letter(dof));
+        let target = Target::OwnLine { axis: name, after: false, dof };
+        return Ok(vec![Parameter::at(format!("E{bare}"), Deg, target, Shape::Constant).alias(bare)]);
     }
     let head = AxisName::B;
     match id {

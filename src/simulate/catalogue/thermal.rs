@@ -51,7 +51,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         "centre-drift-c" => {
             must_stand_on(AxisName::C, Side::Workpiece, machine)?;
             let row = |dof: usize, name: &str| {
-                let target = Target::Axis { axis: AxisName::C, after: false, dof };
+                let target = Target::OwnLine { axis: AxisName::C, after: false, dof };
                 Parameter::at(format!("centre_{name}"), UmPerH, target, Shape::Hours).alias(name)
             };
             vec![row(0, "vx"), row(1, "vy")]

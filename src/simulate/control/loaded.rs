@@ -166,7 +166,7 @@ impl Texts<'_> {
             match (kind.as_str(), which) {
                 ("T", 0) => md("PART_OFFSET", k),
                 ("T", 1) => md("JOINT_OFFSET", k),
-                ("P", 2) => md("JOINT_OFFSET_PART", k),
+                ("P", 2) => md("JOINT_OFFSET", k),
                 ("M", 0) => md("JOINT_OFFSET", k),
                 ("M", 2) => md("JOINT_OFFSET_PART", k),
                 ("P" | "M", 3) => md("PART_OFFSET", k),
@@ -313,7 +313,9 @@ pub fn fanuc(files: &[Source], machine: &Machine, findings: &mut Findings) -> Lo
 
 /// `N19703Q1M-0.0123;` in mm.
 fn parameter(line: &str) -> Option<(u32, f64)> {
-    let (number, value) = line.strip_prefix('N')?.strip_suffix(';')?.split_once("Q1")?;
+    let line = line.strip_suffix(';').unwrap_or(line).trim_end();
+    let (number, value) = line.strip_prefix('N')?.split_once("Q1")?;
+    let value = value.strip_prefix("L1").unwrap_or(value);
     let unit = match value.as_bytes().first()? {
         b'M' => 1.0,
         b'I' => crate::units::mm_from_inch(1.0),

@@ -6,7 +6,8 @@
 //! j = P + D + Rt(T)·( Rz(C)·(w - P) - D )        T = A about X, or B about Y; machine coordinates, mm
 //! ```
 //!
-//! for a tool centre point w in the workpiece (LinuxCNC manual, chapter on 5-axis kinematics). At T = C = 0 the two are
+//! for a tool centre point w in the workpiece (LinuxCNC manual, chapter on 5-axis kinematics). Where the pin
+//! conventional-directions is 1, both angles count the other way: T and C are replaced by -T and -C. At T = C = 0 the two are
 //! equal.
 
 use super::Linear;
@@ -24,6 +25,8 @@ pub struct TiltingTable {
     pub rot_point: Vec3,
     /// D without the tool, mm.
     pub offset: Vec3,
+    /// The direction pin is 1: positive angles turn the table left-handed.
+    pub conventional: bool,
     /// `tool-offset` less the machine's own tool length, mm: what the pin says beyond the stylus that is clamped.
     pub tool_beyond_mm: f64,
     /// Machine coordinates of R's origin, mm.
@@ -48,8 +51,9 @@ impl TiltingTable {
     /// The module's inverse function.
     fn joints(&self, world: Vec3, pose: &Position, stylus: Stylus) -> Vec3 {
         let along = if self.tilting == AxisName::A { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-        let tilt = Rigid::turn(along, [0.0; 3], sin_cos_deg(pose.get(self.tilting)));
-        let turn = Rigid::turn([0.0, 0.0, 1.0], [0.0; 3], sin_cos_deg(pose.get(AxisName::C)));
+        let way = if self.conventional { -1.0 } else { 1.0 };
+        let tilt = Rigid::turn(along, [0.0; 3], sin_cos_deg(way * pose.get(self.tilting)));
+        let turn = Rigid::turn([0.0, 0.0, 1.0], [0.0; 3], sin_cos_deg(way * pose.get(AxisName::C)));
         let mut d = self.offset;
         d[2] += stylus.length_mm + self.tool_beyond_mm;
         let table = minus(turn.outward(minus(world, self.rot_point)), d);
@@ -68,6 +72,7 @@ mod tests {
             tilting: AxisName::A,
             rot_point: [1.0, 2.0, -250.0],
             offset: [0.0, 0.3, -0.7],
+            conventional: false,
             tool_beyond_mm: 0.0,
             origin: [0.0; 3],
             workpiece_shift: [0.0; 3],
@@ -86,5 +91,29 @@ mod tests {
         for (a, b) in found.iter().zip(expected) {
             assert!((a - b).abs() < 1e-12);
         }
+    }
+
+    /// Joints that somebody else expects of xyzbc-trt-kins with conventional directions (LinuxCNC issue 2435), all pins at 0.
+    #[test]
+    fn conventional_directions_are_those_of_the_table_of_others() {
+        let table = include_str!("../../../tests/linuxcnc_kins/expected_xyzbc_trt.csv");
+        let module = TiltingTable {
+            tilting: AxisName::B,
+            rot_point: [0.0; 3],
+            offset: [0.0; 3],
+            conventional: true,
+            tool_beyond_mm: 0.0,
+            origin: [0.0; 3],
+            workpiece_shift: [0.0; 3],
+        };
+        let mut rows = 0;
+        for line in table.lines().skip(1) {
+            let v: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+            let pose = Position([0.0, 0.0, 0.0, 0.0, v[3], v[4]]);
+            let found = module.joints([v[0], v[1], v[2]], &pose, Stylus { length_mm: 0.0, spindle_deg: 0.0 });
+            assert!(found.iter().zip(&v[5..8]).all(|(a, b)| (a - b).abs() < 1e-12), "{line}: {found:?}");
+            rows += 1;
+        }
+        assert_eq!(rows, 3);
     }
 }

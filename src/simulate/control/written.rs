@@ -1,7 +1,7 @@
 //! `compensation.json` as it is written → [`Compensation`].
 
 use super::component::Component;
-use super::loaded::{self, Loaded};
+use super::loaded::{self, Cross, Loaded};
 use super::stock::TiltingTable;
 use super::table::Table;
 use super::{Compensation, Kinematics};
@@ -46,6 +46,20 @@ struct WrittenTables {
     vectors: Vec<WrittenVector>,
     #[serde(default)]
     zero_deg: BTreeMap<AxisName, f64>,
+    #[serde(default)]
+    grids: Vec<WrittenGrid>,
+}
+
+/// A table of one axis's correction by another's position, machine coordinates.
+#[derive(Debug, Deserialize)]
+struct WrittenGrid {
+    input: AxisName,
+    output: AxisName,
+    sense: f64,
+    min: f64,
+    step: f64,
+    modulo: bool,
+    values: Vec<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -76,6 +90,9 @@ struct WrittenStock {
     module: Option<String>,
     #[serde(default)]
     pins: BTreeMap<String, f64>,
+    /// The module's direction pin is 1.
+    #[serde(default)]
+    conventional_directions: bool,
     #[serde(default)]
     home_offset_deg: BTreeMap<AxisName, f64>,
     #[serde(default)]
@@ -244,8 +261,15 @@ impl Reader<'_> {
             // an offset is added to what is commanded
             told_less_deg[axis.index()] -= deg;
         }
-        let files = || written.files.iter().map(|name| open(name)).collect::<Result<Vec<_>>>();
-        Ok(match written.reads.as_deref() {
+        let opened: Vec<Result<Source>> = written.files.iter().map(|name| open(name)).collect();
+        // the record holds the same numbers: it is enough by itself, but half of the files are no compensation
+        let alone = written.reads.is_some() && opened.iter().all(Result::is_err);
+        if alone && !opened.is_empty() {
+            let says = format!("{} is not beside it: the numbers of the record are applied", written.files.join(", "));
+            self.findings.push(Finding::info("compensation::record", says));
+        }
+        let files = || opened.into_iter().collect::<Result<Vec<_>>>();
+        Ok(match written.reads.as_deref().filter(|_| !alone) {
             Some("sinumerik-data") => {
                 let mm_per_unit = if written.unit.as_deref() == Some("inch") { mm_from_inch(1.0) } else { 1.0 };
                 loaded::sinumerik(&files()?, self.machine, mm_per_unit, &mut self.findings)
@@ -256,12 +280,12 @@ impl Reader<'_> {
                 self.error("compensation::reads", message, "there are: sinumerik-data, fanuc-parameters");
                 Loaded::default()
             }
-            None => self.worksheet(written),
+            None => self.record(written),
         })
     }
 
-    /// What a person entered from a worksheet: lines by vectors between named points, and directions.
-    fn worksheet(&mut self, written: &WrittenTables) -> Loaded {
+    /// What a person entered, or where no file is to be had: lines by vectors between named points, directions, and position tables.
+    fn record(&mut self, written: &WrittenTables) -> Loaded {
         let mut points: BTreeMap<&str, Vec3> = [("machine-zero", [0.0; 3]), ("tool-adapter", [0.0; 3])].into();
         // as often as there are vectors: each may lead on from any other
         for _ in &written.vectors {
@@ -290,7 +314,25 @@ impl Reader<'_> {
             out
         };
         let (table, head) = (lines(machine::Side::Workpiece, "workpiece"), lines(machine::Side::Tool, "tool"));
-        Loaded { vectors: Some(loaded::through(self.machine, &table, &head)), cross: Vec::new() }
+        let cross = written.grids.iter().filter_map(|grid| self.position_table(grid)).collect();
+        Loaded { vectors: Some(loaded::through(self.machine, &table, &head)), cross }
+    }
+
+    fn position_table(&mut self, grid: &WrittenGrid) -> Option<Cross> {
+        let WrittenGrid { input, output, sense, min, step, modulo, ref values } = *grid;
+        let numbers = [min, step, sense].iter().chain(values).all(|v| v.is_finite());
+        let axes = [input, output].iter().all(|a| self.machine.axis(*a).is_some());
+        if !(numbers && axes && step > 0.0 && values.len() > 1) {
+            self.error(
+                "compensation::tables",
+                format!("the position table of {output} by {input} is damaged"),
+                UNCHANGED,
+            );
+            return None;
+        }
+        let max = min + step * (values.len() - 1) as f64;
+        let origin = self.machine.origin.get(input).unwrap_or(0.0);
+        Some(Cross { input, output, sense, min, max, step, modulo, values: values.clone(), origin })
     }
 
     fn tilting_table(&mut self, module: &str, stock: &WrittenStock) -> Option<Kinematics> {
@@ -324,7 +366,8 @@ impl Reader<'_> {
         let tool_beyond_mm = pin("tool-offset", Some(length)) - length;
         let origin = [AxisName::X, AxisName::Y, AxisName::Z].map(|a| self.machine.origin.get(a).unwrap_or(0.0));
         let workpiece_shift = stock.workpiece_shift_mm.unwrap_or([0.0; 3]);
-        let table = TiltingTable { tilting, rot_point, offset, tool_beyond_mm, origin, workpiece_shift };
+        let conventional = stock.conventional_directions;
+        let table = TiltingTable { tilting, rot_point, offset, conventional, tool_beyond_mm, origin, workpiece_shift };
         Some(Kinematics::TiltingTable(table))
     }
 

@@ -1,10 +1,8 @@
-//! Formulas of a user's effects, as the virtual machine reads them: the expression crate parses and evaluates, and what a
-//! word stands for is taken from the virtual machine's own state of a touch.
+//! Formulas of a user's effects, as the virtual machine reads them: it parses and evaluates them by itself, so that a fault of the
+//! model's reader is no fault of both. What a word stands for is taken from the virtual machine's own state of a touch.
 
 use crate::axes::{AxisName, Position};
 use crate::simulate::terms::TouchState;
-use exmex::prelude::*;
-use exmex::{BinOp, MakeOperators, MatchLiteral, Operator};
 
 /// Words for the state of a touch, as messages list them.
 pub const STATE_WORDS: &str = "X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB sC feed S gx gy gz L L0 bx by bz px py pz \
@@ -118,75 +116,190 @@ fn plain(part: f64) -> f64 {
     if part.abs() <= 1e-12 { 0.0 } else { part }
 }
 
-/// The operators that a formula may use.
-#[derive(Clone, Debug)]
-struct Operators;
+/// A step of a formula on a pile of values: the last values are taken, and what comes of them is put there.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    /// A number is put there.
+    Number(f64),
+    /// The value of one of the formula's words is put there.
+    Word(usize),
+    /// Of the last value.
+    One(fn(f64) -> f64),
+    /// Of the last two.
+    Two(fn(f64, f64) -> f64),
+}
 
-impl MakeOperators<f64> for Operators {
-    fn make<'a>() -> Vec<Operator<'a, f64>> {
-        let binary = |apply: fn(f64, f64) -> f64, prio, is_commutative| BinOp { apply, prio, is_commutative };
-        let step = |x: f64| f64::from(x >= 0.0);
-        let sign = |x: f64| f64::from(x > 0.0) - f64::from(x < 0.0);
-        // the remainder that has the sign of the divisor
+impl Step {
+    fn function(name: &str) -> Option<Self> {
+        // the remainder has the sign of the divisor
         let remainder = |a: f64, b: f64| a - (a / b).floor() * b;
-        vec![
-            Operator::make_bin_unary("+", binary(|a, b| a + b, 0, true), |x| x),
-            Operator::make_bin_unary("-", binary(|a, b| a - b, 1, false), |x| -x),
-            Operator::make_bin("*", binary(|a, b| a * b, 2, true)),
-            Operator::make_bin("/", binary(|a, b| a / b, 3, false)),
-            Operator::make_bin("^", binary(f64::powf, 4, false)),
-            Operator::make_bin("atan2", binary(f64::atan2, 0, false)),
-            Operator::make_bin("mod", binary(remainder, 4, false)),
-            Operator::make_unary("sin", f64::sin),
-            Operator::make_unary("cos", f64::cos),
-            Operator::make_unary("tan", f64::tan),
-            Operator::make_unary("asin", f64::asin),
-            Operator::make_unary("acos", f64::acos),
-            Operator::make_unary("atan", f64::atan),
-            Operator::make_unary("exp", f64::exp),
-            Operator::make_unary("ln", f64::ln),
-            Operator::make_unary("sqrt", f64::sqrt),
-            Operator::make_unary("abs", f64::abs),
-            Operator::make_unary("floor", f64::floor),
-            Operator::make_unary("sign", sign),
-            Operator::make_unary("step", step),
-            Operator::make_constant("pi", std::f64::consts::PI),
-            Operator::make_constant("PI", std::f64::consts::PI),
-        ]
+        Some(match name {
+            "sin" => Self::One(f64::sin),
+            "cos" => Self::One(f64::cos),
+            "tan" => Self::One(f64::tan),
+            "asin" => Self::One(f64::asin),
+            "acos" => Self::One(f64::acos),
+            "atan" => Self::One(f64::atan),
+            "exp" => Self::One(f64::exp),
+            "ln" => Self::One(f64::ln),
+            "sqrt" => Self::One(f64::sqrt),
+            "abs" => Self::One(f64::abs),
+            "floor" => Self::One(f64::floor),
+            "sign" => Self::One(|x| f64::from(x > 0.0) - f64::from(x < 0.0)),
+            "step" => Self::One(|x| f64::from(x >= 0.0)),
+            "atan2" => Self::Two(f64::atan2),
+            "mod" => Self::Two(remainder),
+            _ => return None,
+        })
+    }
+
+    fn operator(sign: char) -> Self {
+        Self::Two(match sign {
+            '+' => |a, b| a + b,
+            '-' => |a, b| a - b,
+            '*' => |a, b| a * b,
+            '/' => |a, b| a / b,
+            _ => f64::powf,
+        })
     }
 }
 
-/// Numbers, with an exponent too.
-#[derive(Clone, Debug)]
-struct Numbers;
+/// The number at the beginning of a text, with an exponent too.
+fn number_at(text: &str) -> Option<&str> {
+    let byte = |at: usize| text.as_bytes().get(at).copied();
+    let digits = |from: usize| text.bytes().skip(from).take_while(u8::is_ascii_digit).count();
+    let whole = digits(0);
+    let mut end = whole;
+    if byte(end) == Some(b'.') {
+        end += 1 + digits(end + 1);
+    }
+    if end == 0 || &text[..end] == "." {
+        return None;
+    }
+    if matches!(byte(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(byte(end + 1), Some(b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        if exponent > 0 {
+            end += 1 + sign + exponent;
+        }
+    }
+    Some(&text[..end])
+}
 
-impl MatchLiteral for Numbers {
-    fn is_literal(text: &str) -> Option<&str> {
-        let byte = |at: usize| text.as_bytes().get(at).copied();
-        let digits = |from: usize| text.bytes().skip(from).take_while(u8::is_ascii_digit).count();
-        let whole = digits(0);
-        let mut end = whole;
-        if byte(end) == Some(b'.') {
-            end += 1 + digits(end + 1);
+/// Brackets, powers and signs inside of one another at most: each takes a part of the stack.
+const DEEPEST: usize = 200;
+
+/// Reads a formula by descent, the loosest level first: sums of products of signed powers.
+struct Reader<'a> {
+    rest: &'a str,
+    parameters: &'a [String],
+    words: Vec<Word>,
+    steps: Vec<Step>,
+    depth: usize,
+}
+
+impl<'a> Reader<'a> {
+    /// Is this sign next? It is taken then.
+    fn takes(&mut self, sign: char) -> bool {
+        self.rest = self.rest.trim_start();
+        let rest = self.rest.strip_prefix(sign);
+        self.rest = rest.unwrap_or(self.rest);
+        rest.is_some()
+    }
+
+    fn taken(&mut self, signs: [char; 2]) -> Option<char> {
+        signs.into_iter().find(|sign| self.takes(*sign))
+    }
+
+    fn sum(&mut self) -> Result<(), String> {
+        self.product()?;
+        while let Some(sign) = self.taken(['+', '-']) {
+            self.product()?;
+            self.steps.push(Step::operator(sign));
         }
-        if end == 0 || &text[..end] == "." {
-            return None;
+        Ok(())
+    }
+
+    fn product(&mut self) -> Result<(), String> {
+        self.signed()?;
+        while let Some(sign) = self.taken(['*', '/']) {
+            self.signed()?;
+            self.steps.push(Step::operator(sign));
         }
-        if matches!(byte(end), Some(b'e' | b'E')) {
-            let sign = usize::from(matches!(byte(end + 1), Some(b'+' | b'-')));
-            let exponent = digits(end + 1 + sign);
-            if exponent > 0 {
-                end += 1 + sign + exponent;
+        Ok(())
+    }
+
+    /// A sign belongs to the whole power behind it, and an exponent may have one of its own.
+    fn signed(&mut self) -> Result<(), String> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(format!("more than {DEEPEST} brackets, powers or signs stand inside of one another"));
+        }
+        match self.taken(['+', '-']) {
+            Some('-') => {
+                self.signed()?;
+                self.steps.push(Step::One(|x| -x));
+            }
+            Some(_) => self.signed()?,
+            None => {
+                self.value()?;
+                if self.takes('^') {
+                    self.signed()?;
+                    self.steps.push(Step::operator('^'));
+                }
             }
         }
-        Some(&text[..end])
+        self.depth -= 1;
+        Ok(())
+    }
+
+    fn value(&mut self) -> Result<(), String> {
+        if self.takes('(') {
+            self.sum()?;
+            return self.closed();
+        }
+        if let Some(number) = number_at(self.rest) {
+            self.rest = &self.rest[number.len()..];
+            self.steps.push(Step::Number(number.parse().map_err(|_| format!("{number:?} is no number"))?));
+            return Ok(());
+        }
+        let end = self.rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        if let Some(known) = Word::of(word, self.parameters) {
+            self.words.push(known);
+            self.steps.push(Step::Word(self.words.len() - 1));
+            return Ok(());
+        }
+        if matches!(word, "pi" | "PI") {
+            self.steps.push(Step::Number(std::f64::consts::PI));
+            return Ok(());
+        }
+        let Some(function) = Step::function(word) else { return Err("a value is missing".to_owned()) };
+        if !self.takes('(') {
+            return Err("a function stands without its bracket".to_owned());
+        }
+        self.sum()?;
+        if matches!(function, Step::Two(_)) {
+            if !self.takes(',') {
+                return Err(format!("{word:?} takes two values"));
+            }
+            self.sum()?;
+        }
+        self.closed()?;
+        self.steps.push(function);
+        Ok(())
+    }
+
+    fn closed(&mut self) -> Result<(), String> {
+        if self.takes(')') { Ok(()) } else { Err("a bracket is not closed".to_owned()) }
     }
 }
 
 /// A formula with the values of the parameters that stand inside it.
 #[derive(Debug, Clone)]
 pub struct Formula {
-    expression: FlatEx<f64, Operators, Numbers>,
+    steps: Vec<Step>,
     words: Vec<Word>,
     /// In the parameters' own units.
     parameters: Vec<f64>,
@@ -210,17 +323,24 @@ impl Formula {
                 return Err((format!("unknown word {word:?} at character {}", at + 1), help()));
             }
         }
-        let expression = FlatEx::<f64, Operators, Numbers>::parse(text).map_err(|e| (e.msg().to_owned(), help()))?;
-        let words: Option<Vec<Word>> = expression.var_names().iter().map(|name| Word::of(name, parameters)).collect();
-        let Some(words) = words else {
-            return Err(("a function stands without its bracket".to_owned(), help()));
-        };
-        Ok(Self { expression, words, parameters: Vec::new(), only: None })
+        let mut reader = Reader { rest: text, parameters, words: Vec::new(), steps: Vec::new(), depth: 0 };
+        reader.sum().map_err(|says| (says, help()))?;
+        let rest = reader.rest.trim();
+        if !rest.is_empty() {
+            return Err((format!("{rest:?} stands behind the end of the formula"), help()));
+        }
+        let Reader { steps, words, .. } = reader;
+        Ok(Self { steps, words, parameters: Vec::new(), only: None })
     }
 
     /// The same with values of the parameters (each in its own unit), on one block only where that is named.
     pub fn with(&self, parameters: &[f64], only: Option<&str>) -> Self {
         Self { parameters: parameters.to_vec(), only: only.map(str::to_owned), ..self.clone() }
+    }
+
+    /// Is it the same number at every touch, whatever the parameters inside it?
+    pub fn is_constant(&self) -> bool {
+        self.words.is_empty()
     }
 
     /// Does it change while the linear axes move?
@@ -239,8 +359,21 @@ impl Formula {
         if !self.only.as_deref().is_none_or(here) {
             return 0.0;
         }
-        let values: Vec<f64> = self.words.iter().map(|w| w.value(touch, joints, &self.parameters)).collect();
-        self.expression.eval(&values).unwrap_or(f64::NAN)
+        let mut pile: Vec<f64> = Vec::with_capacity(8);
+        for step in &self.steps {
+            let mut last = || pile.pop().unwrap_or(f64::NAN);
+            let value = match *step {
+                Step::Number(value) => value,
+                Step::Word(i) => self.words[i].value(touch, joints, &self.parameters),
+                Step::One(of) => of(last()),
+                Step::Two(of) => {
+                    let right = last();
+                    of(last(), right)
+                }
+            };
+            pile.push(value);
+        }
+        pile.pop().unwrap_or(f64::NAN)
     }
 }
 
@@ -250,7 +383,7 @@ fn words_in(text: &str) -> Vec<(usize, &str)> {
     let mut at = 0;
     while let Some(c) = text[at..].chars().next() {
         let rest = &text[at..];
-        if let Some(number) = Numbers::is_literal(rest) {
+        if let Some(number) = number_at(rest) {
             at += number.len();
         } else if c.is_alphabetic() || c == '_' {
             let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
@@ -304,6 +437,33 @@ mod tests {
         assert!(help.contains("X Y Z A B C") && help.contains("atan2"));
         for text in ["", "1 +", "sine(B)", "(1", "1 2", "å", "2..3"] {
             assert!(Formula::read(text, &[]).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn formulas_have_the_values_that_python_computes() {
+        let text = include_str!("../../../tests/formulas/expressions.json");
+        let table: serde_json::Value = serde_json::from_str(text).unwrap();
+        let at = |name: &str| table["variables"][name].as_f64().unwrap();
+        let touch = TouchState { hours: at("t"), temperature_deg_c: at("T"), ..TouchState::default() };
+        let degrees = |name: &str| at(name).to_degrees();
+        let joints = Position([at("X"), at("Y"), at("Z"), degrees("A"), degrees("B"), degrees("C")]);
+        let mut wrong = Vec::new();
+        for row in table["rows"].as_array().unwrap() {
+            let (text, expected) = (row["formula"].as_str().unwrap(), row["value"].as_f64().unwrap());
+            let formula = Formula::read(text, &[]).unwrap_or_else(|e| panic!("{text}: {}", e.0));
+            let value = formula.value(&touch, &joints);
+            if (value - expected).abs() > 1e-9 * expected.abs().max(1.0) {
+                wrong.push(format!("{text}: {value}, and {expected} in Python"));
+            }
+        }
+        assert!(wrong.is_empty(), "{wrong:#?}");
+    }
+
+    #[test]
+    fn brackets_within_brackets_end_with_a_sentence() {
+        for deep in ["(".repeat(4000), "-".repeat(4000), "2^".repeat(2000)] {
+            assert!(Formula::read(&deep, &[]).is_err());
         }
     }
 }

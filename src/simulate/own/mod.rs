@@ -1,5 +1,5 @@
 //! A user's own effects in the virtual machine. The file is read here once more, placed in the virtual machine's own chain
-//! and given its own state: with the code that predicts it shares the expression crate and the form of the file only.
+//! and given its own state: with the code that predicts it shares the form of the file only.
 
 pub mod formula;
 
@@ -59,11 +59,13 @@ struct OwnEffect {
     _paper: Option<bool>,
 }
 
-/// Rotations of an axis that bears the workpiece leave the place of the ball's centre at zero where it is.
-#[derive(Deserialize, Clone, Copy)]
+#[derive(Deserialize, Clone, Copy, PartialEq)]
 #[serde(rename_all = "lowercase")]
 enum OwnAbout {
+    /// Rotations of a linear axis that bears the workpiece leave the place of the ball's centre at zero where it is.
     Ball,
+    /// Constant errors of a rotary axis count on its own line, as those that vary always do.
+    Line,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -248,7 +250,7 @@ impl Reader<'_> {
         for term in &row.terms {
             let at = term.at.as_ref().unwrap_or(&row.at);
             let target = self.target(at, &term.dof, term.frame);
-            if let Some(Target::Axis { axis, .. } | Target::Reading(axis)) = target {
+            if let Some(Target::Axis { axis, .. } | Target::OwnLine { axis, .. } | Target::Reading(axis)) = target {
                 needs.push(axis);
             }
             let formula = match Formula::read(term.formula.get_ref(), &names) {
@@ -261,6 +263,7 @@ impl Reader<'_> {
             };
             let parameter = names.iter().position(|n| n == term.parameter.get_ref());
             if let (Some(parameter), Some(target), Some(formula)) = (parameter, target, formula) {
+                let target = self.on_own_line(target, &formula, row.about);
                 if let Some(OwnAbout::Ball) = row.about {
                     let back = super::catalogue::axes::back_to_the_ball(target, self.machine);
                     acts.extend(back.into_iter().map(|(target, by)| (parameter, target, formula.clone(), by)));
@@ -282,6 +285,17 @@ impl Reader<'_> {
             needs.iter().find(|n| !here(n)).map(|n| format!("machine {:?} has no axis {n} there", self.machine.name));
         let has = unless.iter().find(|n| here(n)).map(|n| format!("machine {:?} has an axis {n}", self.machine.name));
         Some(Own { id: row.id.get_ref().clone(), parameters, acts, not_here: lacks.or(has) })
+    }
+
+    /// How a rotary axis runs counts on its own line; what is constant says where that line lies, unless it turns a table
+    /// about itself.
+    fn on_own_line(&self, target: Target, formula: &Formula, about: Option<OwnAbout>) -> Target {
+        let Target::Axis { axis, after, dof } = target else { return target };
+        let Some(here) = self.machine.axis(axis).filter(|_| axis.is_rotary()) else { return target };
+        let letter = [here.direction.x, here.direction.y, here.direction.z][axis.index() % 3];
+        let about_itself = here.side == Side::Workpiece && dof == axis.index() && letter.abs() > 1.0 - 1e-9;
+        let own = about == Some(OwnAbout::Line) || about_itself || !formula.is_constant();
+        if own { Target::OwnLine { axis, after, dof } } else { target }
     }
 
     /// Where a term acts.

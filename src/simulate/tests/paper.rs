@@ -151,6 +151,8 @@ fn a_flawless_machine_reads_zero_everywhere() {
         ("double-head", "head", vec![[(AxisName::B, 31.0), (AxisName::A, -17.0)]]),
         ("trunnion", "table", vec![[(AxisName::A, -35.0), (AxisName::C, 211.0)]]),
         ("swivel-table-b", "table", vec![[(AxisName::B, 25.0), (AxisName::C, -77.0)]]),
+        ("nutating-b", "table", vec![[(AxisName::B, 143.0), (AxisName::C, -77.0)]]),
+        ("trunnion-offset", "table", vec![[(AxisName::A, -35.0), (AxisName::C, 211.0)]]),
     ] {
         let machine = machine_named(name);
         let poses: Vec<AxisMap> = poses.iter().map(|p| pose(p)).collect();

@@ -1,7 +1,9 @@
 //! Old values from the user's own backup of the control: strict about what it needs, blind to the rest of the file.
 
 use crate::diag::{Finding, Findings, Result, Source};
+use crate::machine::Machine;
 use crate::post::tables::{BackupForm, BackupKind, LengthUnit};
+use crate::units::Plain;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -143,6 +145,36 @@ pub fn read_such_as(source: &Source, form: &BackupForm, wanted: &BTreeSet<String
         wrong(&mut findings, source, end, format!("none of the values that are to be changed stands in it{first}"));
     }
     Ok(findings.finish(old)?.0)
+}
+
+/// Values further than this beyond everything that the machine's description holds are no values of that machine, mm or deg.
+const BEYOND: f64 = 2000.0;
+
+/// Checks that every value can be one of this machine: a number that is metres beyond all of its coordinates was not read as it is
+/// meant. `source`: the backup, where the values have lines.
+///
+/// # Errors
+/// When one cannot: each with its line and the range.
+pub fn within_reach(old: &Old, source: Option<&Source>, machine: &Machine) -> Result<()> {
+    let largest = machine.largest_coordinate() + BEYOND;
+    let mut findings = Findings::default();
+    for (name, (value, _)) in old.values.iter().filter(|(_, (value, _))| !(-largest..=largest).contains(value)) {
+        let finding = Finding::error(
+            "export::backup_range",
+            format!("{name} is {}, expected {} to {}", Plain(*value), Plain(-largest), Plain(largest)),
+        )
+        .help("compare the value with the control: no coordinate of this machine is as large");
+        let line = old.lines.get(name).copied().unwrap_or_default();
+        findings.push(match source.filter(|_| line > 0) {
+            Some(source) => {
+                let before: usize = source.inner().split_inclusive('\n').take(line - 1).map(str::len).sum();
+                let length = source.inner()[before..].lines().next().map_or(0, str::len);
+                finding.at(source, before..before + length)
+            }
+            None => finding,
+        });
+    }
+    findings.finish(()).map(|_| ())
 }
 
 fn wrong(findings: &mut Findings, source: &Source, span: Range<usize>, message: String) {

@@ -1,6 +1,7 @@
 //! The files of an export: the control's own through its templates, and what a person reads.
 
 use super::backup::Old;
+use super::changes::{Division, SHEET};
 use super::fill::{Filled, Value as Entry};
 use super::{Export, Options};
 use crate::diag::{Failure, Findings, Result};
@@ -14,6 +15,7 @@ use minijinja::{Value, context};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
+const CHANGES: &str = include_str!("../templates/control/changes.txt.j2");
 const README: &str = include_str!("../templates/control/readme.txt.j2");
 
 /// A number with so many digits; a minus before zero is none.
@@ -98,7 +100,7 @@ pub(super) fn write(
     kind: &Kind,
     correction: &Correction,
     options: &Options,
-    (first, others): (&Filled, &BTreeMap<&str, Filled>),
+    (first, others, division): (&Filled, &BTreeMap<&str, Filled>, &Division),
     export: &mut Export,
     findings: &mut Findings,
 ) -> Result<()> {
@@ -126,19 +128,19 @@ pub(super) fn write(
         options.old.unit(std::iter::once(first).chain(others.values()).flat_map(Filled::given_lengths), options.unit);
     let record = export.compensation.tables.clone();
     let grids = record.map(|r| r.grids).unwrap_or_default();
-    let active = correction.active.as_ref().and_then(|a| a.tables.clone()).map(|t| t.grids).unwrap_or_default();
-    let none = |g: &Grid| Grid { values: vec![0.0; g.values.len()], ..g.clone() };
-    let before = |g: &Grid| {
-        let same = |o: &&Grid| (o.input, o.output, o.sense) == (g.input, g.output, g.sense);
-        active.iter().find(same).cloned().unwrap_or_else(|| none(g))
-    };
-    let grids_known = tables.grid.as_ref().is_some_and(|form| super::grids::known(form, &grids, &options.old));
+    let active = correction.active.as_ref().and_then(|a| a.tables.as_ref());
+    let before = |g: &Grid| super::grids::before(active, g);
+    let grids_known = division.grids_known;
+    let is_written = |f: &&FileForm| division.files.contains(&f.name);
+    let main = tables.file.iter().filter(|f| !f.grids).find(is_written);
     let common = |restore: bool, form: Option<&FileForm>| {
-        let spelling = form.or(tables.file.first()).and_then(|f| f.spelling.as_deref());
+        let spelling = form.or(main).or(tables.file.first()).and_then(|f| f.spelling.as_deref());
         let unit = old_unit.filter(|_| restore).unwrap_or(options.unit);
         let filled = spelling.and_then(|s| others.get(s)).unwrap_or(first);
+        let entries: Vec<&Entry> =
+            if filled.known() { filled.entries().collect() } else { filled.values.iter().collect() };
         let entries: Vec<Value> =
-            filled.values.iter().filter_map(|v| entry(v, spelling, restore, unit, tables, &options.old)).collect();
+            entries.into_iter().filter_map(|v| entry(v, spelling, restore, unit, tables, &options.old)).collect();
         let letter = if unit == LengthUnit::Mm { "M" } else { "I" };
         let shown: Vec<Value> = grids.iter().map(|g| grid(machine, tables, g, restore.then_some(&before(g)))).collect();
         let of_grids = form.is_some_and(|f| f.grids);
@@ -150,16 +152,29 @@ pub(super) fn write(
         }
     };
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
-    for form in &tables.file {
-        if form.grids && grids.is_empty() {
-            continue;
-        }
+    for form in tables.file.iter().filter(is_written) {
         for (name, restore) in [(Some(&form.name), false), (form.restore.as_ref(), true)] {
             let Some(name) = name else { continue };
             let text = own(form, &common(restore, Some(form)))?;
-            let text = if form.crlf { text.replace('\n', "\r\n") } else { text };
+            let text = text.replace('\n', form.end_of_line.characters());
             files.push((name.clone(), text.into_bytes()));
         }
+    }
+    if division.changes().next().is_some() {
+        let line = |c: &super::changes::Change| {
+            let described = digits(c.described, c.decimals, false);
+            context! { name => c.names.join(" or "), change => c.signed(), unit => c.unit, described, says => one_line(&c.says) }
+        };
+        let text = render(
+            "changes",
+            CHANGES,
+            &context! {
+                head => head_of(false), bare => !correction.transformation, unit => options.unit.says(),
+                grids => division.points.first().and_then(|c| c.names.first().cloned()), doubts => doubts.clone(),
+                changes => division.changes().map(line).collect::<Vec<_>>(),
+            },
+        )?;
+        files.push((SHEET.to_owned(), text.into_bytes()));
     }
     let load = how_to_load(tables, &files);
     let left: Vec<Value> = export
@@ -215,10 +230,12 @@ pub(super) fn write(
                 own_head => head_of_readme(head_of(false)), says => tables.says.clone(), worksheet => tables.worksheet, load, cannot => tables.cannot.clone(),
                 files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
                 variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
-                reads => tables.reads.is_some(),
+                reads => tables.reads.is_some() && division.complete(),
+                sheet => division.changes().next().map(|_| SHEET), values_known => division.values_known,
                 restore_unit => old_unit.filter(|unit| *unit != options.unit).map(|unit| unit.says()), on_top,
                 left, omitted => not, in_grids, points, grids_known, radius => format!("{}", options.radius_mm),
                 rounding => format!("{:.2}", export.rounding_um), rest => format!("{:.2}", export.rest_um),
+                table_errors => export.table_errors.iter().map(|t| one_line(&t.says(|um| format!("{um:.2}")))).collect::<Vec<_>>(),
                 longer => format!("{:.2}", export.longer_tool_um), length => format!("{:.3}", machine.tool.length_mm),
                 shift => shift.map(|v| format!("{v:+.4}")).to_vec(), tool => correction.tool_length_mm.map(|v| format!("{v:+.4}")),
                 measured => correction.of_measurement.keys().cloned().collect::<Vec<_>>(),

@@ -43,6 +43,18 @@ pub struct Value {
 }
 
 impl Value {
+    /// Is it the zero position of a rotary axis, and no component of a vector?
+    #[must_use]
+    pub fn is_zero_position(&self) -> bool {
+        self.unit == "deg"
+    }
+
+    /// By how much it changes, in its unit.
+    #[must_use]
+    pub fn change(&self) -> f64 {
+        rounded(self.new - self.old)
+    }
+
     /// Its name in one of the control's tables, or the first one.
     #[must_use]
     pub fn name(&self, spelling: Option<&str>) -> Option<&String> {
@@ -67,11 +79,22 @@ pub struct Filled {
 }
 
 impl Filled {
-    /// Did every old value come from the user? Where software has either of two sets, one is enough.
+    /// Did every old value come from the user? Where software has either of two sets of vectors, one is enough.
     #[must_use]
     pub fn known(&self) -> bool {
-        let all = |instead: bool| self.values.iter().filter(|v| v.instead == instead).all(|v| v.known);
-        all(false) || (self.values.iter().any(|v| v.instead) && all(true))
+        let vectors = self.complete(false) || (self.values.iter().any(|v| v.instead) && self.complete(true));
+        vectors && self.values.iter().filter(|v| v.is_zero_position()).all(|v| v.known)
+    }
+
+    /// Are the old values of all vectors of a set known?
+    fn complete(&self, instead: bool) -> bool {
+        self.values.iter().filter(|v| !v.is_zero_position() && v.instead == instead).all(|v| v.known)
+    }
+
+    /// What a file of this table holds: of two sets of vectors those whose old values are known.
+    pub fn entries(&self) -> impl Iterator<Item = &Value> {
+        let sets = [self.complete(false), self.complete(true)];
+        self.values.iter().filter(move |v| v.is_zero_position() || sets[usize::from(v.instead)])
     }
 
     /// Names by which the user gave old lengths.
@@ -89,7 +112,7 @@ impl Filled {
         let spelling = given.next().map(|(spelling, _)| spelling.as_str()).or(first).unwrap_or_default();
         let name = |v: &Value| v.names.get(spelling).or(v.names.values().next()).cloned();
         let instead = begun(true) && !begun(false);
-        let lacks = self.values.iter().filter(|v| v.instead == instead && !is_given(v));
+        let lacks = self.values.iter().filter(|v| (v.is_zero_position() || v.instead == instead) && !is_given(v));
         if self.known() { Vec::new() } else { lacks.filter_map(name).collect() }
     }
 }
@@ -135,6 +158,20 @@ pub fn decimals(step: f64) -> usize {
 pub fn line_of(seen: &Seen, turn: Turn) -> Option<(Side, usize, &Line)> {
     let (side, place) = turn.place();
     Some((side, place, seen.side(side).get(place)?))
+}
+
+/// A crossing of two axes that miss each other by more than this does not exist, mm: a control that knows nothing else
+/// would turn the workpiece about a line that is not there.
+const LARGEST_MISS_MM: f64 = 0.5;
+
+/// By how much two lines miss each other, mm.
+fn miss_mm(first: &Line, second: &Line) -> f64 {
+    let between = second.point - first.point;
+    let square = first.direction.cross(&second.direction);
+    match square.try_normalize(1e-9) {
+        Some(across) => between.dot(&across).abs(),
+        None => first.direction.cross(&between).norm(),
+    }
 }
 
 fn point_of(seen: &Seen, point: Point) -> Vector3<f64> {
@@ -204,6 +241,14 @@ impl Question<'_> {
         })
     }
 
+    /// By how much the axes of a vector to their crossing miss each other, where there is no such crossing, mm.
+    fn no_crossing_mm(&self, form: &VectorForm) -> Option<f64> {
+        let of = |turn| line_of(self.before, turn).map(|(_, _, line)| line);
+        let (first, second) = (of(Turn::Workpiece1)?, of(Turn::Workpiece2)?);
+        let mm = miss_mm(first, second);
+        (form.to == Some(Point::WorkpieceCrossing) && mm > LARGEST_MISS_MM).then_some(mm)
+    }
+
     /// As the description has it.
     fn described(&self, form: &VectorForm, seen: &Seen) -> Vector3<f64> {
         match (form.from, form.to, form.direction) {
@@ -229,6 +274,14 @@ impl Question<'_> {
         for form in in_order(self.kind.vector.iter(), |f| f) {
             let described = self.described(form, self.before);
             let old = self.old_vector(form, described);
+            if let Some(mm) = self.no_crossing_mm(form) {
+                let says = format!("{} is not written: the two axes miss each other by {mm:.3} mm", form.id);
+                findings.push(
+                    Finding::info("tables::no_crossing", says)
+                        .help("software that has only a common point of the two axes cannot drive this machine"),
+                );
+                continue;
+            }
             if form.instead {
                 self.compare_instead(form, old - described, &mut findings);
                 continue;
@@ -289,7 +342,7 @@ impl Question<'_> {
         let mut vectors: Vec<(VectorForm, Vector3<f64>)> = Vec::new();
         let step = self.step_mm();
         let direction_step = 0.1_f64.powi(i32::try_from(self.tables.direction_decimals).unwrap_or(9));
-        for form in &self.kind.vector {
+        for form in self.kind.vector.iter().filter(|f| self.no_crossing_mm(f).is_none()) {
             let described = self.described(form, self.before);
             let old = self.old_vector(form, described);
             let direction = form.direction.is_some();

@@ -2,33 +2,39 @@
 
 use super::backup::Old;
 use crate::axes::AxisName;
-use crate::diag::Finding;
+use crate::diag::{Failure, Finding};
 use crate::machine::Machine;
 use crate::post::tables::GridForm;
-use crate::tables::compensation::Grid;
+use crate::tables::compensation::{Grid, Tables as Record};
 use crate::tables::correction::{AxisShape, Correction, Limits, rounded};
+use crate::tables::rows::{TableError, Wanted};
 use crate::units::um_from_mm;
 
-/// A table follows the error to this, mm or deg: a tenth of what a control resolves.
-const CLOSE_ENOUGH: f64 = 1e-5;
+/// Counts of points of a table that repeats every turn: whole degrees, and halves of one.
+const TURN_COUNTS: [usize; 6] = [37, 73, 121, 181, 361, 721];
 
-/// The tables of a correction, on top of those that were active; `step` is the smallest step of (a length, an angle).
+/// Counts of points over a range: zero is a point of a symmetrical one.
+const COUNTS: [usize; 11] = [3, 5, 9, 17, 33, 65, 97, 129, 193, 257, 513];
+
+/// The tables of a correction with what each leaves, on top of those that were active; `step` is the smallest step of (a
+/// length, an angle), `lever_mm` where errors of angles are stated.
 ///
 /// # Errors
-/// When the control has not so many tables.
+/// When the control has not so many tables, or an error has no value at a coordinate.
 pub fn grids(
     machine: &Machine,
     correction: &Correction,
     form: &GridForm,
     active: &[Grid],
     step: [f64; 2],
-) -> Result<Vec<Grid>, String> {
+    lever_mm: f64,
+) -> Result<(Vec<Grid>, Vec<TableError>), Failure> {
     let shapes: Vec<&AxisShape> = correction.shapes.iter().chain(&correction.across).collect();
     let mut pairs: Vec<(AxisName, AxisName)> = shapes.iter().map(|s| (s.input, s.axis)).collect();
     pairs.extend(active.iter().map(|g| (g.input, g.output)));
     pairs.sort_unstable();
     pairs.dedup();
-    let (mut out, mut number) = (Vec::new(), form.first);
+    let (mut out, mut leaves, mut number) = (Vec::new(), Vec::new(), form.first);
     for (input, output) in pairs {
         let Some(axis) = machine.axis(input) else { continue };
         let origin = machine.origin.get(input).unwrap_or(0.0);
@@ -48,19 +54,46 @@ pub fn grids(
                 (value(at, 1.0) - value(probe(i), 1.0)).abs() < 1e-9
                     && (value(at, -1.0) - value(probe(i), -1.0)).abs() < 1e-9
             });
-        let range = if turns { [0.0, 360.0] } else { [low, high] };
         let smallest = step[usize::from(output.is_rotary())];
         for sense in if even { &[0_i8][..] } else { &[1, -1] } {
-            let of = |at: f64| value(at, if *sense < 0 { -1.0 } else { 1.0 });
-            let (min, distance, values) = points(range, turns, form.most_points, smallest, of);
+            let senses: &[f64] = if *sense < 0 { &[-1.0] } else { &[1.0] };
+            let wanted = Wanted {
+                input,
+                output,
+                origin,
+                travel: axis.range,
+                used: correction.used.get(&input).copied(),
+                senses,
+                value: &value,
+            };
+            let possible = |counts: &[usize]| -> Vec<usize> {
+                let fitting: Vec<usize> = counts.iter().copied().filter(|n| *n <= form.most_points).collect();
+                if fitting.is_empty() { vec![form.most_points.max(2)] } else { fitting }
+            };
+            let ([low, high], count) = if turns {
+                ([0.0, 360.0], wanted.count([0.0, 360.0], &possible(&TURN_COUNTS)))
+            } else {
+                wanted.place(&possible(&COUNTS))
+            };
+            let (min, distance) = (rounded(low), rounded((high - low) / (count - 1) as f64));
+            let positions: Vec<f64> = (0..count).map(|i| min + distance * i as f64).collect();
+            let stored = |at: &f64| rounded((value(*at, senses[0]) / smallest).round() * smallest);
+            let mut values: Vec<f64> = positions.iter().map(stored).collect();
+            if turns && let (Some(first), Some(last)) = (values.first().copied(), values.last_mut()) {
+                *last = first;
+            }
+            leaves.push(wanted.leaves(&positions, |i, _| values[i], (number, *sense, turns), lever_mm)?);
             out.push(Grid { number, input, output, sense: *sense, min, step: distance, modulo: turns, values });
             number += 1;
         }
     }
     if out.len() > form.most {
-        return Err(format!("{} position tables are needed, the control has {}", out.len(), form.most));
+        let says = format!("{} position tables are needed, the control has {}", out.len(), form.most);
+        return Err(
+            Failure::new("tables::grids", says).help("take the smallest effects out of the study's model, one by one")
+        );
     }
-    Ok(out)
+    Ok((out, leaves))
 }
 
 /// Position tables with values that no correction should reach.
@@ -91,10 +124,22 @@ fn in_backup(form: &GridForm, number: usize, old: &Old) -> Option<Vec<(usize, St
     (!found.is_empty()).then_some(found)
 }
 
-/// Is what stood in every one of these tables known from the user's backup?
+/// Is what stood in a table known: from the user's backup, or because a file that was loaded wrote it?
 #[must_use]
-pub fn known(form: &GridForm, grids: &[Grid], old: &Old) -> bool {
-    grids.iter().all(|g| in_backup(form, g.number, old).is_some())
+pub fn known(form: &GridForm, grid: &Grid, active: Option<&Record>, old: &Old) -> bool {
+    let by_file = |a: &Record| {
+        let wrote = a.grids.iter().any(|g| g.number == grid.number);
+        wrote && form.point_name(grid.number, 0).is_none_or(|name| !a.changes.contains_key(&name))
+    };
+    in_backup(form, grid.number, old).is_some() || active.is_some_and(by_file)
+}
+
+/// The table that acted before a new one, or one of zeros.
+#[must_use]
+pub fn before(active: Option<&Record>, grid: &Grid) -> Grid {
+    let same = |o: &&Grid| (o.input, o.output, o.sense) == (grid.input, grid.output, grid.sense);
+    let none = || Grid { values: vec![0.0; grid.values.len()], ..grid.clone() };
+    active.and_then(|a| a.grids.iter().find(same).cloned()).unwrap_or_else(none)
 }
 
 /// Tables that hold something else than what axiscal has written into them: they would be written over.
@@ -133,32 +178,6 @@ pub fn occupied(form: &GridForm, grids: &[Grid], active: &[Grid], old: &Old) -> 
 
 /// Points of a table that differ by less are the same, mm or deg.
 const SAME_POINT: f64 = 1e-6;
-
-/// First point, distance and values: as few as follow the value to [`CLOSE_ENOUGH`].
-fn points(
-    [low, high]: [f64; 2],
-    turns: bool,
-    most: usize,
-    smallest: f64,
-    value: impl Fn(f64) -> f64,
-) -> (f64, f64, Vec<f64>) {
-    // whole degrees for a turn; zero is a point of a symmetrical range
-    let counts: &[usize] = if turns { &[37, 73, 121, 181, 361] } else { &[3, 5, 9, 17, 33, 65, 97, 129, 193, 257] };
-    let exact = |n: usize, i: f64| value(low + (high - low) * i / (n - 1) as f64);
-    let follows = |n: usize| {
-        (0..n - 1).all(|i| {
-            let (a, b) = (exact(n, i as f64), exact(n, i as f64 + 1.0));
-            [0.25, 0.5, 0.75].iter().all(|s| (exact(n, i as f64 + s) - a - s * (b - a)).abs() <= CLOSE_ENOUGH)
-        })
-    };
-    let mut fitting = counts.iter().copied().filter(|n| *n <= most);
-    let n = fitting.clone().find(|n| follows(*n)).or(fitting.next_back()).unwrap_or(2);
-    let mut values: Vec<f64> = (0..n).map(|i| rounded((exact(n, i as f64) / smallest).round() * smallest)).collect();
-    if turns && let Some(first) = values.first().copied() {
-        values[n - 1] = first;
-    }
-    (rounded(low), rounded((high - low) / (n - 1) as f64), values)
-}
 
 /// The largest error that a shape makes over the range of its input, µm (linear axes) or deg.
 #[must_use]

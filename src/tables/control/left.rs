@@ -1,6 +1,6 @@
 //! What a table leaves: found by driving the machine with its errors by the control that knows the table.
 
-use super::{Carried, Filled, grids};
+use super::{Carried, Filled, grids, workpiece};
 use crate::axes::{AxisName, Position};
 use crate::machine::{Machine, Side};
 use crate::tables::compensation::Term;
@@ -50,12 +50,11 @@ impl Pieces<'_> {
 
     /// Places of the workpiece: about its last rotary axis at the stated radius, at the ball's height.
     fn places(&self) -> Vec<Vector3<f64>> {
-        let ball = self.machine.reference.ball;
+        let foot = workpiece(self.machine);
         let Some(axis) = self.machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last() else {
-            return vec![ball];
+            return vec![foot];
         };
         let d = axis.direction.into_inner();
-        let foot = axis.point + d * d.dot(&(ball - axis.point));
         let u = d.cross(&if d.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() }).normalize();
         let v = d.cross(&u);
         [u, v, -u, -v].map(|w| foot + w * self.radius_mm).to_vec()

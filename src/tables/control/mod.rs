@@ -6,6 +6,7 @@
 //! position become position tables ([`grids`]). What the control has no place for is left, with the error that it leaves.
 
 pub mod backup;
+pub mod changes;
 mod files;
 pub mod fill;
 pub mod grids;
@@ -18,15 +19,18 @@ use super::correction::{Correction, Limits, rounded};
 use super::kins::Errors;
 use super::lines::{self, Seen};
 use super::linuxcnc::{Left, force, program};
-use super::place::{Place, Spot, along};
+use super::place::{Place, Spot, along, turns_about_itself};
 use super::restate::{kept_in_words, stated_at};
+use super::rows::TableError;
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
-use crate::machine::{Machine, Side};
-use crate::post::tables::{Kind, LengthUnit, Tables, doubt};
+use crate::machine::{Axis, Machine, Side};
+use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, Turn, doubt};
 use backup::Old;
+use changes::{Change, Division, SHEET};
 pub use files::digits;
 use fill::{Filled, Question, Value};
+use nalgebra::Vector3;
 use replace::Replaced;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -73,12 +77,16 @@ pub struct Export {
     pub left: Vec<Left>,
     /// The values, old and new.
     pub values: Vec<Value>,
+    /// What is given as changes, because the control's present values are not known.
+    pub changes: Vec<Change>,
     /// What rounding to the control's resolution leaves, µm.
     pub rounding_um: f64,
     /// What all that is known and not carried leaves together, rounding included, µm.
     pub rest_um: f64,
     /// A tool 100 mm longer or shorter than the stylus is off by so much, because the tool's own tilt is not held, µm.
     pub longer_tool_um: f64,
+    /// What each position table leaves.
+    pub table_errors: Vec<TableError>,
 }
 
 /// A value that every backup of such a machine holds, for messages; position tables are not always written.
@@ -115,7 +123,43 @@ pub fn kind_of<'a>(machine: &Machine, tables: &'a Tables) -> Result<&'a Kind> {
     };
     lines::fits(machine).map_err(refuse)?;
     let found = tables.kind.iter().find(|k| (k.workpiece, k.tool) == (workpiece, tool));
-    found.ok_or_else(|| refuse(format!("it has {workpiece} rotary axes in the table and {tool} in the head")))
+    let kind =
+        found.ok_or_else(|| refuse(format!("it has {workpiece} rotary axes in the table and {tool} in the head")))?;
+    let held = directions_of(machine, kind);
+    let inclined = machine.rotary().find(|a| !held.contains(&a.name) && is_inclined(a));
+    match inclined.filter(|_| !tables.inclined_axes) {
+        Some(axis) => Err(refuse(format!(
+            "axis {} is inclined, and the control takes it to be along {}",
+            axis.name,
+            ["X", "Y", "Z"][axis.name.index() % 3]
+        ))),
+        None => Ok(kind),
+    }
+}
+
+/// Is a rotary axis not along the linear axis of its letter, as a control without directions assumes?
+fn is_inclined(axis: &Axis) -> bool {
+    (axis.direction[axis.name.index() % 3].abs() - 1.0).abs() > 1e-9
+}
+
+/// The axes whose directions a kind of table holds.
+fn directions_of(machine: &Machine, kind: &Kind) -> BTreeSet<AxisName> {
+    kind.vector.iter().filter_map(|v| axis_of(machine, v.direction?)).collect()
+}
+
+/// The machine's axis in a place of a kind.
+fn axis_of(machine: &Machine, turn: Turn) -> Option<AxisName> {
+    let (side, place) = turn.place();
+    machine.side(side).filter(|a| a.name.is_rotary()).nth(place).map(|a| a.name)
+}
+
+/// Where a workpiece stands, mm in R: on the line of the table's last rotary axis, next to the ball at zero.
+fn workpiece(machine: &Machine) -> Vector3<f64> {
+    let ball = machine.reference.ball;
+    match machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last() {
+        Some(axis) => axis.point + axis.direction.into_inner() * axis.direction.dot(&(ball - axis.point)),
+        None => ball,
+    }
 }
 
 /// What the control can hold of the terms, where it holds them, and the rest with the reason.
@@ -132,26 +176,17 @@ struct Carried {
     kept: Vec<Spot>,
 }
 
-/// Is it a turn of an axis about itself?
-fn own_turn(machine: &Machine, term: &Term) -> bool {
-    term.dof.is_angle() && machine.axis(term.axis).is_some_and(|a| along(a, term.dof).is_some())
-}
-
 fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
-    let axis_of = |turn: crate::post::tables::Turn| {
-        let (side, place) = turn.place();
-        machine.side(side).filter(|a| a.name.is_rotary()).nth(place).map(|a| a.name)
-    };
-    let held: BTreeSet<AxisName> = kind.vector.iter().filter_map(|v| axis_of(v.direction?)).collect();
+    let held = directions_of(machine, kind);
     let tilts = machine.rotary().all(|a| held.contains(&a.name));
-    let angles: BTreeSet<AxisName> = kind.angle.iter().filter_map(|a| axis_of(a.axis)).collect();
-    let reference_mm = if tilts { correction.reference_mm } else { machine.reference.ball.into() };
-    // without directions an offset is right at one height only: that of the workpiece
+    let angles: BTreeSet<AxisName> = kind.angle.iter().filter_map(|a| axis_of(machine, a.axis)).collect();
+    let reference_mm = if tilts { correction.reference_mm } else { workpiece(machine).into() };
+    // without directions an offset is right at one place only: that of the workpiece
     let (terms, kept) = stated_at(machine, correction, reference_mm);
     let last_work = machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
     let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept };
     for term in terms {
-        let own = own_turn(machine, &term) && term.place != Place::After;
+        let own = turns_about_itself(machine, term.spot());
         if own && angles.contains(&term.axis) {
             out.zero.push(term);
         } else if own && Some(term.axis) == last_work {
@@ -278,23 +313,22 @@ pub fn export(
         findings
             .push(Finding::info("tables::old_unit", says).help(format!("the new ones are in {ours}, as --unit says")));
     }
-    let mut grid_list = None;
+    let (mut grid_list, mut table_errors) = (None, Vec::new());
     if let Some(form) = &tables.grid {
-        match grids::grids(machine, correction, form, old_grids, [unit_step, *tables.step_deg.get_ref()]) {
-            Ok(found) => grid_list = Some(found),
-            Err(why) => findings.push(
-                Finding::error("tables::grids", why)
-                    .help("take the smallest effects out of the study's model, one by one"),
-            ),
+        let steps = [unit_step, *tables.step_deg.get_ref()];
+        match grids::grids(machine, correction, form, old_grids, steps, options.radius_mm) {
+            Ok((found, leaves)) => (grid_list, table_errors) = (Some(found), leaves),
+            Err(failure) => findings.0.extend(failure.0),
         }
     }
+    findings.0.extend(table_errors.iter().flat_map(TableError::findings));
     if let (Some(form), Some(list)) = (&tables.grid, &grid_list) {
         findings.0.extend(grids::beyond(list, &options.limits));
         findings.0.extend(grids::occupied(form, list, old_grids, &options.old));
     }
     if options.unit == LengthUnit::Inch && grid_list.as_ref().is_some_and(|g| !g.is_empty()) {
         // a forced export leaves them out too: in the wrong unit they would be wrong
-        grid_list = None;
+        (grid_list, table_errors) = (None, Vec::new());
         findings.push(
             Finding::error("tables::inch", "position tables are written for metric controls only")
                 .help("leave the position-dependent effects out, or export with --unit mm"),
@@ -306,34 +340,41 @@ pub fn export(
     if options.force {
         force(&mut findings.0, &mut noted);
     }
-    say_unverified(tables, kind, &filled, !grid_list.is_empty(), options, &mut findings);
+    let division =
+        Division::of(tables, (&filled, &others), &grid_list, active.and_then(|a| a.tables.as_ref()), &options.old);
+    say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
     let lacking = filled.lacking(&options.old, spellings.first().copied());
-    if !options.old.values.is_empty() && !lacking.is_empty() {
-        let says = format!(
-            "the control's old values of {} are not known: they are taken from the machine's description and what was active",
-            lacking.join(", ")
-        );
+    let instead = format!("no file with values is written, {SHEET} says by how much each value changes");
+    if division.values_known || filled.values.is_empty() {
+        // a table that lacks its own is said above
+    } else if !options.old.values.is_empty() && !lacking.is_empty() {
+        let says = format!("the control's present values of {} are not known: {instead}", some_of(&lacking));
         findings.push(
             Finding::warning("tables::old_lacking", says)
-                .help("give these too: in the backup, or each as --old \"NAME=VALUE\"; without them the restoring file is not this machine's own"),
+                .help("give these too: in the backup, or each as --old \"NAME=VALUE\""),
         );
-    } else if filled.values.iter().any(|v| v.elsewhere) {
-        // said above: they are those of another table
-    } else if !filled.known() && !options.old.assumed.is_empty() {
+    } else if !options.old.assumed.is_empty() {
         let marked: Vec<&str> = options.old.assumed.iter().map(String::as_str).collect();
         let says = format!(
-            "the backup marks old values as ASSUMED: {}; an earlier export took them from the machine's description",
+            "the backup marks old values as ASSUMED: {}; an earlier export took them from the machine's description: {instead}",
             marked.join(", ")
         );
         findings.push(
-            Finding::warning("tables::old_assumed", says)
-                .help("give the control's own backup with --backup FILE; without it neither the new values nor the restoring file are this machine's own"),
+            Finding::warning("tables::old_assumed", says).help("give the control's own backup with --backup FILE"),
         );
-    } else if !filled.known() && !filled.values.is_empty() {
+    } else {
+        let says = format!("the control's present values are not known: {instead}");
         findings.push(
-            Finding::warning("tables::old_assumed", "the control's old values are not known: they are taken from the machine's description and what was active")
-                .help("give the control's own backup with --backup FILE; without it neither the new values nor the restoring file are this machine's own"),
+            Finding::warning("tables::old_assumed", says)
+                .help("give the control's own backup with --backup FILE, or each value with --old \"NAME=VALUE\""),
         );
+    }
+    if let (false, Some(form), Some(first)) = (division.grids_known, &tables.grid, grid_list.first()) {
+        let says = "what the control's position tables hold is not known: no file with their points is written";
+        let name = form.point_name(first.number, 0).unwrap_or_default();
+        findings.push(Finding::warning("tables::old_grids", format!("{says}, {SHEET} says by how much each changes")).help(
+            format!("give the control's own backup with --backup FILE; where the table is not in use, --old \"{name}=0\" is enough"),
+        ));
     }
     if carried.terms.is_empty() && carried.zero.is_empty() && grid_list.is_empty() {
         findings.push(
@@ -357,8 +398,13 @@ pub fn export(
     let left = pieces.left();
     let written: BTreeMap<String, f64> = std::iter::once((spellings.first().copied(), &filled))
         .chain(others.iter().map(|(s, f)| (Some(*s), f)))
-        .flat_map(|(spelling, f)| f.values.iter().filter_map(move |v| Some((v.name(spelling)?.clone(), v.new))))
+        .filter(|(_, f)| f.known())
+        .flat_map(|(spelling, f)| f.entries().filter_map(move |v| Some((v.name(spelling)?.clone(), v.new))))
         .collect();
+    let is_written = |f: &&FileForm| division.files.contains(&f.name);
+    // of several files with the same values one is loaded
+    let main = tables.file.iter().filter(is_written).any(|f| !f.grids && !f.variant);
+    let loaded = tables.file.iter().filter(is_written).filter(|f| !f.variant || !main);
     let (rounding_um, rest_um, longer_tool_um) = pieces.figures(&now);
     let mut terms = carried.terms.clone();
     terms.extend(carried.zero.iter().cloned());
@@ -368,13 +414,9 @@ pub fn export(
     let record = Record {
         kind: kind.name.clone(),
         unit: options.unit,
-        reads: tables.reads.clone(),
-        files: tables
-            .file
-            .iter()
-            .filter(|f| !f.variant && (!f.grids || !grid_list.is_empty()))
-            .map(|f| f.name.clone())
-            .collect(),
+        // a part of the files says nothing of the rest
+        reads: tables.reads.clone().filter(|_| division.complete()),
+        files: loaded.map(|f| f.name.clone()).collect(),
         vectors: filled
             .vectors
             .iter()
@@ -388,6 +430,7 @@ pub fn export(
             })
             .collect(),
         values: written,
+        changes: division.by_name(),
         zero_deg: zero,
         grids: grid_list,
         workpiece_shift_mm: shift.into(),
@@ -404,6 +447,7 @@ pub fn export(
         terms,
         stock: None,
         tables: Some(record),
+        table_errors: table_errors.clone(),
         program: program(),
         provenance: noted.provenance.clone(),
     };
@@ -413,11 +457,14 @@ pub fn export(
         seen: filled.seen.clone(),
         left,
         values: filled.values.clone(),
+        changes: division.changes().cloned().collect(),
         rounding_um,
         rest_um,
         longer_tool_um,
+        table_errors,
     };
-    files::write(machine, tables, kind, &noted, options, (&filled, &others), &mut export, &mut findings)?;
+    let tables_of = (&filled, &others, &division);
+    files::write(machine, tables, kind, &noted, options, tables_of, &mut export, &mut findings)?;
     Ok((export, findings))
 }
 
@@ -471,12 +518,37 @@ fn unverified_entries(findings: &Findings) -> BTreeMap<String, String> {
     parts.map(|(what, why)| (what.to_owned(), why.to_owned())).collect()
 }
 
+/// Entries of the tables for a machine that were not run on a real control: what `--accept-unverified` accepts.
+#[must_use]
+pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec<String> {
+    let Ok(kind) = kind_of(machine, tables) else { return Vec::new() };
+    let mut out = Vec::new();
+    let mut add = |what: String, source: &Option<String>, unverified: &Option<String>| {
+        if doubt(source.as_ref(), unverified.as_ref()).is_some() {
+            out.push(what);
+        }
+    };
+    add("the tables".to_owned(), &tables.source, &tables.unverified);
+    add(format!("kind {}", kind.name), &kind.source, &kind.unverified);
+    kind.vector.iter().for_each(|v| add(v.id.clone(), &v.source, &v.unverified));
+    kind.angle.iter().for_each(|a| add(a.id.clone(), &a.source, &a.unverified));
+    if let Some(grid) = tables.grid.as_ref().filter(|_| position_tables) {
+        add("position tables".to_owned(), &grid.source, &grid.unverified);
+    }
+    tables
+        .file
+        .iter()
+        .filter(|f| position_tables || !f.grids)
+        .for_each(|f| add(format!("file {}", f.name), &f.source, &f.unverified));
+    out
+}
+
 /// Entries that nobody has verified: refused, or said.
 fn say_unverified(
     tables: &Tables,
     kind: &Kind,
     filled: &Filled,
-    grids: bool,
+    (grids, division): (bool, &Division),
     options: &Options,
     findings: &mut Findings,
 ) {
@@ -498,7 +570,7 @@ fn say_unverified(
     if grids && let Some(form) = &tables.grid {
         add("position tables".to_owned(), doubt(form.source.as_ref(), form.unverified.as_ref()));
     }
-    for file in tables.file.iter().filter(|f| !f.grids || grids) {
+    for file in tables.file.iter().filter(|f| division.files.contains(&f.name)) {
         add(format!("file {}", file.name), doubt(file.source.as_ref(), file.unverified.as_ref()));
     }
     for (what, why) in doubts {
@@ -511,4 +583,12 @@ fn say_unverified(
                 .help("compare it with the control's manual and backup; --accept-unverified writes it all the same")
         });
     }
+}
+
+/// The first of some names; a person who needs the rest finds it in the sheet.
+fn some_of(names: &[String]) -> String {
+    const SHOWN: usize = 12;
+    let rest = names.len().saturating_sub(SHOWN);
+    let shown = names[..names.len() - rest].join(", ");
+    if rest > 0 { format!("{shown} and {rest} more") } else { shown }
 }

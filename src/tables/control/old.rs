@@ -90,7 +90,9 @@ fn written(active: &Record, value: &Value, name: &str, unit: LengthUnit) -> Opti
     // a record of an older version has the vectors only, in mm
     let (id, k) = value.id.split_once('.')?;
     let k = ["x", "y", "z"].iter().position(|c| *c == k)?;
-    let vector = active.vectors.iter().find(|v| active.values.is_empty() && v.id == id)?;
+    // and a sheet of changes says nothing of what the control then held
+    let older = active.values.is_empty() && active.changes.is_empty();
+    let vector = active.vectors.iter().find(|v| older && v.id == id)?;
     let written = *vector.value.get(k)?;
     Some(if is_length { in_unit(written, LengthUnit::Mm) } else { written })
 }
@@ -108,7 +110,7 @@ pub fn between_tables(tables: &Tables, first: &Filled, others: &BTreeMap<&str, F
         let Some(value) = filled.values.iter().find(|v| v.elsewhere) else { continue };
         let lacks = filled.values.iter().filter(|v| v.elsewhere).count();
         let says = format!(
-            "{}: {lacks} of its old values are not in the backup, such as {}: those of the other table are taken, such as {}, and marked ASSUMED",
+            "{}: {lacks} of its old values are not in the backup, such as {}: it is not written, because the backup has only those of the other table, such as {}",
             named(spelling),
             value.name(spelling).cloned().unwrap_or_default(),
             value.given.clone().unwrap_or_default()

@@ -44,7 +44,7 @@ impl Replaced {
         }
     }
 
-    /// What of a difference of two places stays: the components that no found offset moves.
+    /// What of a difference of two places stays: what is square to all that a found offset moves.
     pub fn place(&self, off: Vector3<f64>, of: impl Fn(&Seen) -> Vector3<f64>) -> Vector3<f64> {
         self.unmoved(self.offsets.iter().map(|(_, seen)| seen), off, of)
     }
@@ -76,7 +76,8 @@ impl Replaced {
                 let along = d * relative.dot(&d);
                 let at = |seen: &Seen| {
                     let point = |n: usize| seen.side(side).get(n).map_or_else(Vector3::zeros, |l| l.point);
-                    point(place) - carrier.map_or_else(Vector3::zeros, point)
+                    // an inclined line moves across itself, whatever the direction of the offset
+                    across(point(place) - carrier.map_or_else(Vector3::zeros, point))
                 };
                 let own = || self.offsets.iter().filter(|(of, _)| *of == side).map(|(_, seen)| seen);
                 // what stays, stays as the control has it next to the head, wherever the head was found
@@ -107,7 +108,7 @@ impl Replaced {
         worst
     }
 
-    /// The components that none of these moves.
+    /// What is square to all that these move.
     fn unmoved<'s>(
         &self,
         moved: impl Iterator<Item = &'s Seen>,
@@ -115,8 +116,15 @@ impl Replaced {
         of: impl Fn(&Seen) -> Vector3<f64>,
     ) -> Vector3<f64> {
         let at = of(&self.described);
-        let steps: Vec<Vector3<f64>> = moved.map(|seen| of(seen) - at).collect();
-        Vector3::from_fn(|k, _| if steps.iter().any(|step| step[k].abs() > NOTHING) { 0.0 } else { off[k] })
+        let mut square: Vec<Vector3<f64>> = Vec::new();
+        let without = |v: Vector3<f64>, known: &[Vector3<f64>]| known.iter().fold(v, |v, u| v - u * v.dot(u));
+        for seen in moved {
+            let step = without(of(seen) - at, &square);
+            if step.norm() > NOTHING {
+                square.push(step.normalize());
+            }
+        }
+        without(off, &square)
     }
 }
 

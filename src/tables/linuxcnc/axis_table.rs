@@ -6,34 +6,52 @@
 //! overrides `BACKLASH`.
 
 use crate::axes::AxisName;
+use crate::diag::Failure;
 use crate::machine::Machine;
 use crate::tables::compensation::AxisTable;
-use crate::tables::correction::{AxisShape, rounded};
+use crate::tables::correction::{AxisShape, Correction, rounded};
+use crate::tables::rows::{TableError, Wanted};
 
 /// Most lines that LinuxCNC reads.
 pub const MAX_LINES: usize = 256;
 
-/// The table follows the error to this, mm or deg: a tenth of what a control resolves.
-const CLOSE_ENOUGH: f64 = 1e-5;
+/// Counts of lines to choose from, the fewest that follow. Odd ones: zero is then a line of a symmetrical range.
+const COUNTS: [usize; 10] = [3, 5, 9, 17, 33, 65, 97, 129, 193, MAX_LINES - 1];
 
 /// What an axis is to be told more than its nominal coordinate, at a coordinate relative to R's origin.
 fn told_more(shapes: &[&AxisShape], q: f64, sense: f64) -> f64 {
     -shapes.iter().map(|shape| (shape.error)(q, sense)).sum::<f64>()
 }
 
-/// The tables of all axes that have an error of their own position, or had one before. Rows in mm or deg.
+/// The table of an axis, with what it leaves.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// Whose it is.
+    pub axis: AxisName,
+    /// Rows in mm or deg.
+    pub table: AxisTable,
+    /// What it leaves.
+    pub leaves: TableError,
+}
+
+/// The tables of all axes that have an error of their own position, or had one before.
 ///
-/// `already` are the tables that were active during the measurement: the new ones are added to them.
-#[must_use]
+/// `already` are the tables that were active during the measurement: the new ones are added to them. LinuxCNC has no table
+/// that repeats every turn: the rows cover the whole travel where they are fine enough for it, else as many turns as they
+/// are fine enough for, at least those in use. `lever_mm`: where errors of angles are stated.
+///
+/// # Errors
+/// When an error has no value at a coordinate.
 pub fn tables(
     machine: &Machine,
-    shapes: &[AxisShape],
+    correction: &Correction,
     already: impl Fn(AxisName) -> Option<AxisTable>,
     joint: impl Fn(AxisName) -> usize,
-) -> Vec<(AxisName, AxisTable)> {
-    let mut tables = Vec::new();
+    lever_mm: f64,
+) -> Result<Vec<Made>, Failure> {
+    let mut made = Vec::new();
     for axis in &machine.axes {
-        let own: Vec<&AxisShape> = shapes.iter().filter(|s| s.axis == axis.name).collect();
+        let own: Vec<&AxisShape> = correction.shapes.iter().filter(|s| s.axis == axis.name).collect();
         let before = already(axis.name);
         if own.is_empty() && before.is_none() {
             continue;
@@ -43,35 +61,29 @@ pub fn tables(
             let old = before.as_ref().map_or(0.0, |t| t.at(nominal, sense > 0.0));
             old + told_more(&own, nominal - origin, sense)
         };
-        let rows = rows(axis.range.map(|v| v + origin), value);
+        let wanted = Wanted {
+            input: axis.name,
+            output: axis.name,
+            origin,
+            travel: axis.range,
+            used: correction.used.get(&axis.name).copied(),
+            senses: &[1.0, -1.0],
+            value: &value,
+        };
+        let ([low, high], count) = wanted.place(&COUNTS);
+        let row = |i: usize| {
+            let nominal = rounded(low + (high - low) * i as f64 / (count - 1) as f64);
+            [nominal, rounded(value(nominal, 1.0)), rounded(value(nominal, -1.0))]
+        };
+        let rows: Vec<[f64; 3]> = (0..count).map(row).collect();
+        let positions: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+        let written = |i: usize, sense: f64| rows[i][if sense > 0.0 { 1 } else { 2 }];
+        let joint = joint(axis.name);
+        let leaves = wanted.leaves(&positions, written, (joint, 0, false), lever_mm)?;
         let file = format!("axiscal_comp_{}.txt", axis.name.letter().to_ascii_lowercase());
-        tables.push((axis.name, AxisTable { joint: joint(axis.name), file, rows }));
+        made.push(Made { axis: axis.name, table: AxisTable { joint, file, rows }, leaves });
     }
-    tables
-}
-
-/// Equidistant lines over a range, as few as follow the value to [`CLOSE_ENOUGH`].
-fn rows(range: [f64; 2], value: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
-    let table = |n: usize| -> Vec<[f64; 3]> {
-        (0..n)
-            .map(|i| {
-                let share = i as f64 / (n - 1) as f64;
-                let nominal = rounded(range[0] + share * (range[1] - range[0]));
-                [nominal, rounded(value(nominal, 1.0)), rounded(value(nominal, -1.0))]
-            })
-            .collect()
-    };
-    let follows = |rows: &[[f64; 3]]| {
-        rows.windows(2).all(|w| {
-            [0.25, 0.5, 0.75].into_iter().all(|share| {
-                let at = |column: usize| w[0][column] + share * (w[1][column] - w[0][column]);
-                (value(at(0), 1.0) - at(1)).abs() <= CLOSE_ENOUGH && (value(at(0), -1.0) - at(2)).abs() <= CLOSE_ENOUGH
-            })
-        })
-    };
-    // odd counts first: zero is then a line of a symmetrical range
-    let counts = [3, 5, 9, 17, 33, 65, 97, 129, 193];
-    counts.into_iter().map(table).find(|rows| follows(rows)).unwrap_or_else(|| table(MAX_LINES))
+    Ok(made)
 }
 
 /// The file's text; linear axes in machine units.
@@ -104,12 +116,20 @@ mod tests {
         }
     }
 
-    fn one(machine: &Machine, shape: AxisShape) -> AxisTable {
+    fn correction(shapes: &[AxisShape]) -> Correction {
+        Correction { shapes: shapes.to_vec(), ..Correction::default() }
+    }
+
+    fn made(machine: &Machine, shape: AxisShape) -> Made {
         let axis = shape.axis;
-        let found = tables(machine, &[shape], |_| None, |_| 7);
+        let found = tables(machine, &correction(&[shape]), |_| None, |_| 7, 100.0).unwrap();
         assert_eq!(found.len(), 1);
-        assert_eq!(found[0].0, axis);
-        found[0].1.clone()
+        assert_eq!(found[0].axis, axis);
+        found[0].clone()
+    }
+
+    fn one(machine: &Machine, shape: AxisShape) -> AxisTable {
+        made(machine, shape).table
     }
 
     /// A screw of the tool side that travels 1.0001 per commanded mm: at 200 it stands at 200.02, so it is told 0.02 less.
@@ -147,10 +167,49 @@ mod tests {
         let old = AxisTable { joint: 7, file: String::new(), rows: vec![[-300.0, 0.01, 0.01], [300.0, 0.01, 0.01]] };
         let machine = machine("trunnion");
         let new = shape(AxisName::X, |x, _| 1e-4 * x);
-        let found = tables(&machine, &[new], |a| (a == AxisName::X).then(|| old.clone()), |_| 7);
-        assert_eq!(found[0].1.rows[2], [300.0, -0.02, -0.02]);
+        let already = |a| (a == AxisName::X).then(|| old.clone());
+        let found = tables(&machine, &correction(&[new]), already, |_| 7, 100.0).unwrap();
+        assert_eq!(found[0].table.rows[2], [300.0, -0.02, -0.02]);
         // without anything new it stays in force
-        let kept = tables(&machine, &[], |a| (a == AxisName::X).then(|| old.clone()), |_| 7);
-        assert_eq!(kept[0].1.rows[0], [-300.0, 0.01, 0.01]);
+        let kept = tables(&machine, &correction(&[]), already, |_| 7, 100.0).unwrap();
+        assert_eq!(kept[0].table.rows[0], [-300.0, 0.01, 0.01]);
+    }
+
+    fn endless(used: Option<[f64; 2]>, error: fn(f64, f64) -> f64) -> Made {
+        let mut machine = machine("trunnion");
+        for axis in machine.axes.iter_mut().filter(|a| a.name == AxisName::C) {
+            axis.range = [-9999.0, 9999.0];
+        }
+        let used = used.map(|range| (AxisName::C, range)).into_iter().collect();
+        let correction = Correction { used, ..correction(&[shape(AxisName::C, error)]) };
+        tables(&machine, &correction, |_| None, |_| 4, 100.0).unwrap().remove(0)
+    }
+
+    /// 200 urad three times a turn: 256 rows over 55 turns would be 78 deg apart.
+    #[test]
+    fn rows_of_an_endless_axis_cover_the_turns_in_use() {
+        let error = |c: f64, _: f64| 0.0115 * (3.0 * c.to_radians()).cos();
+        let made = endless(None, error);
+        assert_eq!(made.leaves.range, [-360.0, 360.0]);
+        assert!(made.leaves.interpolation_um < 0.1, "{:?}", made.leaves);
+        assert!(made.leaves.findings().iter().all(|f| f.severity != crate::diag::Severity::Error));
+        // the control holds the end value elsewhere, and that is a warning
+        assert!(made.leaves.beyond_um.is_some_and(|um| um > 30.0), "{:?}", made.leaves);
+        assert_eq!(made.leaves.findings().len(), 1);
+        // a program that went to C = 800 needs three turns
+        assert_eq!(endless(Some([-10.0, 800.0]), error).leaves.range, [-1080.0, 1080.0]);
+        // where two rows say it all, they cover the whole travel
+        let all = endless(None, |c, _| 1e-6 * c);
+        assert_eq!((all.leaves.range, all.leaves.beyond_um), ([-9999.0, 9999.0], None));
+    }
+
+    /// 0.0115 deg forty times a turn cannot be held by rows that are 2.8 deg apart: refused.
+    #[test]
+    fn what_the_rows_cannot_follow_is_refused() {
+        let made = endless(None, |c, _| 0.0115 * (40.0 * c.to_radians()).cos());
+        assert!(made.leaves.findings().iter().any(|f| f.code == "tables::too_coarse"), "{:?}", made.leaves);
+        // the same with less than half a micrometre is none worth refusing
+        let made = endless(None, |c, _| 0.0001 * (40.0 * c.to_radians()).cos());
+        assert!(made.leaves.findings().is_empty(), "{:?}", made.leaves);
     }
 }

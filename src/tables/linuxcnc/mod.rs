@@ -14,8 +14,10 @@ pub mod work_offset;
 
 use super::compensation::{Compensation, Mode};
 use super::correction::{Correction, Limits, left_um};
+use super::rows::TableError;
 use crate::diag::{Failure, Finding, Findings, Result, Severity};
 use crate::machine::Machine;
+use crate::post::{Postprocessor, Release};
 use ini::UserIni;
 
 /// Id of the controller.
@@ -35,11 +37,13 @@ pub struct Options {
     pub force: bool,
     /// The machine's INI file, for its old values and the numbers of its joints.
     pub ini: Option<UserIni>,
+    /// The version of LinuxCNC that the files are written for; absent: the one that the built-in controller names.
+    pub release: Option<Release>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { radius_mm: 100.0, limits: Limits::default(), force: false, ini: None }
+        Self { radius_mm: 100.0, limits: Limits::default(), force: false, ini: None, release: None }
     }
 }
 
@@ -87,6 +91,19 @@ pub struct Way {
     pub left: Vec<Left>,
 }
 
+/// By how much a value changes whose present one is not known.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Changed {
+    /// The sheet that says it.
+    pub file: String,
+    /// What changes, as LinuxCNC names it.
+    pub name: String,
+    /// What is added to the present value.
+    pub change: f64,
+    /// Its unit: `mm`, `inch` or `deg`.
+    pub unit: &'static str,
+}
+
 /// The files of an export, with what they carry.
 #[derive(Debug, Clone)]
 pub struct Export {
@@ -96,6 +113,10 @@ pub struct Export {
     pub component: Way,
     /// By what LinuxCNC has without it.
     pub stock: Way,
+    /// What each axis table leaves, whichever way is loaded.
+    pub table_errors: Vec<TableError>,
+    /// What is given as changes, because the present values are not known.
+    pub changes: Vec<Changed>,
 }
 
 /// Program and version, as every file names it.
@@ -117,6 +138,7 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
     }
     let mut correction = correction.clone();
     let mut beyond = correction.beyond(&options.limits);
+    beyond.extend(component_in_use(machine, &correction, options.ini.as_ref()));
     if options.force {
         force(&mut beyond, &mut correction);
     }
@@ -146,10 +168,29 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
     let Some(joints) = joints else {
         return Err(Failure(findings.0));
     };
-    let (export, more) = pack::pack(machine, correction, options, &joints)?;
+    let release = match &options.release {
+        Some(release) => release.clone(),
+        None => Postprocessor::load_built_in_or_file(CONTROLLER)?.0.release(None)?.clone(),
+    };
+    let (export, more) = pack::pack(machine, correction, options, (&joints, &release))?;
     let mut findings = findings;
     findings.0.extend(more.0);
     Ok((export, findings))
+}
+
+/// The pins of a component that is in use hold values that acted on the touches: written anew, all of them would be lost.
+fn component_in_use(machine: &Machine, correction: &Correction, ini: Option<&UserIni>) -> Option<Finding> {
+    let component = component::name(machine);
+    let in_use = ini?.kinematics.as_deref()?.split_whitespace().next()? == component;
+    (in_use && correction.active.is_none()).then(|| {
+        let says = format!(
+            "the INI file uses {component}, the component of an earlier export, and the study names no compensation"
+        );
+        Finding::error("tables::component_in_use", says).help(
+            "write `compensation = \"FOLDER\"` of that export beside each run of the study in which it was loaded; where it was not \
+             loaded, give the INI file with which the machine ran",
+        )
+    })
 }
 
 fn mode_note(active: &Compensation, acted: bool) -> Finding {

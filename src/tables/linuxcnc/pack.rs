@@ -4,18 +4,26 @@ use super::axis_table::{self};
 use super::component;
 use super::ini::Joints;
 use super::stock::{self, Module};
-use super::{CONTROLLER, Export, Left, Options, Way, force, head, program, readme, render, work_offset};
+use super::{CONTROLLER, Changed, Export, Left, Options, Way, force, head, program, readme, render, work_offset};
 use crate::axes::AxisName;
-use crate::diag::{Finding, Findings, Result};
+use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Machine, Side};
+use crate::post::{ModuleFault, Release};
 use crate::tables::compensation::{AxisTable, Compensation, FORMAT, Mode, Stock, Term};
 use crate::tables::correction::{Correction, left_um, rounded};
 use crate::tables::restate::kept_in_words;
+use crate::tables::rows::TableError;
 use minijinja::{Value, context};
 use std::collections::BTreeMap;
 
+/// Why a line is a remark.
+const NO_INI: &str = "(no INI file was given)";
+
 const SETP: &str = include_str!("../templates/linuxcnc/setp.hal.j2");
 const FRAGMENT: &str = include_str!("../templates/linuxcnc/fragment.ini.j2");
+const CHANGES: &str = include_str!("../templates/linuxcnc/changes.txt.j2");
+/// Sheet of the changes of values whose present ones are not known.
+const SHEET: &str = "axiscal_changes.txt";
 const TOOL_TABLE: &str = include_str!("../templates/linuxcnc/tool_table.ngc.j2");
 
 /// What both ways of loading need to know.
@@ -24,8 +32,11 @@ pub(super) struct Packing<'a> {
     pub correction: &'a Correction,
     pub options: &'a Options,
     pub joints: &'a Joints,
+    pub release: &'a Release,
     pub module: Result<Module, String>,
     pub tables: Vec<(AxisName, AxisTable)>,
+    pub table_errors: Vec<TableError>,
+    changes: Vec<Changed>,
     files: Vec<(String, Vec<u8>)>,
     findings: Findings,
 }
@@ -49,14 +60,17 @@ pub(super) fn pack(
     machine: &Machine,
     correction: &Correction,
     options: &Options,
-    joints: &Joints,
+    (joints, release): (&Joints, &Release),
 ) -> Result<(Export, Findings)> {
     let active = correction.active.as_ref();
     let old_table = |axis: AxisName| active.and_then(|a| a.stock.as_ref()?.axis_tables.get(&axis).cloned());
     let joint = |axis: AxisName| joints.numbers(axis).first().copied().unwrap_or(0);
-    let tables = axis_table::tables(machine, &correction.shapes, old_table, joint);
+    let made = axis_table::tables(machine, correction, old_table, joint, options.radius_mm)?;
+    let table_errors: Vec<TableError> = made.iter().map(|m| m.leaves.clone()).collect();
+    let tables: Vec<(AxisName, AxisTable)> = made.into_iter().map(|m| (m.axis, m.table)).collect();
     let mut noted = correction.clone();
     let mut findings = old_tables(&tables, correction, options);
+    findings.0.extend(table_errors.iter().flat_map(TableError::findings));
     if options.force {
         force(&mut findings.0, &mut noted);
     }
@@ -65,18 +79,23 @@ pub(super) fn pack(
         correction: &noted,
         options,
         joints,
-        module: stock::module_of(machine),
+        release,
+        module: stock::module_of(machine, release),
         tables,
+        table_errors,
+        changes: Vec::new(),
         files: Vec::new(),
         findings,
     };
     let component = packing.component()?;
     let stock = packing.stock()?;
     packing.tool_table()?;
+    packing.sheets()?;
     let text = readme::text(&packing, &component, &stock)?;
     packing.put("README.txt", text);
+    let changes = packing.changes;
     let (files, findings) = packing.findings.finish(packing.files)?;
-    Ok((Export { files, component, stock }, findings))
+    Ok((Export { files, component, stock, table_errors: packing.table_errors, changes }, findings))
 }
 
 /// Tables or backlash of the user's own that ours would silently replace.
@@ -85,7 +104,7 @@ fn old_tables(tables: &[(AxisName, AxisTable)], correction: &Correction, options
     let Some(ini) = &options.ini else { return findings };
     let active = correction.active.as_ref();
     for (axis, table) in tables {
-        let ours = active.and_then(|a| a.stock.as_ref()).is_some_and(|s| s.axis_tables.contains_key(axis));
+        let ours = active.and_then(|a| a.stock.as_ref()?.loaded_table(*axis)).is_some();
         let old = ini.comp_file.get(&table.joint).map(|(file, _)| format!("COMP_FILE = {file}"));
         let backlash = ini.backlash.get(&table.joint).map(|b| format!("BACKLASH = {b}"));
         let Some(old) = old.filter(|_| !ours).or(backlash) else { continue };
@@ -130,13 +149,71 @@ impl Packing<'_> {
             terms,
             stock,
             tables: None,
+            table_errors: self.table_errors.clone(),
             program: program(),
             provenance: self.correction.provenance.clone(),
         }
     }
 
-    fn table_map(&self) -> BTreeMap<AxisName, AxisTable> {
-        self.tables.iter().cloned().collect()
+    /// The axis tables as both ways record them.
+    fn table_record(&self) -> Stock {
+        let by_change = self.tables.iter().map(|(axis, _)| *axis).filter(|axis| !self.knows_table(*axis));
+        Stock {
+            axis_tables: self.tables.iter().cloned().collect(),
+            tables_by_change: by_change.collect(),
+            ..Stock::default()
+        }
+    }
+
+    /// The table of an axis that a file of an earlier export held.
+    fn loaded_table(&self, axis: AxisName) -> Option<&AxisTable> {
+        self.correction.active.as_ref()?.stock.as_ref()?.loaded_table(axis)
+    }
+
+    /// Is it known what table an axis had? The INI file says it, or the file that was loaded.
+    fn knows_table(&self, axis: AxisName) -> bool {
+        self.options.ini.is_some() || self.loaded_table(axis).is_some()
+    }
+
+    // ------------------------------------------------------------------- what is added to values that are not known
+
+    fn change(&mut self, folder: &str, name: String, change: f64, unit: &'static str) {
+        let change = rounded(change);
+        if change != 0.0 {
+            self.changes.push(Changed { file: format!("{folder}{SHEET}"), name, change, unit });
+        }
+    }
+
+    fn length_unit(&self) -> &'static str {
+        if self.mm_per_unit() == 1.0 { "mm" } else { "inch" }
+    }
+
+    /// The sheets, and what a person is told of them.
+    fn sheets(&mut self) -> Result<()> {
+        for folder in ["", "stock/"] {
+            let path = format!("{folder}{SHEET}");
+            let own = self.changes.iter().filter(|c| c.file == path);
+            let lines: Vec<Value> = own
+                .map(|c| context! { name => c.name.clone(), unit => c.unit, change => format!("{}{}", if c.change > 0.0 { "+" } else { "" }, plain(c.change)) })
+                .collect();
+            if lines.is_empty() {
+                continue;
+            }
+            let says = format!(
+                "the present values of what {path} names are not known: it says by how much each changes, and no file with values is written"
+            );
+            self.findings
+                .push(Finding::warning("tables::old_assumed", says).help(
+                    "give the machine's INI file with --ini: then the files to load and to go back are complete",
+                ));
+            let text = render(
+                "changes.txt",
+                CHANGES,
+                &context! { head => head(self.machine, self.correction), changes => lines },
+            )?;
+            self.put(&path, text);
+        }
+        Ok(())
     }
 
     // ------------------------------------------------------------------------------------------- the component
@@ -148,7 +225,7 @@ impl Packing<'_> {
             Some(active) => (active.terms.clone(), active.reference_mm),
             None => (Vec::new(), self.machine.reference.pivot.into()),
         };
-        let stock = (!self.tables.is_empty()).then(|| Stock { axis_tables: self.table_map(), ..Stock::default() });
+        let stock = (!self.tables.is_empty()).then(|| self.table_record());
         let compensation = self.compensation(Mode::Component, terms.clone(), stock);
 
         let source = component::source(self.machine, self.correction)?;
@@ -201,33 +278,29 @@ impl Packing<'_> {
 
     // -------------------------------------------------------------------------------------------- INI fragments
 
-    /// The `[KINS] KINEMATICS` line that was in force, and whether it is known.
-    fn old_kinematics(&self) -> (String, bool) {
+    /// The `[KINS] KINEMATICS` line that was in force, where it is known.
+    fn old_kinematics(&self) -> Option<String> {
         let coordinates = self.joints.coordinates();
         if let Some(line) = self.options.ini.as_ref().and_then(|i| i.kinematics.clone()) {
-            return (line, true);
+            return Some(line);
         }
         let active = self.correction.active.as_ref();
         let module = active.and_then(|a| a.component.clone().or_else(|| a.stock.as_ref()?.module.clone()));
-        match module {
-            Some(module) => (format!("{module} coordinates={coordinates}"), true),
-            None => (format!("trivkins coordinates={coordinates}"), false),
-        }
+        module.map(|module| format!("{module} coordinates={coordinates}"))
     }
 
     /// `axiscal.ini` and `restore.ini` of a directory, with the axis tables beside them.
     fn ini_files(&mut self, folder: &str, kinematics: Option<String>, home: &BTreeMap<AxisName, f64>) -> Result<()> {
-        let (old_kinematics, known) = self.old_kinematics();
         let mut new: BTreeMap<(u8, usize), Vec<String>> = BTreeMap::new();
         let mut old = new.clone();
         const KINS: (u8, usize) = (0, 0);
         if let Some(line) = kinematics {
             let joints = format!("JOINTS = {}", self.joints.count());
             new.insert(KINS, vec![format!("KINEMATICS = {line}"), joints.clone()]);
-            let mut lines = vec![format!("KINEMATICS = {old_kinematics}"), joints];
-            if !known {
-                lines.insert(0, "# assumed: no INI file was given, so put back the line that you replaced".to_owned());
-            }
+            let lines = match self.old_kinematics() {
+                Some(line) => vec![format!("KINEMATICS = {line}"), joints],
+                None => vec![format!("# put back the lines KINEMATICS and JOINTS that you replaced {NO_INI}")],
+            };
             old.insert(KINS, lines);
         }
         let home_active: BTreeMap<AxisName, f64> = self
@@ -242,21 +315,16 @@ impl Packing<'_> {
                 continue;
             }
             for joint in self.joints.numbers(axis.name) {
-                // an INI without the line homes to 0; without an INI the machine's own offset is taken as 0
-                let was = match &self.options.ini {
-                    Some(ini) => ini.home_offset.get(&joint).copied().unwrap_or(0.0),
-                    None => active,
+                let Some(ini) = &self.options.ini else {
+                    self.change(folder, format!("[JOINT_{joint}] HOME_OFFSET"), change, "deg");
+                    let says = format!("# {SHEET} says by how much HOME_OFFSET changes {NO_INI}");
+                    new.entry((1, joint)).or_default().push(says);
+                    let says = format!("# put back the line HOME_OFFSET that you replaced {NO_INI}");
+                    old.entry((1, joint)).or_default().push(says);
+                    continue;
                 };
-                if self.options.ini.is_none() {
-                    let changed = plain(rounded(change));
-                    new.entry((1, joint)).or_default().push(format!(
-                        "# assumed: the old line is HOME_OFFSET = {} (no INI file was given); is it another one, add {changed} to it",
-                        plain(was)
-                    ));
-                    old.entry((1, joint))
-                        .or_default()
-                        .push("# assumed: put back the line that you replaced".to_owned());
-                }
+                // an INI without the line homes to 0
+                let was = ini.home_offset.get(&joint).copied().unwrap_or(0.0);
                 new.entry((1, joint)).or_default().push(format!("HOME_OFFSET = {}", plain(rounded(was + change))));
                 old.entry((1, joint)).or_default().push(format!("HOME_OFFSET = {}", plain(was)));
             }
@@ -299,8 +367,19 @@ impl Packing<'_> {
     ) {
         let unit = self.mm_per_unit();
         for (axis, table) in self.tables.clone() {
-            let active =
-                self.correction.active.as_ref().and_then(|a| a.stock.as_ref()?.axis_tables.get(&axis).cloned());
+            if !self.knows_table(axis) {
+                self.table_changes(folder, axis, &table);
+                for joint in self.joints.numbers(axis) {
+                    let says = format!(
+                        "# {SHEET} says by how much the axis compensation (COMP_FILE, BACKLASH) changes {NO_INI}"
+                    );
+                    new.entry((1, joint)).or_default().push(says);
+                    let says = format!("# put back what COMP_FILE and BACKLASH were {NO_INI}");
+                    old.entry((1, joint)).or_default().push(says);
+                }
+                continue;
+            }
+            let active = self.loaded_table(axis).cloned();
             self.put(&format!("{folder}{}", table.file), axis_table::text(axis, &table, unit));
             let restore = active.map(|old_table| {
                 let file = format!("restore_{}", table.file);
@@ -326,6 +405,21 @@ impl Packing<'_> {
         }
     }
 
+    /// The rows of an axis table as changes of the one that the machine has.
+    fn table_changes(&mut self, folder: &str, axis: AxisName, table: &AxisTable) {
+        let before = self.correction.active.as_ref().and_then(|a| a.stock.as_ref()?.axis_tables.get(&axis).cloned());
+        let (unit, factor) = if axis.is_rotary() { ("deg", 1.0) } else { (self.length_unit(), self.mm_per_unit()) };
+        for row in &table.rows {
+            for (column, up) in [(1, true), (2, false)] {
+                let was = before.as_ref().map_or(0.0, |t| t.at(row[0], up));
+                let at = plain(rounded(row[0] / factor));
+                let way = if up { "up" } else { "down" };
+                let name = format!("compensation of {axis} at {at} {unit}, moving {way},");
+                self.change(folder, name, (row[column] - was) / factor, unit);
+            }
+        }
+    }
+
     // --------------------------------------------------------------------------------------------------- stock
 
     fn stock(&mut self) -> Result<Way> {
@@ -337,27 +431,48 @@ impl Packing<'_> {
         let (carried, not): (Vec<Term>, Vec<Term>) =
             terms.into_iter().partition(|t| stock::why_not(machine, &module, t).is_none());
         let home = stock::home_offsets(machine, &carried);
-        let mut record = Stock { home_offset_deg: home.clone(), axis_tables: self.table_map(), ..Stock::default() };
+        let mut record = Stock { home_offset_deg: home.clone(), ..self.table_record() };
         let mut kinematics = None;
         if let Ok(module) = &module {
             let pins = stock::pins(machine, *module, &carried);
             record.module = Some(module.name.to_owned());
             record.pins = pins.pins.clone();
+            record.version = Some(self.release.name.clone());
+            record.conventional_directions = module.conventional;
+            let told = |fault: &ModuleFault| {
+                Finding::warning("tables::build", format!("stock/: {}", fault.says))
+                    .help("use a newer build, or the kinematics component, which does not depend on it")
+            };
+            let faults: Vec<Finding> = self.faults(module).map(told).collect();
+            self.findings.0.extend(faults);
             record.workpiece_shift_mm = Some(pins.workpiece_shift_mm);
             kinematics = Some(format!("{} coordinates={}", module.name, self.joints.coordinates()));
-            let old_pins = match self.active(Mode::Stock).and_then(|a| a.stock.clone()) {
-                Some(old) if !old.pins.is_empty() => old.pins,
-                _ => stock::pins(machine, *module, &[]).pins,
-            };
+            let loaded = self.active(Mode::Stock).and_then(|a| a.stock.clone()).filter(|old| !old.pins.is_empty());
+            // a module that was not in use had no pins: the file is then all that there is
+            let not_in_use = self.options.ini.as_ref().and_then(|ini| ini.kinematics.as_ref());
+            let not_in_use = not_in_use.is_some_and(|line| line.split_whitespace().next() != Some(module.name));
+            let known = not_in_use || loaded.as_ref().is_some_and(|old| !old.pins_by_change);
+            let old_pins = loaded.map_or_else(|| stock::pins(machine, *module, &[]).pins, |old| old.pins);
+            if !known {
+                record.pins_by_change = true;
+                let (factor, unit) = (self.mm_per_unit(), self.length_unit());
+                for (name, mm) in &pins.pins {
+                    let was = old_pins.get(name).copied().unwrap_or(0.0);
+                    self.change("stock/", format!("{}.{name}", module.name), (mm - was) / factor, unit);
+                }
+            }
             let says = [
+                format!("Written for {}. {}", self.release.says, self.turning(module)),
                 format!("Pins of {}: load this after `loadrt [KINS]KINEMATICS` (a further [HAL] HALFILE).", module.name),
                 "tool-offset holds the probe's length, for programs with G49. For other tools take that line out and write".to_owned(),
                 format!("    net axiscal-tool-offset motion.tooloffset.z => {}.tool-offset", module.name),
                 "with G43 and tool lengths that count from the spindle's pivot.".to_owned(),
             ];
-            self.module_pins("stock/axiscal.hal", module, &pins.pins, &says)?;
-            let says = ["The pins before: load this in place of axiscal.hal to go back.".to_owned()];
-            self.module_pins("stock/restore.hal", module, &old_pins, &says)?;
+            if known {
+                self.module_pins("stock/axiscal.hal", module, &pins.pins, &says)?;
+                let says = ["The pins before: load this in place of axiscal.hal to go back.".to_owned()];
+                self.module_pins("stock/restore.hal", module, &old_pins, &says)?;
+            }
         }
         self.ini_files("stock/", kinematics, &home)?;
         for (path, text) in work_offset::files(machine, self.correction, &carried)? {
@@ -382,9 +497,40 @@ impl Packing<'_> {
         says: &[String],
     ) -> Result<()> {
         let unit = self.mm_per_unit();
-        let pins: Vec<Pin> =
+        let mut pins: Vec<Pin> =
             pins.iter().map(|(name, mm)| Pin { name: name.clone(), value: mm / unit, says: String::new() }).collect();
+        // what the control has without the pin is relied on too: it is set in any case
+        if let (Some(name), Some(conventional)) = (&self.release.direction_pin, module.conventional) {
+            let says = self.turning(module);
+            pins.push(Pin { name: name.clone(), value: f64::from(u8::from(conventional)), says });
+        }
+        let known = self.release.pins.get(module.name);
+        if let Some(pin) = pins.iter().find(|p| known.is_none_or(|known| !known.contains(&p.name))) {
+            let says = format!("{} of {} has no pin {}", module.name, self.release.says, pin.name);
+            return Err(Failure::new("tables::pin", says)
+                .help("LinuxCNC would not load the HAL file: name the version of your control with --target"));
+        }
         self.hal_file(&HalFile { path, module: module.name, says, pins: &pins })
+    }
+
+    /// Which way the module turns the table.
+    pub(super) fn turning(&self, module: &Module) -> String {
+        match module.conventional {
+            Some(true) => {
+                "Positive angles turn the table left-handed (clockwise seen against the axis), as this machine does."
+            }
+            Some(false) => "Positive angles turn the table right-handed, as this machine does.",
+            None => {
+                "Positive angles turn the table right-handed, as this machine does; this version has no pin for that."
+            }
+        }
+        .to_owned()
+    }
+
+    /// Faults of some builds of this version that this machine would show.
+    pub(super) fn faults(&self, module: &Module) -> impl Iterator<Item = &ModuleFault> {
+        let shows = (module.name, module.conventional.unwrap_or(false));
+        self.release.fault.iter().filter(move |f| (f.module.as_str(), f.conventional) == shows)
     }
 
     /// The probe's length for the tool table, as two programs that change it there and back.

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! with the tilting axis T = A about X or B about Y (`trtfuncs.c`; a test drives the installed modules and compares).
-//! So the table turns right-handed for positive angles, C about the vertical through P, T about the line through P + D;
+//! So the table turns right-handed for positive angles (newer versions have a pin that turns both angles round, with P and D as
+//! they are: [`Release`]), C about the vertical through P, T about the line through P + D;
 //! D's component along T does not act, and of z only the sum z-rot-point + z-offset + tool-offset does.
 //! World and joints are equal at T = C = 0 whatever the pins say.
 //!
@@ -16,9 +17,10 @@
 
 use crate::axes::AxisName;
 use crate::machine::{Axis, Machine, Side};
+use crate::post::Release;
 use crate::tables::compensation::Term;
 use crate::tables::correction::{Correction, rounded};
-use crate::tables::place::{Place, Spot, along};
+use crate::tables::place::{Place, Spot, along, turns_about_itself};
 use crate::tables::restate::stated_at;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -30,6 +32,8 @@ pub struct Module {
     pub name: &'static str,
     /// The tilting axis.
     pub tilting: AxisName,
+    /// What its direction pin must be: 1 (true) where positive angles turn the table left-handed. `None`: this version has none.
+    pub conventional: Option<bool>,
 }
 
 /// What the offsets of the two axes amount to.
@@ -42,14 +46,13 @@ pub struct Pins {
 }
 
 /// Modules and the tilting axis of each.
-const MODULES: [Module; 2] =
-    [Module { name: "xyzac-trt-kins", tilting: AxisName::A }, Module { name: "xyzbc-trt-kins", tilting: AxisName::B }];
+const MODULES: [(&str, AxisName); 2] = [("xyzac-trt-kins", AxisName::A), ("xyzbc-trt-kins", AxisName::B)];
 
-/// The module that describes the machine.
+/// The module of this version that describes the machine.
 ///
 /// # Errors
 /// The reason, in words for the person, when none does.
-pub fn module_of(machine: &Machine) -> Result<Module, String> {
+pub fn module_of(machine: &Machine, release: &Release) -> Result<Module, String> {
     let rotary: Vec<&Axis> = machine.rotary().collect();
     let [tilting, turning] = rotary.as_slice() else {
         return Err(format!("the machine has {} rotary axes, the modules know two", rotary.len()));
@@ -57,7 +60,8 @@ pub fn module_of(machine: &Machine) -> Result<Module, String> {
     if tilting.side == Side::Tool || turning.side == Side::Tool {
         return Err("a rotary axis is in the head; the modules know two rotary axes in the table".to_owned());
     }
-    let Some(module) = MODULES.into_iter().find(|m| m.tilting == tilting.name && turning.name == AxisName::C) else {
+    let known = |(_, of): &(&str, AxisName)| *of == tilting.name && turning.name == AxisName::C;
+    let Some((name, tilts)) = MODULES.into_iter().find(known) else {
         return Err(format!(
             "{} carries {}; the modules know A that carries C and B that carries C",
             tilting.name, turning.name
@@ -69,19 +73,18 @@ pub fn module_of(machine: &Machine) -> Result<Module, String> {
     if last_linear > first_rotary {
         return Err("a rotary axis carries a linear one; the modules know it the other way round".to_owned());
     }
+    if !release.pins.contains_key(name) {
+        return Err(format!("{} has no module {name} whose pins are known here", release.says));
+    }
+    // axes that turn the table left-handed for positive angles
+    let mut left_handed: Vec<AxisName> = Vec::new();
     for axis in &machine.axes {
         let nominal = unit(axis.name.index() % 3);
         let sense = if axis.name.is_rotary() { axis.sense } else { 1.0 };
         let along = axis.direction.dot(&nominal) * sense;
         if (along + 1.0).abs() < 1e-9 && axis.name.is_rotary() {
-            return Err(format!(
-                "positive {0} turns the table the other way than the module does (right-handed about +{1}), and this version \
-                 of LinuxCNC has no pin for that",
-                axis.name,
-                ["X", "Y", "Z"][axis.name.index() % 3]
-            ));
-        }
-        if (along - 1.0).abs() > 1e-9 {
+            left_handed.push(axis.name);
+        } else if (along - 1.0).abs() > 1e-9 {
             return Err(format!("axis {} is not along a coordinate of the machine, as the modules assume", axis.name));
         }
         let origin = machine.origin.get(axis.name).unwrap_or(0.0);
@@ -92,7 +95,24 @@ pub fn module_of(machine: &Machine) -> Result<Module, String> {
     if (machine.tool.direction.dot(&Vector3::z()) - 1.0).abs() > 1e-9 {
         return Err("the spindle is not along Z, as the modules assume".to_owned());
     }
-    Ok(module)
+    let conventional = match (&release.direction_pin, left_handed.as_slice()) {
+        (None, [axis, ..]) => {
+            return Err(format!(
+                "positive {axis} turns the table the other way than the module does (right-handed about +{}), and {} has no pin \
+                 for that",
+                ["X", "Y", "Z"][axis.index() % 3],
+                release.says
+            ));
+        }
+        (Some(pin), [axis]) => {
+            return Err(format!(
+                "positive {axis} turns the table left-handed, the other rotary axis right-handed: {pin} turns both round or none"
+            ));
+        }
+        (None, []) => None,
+        (Some(_), all) => Some(!all.is_empty()),
+    };
+    Ok(Module { name, tilting: tilts, conventional })
 }
 
 fn unit(component: usize) -> Vector3<f64> {
@@ -129,14 +149,7 @@ pub fn pins_carry(module: Module, term: &Term) -> bool {
 /// Is this term a turn of an axis about itself, which its home offset holds?
 #[must_use]
 pub fn home_offset_carries(machine: &Machine, term: &Term) -> bool {
-    let Some(axis) = machine.axis(term.axis) else { return false };
-    let own = along(axis, term.dof).is_some();
-    match term.place {
-        Place::Zero => true,
-        // about its own axis a turn before the rotation and one of the zero position are the same
-        Place::Before => term.dof.is_angle() && own,
-        Place::After => false,
-    }
+    turns_about_itself(machine, term.spot())
 }
 
 /// The pins of a module for the machine with the offsets of `terms`.
@@ -225,12 +238,46 @@ mod tests {
         }
     }
 
+    fn release(name: &str) -> Release {
+        let (post, _) = crate::post::Postprocessor::load_built_in_or_file("linuxcnc").unwrap();
+        post.release(Some(name)).unwrap().clone()
+    }
+
+    fn module_of(machine: &Machine) -> Result<Module, String> {
+        super::module_of(machine, &release("2.9"))
+    }
+
+    /// One pin turns both angles round: both axes left-handed, or none.
+    #[test]
+    fn the_direction_pin_follows_the_machine() {
+        let with = |a: f64, c: f64| {
+            let mut machine = machine("trunnion");
+            for axis in machine.axes.iter_mut().filter(|x| x.name.is_rotary()) {
+                axis.sense = if axis.name == AxisName::C { c } else { a };
+            }
+            machine
+        };
+        let master = release("master");
+        let pin = |a, c| super::module_of(&with(a, c), &master).map(|m| m.conventional);
+        assert_eq!((pin(1.0, 1.0), pin(-1.0, -1.0)), (Ok(Some(false)), Ok(Some(true))));
+        assert!(pin(1.0, -1.0).unwrap_err().contains("both round"));
+        assert_eq!(module_of(&with(1.0, 1.0)).unwrap().conventional, None);
+        assert!(module_of(&with(-1.0, -1.0)).is_err());
+        // a version that lacks the module
+        let without = Release { pins: BTreeMap::new(), ..master.clone() };
+        assert!(super::module_of(&with(1.0, 1.0), &without).is_err());
+    }
+
     #[test]
     fn the_two_tables_are_known_and_the_heads_are_not() {
         assert_eq!(module_of(&machine("trunnion")).unwrap().name, "xyzac-trt-kins");
         assert_eq!(module_of(&machine("swivel-table-b")).unwrap().name, "xyzbc-trt-kins");
         assert!(module_of(&machine("swivel-head")).unwrap_err().contains("in the head"));
         assert!(module_of(&machine("double-head")).unwrap_err().contains("in the head"));
+        assert!(module_of(&machine("nutating-b")).unwrap_err().contains("axis B is not along"));
+        assert!(
+            module_of(&machine("trunnion-offset")).unwrap_err().contains("positive C turns the table the other way")
+        );
         let mut other_way = machine("trunnion");
         for axis in &mut other_way.axes {
             if axis.name == AxisName::C {
@@ -267,7 +314,7 @@ mod tests {
     #[test]
     fn a_home_offset_grows_by_where_the_axis_stands() {
         let mut machine = machine("trunnion");
-        let terms = [term(AxisName::C, Place::Zero, Dof::Rz, 0.05), term(AxisName::A, Place::Before, Dof::Rx, -0.02)];
+        let terms = [term(AxisName::C, Place::Zero, Dof::Rz, 0.05), term(AxisName::A, Place::Zero, Dof::Rx, -0.02)];
         let found = home_offsets(&machine, &terms);
         assert_eq!((found[&AxisName::C], found[&AxisName::A]), (0.05, -0.02));
         for axis in &mut machine.axes {
@@ -282,7 +329,9 @@ mod tests {
         let module = module_of(&trunnion);
         let carried = |t: &Term| why_not(&trunnion, &module, t);
         assert_eq!(carried(&term(AxisName::C, Place::Before, Dof::Dx, 0.1)), None);
-        assert_eq!(carried(&term(AxisName::C, Place::Before, Dof::Rz, 0.1)), None);
+        assert_eq!(carried(&term(AxisName::C, Place::Zero, Dof::Rz, 0.1)), None);
+        // a turn of a table stated at the reference point is none about its own line
+        assert!(carried(&term(AxisName::C, Place::Before, Dof::Rz, 0.1)).is_some());
         assert!(carried(&term(AxisName::C, Place::Before, Dof::Rx, 0.1)).unwrap().contains("no pin for a tilt"));
         let head = machine("swivel-head");
         let module = module_of(&head);

@@ -2,7 +2,12 @@ use super::*;
 
 fn read(text: &str) -> Result<Code, Fault> {
     let (post, _) = Postprocessor::load_built_in_or_file("sinumerik").unwrap();
-    parse(text, &post)
+    let code = parse(text, &post)?;
+    // what is not known is refused by whoever asked for the code
+    match code.unknown.first() {
+        Some(first) => Err(Fault { at: first.at.clone(), says: first.name.clone() }),
+        None => Ok(code),
+    }
 }
 
 #[test]

@@ -1,0 +1,80 @@
+//! Cross-validated errors of candidates, beside the cross-validated error of the model (`fit::held_out::by_visit`): with the same
+//! weights and on the same touches, so that a model has one such figure wherever it is shown.
+//!
+//! The tests allow for the scatter of index positions that revisited poses show. That may hold the missing effect itself, so that the
+//! choice is left to the tests and the errors are worked out with the noise of cross-validation (`Noise::tau_fold_mm`).
+
+use super::evidence::Evidence;
+use super::named::Named;
+use crate::fit::{Fit, held_out};
+use crate::search::Library;
+use crate::search::held_out::{Choice, Colours, HeldOut, held_out_in};
+use crate::units::mm_from_um;
+
+/// What cross-validated errors are worked out from.
+#[derive(Debug)]
+pub struct Folds {
+    /// The model's own error.
+    model: Option<held_out::HeldOut>,
+    /// Rows with the noise of cross-validation, where the tests use another one.
+    otherwise: Option<(Evidence, Library)>,
+    /// Whitened rows as µm of touches.
+    colours: Colours,
+}
+
+/// Cross-validated error of a candidate, µm.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Errors {
+    /// Without it: the model's own.
+    pub before_um: Option<f64>,
+    /// With it, on the same touches.
+    pub after_um: Option<f64>,
+    /// Standard error of their difference.
+    pub fall_se_um: Option<f64>,
+}
+
+impl Folds {
+    /// Of a fit; `evidence` and `named` are those of the tests.
+    pub(super) fn of(fit: &Fit, evidence: &Evidence, named: &Named) -> Self {
+        let model = held_out::by_visit(fit);
+        let otherwise = (evidence.tau_mm != fit.noise.tau_fold_mm).then(|| {
+            let own = Evidence::with_visits(fit, fit.noise.tau_fold_mm);
+            let library = named.library.with_columns(own.whiten(named.raw_um.map(mm_from_um)))?;
+            Some((own, library))
+        });
+        let otherwise = otherwise.flatten();
+        let colours = otherwise.as_ref().map_or(evidence, |(own, _)| own).colours_um(fit);
+        Self { model, otherwise, colours }
+    }
+
+    /// The model's own error.
+    #[must_use]
+    pub fn model(&self) -> Option<&held_out::HeldOut> {
+        self.model.as_ref()
+    }
+
+    /// With what the tests chose in each fold.
+    pub(super) fn chosen(&self, evidence: &Evidence, named: &Named, tested: &HeldOut) -> HeldOut {
+        let (own, library) =
+            self.otherwise.as_ref().map_or((evidence, &named.library), |(own, library)| (own, library));
+        held_out_in(own.question(), library, &own.visits, Choice::AsIn(&tested.folds), &self.colours)
+    }
+
+    /// With a candidate of the tests.
+    pub(super) fn given(&self, evidence: &Evidence, named: &Named, candidate: usize) -> HeldOut {
+        let (own, library) =
+            self.otherwise.as_ref().map_or((evidence, &named.library), |(own, library)| (own, library));
+        held_out_in(own.question(), &library.only(candidate), &own.visits, Choice::Given(0), &self.colours)
+    }
+
+    /// As they are shown. The linear folds come to the model's own error but for rounding: it is the one figure.
+    pub(super) fn errors(&self, held: &HeldOut) -> Errors {
+        let Some(model) = self.model.as_ref().filter(|_| held.before.is_finite()) else { return Errors::default() };
+        let ratio = if held.before > 0.0 { held.after / held.before } else { 1.0 };
+        Errors {
+            before_um: Some(model.rms_um),
+            after_um: Some(model.rms_um * ratio),
+            fall_se_um: Some(held.fall_error).filter(|x| x.is_finite()),
+        }
+    }
+}
