@@ -254,6 +254,41 @@ fn linuxcnc_adds_to_what_the_ini_holds() {
     let used = json(export(at, "linuxcnc", "used", &["--ini", "used.ini"]));
     assert!(!files(&used).contains(&"stock/axiscal.hal".to_owned()), "{used}");
     assert!(used["changes"].as_array().unwrap().iter().all(|c| c["file"] == "stock/axiscal_changes.txt"));
+    // given by hand they are added to, and the restoring file brings them back
+    let pin = |folder: &str, file: &str, name: &str| -> Option<f64> {
+        let lines = text(at, &format!("{folder}/stock/{file}.hal"));
+        lines.lines().find_map(|l| l.strip_prefix(&format!("setp xyzac-trt-kins.{name} "))?.parse().ok())
+    };
+    let present = [("x-rot-point", 7.5), ("y-rot-point", -3.25), ("z-rot-point", -251.0), ("y-offset", 0.4)];
+    let old: Vec<String> = present.iter().map(|(n, v)| format!("--old=xyzac-trt-kins.{n}={v}")).collect();
+    let old: Vec<&str> = ["--ini", "used.ini"].into_iter().chain(old.iter().map(String::as_str)).collect();
+    let given = json(export(at, "linuxcnc", "given", &old));
+    assert_eq!(given["changes"], serde_json::json!([]));
+    for (name, was) in present {
+        let described = pin("with", "restore", name).unwrap();
+        let change = pin("with", "axiscal", name).unwrap() - described;
+        assert_eq!(pin("given", "restore", name), Some(was), "{name}");
+        assert!((pin("given", "axiscal", name).unwrap() - was - change).abs() < 1e-9, "{name}");
+    }
+    assert_eq!(pin("given", "axiscal", "tool-offset"), None);
+    // the virtual machine has the described machine's pins: the same change
+    let record = |folder: &str| -> Value {
+        serde_json::from_str(&text(at, &format!("{folder}/stock/compensation.json"))).unwrap()
+    };
+    assert_eq!(record("given")["stock"]["pins"], record("with")["stock"]["pins"]);
+    // what lacks a pin, or is none, or has another kinematics in use is refused with its code
+    let refused: [(&[&str], &str); 4] = [
+        (&["--ini", "used.ini", "--old", "xyzac-trt-kins.x-offset=0"], "tables::old_pins"),
+        (&["--ini", "used.ini", "--old", "xyzac-trt-kins.rot-point=0"], "export::old"),
+        (&["--ini", "used.ini", "--old", "xyzac-trt-kins.x-rot-point=1e308"], "export::backup_range"),
+        (&[&["--ini", "own.ini"], &old[2..]].concat(), "tables::old_pins"),
+    ];
+    for (more, code) in refused {
+        let run = export(at, "linuxcnc", "refused", &[more, &["--json"]].concat()).assert().code(2);
+        let answer: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        assert_eq!(answer["findings"][0]["code"], code, "{more:?}: {answer}");
+        assert!(!at.join("refused").exists());
+    }
 }
 
 #[test]
@@ -288,7 +323,7 @@ fn old_values_by_hand_are_checked() {
         .code(2)
         .stderr(predicate::str::contains("--force"));
     // LinuxCNC has its own
-    for more in [&["--backup", "backup.ini"][..], &["--old", "X=1"], &["--unit", "inch"]] {
+    for more in [&["--backup", "backup.ini"][..], &["--unit", "inch"]] {
         export(at, "linuxcnc", "comp", more).assert().code(2).stderr(predicate::str::contains("--ini"));
     }
     export(at, "sinumerik", "comp", &["--ini", "backup.ini"])

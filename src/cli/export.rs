@@ -22,7 +22,7 @@ use crate::tables::rows::TableError;
 use crate::units::Plain;
 use comfy_table::Cell;
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `export`.
@@ -51,7 +51,7 @@ pub struct Args {
     /// The control's own backup of the values that are to be changed: they are added to
     #[arg(long, value_name = "FILE", alias = "active")]
     pub backup: Option<PathBuf>,
-    /// One old value of the control, in its unit (in place of a backup, or beside it)
+    /// One old value of the control, in its unit (in place of a backup, or beside it). LinuxCNC: MODULE.PIN=VALUE
     #[arg(long, value_name = "NAME=VALUE")]
     pub old: Vec<String>,
     /// Unit of lengths in the control's tables
@@ -87,9 +87,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         (Some(_), None) => None,
         (None, target) => Some(described.release(target.as_deref())?.clone()),
     };
-    if post.is_none() && (args.backup.is_some() || !args.old.is_empty() || args.unit == LengthUnit::Inch) {
-        return Err(Failure::new("export::options", "--backup, --old and --unit are not for linuxcnc")
-            .help("its old values and its unit are in the INI file: --ini"));
+    if post.is_none() && (args.backup.is_some() || args.unit == LengthUnit::Inch) {
+        return Err(Failure::new("export::options", "--backup and --unit are not for linuxcnc").help(
+            "its old values and its unit are in the INI file: --ini; the pins of a kinematics module: --old MODULE.PIN=VALUE",
+        ));
     }
     if post.is_some() && args.ini.is_some() {
         return Err(Failure::new("export::options", "--ini is for linuxcnc only")
@@ -308,10 +309,44 @@ fn export(loaded: &Loaded, correction: &Correction, release: Option<Release>, ar
         Some(path) => Some(UserIni::read(&source(path.display().to_string(), files::read_text(path)?))?),
         None => None,
     };
-    let options = Options { radius_mm: args.radius, force: args.force, ini, release, ..Options::default() };
+    let mm_per_unit = ini.as_ref().map_or(1.0, |i| i.mm_per_unit);
+    let mut options = Options { radius_mm: args.radius, force: args.force, ini, release, ..Options::default() };
+    if !args.old.is_empty() {
+        options.old_pins = old_pins(&loaded.machine, options.release.as_ref(), mm_per_unit, args)?;
+    }
     let (export, findings) = linuxcnc::export(&loaded.machine, correction, &options)?;
     io.report(&findings.0);
     Ok(export)
+}
+
+/// Present pins of the stock kinematics module, by their names without the module's, mm.
+fn old_pins(
+    machine: &Machine,
+    release: Option<&Release>,
+    mm_per_unit: f64,
+    args: &Args,
+) -> Result<BTreeMap<String, f64>> {
+    let module = release.and_then(|release| Some((linuxcnc::stock::module_of(machine, release).ok()?, release)));
+    let Some((module, release)) = module else {
+        return Err(Failure::new(
+            "export::options",
+            "--old is for the pins of a stock kinematics module, and none describes this machine",
+        )
+        .help(
+            "leave it away: the component's pins are all written, the other old values are in the INI file (--ini)",
+        ));
+    };
+    let numbers = release.pins.get(module.name).into_iter().flatten();
+    let numbers = numbers.filter(|pin| release.direction_pin.as_ref() != Some(*pin));
+    let names = numbers.map(|pin| format!("{}.{pin}", module.name)).collect();
+    let mut old = Old::default();
+    by_hand(&mut old, &names, args)?;
+    for (value, _) in old.values.values_mut() {
+        *value *= mm_per_unit;
+    }
+    backup::within_reach(&old, None, machine)?;
+    let pin = |name: &str| name.rsplit_once('.').map_or(name, |(_, pin)| pin).to_owned();
+    Ok(old.values.into_iter().map(|(name, (mm, _))| (pin(&name), mm)).collect())
 }
 
 /// Old values: the backup, and what was given by hand.
@@ -329,6 +364,13 @@ fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args:
         }
         None => Old::default(),
     };
+    by_hand(&mut old, &names, args)?;
+    backup::within_reach(&old, None, machine)?;
+    Ok(old)
+}
+
+/// What `--old` gives, checked against the names that there are.
+fn by_hand(old: &mut Old, names: &BTreeSet<String>, args: &Args) -> Result<()> {
     for word in &args.old {
         let bad = |what: &str| {
             // a table has a thousand names: the nearest are those that may be meant
@@ -350,8 +392,7 @@ fn old_values(machine: &Machine, tables: &Tables, correction: &Correction, args:
         old.assumed.remove(known);
         old.texts.insert(known.clone(), digits);
     }
-    backup::within_reach(&old, None, machine)?;
-    Ok(old)
+    Ok(())
 }
 
 /// The file that this study's own export wrote holds the new values: what was identified would be added twice.

@@ -106,6 +106,9 @@ pub struct Stock {
     /// The pins were given as changes, because the present ones are not known.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub pins_by_change: bool,
+    /// What the file set, mm, where the machine's own pins were given: `pins` is then the same change to the machine as described.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub pins_written: BTreeMap<String, f64>,
     /// Axes whose tables were given as changes, because the present ones are not known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tables_by_change: Vec<AxisName>,
@@ -382,7 +385,7 @@ impl Compensation {
         }
         if let Some(stock) = &read.stock {
             let mut wrong = |message: String| wrong((None, "stock"), message);
-            if !stock.pins.values().all(|v| v.abs() <= LARGEST_MM) {
+            if !stock.pins.values().chain(stock.pins_written.values()).all(|v| v.abs() <= LARGEST_MM) {
                 wrong(format!("a pin is no number up to {LARGEST_MM} mm"));
             }
             if !angles(stock.home_offset_deg.values()) {

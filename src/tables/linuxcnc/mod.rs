@@ -19,6 +19,7 @@ use crate::diag::{Failure, Finding, Findings, Result, Severity};
 use crate::machine::Machine;
 use crate::post::{Postprocessor, Release};
 use ini::UserIni;
+use std::collections::BTreeMap;
 
 /// Id of the controller.
 pub const CONTROLLER: &str = "linuxcnc";
@@ -37,13 +38,22 @@ pub struct Options {
     pub force: bool,
     /// The machine's INI file, for its old values and the numbers of its joints.
     pub ini: Option<UserIni>,
+    /// Present values of the pins of the stock module in use, as the person gave them, mm.
+    pub old_pins: BTreeMap<String, f64>,
     /// The version of LinuxCNC that the files are written for; absent: the one that the built-in controller names.
     pub release: Option<Release>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { radius_mm: 100.0, limits: Limits::default(), force: false, ini: None, release: None }
+        Self {
+            radius_mm: 100.0,
+            limits: Limits::default(),
+            force: false,
+            ini: None,
+            old_pins: BTreeMap::new(),
+            release: None,
+        }
     }
 }
 

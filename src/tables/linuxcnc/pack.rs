@@ -22,6 +22,8 @@ const NO_INI: &str = "(no INI file was given)";
 const SETP: &str = include_str!("../templates/linuxcnc/setp.hal.j2");
 const FRAGMENT: &str = include_str!("../templates/linuxcnc/fragment.ini.j2");
 const CHANGES: &str = include_str!("../templates/linuxcnc/changes.txt.j2");
+/// Values that differ by less are the same, mm.
+const SAME_MM: f64 = 1e-4;
 /// Sheet of the changes of values whose present ones are not known.
 const SHEET: &str = "axiscal_changes.txt";
 const TOOL_TABLE: &str = include_str!("../templates/linuxcnc/tool_table.ngc.j2");
@@ -204,7 +206,8 @@ impl Packing<'_> {
             );
             self.findings
                 .push(Finding::warning("tables::old_assumed", says).help(
-                    "give the machine's INI file with --ini: then the files to load and to go back are complete",
+                    "give the machine's INI file with --ini, and the pins of a kinematics module in use with --old MODULE.PIN=VALUE: then \
+                     the files to load and to go back are complete",
                 ));
             let text = render(
                 "changes.txt",
@@ -448,18 +451,32 @@ impl Packing<'_> {
             record.workpiece_shift_mm = Some(pins.workpiece_shift_mm);
             kinematics = Some(format!("{} coordinates={}", module.name, self.joints.coordinates()));
             let loaded = self.active(Mode::Stock).and_then(|a| a.stock.clone()).filter(|old| !old.pins.is_empty());
-            // a module that was not in use had no pins: the file is then all that there is
-            let not_in_use = self.options.ini.as_ref().and_then(|ini| ini.kinematics.as_ref());
-            let not_in_use = not_in_use.is_some_and(|line| line.split_whitespace().next() != Some(module.name));
-            let known = not_in_use || loaded.as_ref().is_some_and(|old| !old.pins_by_change);
-            let old_pins = loaded.map_or_else(|| stock::pins(machine, *module, &[]).pins, |old| old.pins);
-            if !known {
+            let before =
+                loaded.as_ref().map_or_else(|| stock::pins(machine, *module, &[]).pins, |old| old.pins.clone());
+            let change = |name: &String, mm: f64| rounded(mm - before.get(name).copied().unwrap_or(0.0));
+            let present = self.present_pins(module, loaded.as_ref(), &before);
+            let changed = pins.pins.iter().filter(|(name, mm)| change(name, **mm) != 0.0);
+            let lacks: Vec<String> =
+                changed.filter(|(n, _)| !present.contains_key(*n)).map(|(n, _)| n.clone()).collect();
+            if let ([name, ..], false) = (&lacks[..], self.options.old_pins.is_empty()) {
+                let says = format!("--old does not give all pins that change, it lacks: {}", lacks.join(", "));
+                self.findings.push(
+                    Finding::error("tables::old_pins", says)
+                        .help(format!("`halcmd getp {}.{name}` on the machine prints the present value", module.name)),
+                );
+            }
+            let written: BTreeMap<String, f64> = present
+                .iter()
+                .filter_map(|(name, was)| Some((name.clone(), rounded(was + change(name, *pins.pins.get(name)?)))))
+                .collect();
+            if !lacks.is_empty() {
                 record.pins_by_change = true;
                 let (factor, unit) = (self.mm_per_unit(), self.length_unit());
                 for (name, mm) in &pins.pins {
-                    let was = old_pins.get(name).copied().unwrap_or(0.0);
-                    self.change("stock/", format!("{}.{name}", module.name), (mm - was) / factor, unit);
+                    self.change("stock/", format!("{}.{name}", module.name), change(name, *mm) / factor, unit);
                 }
+            } else if written != pins.pins {
+                record.pins_written = written.clone();
             }
             let says = [
                 format!("Written for {}. {}", self.release.says, self.turning(module)),
@@ -468,10 +485,10 @@ impl Packing<'_> {
                 format!("    net axiscal-tool-offset motion.tooloffset.z => {}.tool-offset", module.name),
                 "with G43 and tool lengths that count from the spindle's pivot.".to_owned(),
             ];
-            if known {
-                self.module_pins("stock/axiscal.hal", module, &pins.pins, &says)?;
+            if lacks.is_empty() {
+                self.module_pins("stock/axiscal.hal", module, &written, &says)?;
                 let says = ["The pins before: load this in place of axiscal.hal to go back.".to_owned()];
-                self.module_pins("stock/restore.hal", module, &old_pins, &says)?;
+                self.module_pins("stock/restore.hal", module, &present, &says)?;
             }
         }
         self.ini_files("stock/", kinematics, &home)?;
@@ -487,6 +504,57 @@ impl Packing<'_> {
             self.left(&term.parameter, &term.effect, term.value, &term.unit, self.lever(term), why)
         }));
         Ok(Way { compensation, left })
+    }
+
+    /// The pins of the module before: as given by hand, as an earlier export wrote them, or, where the module was not in use, those
+    /// of the machine as described (`before`). Empty where they are not known.
+    fn present_pins(
+        &mut self,
+        module: &Module,
+        loaded: Option<&Stock>,
+        before: &BTreeMap<String, f64>,
+    ) -> BTreeMap<String, f64> {
+        let in_ini = self.options.ini.as_ref().and_then(|ini| ini.kinematics.as_ref());
+        let other = in_ini.and_then(|line| line.split_whitespace().next()).filter(|name| *name != module.name);
+        let known = match loaded.filter(|old| !old.pins_by_change) {
+            Some(old) if old.pins_written.is_empty() => before.clone(),
+            Some(old) => old.pins_written.clone(),
+            None if other.is_some() => before.clone(),
+            None => BTreeMap::new(),
+        };
+        let given = &self.options.old_pins;
+        if given.is_empty() {
+            return known;
+        }
+        let differs = |(name, mm): (&String, &f64)| {
+            let written = known.get(name).filter(|w| (*w - mm).abs() > SAME_MM)?;
+            Some(format!(
+                "{}.{name} is {} mm by --old and {} mm by that file",
+                module.name,
+                plain(*mm),
+                plain(*written)
+            ))
+        };
+        let finding = match (other, given.iter().find_map(differs)) {
+            (Some(other), _) if loaded.is_none() => Some(
+                Finding::error(
+                    "tables::old_pins",
+                    format!("--old gives pins of {}, and the INI file says that {other} is in use", module.name),
+                )
+                .help("leave --old away, or give the INI file with which the machine ran"),
+            ),
+            (_, Some(differs)) => Some(
+                Finding::error(
+                    "tables::old_not_active",
+                    format!("the compensation that was active during the measurement wrote other pins: {differs}"),
+                )
+                .help("give the pins from after that compensation was loaded, or leave --old away: then what it wrote is used"),
+            ),
+            _ => None,
+        };
+        let given = given.clone();
+        self.findings.0.extend(finding);
+        given
     }
 
     fn module_pins(
