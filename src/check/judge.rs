@@ -89,29 +89,48 @@ impl Said {
     }
 }
 
-/// Judges all runs. The first one is the whole program; of the others only what they leave to the user.
-pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told]) -> Vec<Finding> {
-    let mut said = Said::default();
-    let mut proofs: BTreeMap<Key, Proof> = BTreeMap::new();
-    for told in runs {
-        let mut walk = Walk::new(case, told, &mut said, &mut proofs);
+/// Judges runs one by one.
+pub struct Judge<'a> {
+    case: &'a Case<'a>,
+    said: Said,
+    proofs: BTreeMap<Key, Proof>,
+}
+
+impl<'a> Judge<'a> {
+    /// Nothing is judged yet.
+    pub fn new(case: &'a Case<'a>) -> Self {
+        Self { case, said: Said::default(), proofs: BTreeMap::new() }
+    }
+
+    /// The whole program, or its run from a set-up.
+    pub fn run(&mut self, told: &Told) {
+        let (case, said) = (self.case, &mut self.said);
+        let mut walk = Walk::new(case, told, said, &mut self.proofs);
         walk.trunk();
         let made = walk.made;
-        against_plan(case, told, &made, &mut said);
+        against_plan(case, told, &made, said);
         let last_line = last_line(told);
         for branch in &told.branches {
-            branch_stops(case, told, last_line, branch, &mut said);
+            branch_stops(case, told, last_line, branch, said);
         }
-        settings_return(case, told, &mut said);
+        settings_return(case, told, said);
     }
-    others.iter().for_each(|told| settings_return(case, told, &mut said));
-    let proofs: Vec<(Key, Proof)> = proofs.into_iter().collect();
-    let hits: Vec<(Range<usize>, &'static str, String)> =
-        proofs.par_iter().filter_map(|(_, proof)| proof.check(case)).collect();
-    for (at, code, message) in hits {
-        said.say(case, code, &at, message, "");
+
+    /// A run that finds the control in another state: only what it leaves to the user.
+    pub fn other(&mut self, told: &Told) {
+        settings_return(self.case, told, &mut self.said);
     }
-    said.finish()
+
+    /// Proves the moves of all runs, and says what is wrong.
+    pub fn finish(mut self) -> Vec<Finding> {
+        let proofs: Vec<(Key, Proof)> = std::mem::take(&mut self.proofs).into_iter().collect();
+        let hits: Vec<(Range<usize>, &'static str, String)> =
+            proofs.par_iter().filter_map(|(_, proof)| proof.check(self.case)).collect();
+        for (at, code, message) in hits {
+            self.said.say(self.case, code, &at, message, "");
+        }
+        self.said.finish()
+    }
 }
 
 // --------------------------------------------------------------------------------------------------------- trunk
@@ -127,7 +146,7 @@ struct Contact {
 
 struct Walk<'a, 'b> {
     case: &'a Case<'a>,
-    told: &'a Told,
+    told: &'b Told,
     said: &'b mut Said,
     proofs: &'b mut BTreeMap<Key, Proof>,
     senses: AxisMap,
@@ -141,7 +160,7 @@ struct Walk<'a, 'b> {
 }
 
 impl<'a, 'b> Walk<'a, 'b> {
-    fn new(case: &'a Case<'a>, told: &'a Told, said: &'b mut Said, proofs: &'b mut BTreeMap<Key, Proof>) -> Self {
+    fn new(case: &'a Case<'a>, told: &'b Told, said: &'b mut Said, proofs: &'b mut BTreeMap<Key, Proof>) -> Self {
         let lift = case.scenes.first().and_then(Scene::lift);
         Self {
             case,

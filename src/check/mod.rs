@@ -37,7 +37,8 @@ use crate::program::plan::{ControllerFrame, Plan, Proof};
 use crate::program::scene::Scene;
 use crate::simulate::Errorless;
 use crate::units::Plain;
-use judge::Case;
+use judge::{Case, Judge};
+use proof::Proving;
 use run::Event;
 use std::sync::{Arc, OnceLock};
 use world::World;
@@ -292,12 +293,8 @@ fn with_parts(
         parts.iter().map(|p| Ok(Scene::new(&p.machine, &p.mounting)?.rounded(slack_mm))).collect::<Result<_>>()?;
     let bodies = parts.iter().map(|p| Errorless::new(&p.machine, Some(&p.mounting))).collect();
     let world = Arc::new(World::new(bodies, &machine.origin, tcp));
-    let told = runs::all(machine, post, against.plan, program, &world, &scenes);
-    let first = told.runs.first();
-    if against.plan.is_none() {
-        let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
-        program.waits_for_a_mounting(trunk, source).map_or(Ok(()), Err)?;
-    }
+    let stage = runs::Stage { machine, post, plan: against.plan, program, world: &world, scenes: &scenes };
+    let opening = runs::opening(stage);
     // what the control rounds, and under a transformation what the rounding of three words does
     // a search that is a way along a vector: begin, way and end are rounded each
     let roundings = if program.is_relative() { 3.0 } else { 1.0 };
@@ -314,31 +311,49 @@ fn with_parts(
         world: &world,
         source,
         same,
-        clear_from_anywhere: told.clear_from_anywhere,
-        neutral: &told.neutral,
+        clear_from_anywhere: opening.clear_from_anywhere,
+        neutral: &opening.neutral,
     };
-    let mut findings = judge::judge(&case, &told.runs, &told.others);
+    let (mut judge, mut proving) = (Judge::new(&case), Proving::default());
+    let (mut declined, mut branches) = (Vec::new(), 0);
+    let told = runs::all(stage, &opening, &mut |told| {
+        judge.run(told);
+        proving.add(told);
+        branches += told.branches.len();
+        if told.declines() && told.from <= program.setups() {
+            declined.push(told.from);
+        }
+    });
+    if against.plan.is_none() {
+        program.waits_for_a_mounting(&told.whole.trunk, source).map_or(Ok(()), Err)?;
+    }
+    for other in &told.others {
+        judge.other(other);
+        proving.add(other);
+    }
+    told.refused.iter().for_each(|refused| proving.add(refused));
+    let mut findings = judge.finish();
     findings.extend(
         told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
     );
     findings.extend(begins(post, program, against.from.max(1), source));
-    let proof = proof::proof(told.runs.iter().chain(&told.others).chain(&told.refused), program.statements());
+    let proof = proving.finish(program.statements());
     if let Some(plan) = against.plan {
-        match as_written(plan, post, &proof, program, first.map(|t| &t.trunk), source) {
+        match as_written(plan, post, &proof, program, &told.whole.trunk, source) {
             // the edited line stands before all that follows from it
             Some(changed) if changed.severity == Severity::Error => findings.insert(0, changed),
             other => findings.extend(other),
         }
     }
-    let trunk = first.map(|t| t.trunk.as_slice()).unwrap_or_default();
+    let trunk = told.whole.trunk.as_slice();
     Ok(Checked {
         mountings: parts.iter().map(|p| p.mounting.name.clone()).collect(),
         touches: trunk.iter().filter(|h| matches!(&h.event, Event::Log(t) if t.starts_with('P'))).count(),
         moves: trunk.iter().filter(|h| matches!(h.event, Event::Move { .. } | Event::Probe { .. })).count(),
         stops: told.stops,
         setups: told.setups,
-        declined: told.runs.iter().filter(|t| t.declines() && t.from <= told.setups).map(|t| t.from).collect(),
-        branches: told.runs.iter().map(|t| t.branches.len()).sum(),
+        declined,
+        branches,
         seconds: seconds::seconds(trunk),
         findings,
         proof,
@@ -379,7 +394,7 @@ fn as_written(
     post: &Postprocessor,
     proof: &Proof,
     program: &runs::Program,
-    trunk: Option<&Vec<run::Happened>>,
+    trunk: &[run::Happened],
     source: &Source,
 ) -> Option<Finding> {
     const HELP: &str =
@@ -397,7 +412,7 @@ fn as_written(
         return other.map(|at| Finding::error("check::changed", says).help(HELP).at(source, at));
     }
     let same = proof::same_lines(written, proof);
-    let lines = trunk.into_iter().flatten().filter(|h| matches!(h.event, Event::Log(_)));
+    let lines = trunk.iter().filter(|h| matches!(h.event, Event::Log(_)));
     let places: Vec<_> = lines.map(|h| h.at.clone()).collect();
     let before = same.checked_sub(1).and_then(|i| places.get(i)).map_or(0, |at| at.end);
     let all_the_same = same == written.lines.len() && same == proof.lines.len();

@@ -14,14 +14,18 @@ use crate::program::plan::Proof;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 
-/// The proof of a program: its runs, and its statements ([`super::statements`]).
-pub fn proof<'a>(
-    runs: impl Iterator<Item = &'a Told>,
-    (statements_sha256, statements): (String, Vec<String>),
-) -> Proof {
-    let mut all = Sha256::new();
-    let mut lines = Vec::new();
-    for (n, told) in runs.enumerate() {
+/// The proof of a program: its runs one by one, and its statements ([`super::statements`]).
+#[derive(Default)]
+pub struct Proving {
+    all: Sha256,
+    lines: Vec<String>,
+    runs: usize,
+}
+
+impl Proving {
+    /// The next run; the first one is that of the whole program.
+    pub fn add(&mut self, told: &Told) {
+        let Self { all, lines, runs: n } = self;
         let mut text = String::new();
         // writing into a String cannot fail
         let _ = writeln!(text, "run {n} from {}", told.from);
@@ -31,7 +35,7 @@ pub fn proof<'a>(
                 write_branch(&mut text, branch);
             }
             write_event(&mut text, happened);
-            if n == 0 && matches!(happened.event, Event::Log(_)) {
+            if *n == 0 && matches!(happened.event, Event::Log(_)) {
                 lines.push(hex(&Sha256::digest(text.as_bytes()))[..8].to_owned());
                 all.update(text.as_bytes());
                 text.clear();
@@ -46,8 +50,13 @@ pub fn proof<'a>(
             told.fault.as_ref().map(|f| &f.says)
         );
         all.update(text.as_bytes());
+        *n += 1;
     }
-    Proof { sha256: hex(&all.finalize()), lines, statements_sha256, statements }
+
+    /// All runs were told.
+    pub fn finish(self, (statements_sha256, statements): (String, Vec<String>)) -> Proof {
+        Proof { sha256: hex(&self.all.finalize()), lines: self.lines, statements_sha256, statements }
+    }
 }
 
 /// The line of the log (from 0) up to which another program still does the same.

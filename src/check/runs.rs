@@ -20,6 +20,7 @@ use crate::program::plan::Plan;
 use crate::program::scene::Scene;
 use otherwise::otherwise;
 use rayon::prelude::*;
+use skewed::Begun;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -182,14 +183,23 @@ fn compared(condition: &Expr, var: &Var, found: &mut dyn FnMut(f64)) {
     }
 }
 
-/// All runs, and what they show together.
-pub struct All {
-    /// The first is that of the whole program.
-    pub runs: Vec<Told>,
-    /// Whole runs that find the control in other states.
-    pub others: Vec<Told>,
+/// What is known before the runs are made.
+pub struct Opening {
+    /// Where the rotary axes may stand when the program begins.
+    window: [[f64; 2]; 6],
+    /// Wherever the program consents to begin, its first moves are clear.
+    pub clear_from_anywhere: bool,
     /// The settings of a control as it is switched on.
     pub neutral: BTreeMap<String, String>,
+}
+
+/// What the runs show together. The whole program and its runs from each set-up are told one by one while they are made: a program of
+/// 250 set-ups has 250 of them, each of which is as long as what is left of it.
+pub struct All {
+    /// The run of the whole program.
+    pub whole: Told,
+    /// Whole runs that find the control in other states.
+    pub others: Vec<Told>,
     /// Runs that find the machine where the program must not begin.
     pub refused: Vec<Told>,
     /// What is wrong in the comparison of runs.
@@ -198,24 +208,42 @@ pub struct All {
     pub setups: u32,
     /// Stops of the whole program.
     pub stops: usize,
-    /// Wherever the program consents to begin, its first moves are clear.
-    pub clear_from_anywhere: bool,
 }
 
-/// Makes all runs.
-pub fn all(
-    machine: &Machine,
-    post: &Postprocessor,
-    plan: Option<&Plan>,
-    program: &Program,
-    world: &Arc<World>,
-    scenes: &[Scene<'_>],
-) -> All {
-    match program.dialect {
-        DialectName::Ngc => Runs::<ngc::Ngc>::new(machine, post, plan, program, world, scenes).all(),
-        DialectName::MacroB => Runs::<macro_b::MacroB>::new(machine, post, plan, program, world, scenes).all(),
-        DialectName::Klartext => Runs::<heidenhain::Heidenhain>::new(machine, post, plan, program, world, scenes).all(),
-        DialectName::Sinumerik => Runs::<sinumerik::Sinumerik>::new(machine, post, plan, program, world, scenes).all(),
+/// The machine and the program whose runs are made.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// The machine with the stylus of the first part.
+    pub machine: &'a Machine,
+    /// The control.
+    pub post: &'a Postprocessor,
+    /// The plan, where there is one.
+    pub plan: Option<&'a Plan>,
+    /// The program.
+    pub program: &'a Program,
+    /// Blocks and coordinates.
+    pub world: &'a Arc<World>,
+    /// Shapes of each part.
+    pub scenes: &'a [Scene<'a>],
+}
+
+/// What is known before the runs are made.
+pub fn opening(stage: Stage<'_>) -> Opening {
+    match stage.program.dialect {
+        DialectName::Ngc => Runs::<ngc::Ngc>::new(stage).opening(),
+        DialectName::MacroB => Runs::<macro_b::MacroB>::new(stage).opening(),
+        DialectName::Klartext => Runs::<heidenhain::Heidenhain>::new(stage).opening(),
+        DialectName::Sinumerik => Runs::<sinumerik::Sinumerik>::new(stage).opening(),
+    }
+}
+
+/// Makes all runs. `each` is told of the whole program, and of its run from each set-up in their order.
+pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(&Told)) -> All {
+    match stage.program.dialect {
+        DialectName::Ngc => Runs::<ngc::Ngc>::new(stage).all(opening, each),
+        DialectName::MacroB => Runs::<macro_b::MacroB>::new(stage).all(opening, each),
+        DialectName::Klartext => Runs::<heidenhain::Heidenhain>::new(stage).all(opening, each),
+        DialectName::Sinumerik => Runs::<sinumerik::Sinumerik>::new(stage).all(opening, each),
     }
 }
 
@@ -226,27 +254,28 @@ struct Runs<'a, D> {
     program: &'a Program,
     world: &'a Arc<World>,
     scenes: &'a [Scene<'a>],
-    codes: Vec<Code>,
+    /// The program from its beginning.
+    whole: Code,
+    /// The program told to do no more than give the settings back.
+    gives_back: Option<Code>,
     dialect: std::marker::PhantomData<fn() -> D>,
 }
 
 impl<'a, D: Dialect> Runs<'a, D> {
-    fn new(
-        machine: &'a Machine,
-        post: &'a Postprocessor,
-        plan: Option<&'a Plan>,
-        program: &'a Program,
-        world: &'a Arc<World>,
-        scenes: &'a [Scene<'a>],
-    ) -> Self {
-        // 1 … the last set-up, and one more that only gives the settings back
-        let last = if program.from.is_some() { program.setups + 1 } else { 1 };
-        let codes = (1..=last).map(|k| program.from(k)).collect();
-        Self { machine, post, plan, program, world, scenes, codes, dialect: std::marker::PhantomData }
+    fn new(Stage { machine, post, plan, program, world, scenes }: Stage<'a>) -> Self {
+        let gives_back = program.from.is_some().then(|| program.from(program.setups + 1));
+        let (whole, dialect) = (program.from(1), std::marker::PhantomData);
+        Self { machine, post, plan, program, world, scenes, whole, gives_back, dialect }
     }
 
-    fn all(&self) -> All {
+    fn opening(&self) -> Opening {
         let (window, clear_from_anywhere) = self.windows();
+        let neutral = D::begin(Start::Fresh, self.post, self.machine).settings();
+        Opening { window, clear_from_anywhere, neutral }
+    }
+
+    fn all(&self, opening: &Opening, each: &mut dyn FnMut(&Told)) -> All {
+        let window = opening.window;
         let beginning = self.start(&window, 0.5, 0.3);
         // a touch takes a dozen, with the guarded moves to it
         const PER_TOUCH: usize = 50;
@@ -258,43 +287,50 @@ impl<'a, D: Dialect> Runs<'a, D> {
             probes: usize::MAX,
             most_probes: 10_000 + PER_TOUCH * touches,
         };
-        let last = self.codes.len();
-        let lasting = D::lasting(self.tcp());
-        // the whole run, the same from elsewhere, and each set-up but the first
-        let numbers: Vec<(usize, Start, bool)> =
-            [(1, Start::Awkward, true), (1, Start::Fresh, false), (1, Start::Third, false)]
-                .into_iter()
-                .chain(lasting.iter().map(|what| (1, Start::Lasting(*what), false)))
-                .chain((2..=last).map(|k| (k, Start::Awkward, true)))
-                .collect();
         let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
-        let mut runs: Vec<Told> = numbers
-            .par_iter()
-            .map(|(k, start, forks)| {
-                let at = if *start == Start::Awkward { beginning } else { elsewhere };
-                self.told(*k, *start, at, forks.then_some(limits))
-            })
+        // the same from elsewhere
+        let starts: Vec<Start> = [Start::Fresh, Start::Third]
+            .into_iter()
+            .chain(D::lasting(self.tcp()).iter().map(|what| Start::Lasting(*what)))
             .collect();
+        let (whole, others) = rayon::join(
+            || self.told(1, Start::Awkward, beginning, Some(limits)),
+            || starts.par_iter().map(|start| self.told(1, *start, elsewhere, None)).collect::<Vec<Told>>(),
+        );
         let mut findings = Vec::new();
-        let others: Vec<Told> = runs.drain(1..(3 + lasting.len()).min(runs.len())).collect();
-        let stops = runs.first().map_or(0, |t| stops(&t.trunk));
-        if let Some(awkward) = runs.first() {
-            for other in &others {
-                findings.extend(otherwise(awkward, other).filter(|_| !stays(other)));
-            }
+        for other in &others {
+            findings.extend(otherwise(&whole, other).filter(|_| !stays(other)));
         }
-        findings.extend(runs.iter().filter_map(spindle::turns));
         let setting = |name: &str| self.post.settings.get(name).map_or("", String::as_str);
         let (on, off) = (setting("probe_on"), setting("probe_off"));
-        findings.extend(runs.iter().filter_map(|run| spindle::searches_dead(run, on, off)));
+        let (mut turns, mut dead) = (Vec::new(), Vec::new());
+        let (mut begun, mut faultless) = (Vec::new(), true);
+        let mut looked_at = |told: &Told| {
+            turns.extend(spindle::turns(told));
+            dead.extend(spindle::searches_dead(told, on, off));
+            begun.push(Begun::of(told));
+            faultless &= told.fault.is_none();
+            each(told);
+        };
+        looked_at(&whole);
+        // 2 … the last set-up, and one more that only gives the settings back; as many at once as there are threads
+        let last = if self.program.from.is_some() { self.program.setups as usize + 1 } else { 1 };
+        let numbers: Vec<usize> = (2..=last).collect();
+        for some in numbers.chunks(rayon::current_num_threads().max(1)) {
+            let made: Vec<Told> =
+                some.par_iter().map(|k| self.told(*k, Start::Awkward, beginning, Some(limits))).collect();
+            made.iter().for_each(&mut looked_at);
+        }
+        findings.extend(turns);
+        findings.extend(dead);
         findings.dedup();
-        if D::may_be_skewed(self.tcp()) && runs.iter().all(|run| run.fault.is_none()) {
-            findings.extend(self.skewed(elsewhere, &runs));
+        if D::may_be_skewed(self.tcp()) && faultless {
+            findings.extend(self.skewed(elsewhere, &begun));
         }
         let refused = self.refused(beginning);
         findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));
-        let neutral = D::begin(Start::Fresh, self.post, self.machine).settings();
-        All { runs, others, neutral, refused, findings, setups: self.program.setups, stops, clear_from_anywhere }
+        let stops = stops(&whole.trunk);
+        All { whole, others, refused, findings, setups: self.program.setups, stops }
     }
 
     /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And those in
@@ -376,9 +412,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
 
     fn told(&self, k: usize, start: Start, at: Position, limits: Option<Limits>) -> Told {
         let from = k as u32;
-        let empty = Code::default();
-        let code = self.codes.get(k - 1).unwrap_or(&empty);
-        let gives_back = self.codes.last().filter(|_| self.codes.len() > 1);
+        let later = (k > 1).then(|| self.program.from(from));
+        let code = later.as_ref().unwrap_or(&self.whole);
+        let gives_back = self.gives_back.as_ref();
         let restart = |run: &Run<'_, D>| {
             let dialect = run.dialect.after_abort()?;
             let mut again = self.run(gives_back?, start, run.vm.at, run.vm.part, false);
@@ -445,7 +481,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         if clear(&window) && !self.tcp() {
             return (window, true);
         }
-        let Some(code) = self.codes.first() else { return (window, false) };
+        let code = &self.whole;
         // other axes stand where the program may want them: at the first angle at which it moves at all
         let rotary: Vec<AxisName> = self.machine.rotary().map(|a| a.name).collect();
         let steps = |[low, high]: [f64; 2]| {

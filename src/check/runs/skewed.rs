@@ -8,19 +8,32 @@ use crate::check::skew::Turn;
 use rayon::prelude::*;
 use std::ops::Range;
 
+const FIRST_MOVES: usize = 6;
+
+/// The beginning of a run.
+pub(super) struct Begun {
+    from: u32,
+    /// Where its first moves lead.
+    places: Vec<Position>,
+}
+
+impl Begun {
+    pub(super) fn of(told: &Told) -> Self {
+        let leads = |h: &Happened| if let Event::Move { to, .. } = &h.event { Some(*to) } else { None };
+        Self { from: told.from, places: told.trunk.iter().filter_map(leads).take(FIRST_MOVES).collect() }
+    }
+}
+
 impl<D: Dialect> Runs<'_, D> {
     /// Something turns the coordinates that no variable shows: begun elsewhere, and from where its own first moves lead, as one that is
     /// simply started again.
-    pub(super) fn skewed(&self, elsewhere: Position, runs: &[Told]) -> Option<(Range<usize>, String)> {
-        const FIRST_MOVES: usize = 6;
+    pub(super) fn skewed(&self, elsewhere: Position, runs: &[Begun]) -> Option<(Range<usize>, String)> {
         let turns = Turn::all();
-        let of = |(run, told): (usize, &Told)| {
-            let leads = |h: &Happened| if let Event::Move { to, .. } = &h.event { Some(*to) } else { None };
-            let places: Vec<Position> =
-                told.trunk.iter().filter_map(leads).take(FIRST_MOVES).chain([elsewhere]).collect();
+        let of = |(run, begun): (usize, &Begun)| {
+            let places: Vec<Position> = begun.places.iter().copied().chain([elsewhere]).collect();
             // a set-up with one turn, the next with the next; the whole with all
             let some = if run == 0 { turns.clone() } else { vec![turns[run % turns.len()]] };
-            let from = told.from as usize;
+            let from = begun.from as usize;
             let begins = some.into_iter().flat_map(move |turn| places.clone().into_iter().map(move |at| (turn, at)));
             begins.map(move |(turn, at)| (from, turn, at))
         };
