@@ -3,10 +3,13 @@
 
 use crate::fit::Fit;
 use crate::fit::whitening::Whitening;
+use crate::search::generic::Rows;
 use crate::search::held_out::Colours;
 use crate::search::{Basis, PureError, Question};
+use crate::units::mm_from_um;
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// The regression that all tests share.
 #[derive(Debug, Clone)]
@@ -26,9 +29,51 @@ pub struct Evidence {
     /// Scatter of index visits that the tests allow for, mm.
     pub tau_mm: f64,
     /// What makes rows of columns of gaps.
+    pub(super) rows: Arc<WhiteRows>,
+}
+
+/// What makes rows of the regression of columns of gaps.
+#[derive(Debug)]
+pub(super) struct WhiteRows {
     whitening: Whitening,
+    /// Observations that are used, in their order: the first rows.
+    used: Vec<usize>,
     /// Rows of priors.
     n_priors: usize,
+}
+
+impl WhiteRows {
+    fn of_mm(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
+        self.whitening.apply(&mut columns_mm);
+        if self.used.len() == columns_mm.nrows() && self.n_priors == 0 {
+            return columns_mm;
+        }
+        let mut out = DMatrix::zeros(self.used.len() + self.n_priors, columns_mm.ncols());
+        for (mut to, from) in out.column_iter_mut().zip(columns_mm.column_iter()) {
+            for (value, &i) in to.iter_mut().zip(&self.used) {
+                *value = from[i];
+            }
+        }
+        out
+    }
+}
+
+impl Rows for WhiteRows {
+    fn count(&self) -> usize {
+        self.used.len() + self.n_priors
+    }
+
+    fn all(&self, mut columns_um: DMatrix<f64>) -> DMatrix<f64> {
+        columns_um.apply(|um| *um = mm_from_um(*um));
+        self.of_mm(columns_um)
+    }
+
+    fn some(&self, rows: &[usize], columns: usize, um: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        // rows of priors see nothing of an effect that is not in the model
+        let touches: Vec<usize> = rows.iter().filter_map(|&row| self.used.get(row).copied()).collect();
+        let white = self.whitening.some(&touches, columns, &|touch, column| mm_from_um(um(touch, column)));
+        if touches.len() == rows.len() { white } else { white.resize_vertically(rows.len(), 0.0) }
+    }
 }
 
 impl Evidence {
@@ -57,8 +102,11 @@ impl Evidence {
         Self {
             base: Basis::new(&jacobian),
             visits: used.iter().map(|&i| fit.data.visits[i]).collect(),
-            whitening: fit.whitening(tau_mm),
-            n_priors: linear.residual.len() - n,
+            rows: Arc::new(WhiteRows {
+                whitening: fit.whitening(tau_mm),
+                used: used.clone(),
+                n_priors: linear.residual.len() - n,
+            }),
             residual,
             jacobian,
             used,
@@ -111,18 +159,7 @@ impl Evidence {
 
     /// Columns of gaps (all observations × columns, mm) as rows of this regression.
     #[must_use]
-    pub fn whiten(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
-        self.whitening.apply(&mut columns_mm);
-        if self.used.len() == columns_mm.nrows() && self.n_priors == 0 {
-            return columns_mm;
-        }
-        let mut out = DMatrix::zeros(self.n_rows(), columns_mm.ncols());
-        for (mut to, from) in out.column_iter_mut().zip(columns_mm.column_iter()) {
-            for (value, &i) in to.iter_mut().zip(&self.used) {
-                *value = from[i];
-            }
-        }
-        debug_assert_eq!(self.n_priors + self.used.len(), self.n_rows());
-        out
+    pub fn whiten(&self, columns_mm: DMatrix<f64>) -> DMatrix<f64> {
+        self.rows.of_mm(columns_mm)
     }
 }

@@ -8,8 +8,9 @@ use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::slot;
 use crate::search::generic::{Direction, Features, Generics, Kind, Variable, generics};
-use crate::units::{mm_from_um, um_from_mm};
+use crate::units::um_from_mm;
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// The table of what is known: one entry per touch in the fit's order.
 #[must_use]
@@ -134,8 +135,8 @@ fn turns(fit: &Fit, machine: &Machine) -> Vec<Direction> {
 
 /// All generic shapes of a fit, whitened as its touches are.
 #[must_use]
-pub fn shapes(evidence: &Evidence, features: &Features) -> Generics {
-    generics(features, |raw_um| evidence.whiten(raw_um.map(mm_from_um)))
+pub fn shapes(evidence: &Evidence, features: &Arc<Features>) -> Generics {
+    generics(features, evidence.rows.clone())
 }
 
 /// In which frame a direction's name stands, for people.

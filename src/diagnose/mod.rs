@@ -44,6 +44,7 @@ pub use answer::{Diagnosis, Verdict};
 use evidence::Evidence;
 use nalgebra::DMatrix;
 use named::Named;
+use std::sync::Arc;
 pub use tell::NEVER as NEVER_PARTED;
 
 /// What is diagnosed.
@@ -210,7 +211,7 @@ fn borne_out_behind(groups: &mut [Group], search: &Search, visits: &[usize], nes
 /// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
 /// explain all of it: what drifts or jumps between two visits of one pose looks like scatter of the visits, and would
 /// widen the tests until they are blind to it. Scatter that nothing explains stays scatter.
-fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Features) -> Option<Evidence> {
+fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Features>) -> Option<Evidence> {
     const AT_MOST: usize = 4;
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
@@ -265,7 +266,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     if fit.n_used() == 0 {
         return Ok(nothing::used(subject, options));
     }
-    let features = features::features(fit, machine);
+    let features = Arc::new(features::features(fit, machine));
     let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
     let named = Named::of(fit, &evidence, machine, catalogue);
     let generics = features::shapes(&evidence, &features);
@@ -329,7 +330,7 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
 
 /// Does a fit still miss something, by the tests of the first step?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
-    let features = features::features(fit, machine);
+    let features = Arc::new(features::features(fit, machine));
     // as the diagnosis of that model would see it: what else acts may look like scatter of the visits
     let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
     let named = Named::of(fit, &evidence, machine, catalogue);

@@ -32,7 +32,7 @@ pub struct Sketch {
 /// # Errors
 /// When nothing significant is left, or what is left has no formula.
 pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> {
-    let features = features(subject.fit, subject.machine);
+    let features = std::sync::Arc::new(features(subject.fit, subject.machine));
     let evidence = super::calm(subject.fit, subject.machine, subject.catalogue, &features)
         .unwrap_or_else(|| Evidence::of(subject.fit));
     let generics = shapes(&evidence, &features);

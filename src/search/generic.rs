@@ -4,9 +4,11 @@
 //! order and of time by frequency, steps, kinks, exponentials, products of two variables, and groups that disagree:
 //! all as candidates of the same tests, a scan as the variants of one candidate.
 
-use super::library::{Library, Origin};
+use super::library::{Library, Origin, Variant};
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Highest order of a rotary axis that is looked for.
 pub const ORDERS: u32 = 12;
@@ -194,26 +196,89 @@ impl Generics {
     /// The candidates that do not depend on something.
     #[must_use]
     pub fn without(&self, depends_on: &str) -> Library {
-        let mut out = Library::new(self.library.n_rows());
-        for (candidate, shape) in self.library.candidates().iter().zip(&self.shapes) {
-            if shape.depends_on != depends_on {
-                let of =
-                    |v: &super::library::Variant| self.library.matrix().columns_range(v.columns.clone()).into_owned();
-                let variants = candidate.variants.iter().map(|v| (v.shape, of(v)));
-                out.push_scan(candidate.id.clone(), Origin::Generic, variants, candidate.n_scanned);
-                if candidate.expected {
-                    out.expect_last();
-                }
-            }
-        }
-        out
+        self.library.some(|c| self.shapes[c].depends_on != depends_on)
     }
 }
 
-/// All generic shapes of a table. `whiten` turns columns of gaps (touches × columns, µm) into whitened rows, prior rows
-/// (zeros) included.
+/// Numbers of a library up to which it lies in memory (120 MB).
+const MOST_KEPT: usize = 15_000_000;
+
+/// What makes rows of a regression of columns of gaps.
+pub trait Rows: Send + Sync {
+    /// Rows, those of priors (zeros) included.
+    fn count(&self) -> usize;
+
+    /// Whitened rows of columns (touches × columns, µm).
+    fn all(&self, columns_um: DMatrix<f64>) -> DMatrix<f64>;
+
+    /// Some of them. `um`: a touch's gap in a column.
+    fn some(&self, rows: &[usize], columns: usize, um: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64>;
+}
+
+/// All generic shapes of a table, as rows of a regression.
 #[must_use]
-pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f64>) -> Generics {
+pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
+    let planned = planned(features);
+    let n_columns = planned.iter().flat_map(|(_, s, _, _)| &s.functions).map(Vec::len).sum();
+    let made: Vec<(Arc<Shape>, Function)> = planned
+        .iter()
+        .flat_map(|(_, shape, _, _)| {
+            let own = Arc::new(Shape { functions: Vec::new(), ..shape.clone() });
+            shape.functions.iter().flatten().map(move |f| (own.clone(), f.clone()))
+        })
+        .collect();
+    let (n_rows, n) = (rows.count(), features.directions.first().map_or(0, |d| d.weight.len()));
+    let names: Vec<String> = features.directions.iter().map(|d| d.name.clone()).collect();
+    let features = features.clone();
+    let make = move |numbers: &[usize], at: Option<&[usize]>| -> DMatrix<f64> {
+        let um = |touch: usize, column: usize| {
+            let (shape, function) = &made[numbers[column]];
+            gap(&features, shape, function, touch)
+        };
+        match at {
+            None => rows.all(DMatrix::from_fn(n, numbers.len(), um)),
+            Some(at) => rows.some(at, numbers.len(), &um),
+        }
+    };
+    let mut library = if n_columns * n_rows > MOST_KEPT {
+        Library::made(n_rows, n_columns, Arc::new(make))
+    } else {
+        let numbers: Vec<usize> = (0..n_columns).collect();
+        let pieces: Vec<DMatrix<f64>> = numbers.par_chunks(64).map(|some| make(some, None)).collect();
+        let mut data = Vec::with_capacity(n_rows * n_columns);
+        pieces.iter().for_each(|piece| data.extend_from_slice(piece.as_slice()));
+        Library::kept(n_rows, data)
+    };
+    let (mut shapes, mut at) = (Vec::new(), 0);
+    for (id, shape, values, n_scanned) in planned {
+        let variant = |(functions, &value): (&Vec<Function>, &f64)| {
+            at += functions.len();
+            Variant { shape: value, columns: at - functions.len()..at }
+        };
+        let variants = shape.functions.iter().zip(&values).map(variant).collect();
+        let direction = shape.direction.map_or("any", |d| names[d].as_str());
+        library.place(format!("{id}:{direction}"), Origin::Generic, variants, n_scanned);
+        if shape.direction.is_none() {
+            library.expect_last();
+        }
+        shapes.push(shape);
+    }
+    Generics { library, shapes }
+}
+
+/// What a touch sees of one unit of a function, µm.
+fn gap(features: &Features, shape: &Shape, function: &Function, touch: usize) -> f64 {
+    if !shape.variables.iter().all(|&v| features.variables[v].acts_at(touch)) {
+        return 0.0;
+    }
+    match shape.direction.map_or(1.0, |d| features.directions[d].weight[touch]) {
+        0.0 => 0.0,
+        weight => weight * function.at_row(features, touch),
+    }
+}
+
+/// The shapes that are tried.
+fn planned(features: &Features) -> Vec<Planned> {
     let mut plan = Plan::default();
     for (d, direction) in features.directions.iter().enumerate() {
         let along_approach = direction.dof == "r";
@@ -228,44 +293,7 @@ pub fn generics(features: &Features, whiten: impl Fn(DMatrix<f64>) -> DMatrix<f6
         }
     }
     plan.of_groups(features);
-    let n = features.directions.first().map_or(0, |d| d.weight.len());
-    let n_columns = plan.shapes.iter().flat_map(|(_, s, _, _)| &s.functions).map(Vec::len).sum();
-    let mut raw = DMatrix::zeros(n, n_columns);
-    let mut columns = raw.column_iter_mut();
-    for (_, shape, _, _) in &plan.shapes {
-        let weight = shape.direction.map(|d| &features.directions[d].weight);
-        for function in shape.functions.iter().flatten() {
-            if let Some(mut column) = columns.next() {
-                for (i, value) in column.iter_mut().enumerate() {
-                    let acts = shape.variables.iter().all(|&v| features.variables[v].acts_at(i));
-                    let weight = if acts { weight.map_or(1.0, |w| w[i]) } else { 0.0 };
-                    *value = if weight == 0.0 { 0.0 } else { weight * function.at_row(features, i) };
-                }
-            }
-        }
-    }
-    let white = whiten(raw);
-    let mut out = Generics { library: Library::new(white.nrows()), shapes: Vec::new() };
-    let mut at = 0;
-    for (id, shape, values, n_scanned) in plan.shapes {
-        let variants: Vec<(f64, DMatrix<f64>)> = shape
-            .functions
-            .iter()
-            .zip(&values)
-            .map(|(functions, &value)| {
-                let part = white.columns(at, functions.len()).into_owned();
-                at += functions.len();
-                (value, part)
-            })
-            .collect();
-        let direction = shape.direction.map_or("any", |d| features.directions[d].name.as_str());
-        out.library.push_scan(format!("{id}:{direction}"), Origin::Generic, variants, n_scanned);
-        if shape.direction.is_none() {
-            out.library.expect_last();
-        }
-        out.shapes.push(shape);
-    }
-    out
+    plan.shapes
 }
 
 /// Id without the direction, shape, scanned values, number of scanned parameters.

@@ -156,18 +156,6 @@ struct Result {
     before: f64,
 }
 
-/// Columns of a library at some rows.
-fn at_rows(library: &Library, rows: &[usize]) -> DMatrix<f64> {
-    let all = library.matrix();
-    let mut out = DMatrix::zeros(rows.len(), all.ncols());
-    for (mut to, from) in out.column_iter_mut().zip(all.column_iter()) {
-        for (t, &i) in to.iter_mut().zip(rows) {
-            *t = from[i];
-        }
-    }
-    out
-}
-
 /// One group left out: the training set as whole less group, in the coordinates of the full basis.
 fn fold(
     question: Question,
@@ -181,7 +169,7 @@ fn fold(
     let p = base.rank();
     // p × group, group × columns, group
     let q_g = base.transposed().select_columns(rows);
-    let j_g = at_rows(library, rows);
+    let j_g = library.at_rows(rows);
     let r_g = DVector::from_iterator(rows.len(), rows.iter().map(|&i| residual[i]));
 
     // QᵀQ of the training set is the identity less the group's; its square root makes the basis orthonormal again

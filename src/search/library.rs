@@ -1,8 +1,10 @@
 //! Candidates and their columns, stacked so that one product serves all.
 
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
+use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
 const LEAST_TRACE: f64 = 1e-6;
@@ -59,11 +61,42 @@ pub struct Candidate {
     pub positive: Vec<usize>,
 }
 
+/// Makes whitened columns, by their numbers, at some rows (`None`: at all).
+pub type Make = Arc<dyn Fn(&[usize], Option<&[usize]>) -> DMatrix<f64> + Send + Sync>;
+
+/// Columns that are worked on at once.
+const CHUNK: usize = 64;
+
+/// Where columns are.
+#[derive(Clone)]
+enum Columns {
+    /// In memory, one after the other.
+    Kept(Vec<f64>),
+    /// Nowhere: made when they are needed. Those of which nothing is left but rounding are zero.
+    Made { make: Make, numbers: Vec<usize>, nothing: Vec<bool> },
+}
+
+impl std::fmt::Debug for Columns {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Kept(data) => write!(f, "Kept({} numbers)", data.len()),
+            Self::Made { numbers, .. } => write!(f, "Made({} columns)", numbers.len()),
+        }
+    }
+}
+
+/// Columns one after the other that are all kept or all made.
+#[derive(Debug, Clone)]
+struct Part {
+    span: Range<usize>,
+    columns: Columns,
+}
+
 /// Candidates with their columns: derivative of the whitened gap by each parameter in units of its typical size.
 #[derive(Debug, Clone, Default)]
 pub struct Library {
     n_rows: usize,
-    data: Vec<f64>,
+    parts: Vec<Part>,
     candidates: Vec<Candidate>,
 }
 
@@ -72,6 +105,41 @@ impl Library {
     #[must_use]
     pub fn new(n_rows: usize) -> Self {
         Self { n_rows, ..Self::default() }
+    }
+
+    /// A library of columns in memory that belong to no candidate yet ([`Library::place`]).
+    #[must_use]
+    pub fn kept(n_rows: usize, mut data: Vec<f64>) -> Self {
+        clear_rounding(&mut data, n_rows);
+        let count = data.len().checked_div(n_rows).unwrap_or(0);
+        let part = Part { span: 0..count, columns: Columns::Kept(data) };
+        Self { n_rows, parts: vec![part], candidates: Vec::new() }
+    }
+
+    /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
+    #[must_use]
+    pub fn made(n_rows: usize, count: usize, make: Make) -> Self {
+        let numbers: Vec<usize> = (0..count).collect();
+        let is_nothing = |column: DVectorView<'_, f64>| column.norm() < LEAST_TRACE;
+        let nothing = numbers
+            .par_chunks(CHUNK)
+            .flat_map_iter(|some| {
+                let columns = make(some, None);
+                let each: Vec<bool> = (0..some.len()).map(|i| is_nothing(columns.column(i))).collect();
+                each
+            })
+            .collect();
+        let part = Part { span: 0..count, columns: Columns::Made { make, numbers, nothing } };
+        Self { n_rows, parts: vec![part], candidates: Vec::new() }
+    }
+
+    /// A candidate whose columns are there already: the shape's value and which columns, for each variant.
+    pub fn place(&mut self, id: impl Into<String>, origin: Origin, variants: Vec<Variant>, n_scanned: usize) {
+        if variants.is_empty() {
+            return;
+        }
+        let (expected, positive) = (false, Vec::new());
+        self.candidates.push(Candidate { id: id.into(), origin, variants, n_scanned, expected, positive });
     }
 
     /// Adds a candidate without a scan. `columns`: N × q, whitened, scaled by typical size.
@@ -91,24 +159,27 @@ impl Library {
         let mut spans = Vec::new();
         for (shape, columns) in variants {
             let columns = columns.borrow();
-            if columns.nrows() != self.n_rows {
-                continue;
+            if columns.nrows() == self.n_rows {
+                spans.push(Variant { shape, columns: self.keep(columns) });
             }
-            let (first, from) = (self.n_columns(), self.data.len());
-            self.data.extend_from_slice(columns.as_slice());
-            clear_rounding(&mut self.data[from..], self.n_rows);
-            spans.push(Variant { shape, columns: first..first + columns.ncols() });
         }
-        if !spans.is_empty() {
-            self.candidates.push(Candidate {
-                id: id.into(),
-                origin,
-                variants: spans,
-                n_scanned,
-                expected: false,
-                positive: Vec::new(),
-            });
+        self.place(id, origin, spans, n_scanned);
+    }
+
+    /// Columns at the end, in memory.
+    fn keep(&mut self, columns: &DMatrix<f64>) -> Range<usize> {
+        let first = self.n_columns();
+        let span = first..first + columns.ncols();
+        if !matches!(self.parts.last(), Some(Part { columns: Columns::Kept(_), .. })) {
+            self.parts.push(Part { span: first..first, columns: Columns::Kept(Vec::new()) });
         }
+        if let Some(Part { span: all, columns: Columns::Kept(data) }) = self.parts.last_mut() {
+            let from = data.len();
+            data.extend_from_slice(columns.as_slice());
+            clear_rounding(&mut data[from..], self.n_rows);
+            all.end = span.end;
+        }
+        span
     }
 
     /// The last candidate is one of the few shapes that are looked for before all others.
@@ -131,10 +202,11 @@ impl Library {
             return;
         }
         let shift = self.n_columns();
-        self.data.extend_from_slice(&other.data);
+        let behind = |span: &Range<usize>| span.start + shift..span.end + shift;
+        self.parts.extend(other.parts.into_iter().map(|part| Part { span: behind(&part.span), ..part }));
         self.candidates.extend(other.candidates.into_iter().map(|mut c| {
             for v in &mut c.variants {
-                v.columns = v.columns.start + shift..v.columns.end + shift;
+                v.columns = behind(&v.columns);
             }
             c
         }));
@@ -161,13 +233,67 @@ impl Library {
     /// Columns of all candidates and variants.
     #[must_use]
     pub fn n_columns(&self) -> usize {
-        self.data.len().checked_div(self.n_rows).unwrap_or(0)
+        self.parts.last().map_or(0, |part| part.span.end)
     }
 
-    /// All columns.
+    /// All columns, as a copy.
     #[must_use]
-    pub fn matrix(&self) -> DMatrixView<'_, f64> {
-        DMatrixView::from_slice(&self.data, self.n_rows, self.n_columns())
+    pub fn matrix(&self) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.n_rows, self.n_columns());
+        for part in &self.parts {
+            self.with(part.span.clone(), |own| out.columns_mut(part.span.start, part.span.len()).copy_from(&own));
+        }
+        out
+    }
+
+    /// Columns of one part of the library as they are, or made.
+    pub(super) fn with<T>(&self, span: Range<usize>, work: impl FnOnce(DMatrixView<'_, f64>) -> T) -> T {
+        let part = self.parts.iter().find(|part| part.span.start <= span.start && span.end <= part.span.end);
+        match part.map(|part| (&part.columns, part.span.start)) {
+            Some((Columns::Kept(data), first)) => {
+                let (from, to) = ((span.start - first) * self.n_rows, (span.end - first) * self.n_rows);
+                work(DMatrixView::from_slice(&data[from..to], self.n_rows, span.len()))
+            }
+            Some((Columns::Made { make, numbers, nothing }, first)) => {
+                let own = span.start - first..span.end - first;
+                let columns = made(make, &numbers[own.clone()], &nothing[own], None);
+                work(columns.as_view())
+            }
+            None => work(DMatrix::zeros(self.n_rows, span.len()).as_view()),
+        }
+    }
+
+    /// All columns in pieces of some, each within one part, and no variant in two of them.
+    pub(super) fn chunks(&self) -> Vec<Range<usize>> {
+        let mut out: Vec<Range<usize>> = Vec::new();
+        let ends = |at: usize| self.parts.iter().any(|part| part.span.start == at);
+        for variant in self.candidates.iter().flat_map(|c| &c.variants) {
+            let span = &variant.columns;
+            match out.last_mut() {
+                Some(last) if last.end == span.start && last.len() < CHUNK && !ends(span.start) => last.end = span.end,
+                _ => out.push(span.clone()),
+            }
+        }
+        out
+    }
+
+    /// All columns at some rows.
+    pub(super) fn at_rows(&self, rows: &[usize]) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(rows.len(), self.n_columns());
+        for part in &self.parts {
+            let mut own = out.columns_mut(part.span.start, part.span.len());
+            match &part.columns {
+                Columns::Kept(data) => {
+                    for (mut to, from) in own.column_iter_mut().zip(data.chunks_exact(self.n_rows.max(1))) {
+                        for (t, &i) in to.iter_mut().zip(rows) {
+                            *t = from[i];
+                        }
+                    }
+                }
+                Columns::Made { make, numbers, nothing } => own.copy_from(&made(make, numbers, nothing, Some(rows))),
+            }
+        }
+        out
     }
 
     /// The same candidates with columns that were whitened otherwise, in the same order; `None` for a matrix of another shape.
@@ -176,31 +302,68 @@ impl Library {
         if columns.ncols() != self.n_columns() {
             return None;
         }
-        let mut data = Vec::from(columns.data);
-        let n_rows = data.len().checked_div(self.n_columns()).unwrap_or(0);
-        clear_rounding(&mut data, n_rows);
-        Some(Self { n_rows, data, candidates: self.candidates.clone() })
+        let n_rows = columns.nrows();
+        Some(Self { candidates: self.candidates.clone(), ..Self::kept(n_rows, Vec::from(columns.data)) })
     }
 
     /// A library of one of the candidates, with all its variants.
     #[must_use]
     pub fn only(&self, candidate: usize) -> Self {
-        let mut own = Self::new(self.n_rows);
-        let mut one = self.candidates[candidate].clone();
-        for variant in &mut one.variants {
-            let span = variant.columns.clone();
-            let first = own.n_columns();
-            own.data.extend_from_slice(&self.data[span.start * self.n_rows..span.end * self.n_rows]);
-            variant.columns = first..first + span.len();
+        self.some(|c| c == candidate)
+    }
+
+    /// A library of some of the candidates, by their index.
+    #[must_use]
+    pub fn some(&self, wanted: impl Fn(usize) -> bool) -> Self {
+        let mut out = Self::new(self.n_rows);
+        for (_, candidate) in self.candidates.iter().enumerate().filter(|(i, _)| wanted(*i)) {
+            let mut own = candidate.clone();
+            for variant in &mut own.variants {
+                variant.columns = out.take(self, &variant.columns);
+            }
+            out.candidates.push(own);
         }
-        own.candidates.push(one);
-        own
+        out
+    }
+
+    /// Columns of another library at the end of this one.
+    fn take(&mut self, other: &Self, span: &Range<usize>) -> Range<usize> {
+        let part = other.parts.iter().find(|part| part.span.start <= span.start && span.end <= part.span.end);
+        let Some(Part { span: all, columns: Columns::Made { make, numbers, nothing } }) = part else {
+            return other.with(span.clone(), |columns| self.keep(&columns.into_owned()));
+        };
+        let first = self.n_columns();
+        let (own, at) = (span.start - all.start..span.end - all.start, first..first + span.len());
+        match self.parts.last_mut() {
+            Some(Part { span, columns: Columns::Made { make: before, numbers: n, nothing: o } })
+                if Arc::ptr_eq(before, make) =>
+            {
+                n.extend_from_slice(&numbers[own.clone()]);
+                o.extend_from_slice(&nothing[own]);
+                span.end = at.end;
+            }
+            _ => {
+                let (numbers, nothing) = (numbers[own.clone()].to_vec(), nothing[own].to_vec());
+                let columns = Columns::Made { make: make.clone(), numbers, nothing };
+                self.parts.push(Part { span: at.clone(), columns });
+            }
+        }
+        at
     }
 
     /// Columns of one variant, N × q.
     #[must_use]
     pub fn columns(&self, candidate: usize, variant: usize) -> DMatrix<f64> {
         let span = self.candidates[candidate].variants[variant].columns.clone();
-        self.matrix().columns(span.start, span.len()).into_owned()
+        self.with(span, |columns| columns.into_owned())
     }
+}
+
+/// Made columns, those of rounding as nothing.
+fn made(make: &Make, numbers: &[usize], nothing: &[bool], rows: Option<&[usize]>) -> DMatrix<f64> {
+    let mut columns = make(numbers, rows);
+    for (mut column, _) in columns.column_iter_mut().zip(nothing).filter(|(_, nothing)| **nothing) {
+        column.fill(0.0);
+    }
+    columns
 }

@@ -7,14 +7,12 @@
 
 use super::basis::Basis;
 use super::library::Library;
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A direction of a candidate of which less than this share is left after projection leaves no trace.
 pub const KEPT: f64 = 1e-3;
-
-/// Columns that one thread multiplies at once.
-const CHUNK: usize = 64;
 
 /// Inner products of a regression and its candidates.
 #[derive(Debug, Clone)]
@@ -33,71 +31,51 @@ pub(super) struct Moments {
     pub blocks: Vec<DMatrix<f64>>,
 }
 
-/// `left` × `right`, chunks of columns in parallel.
-fn product(left: &DMatrix<f64>, library: &Library) -> DMatrix<f64> {
-    let (rows, n, m) = (left.nrows(), library.n_rows(), library.n_columns());
-    if rows == 0 || n == 0 || m == 0 {
-        return DMatrix::zeros(rows, m);
-    }
-    let j = library.matrix();
-    if rows * n * m < 1 << 18 {
-        return left * j;
-    }
-    let mut out = DMatrix::zeros(rows, m);
-    out.as_mut_slice().par_chunks_mut(rows * CHUNK).enumerate().for_each(|(i, part)| {
-        let count = part.len() / rows;
-        let product = left * j.columns(i * CHUNK, count);
-        part.copy_from_slice(product.as_slice());
-    });
-    out
-}
-
 impl Moments {
     /// Of a residual and a library over a base.
     pub fn new(residual: &DVector<f64>, base: &Basis, library: &Library) -> Self {
         let r = base.project(residual);
-        let j = library.matrix();
-        let jr = DVector::from_vec(
-            (0..j.ncols()).into_par_iter().with_min_len(CHUNK).map(|c| j.column(c).dot(&r)).collect(),
-        );
-        let spans: Vec<_> = library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone()).collect();
-        let blocks = spans
-            .par_iter()
-            .with_min_len(16)
-            .map(|span| {
-                let q = span.len();
-                let mut block = DMatrix::zeros(q, q);
-                for a in 0..q {
-                    let column: DVectorView<'_, f64> = j.column(span.start + a);
-                    for b in 0..=a {
-                        let dot = column.dot(&j.column(span.start + b));
-                        block[(a, b)] = dot;
-                        block[(b, a)] = dot;
-                    }
-                }
-                block
+        let variants: Vec<_> =
+            library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone()).collect();
+        let of = |span: Range<usize>| {
+            let from = variants.partition_point(|v| v.start < span.start);
+            let own = variants[from..].iter().take_while(|v| v.end <= span.end);
+            library.with(span.clone(), |j| {
+                let jr: Vec<f64> = j.column_iter().map(|column| column.dot(&r)).collect();
+                let qj = base.transposed() * j;
+                let blocks: Vec<DMatrix<f64>> = own.map(|v| block(j.columns(v.start - span.start, v.len()))).collect();
+                (jr, qj, blocks)
             })
-            .collect();
+        };
+        let pieces: Vec<_> = library.chunks().into_par_iter().map(of).collect();
+        let (mut jr, mut qj, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
+        for (own_jr, own_qj, own_blocks) in pieces {
+            jr.extend(own_jr);
+            qj.extend_from_slice(own_qj.as_slice());
+            blocks.extend(own_blocks);
+        }
+        let (p, columns) = (base.transposed().nrows(), jr.len());
         Self {
             n: residual.len(),
             p: base.rank(),
             rr: r.norm_squared(),
-            jr,
-            qj: product(base.transposed(), library),
+            jr: DVector::from_vec(jr),
+            qj: DMatrix::from_vec(p, columns, qj),
             blocks,
         }
     }
 
     /// MᵀJ for a matrix M of few columns that is already projected: columns of M × columns of the library.
     pub fn cross(projected: &DMatrix<f64>, library: &Library) -> DMatrix<f64> {
-        let (j, k) = (library.matrix(), projected.ncols());
-        let dots: Vec<f64> = (0..j.ncols())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .flat_map_iter(|c| (0..k).map(move |row| (row, c)))
-            .map(|(row, c)| projected.column(row).dot(&j.column(c)))
-            .collect();
-        DMatrix::from_vec(k, j.ncols(), dots)
+        let k = projected.ncols();
+        let dots = |span: Range<usize>| -> Vec<f64> {
+            library.with(span, |j| {
+                let each = j.column_iter().map(|column| (0..k).map(move |row| projected.column(row).dot(&column)));
+                each.flatten().collect()
+            })
+        };
+        let dots: Vec<f64> = library.chunks().into_par_iter().flat_map_iter(dots).collect();
+        DMatrix::from_vec(k, library.n_columns(), dots)
     }
 
     /// JᵀPJ of a variant in pieces: what its directions are and how much of them is left.
@@ -107,6 +85,20 @@ impl Moments {
         let w = self.qj.columns(first, q);
         Block::new(raw, &(raw - w.transpose() * w))
     }
+}
+
+/// JᵀJ of a few columns.
+fn block(j: DMatrixView<'_, f64>) -> DMatrix<f64> {
+    let q = j.ncols();
+    let mut block = DMatrix::zeros(q, q);
+    for a in 0..q {
+        for b in 0..=a {
+            let dot = j.column(a).dot(&j.column(b));
+            block[(a, b)] = dot;
+            block[(b, a)] = dot;
+        }
+    }
+    block
 }
 
 /// What is left of a candidate after projection: JᵀPJ = D⁻¹ V Λ Vᵀ D⁻¹ with D⁻¹ the columns' norms.

@@ -1,7 +1,7 @@
 //! Generic shapes on a small plan: which variable is named, how often clean data are suspected, and how long it takes.
 
 use super::dependence::{Dependence, dependences, serial};
-use super::generic::{Direction, Features, Generics, Kind, Variable, generics};
+use super::generic::{Direction, Features, Generics, Kind, Rows, Variable, generics};
 use super::testing::{noise, rng};
 use super::tests::{ask, correlated_library};
 use super::*;
@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// A small plan: nine angles of C, six of B in changing order, two blocks, five faces each touched twice; 2.2 h.
 fn table_of_touches(rng: &mut ChaCha8Rng) -> Features {
@@ -68,6 +69,27 @@ fn location_base(f: &Features) -> Basis {
     Basis::new(&DMatrix::from_columns(&columns))
 }
 
+/// Rows of touches as they are.
+struct Plain(usize);
+
+impl Rows for Plain {
+    fn count(&self) -> usize {
+        self.0
+    }
+
+    fn all(&self, columns_um: DMatrix<f64>) -> DMatrix<f64> {
+        columns_um
+    }
+
+    fn some(&self, rows: &[usize], columns: usize, um: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), columns, |i, j| um(rows[i], j))
+    }
+}
+
+fn of(f: &Features) -> Generics {
+    generics(&Arc::new(f.clone()), Arc::new(Plain(f.block.len())))
+}
+
 fn found(f: &Features, g: &Generics, base: &Basis, r: &DVector<f64>) -> Vec<Dependence> {
     dependences(ask(r, base), f, g)
 }
@@ -77,7 +99,7 @@ fn shapes_of_no_catalogue_are_named_by_their_variable() {
     let mut rng = rng(20);
     let f = table_of_touches(&mut rng);
     let base = location_base(&f);
-    let g = generics(&f, |raw| raw);
+    let g = of(&f);
     let n = f.block.len();
     let values = |v: usize| &f.variables[v].values;
     type Effect<'a> = (&'a str, Box<dyn Fn(usize) -> f64 + 'a>);
@@ -135,7 +157,7 @@ fn named_effects_and_shapes_share_one_level() {
     let base = location_base(&f);
     let n = f.block.len();
     let mut library = correlated_library(&mut rng, n, 60);
-    library.append(generics(&f, |raw| raw).library);
+    library.append(of(&f).library);
     let runs = std::env::var("RUNS").map_or(250, |r| r.parse().unwrap());
     let (mut any, mut generic) = (0, 0);
     for _ in 0..runs {
