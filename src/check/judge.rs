@@ -7,6 +7,7 @@ mod faces;
 mod proofs;
 
 use super::branches::{branch_stops, last_line};
+use super::doubt::Doubt;
 use super::explore::Told;
 use super::run::{Event, Happened, Rate};
 use super::settings::settings_return;
@@ -63,6 +64,8 @@ pub struct Said {
     findings: Vec<Finding>,
     seen: BTreeSet<(&'static str, usize, String)>,
     count: BTreeMap<&'static str, usize>,
+    /// In which run it happens, where that is none of the usual ones.
+    when: Option<String>,
 }
 
 impl Said {
@@ -71,6 +74,7 @@ impl Said {
         if !self.seen.insert((code, at.start, message.clone())) {
             return;
         }
+        let message = self.when.as_ref().map_or(message.clone(), |when| format!("{when}: {message}"));
         let count = self.count.entry(code).or_default();
         *count += 1;
         if *count <= SHOWN {
@@ -90,9 +94,10 @@ impl Said {
 }
 
 /// Judges all runs. The first one is the whole program; of the others only what they leave to the user.
-pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told]) -> Vec<Finding> {
+pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told], doubted: &[Told]) -> Vec<Finding> {
     let mut said = Said::default();
     let mut proofs: BTreeMap<Key, Proof> = BTreeMap::new();
+    let mut proven: BTreeSet<Key> = BTreeSet::new();
     for told in runs {
         let mut walk = Walk::new(case, told, &mut said, &mut proofs);
         walk.trunk();
@@ -105,13 +110,50 @@ pub fn judge(case: &Case<'_>, runs: &[Told], others: &[Told]) -> Vec<Finding> {
         settings_return(case, told, &mut said);
     }
     others.iter().for_each(|told| settings_return(case, told, &mut said));
-    let proofs: Vec<(Key, Proof)> = proofs.into_iter().collect();
+    prove_moves(case, proofs, &mut proven, &mut said);
+    for told in doubted {
+        judge_doubted(case, told, &mut proven, &mut said);
+    }
+    said.finish()
+}
+
+/// Proves moves that have not been proven yet.
+fn prove_moves(case: &Case<'_>, proofs: BTreeMap<Key, Proof>, proven: &mut BTreeSet<Key>, said: &mut Said) {
+    let proofs: Vec<(Key, Proof)> = proofs.into_iter().filter(|(key, _)| proven.insert(*key)).collect();
     let hits: Vec<(Range<usize>, &'static str, String)> =
         proofs.par_iter().filter_map(|(_, proof)| proof.check(case)).collect();
     for (at, code, message) in hits {
         said.say(case, code, &at, message, "");
     }
-    said.finish()
+}
+
+/// A run that takes the other way at a condition on an unknown value: its moves must be clear as well, and it must stop where something
+/// goes wrong. It may stop by itself.
+fn judge_doubted(case: &Case<'_>, told: &Told, proven: &mut BTreeSet<Key>, said: &mut Said) {
+    said.when = Some(when(case, told));
+    let mut proofs = BTreeMap::new();
+    Walk::new(case, told, said, &mut proofs).trunk();
+    prove_moves(case, proofs, proven, said);
+    let last_line = last_line(told);
+    for branch in &told.branches {
+        branch_stops(case, told, last_line, branch, said);
+    }
+    // where a stored value is said to be another one than it is, the program gives that other one back
+    if told.otherwise.iter().all(|(_, doubt)| *doubt == Doubt::Outside) {
+        settings_return(case, told, said);
+    }
+    said.when = None;
+}
+
+/// In which run it is.
+fn when(case: &Case<'_>, told: &Told) -> String {
+    let line = |at: &Range<usize>| case.source.inner().get(..at.start).map_or(0, |text| text.matches('\n').count()) + 1;
+    let each = |(at, doubt): &(Range<usize>, Doubt)| format!("line {} (it depends on {})", line(at), doubt.says());
+    let conditions: Vec<String> = told.otherwise.iter().map(each).collect();
+    if conditions.is_empty() {
+        return "when the program is run a second time".to_owned();
+    }
+    format!("when the condition goes the other way in {}", conditions.join(" and in "))
 }
 
 // --------------------------------------------------------------------------------------------------------- trunk
@@ -183,7 +225,7 @@ impl<'a, 'b> Walk<'a, 'b> {
                 fault.says.clone(),
                 "the control would stop here, or do something that axiscal does not know",
             );
-        } else if stops_by_itself(told) && !told.declines() {
+        } else if self.said.when.is_none() && stops_by_itself(told) && !told.declines() {
             let texts = told.trunk.iter().rev().filter_map(|h| match &h.event {
                 Event::Abort(text) | Event::Message(text) | Event::Wait(text) if !text.is_empty() => {
                     Some(text.as_str())

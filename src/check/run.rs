@@ -3,7 +3,8 @@
 //! It stops at every move that a probe may end ([`Pause::Probe`]); whoever runs it decides how that move ends. So one
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
-use super::code::{Code, Piece, Statement, Values, Var, What, Word};
+use super::code::{Code, Expr, Piece, Statement, UnknownKind, Values, Var, What, Word, numbered};
+use super::doubt::{Doubt, Doubts, Fork};
 use super::skew::Turn;
 use super::vm;
 use crate::axes::Position;
@@ -101,8 +102,12 @@ pub trait Dialect: Clone + Send + Sync {
         None
     }
     /// What axiscal does not know of a block, by name. Values that are computed are NaN.
-    fn unknown(&self, _words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+    fn unknown(&self, _words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         Vec::new()
+    }
+    /// A variable that switches an output of the machine when it is written.
+    fn is_output(&self, _var: &Var) -> bool {
+        false
     }
     /// A block of words with their values.
     ///
@@ -118,6 +123,18 @@ pub trait Dialect: Clone + Send + Sync {
     fn exists(&self, var: &Var) -> bool;
     /// Does this variable hold whether the probe is deflected?
     fn is_probe_input(&self, _var: &Var) -> bool {
+        false
+    }
+    /// Why a proof cannot know what a variable of the control holds; `None`: it can.
+    fn doubt(&self, _var: &Var, _vm: &Vm) -> Option<Doubt> {
+        None
+    }
+    /// A variable that does not exist here may be left at the control by another program.
+    fn may_exist(&self, _var: &Var) -> bool {
+        false
+    }
+    /// Each subroutine has a variable of this name of its own.
+    fn is_local(&self, _var: &Var) -> bool {
         false
     }
     /// A variable is written.
@@ -210,8 +227,8 @@ const MOST_STATEMENTS: u64 = 3_000_000;
 /// A program on its way.
 #[derive(Debug, Clone)]
 pub struct Run<'p, D> {
-    code: &'p Code,
-    next: usize,
+    pub(super) code: &'p Code,
+    pub(super) next: usize,
     returns: Vec<usize>,
     done: u64,
     pending: Option<Probe>,
@@ -225,6 +242,9 @@ pub struct Run<'p, D> {
     /// Runs in which there is trouble at a statement are kept: place in the record, what, and the run at that statement.
     pub keeps_forks: bool,
     forks: Vec<(usize, Trouble, Self)>,
+    /// What of its values is not known.
+    pub doubts: Doubts,
+    pub(super) doubted: Vec<Fork<'p, D>>,
     /// The axes and the record.
     pub vm: Vm,
     /// The language.
@@ -247,9 +267,21 @@ impl<'p, D: Dialect> Run<'p, D> {
             log_is_full: false,
             keeps_forks: false,
             forks: Vec::new(),
+            doubts: Doubts::default(),
+            doubted: Vec::new(),
             vm,
             dialect,
         }
+    }
+
+    /// Takes the runs that went the other way at a condition whose values are not known.
+    pub fn take_doubted(&mut self) -> Vec<Fork<'p, D>> {
+        std::mem::take(&mut self.doubted)
+    }
+
+    /// How deep in subroutines it is.
+    pub(super) fn depth(&self) -> usize {
+        self.returns.len()
     }
 
     /// Takes the runs in which there is trouble.
@@ -257,14 +289,34 @@ impl<'p, D: Dialect> Run<'p, D> {
         std::mem::take(&mut self.forks)
     }
 
+    /// The run as it stands, without what has happened and the runs that it has kept.
+    pub(super) fn without_record(&self) -> Self {
+        Self {
+            code: self.code,
+            next: self.next,
+            returns: self.returns.clone(),
+            done: self.done,
+            pending: self.pending.clone(),
+            over: self.over,
+            texts: self.texts.clone(),
+            deleted: self.deleted.clone(),
+            writes_to: self.writes_to.clone(),
+            log_is_full: self.log_is_full,
+            keeps_forks: false,
+            forks: Vec::new(),
+            doubts: self.doubts.clone(),
+            doubted: Vec::new(),
+            vm: self.vm.without_record(),
+            dialect: self.dialect.clone(),
+        }
+    }
+
     /// Keeps the run that comes to this statement again with trouble.
     fn fork(&mut self, trouble: Trouble) {
         if !self.keeps_forks {
             return;
         }
-        let (trace, forks) = (std::mem::take(&mut self.vm.trace), std::mem::take(&mut self.forks));
-        let mut fork = self.clone();
-        (self.vm.trace, self.forks) = (trace, forks);
+        let mut fork = self.without_record();
         (fork.keeps_forks, fork.next) = (false, fork.next - 1);
         match trouble {
             Trouble::LogFull => fork.log_is_full = true,
@@ -339,7 +391,7 @@ impl<'p, D: Dialect> Run<'p, D> {
         self.over
     }
 
-    fn value(&self, expr: &super::code::Expr) -> Result<f64, String> {
+    fn value(&self, expr: &Expr) -> Result<f64, String> {
         expr.value(&|var| self.dialect.read(var, &self.vm), &|var| self.dialect.exists(var))
     }
 
@@ -359,9 +411,15 @@ impl<'p, D: Dialect> Run<'p, D> {
         Ok(out)
     }
 
-    fn statement(&mut self, statement: &Statement) -> Result<Option<Probe>, String> {
+    /// The variable whose number an expression computes.
+    pub(super) fn variable(&self, number: &Expr) -> Result<Var, String> {
+        numbered(self.value(number)?)
+    }
+
+    pub(super) fn statement(&mut self, statement: &Statement) -> Result<Option<Probe>, String> {
         match &statement.what {
             What::Block(words) => {
+                self.refuse_outside(words)?;
                 let spoken = self.spoken(words)?;
                 match self.dialect.block(&spoken, &mut self.vm)? {
                     Next::On => {}
@@ -370,12 +428,15 @@ impl<'p, D: Dialect> Run<'p, D> {
                 }
             }
             What::Set(var, expr) => {
-                let value = self.value(expr)?;
+                let (value, doubt) = (self.value(expr)?, self.doubt(expr));
                 self.dialect.write(var, value, &self.vm)?;
+                self.given(var, doubt);
             }
             What::SetIndirect(number, expr) => {
-                let (number, value) = (self.value(number)?, self.value(expr)?);
-                self.dialect.write(&super::code::numbered(number)?, value, &self.vm)?;
+                let (var, value) = (self.variable(number)?, self.value(expr)?);
+                let doubt = self.doubt(number).max(self.doubt(expr));
+                self.dialect.write(&var, value, &self.vm)?;
+                self.given(&var, doubt);
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
@@ -383,7 +444,11 @@ impl<'p, D: Dialect> Run<'p, D> {
                     self.fork(Trouble::Deflected);
                     self.vm.asked = true;
                 }
-                if self.value(condition)? == 0.0 {
+                let holds = self.value(condition)? != 0.0;
+                if let Some(doubt) = self.doubt(condition) {
+                    self.in_doubt(doubt, holds, *to);
+                }
+                if !holds {
                     self.next = *to;
                 }
             }
@@ -396,10 +461,12 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.next = *to;
                 self.dialect.entered();
             }
-            What::Return(value) => {
-                let value = value.as_ref().map(|v| self.value(v)).transpose()?;
+            What::Return(expr) => {
+                let value = expr.as_ref().map(|v| self.value(v)).transpose()?;
+                let doubt = expr.as_ref().and_then(|v| self.doubt(v));
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
                 self.dialect.left(value, &self.vm);
+                self.given(&Var::Name("_value".into()), doubt);
             }
             What::Message(text) => self.say(text, Event::Message)?,
             What::Wait(text) => self.say(text, Event::Wait)?,
@@ -432,6 +499,17 @@ impl<'p, D: Dialect> Run<'p, D> {
             What::End => self.end(Event::End),
         }
         Ok(None)
+    }
+
+    /// What a block does must not depend on a clock or an input.
+    fn refuse_outside(&self, words: &[Word]) -> Result<(), String> {
+        match words.iter().find(|w| self.doubt(&w.value) == Some(Doubt::Outside)) {
+            Some(word) => Err(format!(
+                "the value of {} depends on a clock or an input: what the block does is not known",
+                word.address
+            )),
+            None => Ok(()),
+        }
     }
 
     fn log_write(&mut self, error: &Var, name: &[Piece], text: &[Piece]) -> Result<(), String> {

@@ -1,13 +1,16 @@
 //! Which runs of a program are made: from the beginning with the control in an awkward state and with everything that may
 //! happen, once more from elsewhere with the control fresh, and from each set-up.
 
+mod doubted;
+mod files;
 mod otherwise;
 mod skewed;
 mod spindle;
 
 use super::blind;
-use super::code::{Code, Expr, Unknown, Var, What, Word};
-use super::explore::{Limits, Told, explore};
+use super::code::{Code, Expr, Unknown, UnknownKind, Var, What, Word};
+use super::doubt::Taken;
+use super::explore::{Explored, Limits, Told, explore};
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Spoken, Start, Vm};
 use super::seconds::Clock;
 use super::world::World;
@@ -78,7 +81,7 @@ impl Program {
             DialectName::Klartext => self.unknown_words::<heidenhain::Heidenhain>(machine, post),
             DialectName::Sinumerik => self.unknown_words::<sinumerik::Sinumerik>(machine, post),
         };
-        let mut all = [self.code.unknown.clone(), words].concat();
+        let mut all = [self.code.unknown.clone(), words, files::others(&self.code)].concat();
         all.sort_by_key(|unknown| unknown.at.start);
         all
     }
@@ -97,9 +100,15 @@ impl Program {
             let spoken: Vec<Spoken> =
                 words.iter().map(|w| Spoken { address: w.address, value: value(w), point: w.point }).collect();
             let names = control.unknown(&spoken, post);
-            names.into_iter().map(|name| Unknown { at: at.clone(), name }).collect::<Vec<_>>()
+            names.into_iter().map(|(kind, name)| Unknown { at: at.clone(), name, kind }).collect::<Vec<_>>()
         });
-        unknown.collect()
+        let outputs = self.code.statements.iter().filter_map(|statement| match &statement.what {
+            What::Set(var, _) if control.is_output(var) => {
+                Some(Unknown { at: statement.at.clone(), name: var.to_string(), kind: UnknownKind::Output })
+            }
+            _ => None,
+        });
+        unknown.chain(outputs).collect()
     }
 
     /// Probing moves are programmed by direction and length.
@@ -192,6 +201,10 @@ pub struct All {
     pub neutral: BTreeMap<String, String>,
     /// Runs that find the machine where the program must not begin.
     pub refused: Vec<Told>,
+    /// Runs that take the other way at a condition on a value that is not known, and one with the control as the program has left it.
+    pub doubted: Vec<Told>,
+    /// The first condition whose other way was not run, where there are too many.
+    pub beyond: Option<Range<usize>>,
     /// What is wrong in the comparison of runs.
     pub findings: Vec<(Range<usize>, String)>,
     /// Set-ups at which it can begin.
@@ -268,33 +281,40 @@ impl<'a, D: Dialect> Runs<'a, D> {
                 .chain((2..=last).map(|k| (k, Start::Awkward, true)))
                 .collect();
         let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
-        let mut runs: Vec<Told> = numbers
+        let mut explored: Vec<Explored<'_, D>> = numbers
             .par_iter()
             .map(|(k, start, forks)| {
                 let at = if *start == Start::Awkward { beginning } else { elsewhere };
-                self.told(*k, *start, at, forks.then_some(limits))
+                self.explored(*k, *start, at, forks.then_some(limits))
             })
             .collect();
+        let begun = self.forks(&mut explored);
+        let again = explored.first().and_then(|whole| self.again(whole, beginning));
+        let mut runs: Vec<Told> = explored.into_iter().map(|e| e.told).collect();
         let mut findings = Vec::new();
         let others: Vec<Told> = runs.drain(1..(3 + lasting.len()).min(runs.len())).collect();
+        let refused = self.refused(beginning);
+        let taken = taken(runs.iter().chain(&others).chain(&refused).chain(&again));
+        let doubted::Doubted { runs: mut doubted, beyond } = self.doubted(begun, &taken, limits);
+        doubted.extend(again);
         let stops = runs.first().map_or(0, |t| stops(&t.trunk));
         if let Some(awkward) = runs.first() {
             for other in &others {
                 findings.extend(otherwise(awkward, other).filter(|_| !stays(other)));
             }
         }
-        findings.extend(runs.iter().filter_map(spindle::turns));
+        findings.extend(runs.iter().chain(&doubted).filter_map(spindle::turns));
         let setting = |name: &str| self.post.settings.get(name).map_or("", String::as_str);
         let (on, off) = (setting("probe_on"), setting("probe_off"));
-        findings.extend(runs.iter().filter_map(|run| spindle::searches_dead(run, on, off)));
+        findings.extend(runs.iter().chain(&doubted).filter_map(|run| spindle::searches_dead(run, on, off)));
         findings.dedup();
         if D::may_be_skewed(self.tcp()) && runs.iter().all(|run| run.fault.is_none()) {
             findings.extend(self.skewed(elsewhere, &runs));
         }
-        let refused = self.refused(beginning);
         findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));
         let neutral = D::begin(Start::Fresh, self.post, self.machine).settings();
-        All { runs, others, neutral, refused, findings, setups: self.program.setups, stops, clear_from_anywhere }
+        let setups = self.program.setups;
+        All { runs, others, neutral, refused, doubted, beyond, findings, setups, stops, clear_from_anywhere }
     }
 
     /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And those in
@@ -320,7 +340,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let told = |setup: u32| {
             let code = self.program.from(setup);
             let run = self.run(&code, Start::Awkward, beginning, 0, false);
-            Told { start: Start::Awkward, ..explore(run, setup, None, &|_| None) }
+            Told { start: Start::Awkward, ..explore(run, setup, None, &|_| None).told }
         };
         [0, self.program.setups + 2].map(told).into()
     }
@@ -375,9 +395,12 @@ impl<'a, D: Dialect> Runs<'a, D> {
     }
 
     fn told(&self, k: usize, start: Start, at: Position, limits: Option<Limits>) -> Told {
+        self.explored(k, start, at, limits).told
+    }
+
+    fn explored(&self, k: usize, start: Start, at: Position, limits: Option<Limits>) -> Explored<'_, D> {
         let from = k as u32;
-        let empty = Code::default();
-        let code = self.codes.get(k - 1).unwrap_or(&empty);
+        let code = self.codes.get(k - 1).unwrap_or(&self.program.code);
         let gives_back = self.codes.last().filter(|_| self.codes.len() > 1);
         let restart = |run: &Run<'_, D>| {
             let dialect = run.dialect.after_abort()?;
@@ -389,13 +412,15 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let part = if k == 1 || parts == 1 { 0 } else { self.part_of(code, from, start, at, parts) };
         let run = self.run(code, start, at, part, k > 1 && parts > 1);
         let probes = if k > 1 { Limits::PROBES_AFTER_RESTART } else { usize::MAX };
-        Told { start, ..explore(run, from, limits.map(|l| Limits { probes, ..l }), &restart) }
+        let mut explored = explore(run, from, limits.map(|l| Limits { probes, ..l }), &restart);
+        explored.told.start = start;
+        explored
     }
 
     /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.
     fn part_of(&self, code: &Code, from: u32, start: Start, at: Position, parts: usize) -> usize {
         let fits = |part: &usize| {
-            let told = explore(self.run(code, start, at, *part, true), from, None, &|_| None);
+            let told = explore(self.run(code, start, at, *part, true), from, None, &|_| None).told;
             let first = told.trunk.iter().find_map(|h| match &h.event {
                 Event::Log(text) if text.starts_with('P') => number_after_n(text),
                 _ => None,
@@ -504,6 +529,16 @@ impl<'a, D: Dialect> Runs<'a, D> {
         // the program is begun well inside of its window
         (window, is_clear)
     }
+}
+
+/// The ways that were taken at conditions on values that are not known, in all these runs.
+fn taken<'t>(runs: impl Iterator<Item = &'t Told>) -> Taken {
+    let mut all = Taken::new();
+    for (statement, [no, yes]) in runs.flat_map(|told| &told.taken) {
+        let ways = all.entry(*statement).or_default();
+        *ways = [ways[0] | no, ways[1] | yes];
+    }
+    all
 }
 
 /// It begins where it must not.
