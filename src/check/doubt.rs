@@ -36,8 +36,8 @@ pub struct Doubts {
     values: BTreeMap<(Var, usize), Doubt>,
     /// By statement: the condition did not hold in a run, it held in one.
     pub taken: Taken,
-    /// The other way of each condition is kept.
-    pub keeps_forks: bool,
+    /// The other ways of conditions with at least this doubt are kept.
+    pub keeps: Option<Doubt>,
     /// How many conditions this run has taken the other way.
     pub depth: usize,
 }
@@ -106,7 +106,8 @@ impl<D: Dialect> Run<'_, D> {
         let (statement, here) = (self.next - 1, self.next);
         self.doubts.taken.entry(statement).or_default()[usize::from(holds)] = true;
         let ways = if holds { [here, to] } else { [to, here] };
-        if !self.doubts.keeps_forks || self.doubted.len() >= MOST_FORKS || self.meet(ways) {
+        let kept = self.doubts.keeps.is_some_and(|least| doubt >= least);
+        if !kept || self.doubted.len() >= MOST_FORKS || self.meet(ways) {
             return;
         }
         let mut run = self.without_record();
@@ -139,7 +140,7 @@ impl<D: Dialect> Run<'_, D> {
     fn computes(&self, next: usize) -> Vec<Computed> {
         const MOST: usize = 40;
         let mut run = self.without_record();
-        run.doubts.keeps_forks = false;
+        run.doubts.keeps = None;
         run.next = next;
         let mut written = BTreeMap::new();
         let mut states = vec![Computed { next, written: BTreeMap::new() }];

@@ -166,7 +166,7 @@ pub fn explore_on<'p, D: Dialect>(
     restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
 ) -> Explored<'p, D> {
     run.keeps_forks = limits.is_some();
-    run.doubts.keeps_forks = limits.is_some();
+    run.doubts.keeps = limits.map(|_| Doubt::Stored);
     let mut forks = Vec::new();
     let mut probes = 0;
     loop {
@@ -320,6 +320,8 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
     let mut fault = None;
     let mut moves = 0;
     let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));
+    // stored values are others in each run that comes here; a clock may show anything
+    run.doubts.keeps = run.doubts.keeps.map(|_| Doubt::Outside);
     loop {
         let paused = run.on();
         for (_, trouble, fork) in run.take_forks() {
@@ -328,8 +330,7 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
             }
         }
         for fork in run.take_doubted() {
-            // what it finds at the control the runs themselves begin with; a clock has any value here too
-            if fork.doubt == Doubt::Outside && fork.run.doubts.depth <= DEEPEST {
+            if fork.run.doubts.depth <= DEEPEST {
                 branches.extend(until_it_stops(fork.run, deviation, leaves));
             }
         }

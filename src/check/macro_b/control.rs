@@ -502,7 +502,7 @@ impl Dialect for MacroB {
         let Var::Number(n) = var else { return None };
         let unmoved = |number: u32| self.axis(number).is_some_and(|axis| !vm.known[axis.index()]);
         match n {
-            1000..=1035 | 3001 | 3012 if !self.builder.is_probe_input(*n) => Some(Doubt::Outside),
+            1000..=1063 | 3001 | 3012 if !self.builder.is_probe_input(*n) => Some(Doubt::Outside),
             _ if self.builder.is_probe_input(*n) => None,
             2001..=2200 | 11_001..=11_999 | 4012 | 4014 | 4130 => Some(Doubt::Stored),
             5021..=5026 => unmoved(n - 5020).then_some(Doubt::Stored),
