@@ -269,7 +269,14 @@ fn what_is_not_known_is_not_called_wrong() {
         ("all at once", format!("{modes}G4 P1\nG5.1 X1 I2\nM62 P0\nM100\nG4 P2\nG92 X0\nM2\n"), 6),
     ] {
         let (code, json) = checked(&text, "linuxcnc");
-        assert_eq!((code, codes(&json)), (2, vec!["check::not_known"; unknown]), "{name}: {json}");
+        let beyond = ["check::output", "check::foreign_program"];
+        let mut found = codes(&json);
+        if name == "all at once" {
+            // an output and a program of the user's are named in their places, as what they are
+            assert!(beyond.iter().all(|c| found.contains(c)), "{json}");
+            found.iter_mut().filter(|c| beyond.contains(c)).for_each(|c| *c = "check::not_known");
+        }
+        assert_eq!((code, found), (2, vec!["check::not_known"; unknown]), "{name}: {json}");
         let lines: BTreeSet<i64> =
             json["findings"].as_array().unwrap().iter().map(|f| f["line"].as_i64().unwrap()).collect();
         assert!(lines.len() == unknown || name == "all at once", "{name}: {json}");

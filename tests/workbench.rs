@@ -324,6 +324,33 @@ fn rubbish_is_answered_and_changes_nothing() {
     }
 }
 
+/// Streams of events take some of the connections only: requests are answered, and a place that is given back can be taken.
+#[test]
+fn streams_of_events_leave_room_for_requests() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let stream = || {
+        let mut stream = TcpStream::connect(("127.0.0.1", w.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let head = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\nX-Axiscal-Token: {}\r\n\r\n", w.host(), w.token);
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut status = String::new();
+        BufReader::new(stream.try_clone().unwrap()).read_line(&mut status).unwrap();
+        (stream, status)
+    };
+    let mut open: Vec<(TcpStream, String)> = (0..24).map(|_| stream()).collect();
+    assert!(open.iter().all(|(_, status)| status.contains(" 200 ")), "{open:?}");
+    let refused = w.get("/api/events");
+    assert_eq!((refused.status, &refused.json()["error"]), (503, &"streams".into()));
+    assert_eq!(w.get("/api/state").status, 200);
+    open.pop();
+    let again = (0..100).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        stream().1.contains(" 200 ")
+    });
+    assert!(again, "the place of a stream that was closed");
+}
+
 #[test]
 fn two_tabs_do_not_corrupt_the_study() {
     let dir = folder();

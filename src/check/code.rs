@@ -219,12 +219,32 @@ pub struct Unknown {
     pub at: Range<usize>,
     /// As a person calls it: `G4`, `P with G64`, `o repeat`.
     pub name: String,
+    /// What of it is not known.
+    pub kind: UnknownKind,
+}
+
+/// What is not known of a word or a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UnknownKind {
+    /// Its meaning.
+    Meaning,
+    /// It calls another program: what that does.
+    Program,
+    /// It switches an output or writes to the PLC: what that moves.
+    Output,
+    /// It writes or deletes another file than the log of the program.
+    File,
 }
 
 impl Code {
     /// Notes what is not known.
     pub fn is_unknown(&mut self, at: Range<usize>, name: impl Into<String>) {
-        self.unknown.push(Unknown { at, name: name.into() });
+        self.is_unknown_of(UnknownKind::Meaning, at, name);
+    }
+
+    /// Notes what is not known, and what of it.
+    pub fn is_unknown_of(&mut self, kind: UnknownKind, at: Range<usize>, name: impl Into<String>) {
+        self.unknown.push(Unknown { at, name: name.into(), kind });
     }
 
     /// Adds a statement and gives its place.

@@ -4,9 +4,11 @@
 //! the way, contact at once, a block that stands off, a probe that does not close again, a search and a measuring touch
 //! that disagree, a person who breaks the program off. A branch is followed until the program ends or moves on.
 
+use super::doubt::{Doubt, Fork, MOST_FORKS, Taken};
 use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Start, Trouble, Vm};
 use super::world::way_mm;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What happens otherwise than it should.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +73,20 @@ pub struct Told {
     /// After a person broke it off and gave the settings back: those that were not given back, and where it was broken
     /// off (place in the trunk).
     pub aborted: Vec<(usize, BTreeMap<String, String>)>,
+    /// The conditions that depend on values that are not known, and the ways that it took there.
+    pub taken: Taken,
+    /// The conditions at which it took the other way than the values say, and what they depend on.
+    pub otherwise: Vec<(Range<usize>, Doubt)>,
+}
+
+/// A run that was made, and what can begin from it.
+pub struct Explored<'p, D> {
+    /// What happened.
+    pub told: Told,
+    /// Runs that take the other way at a condition that depends on a value that is not known.
+    pub forks: Vec<Fork<'p, D>>,
+    /// The control as it was left.
+    pub left: D,
 }
 
 /// A probing move that asks whether the probe is deflected is no longer than this, mm.
@@ -121,14 +137,13 @@ const MOVES_WHILE_STUCK: usize = 3;
 /// Runs a program that stands at its beginning. `restart` makes the run that gives the settings back after a person
 /// has broken the program off, where the dialect and the program can.
 pub fn explore<'p, D: Dialect>(
-    mut run: Run<'p, D>,
+    run: Run<'p, D>,
     from: u32,
     limits: Option<Limits>,
     restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
-) -> Told {
+) -> Explored<'p, D> {
     let before = run.dialect.settings();
-    run.keeps_forks = limits.is_some();
-    let mut told = Told {
+    let told = Told {
         from,
         start: Start::Fresh,
         trunk: Vec::new(),
@@ -137,7 +152,22 @@ pub fn explore<'p, D: Dialect>(
         fault: None,
         settings: [before, BTreeMap::new()],
         aborted: Vec::new(),
+        taken: Taken::new(),
+        otherwise: Vec::new(),
     };
+    explore_on(run, told, limits, restart)
+}
+
+/// Runs a program on from where it stands; `told`: what is known of it so far.
+pub fn explore_on<'p, D: Dialect>(
+    mut run: Run<'p, D>,
+    mut told: Told,
+    limits: Option<Limits>,
+    restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
+) -> Explored<'p, D> {
+    run.keeps_forks = limits.is_some();
+    run.doubts.keeps = limits.map(|_| Doubt::Stored);
+    let mut forks = Vec::new();
     let mut probes = 0;
     loop {
         let part_before = run.vm.part;
@@ -147,6 +177,8 @@ pub fn explore<'p, D: Dialect>(
         for (leaves, trouble, fork) in run.take_forks() {
             told.branches.extend(until_it_stops(fork, trouble.into(), leaves));
         }
+        let free = MOST_FORKS - forks.len().min(MOST_FORKS);
+        forks.extend(run.take_doubted().into_iter().take(free));
         match paused {
             Err(fault) => {
                 told.fault = Some(fault);
@@ -181,7 +213,8 @@ pub fn explore<'p, D: Dialect>(
     told.settings[1] = run.dialect.settings();
     note_parts(&mut told.parts, &run.vm, run.vm.part);
     told.trunk = run.vm.trace;
-    told
+    told.taken = run.doubts.taken;
+    Explored { told, forks, left: run.dialect }
 }
 
 fn note_parts(parts: &mut Vec<usize>, vm: &Vm, before: usize) {
@@ -278,17 +311,27 @@ impl From<Trouble> for Deviation {
     }
 }
 
+/// Conditions on a clock that are taken the other way, one behind the other, after something went wrong.
+const DEEPEST: usize = 2;
+
 /// Follows a run until it ends or moves on; the line with which it says what is wrong may be lost as well.
 fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves: usize) -> Vec<Branch> {
     let mut branches = Vec::new();
     let mut fault = None;
     let mut moves = 0;
     let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));
+    // stored values are others in each run that comes here; a clock may show anything
+    run.doubts.keeps = run.doubts.keeps.map(|_| Doubt::Outside);
     loop {
         let paused = run.on();
         for (_, trouble, fork) in run.take_forks() {
             if trouble == Trouble::LogFull && deviation.must_stop() {
                 branches.extend(until_it_stops(fork, Deviation::NotWritten, leaves));
+            }
+        }
+        for fork in run.take_doubted() {
+            if fork.run.doubts.depth <= DEEPEST {
+                branches.extend(until_it_stops(fork.run, deviation, leaves));
             }
         }
         match paused {

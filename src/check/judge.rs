@@ -7,6 +7,7 @@ mod faces;
 mod proofs;
 
 use super::branches::{branch_stops, last_line};
+use super::doubt::Doubt;
 use super::explore::Told;
 use super::run::{Event, Happened, Rate};
 use super::settings::settings_return;
@@ -63,6 +64,8 @@ pub struct Said {
     findings: Vec<Finding>,
     seen: BTreeSet<(&'static str, usize, String)>,
     count: BTreeMap<&'static str, usize>,
+    /// In which run it happens, where that is none of the usual ones.
+    when: Option<String>,
 }
 
 impl Said {
@@ -71,6 +74,7 @@ impl Said {
         if !self.seen.insert((code, at.start, message.clone())) {
             return;
         }
+        let message = self.when.as_ref().map_or(message.clone(), |when| format!("{when}: {message}"));
         let count = self.count.entry(code).or_default();
         *count += 1;
         if *count <= SHOWN {
@@ -93,13 +97,15 @@ impl Said {
 pub struct Judge<'a> {
     case: &'a Case<'a>,
     said: Said,
+    /// Moves that are to be proven, and those that were.
     proofs: BTreeMap<Key, Proof>,
+    proven: BTreeSet<Key>,
 }
 
 impl<'a> Judge<'a> {
     /// Nothing is judged yet.
     pub fn new(case: &'a Case<'a>) -> Self {
-        Self { case, said: Said::default(), proofs: BTreeMap::new() }
+        Self { case, said: Said::default(), proofs: BTreeMap::new(), proven: BTreeSet::new() }
     }
 
     /// The whole program, or its run from a set-up.
@@ -121,16 +127,52 @@ impl<'a> Judge<'a> {
         settings_return(self.case, told, &mut self.said);
     }
 
-    /// Proves the moves of all runs, and says what is wrong.
-    pub fn finish(mut self) -> Vec<Finding> {
-        let proofs: Vec<(Key, Proof)> = std::mem::take(&mut self.proofs).into_iter().collect();
+    /// A run that takes the other way at a condition on an unknown value: its moves must be clear as well, and it must stop where
+    /// something goes wrong. It may stop by itself.
+    pub fn doubted(&mut self, told: &Told) {
+        self.prove();
+        let case = self.case;
+        self.said.when = Some(when(case, told));
+        Walk::new(case, told, &mut self.said, &mut self.proofs).trunk();
+        self.prove();
+        let last_line = last_line(told);
+        for branch in &told.branches {
+            branch_stops(case, told, last_line, branch, &mut self.said);
+        }
+        // where a stored value is said to be another one than it is, the program gives that other one back
+        if told.otherwise.iter().all(|(_, doubt)| *doubt == Doubt::Outside) {
+            settings_return(case, told, &mut self.said);
+        }
+        self.said.when = None;
+    }
+
+    /// Proves moves that have not been proven yet.
+    fn prove(&mut self) {
+        let all = std::mem::take(&mut self.proofs);
+        let proofs: Vec<(Key, Proof)> = all.into_iter().filter(|(key, _)| self.proven.insert(*key)).collect();
         let hits: Vec<(Range<usize>, &'static str, String)> =
             proofs.par_iter().filter_map(|(_, proof)| proof.check(self.case)).collect();
         for (at, code, message) in hits {
             self.said.say(self.case, code, &at, message, "");
         }
+    }
+
+    /// What is wrong with the runs.
+    pub fn finish(mut self) -> Vec<Finding> {
+        self.prove();
         self.said.finish()
     }
+}
+
+/// In which run it is.
+fn when(case: &Case<'_>, told: &Told) -> String {
+    let line = |at: &Range<usize>| case.source.inner().get(..at.start).map_or(0, |text| text.matches('\n').count()) + 1;
+    let each = |(at, doubt): &(Range<usize>, Doubt)| format!("line {} (it depends on {})", line(at), doubt.says());
+    let conditions: Vec<String> = told.otherwise.iter().map(each).collect();
+    if conditions.is_empty() {
+        return "when the program is run a second time".to_owned();
+    }
+    format!("when the condition goes the other way in {}", conditions.join(" and in "))
 }
 
 // --------------------------------------------------------------------------------------------------------- trunk
@@ -202,7 +244,7 @@ impl<'a, 'b> Walk<'a, 'b> {
                 fault.says.clone(),
                 "the control would stop here, or do something that axiscal does not know",
             );
-        } else if stops_by_itself(told) && !told.declines() {
+        } else if self.said.when.is_none() && stops_by_itself(told) && !told.declines() {
             let texts = told.trunk.iter().rev().filter_map(|h| match &h.event {
                 Event::Abort(text) | Event::Message(text) | Event::Wait(text) if !text.is_empty() => {
                     Some(text.as_str())

@@ -12,6 +12,7 @@
 mod blind;
 mod branches;
 mod code;
+mod doubt;
 mod explore;
 mod heidenhain;
 mod judge;
@@ -37,9 +38,12 @@ use crate::program::plan::{ControllerFrame, Plan, Proof};
 use crate::program::scene::Scene;
 use crate::simulate::Errorless;
 use crate::units::Plain;
+use code::{Unknown, UnknownKind};
 use judge::{Case, Judge};
 use proof::Proving;
 use run::Event;
+use runs::Kind;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 use world::World;
 
@@ -77,8 +81,12 @@ pub struct Checked {
     pub declined: Vec<u32>,
     /// Ways on which something happens otherwise that were followed.
     pub branches: usize,
+    /// Runs that took the other way at conditions on values that a proof cannot know.
+    pub both_ways: usize,
     /// Run time without the stops, s.
     pub seconds: f64,
+    /// It was run: without that there are findings only.
+    pub ran: bool,
 }
 
 /// A part of a program: what is mounted, and the machine with its stylus.
@@ -93,48 +101,92 @@ struct Part {
 /// When the text is not of the dialect's grammar, or plan and machine do not belong together.
 pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
     let program = read(post, source, against.beside)?;
-    match against.plan {
+    let unknown = match against.plan {
         // what was edited comes first, and then what the control says to it
+        Some(_) => program.unknown_of_grammar().to_vec(),
+        None => program.unknown(machine, post),
+    };
+    let foreign = refuse_unknown(&unknown, source)?;
+    if !foreign.is_empty() {
+        return Ok(Checked::not_run(foreign));
+    }
+    match against.plan {
         Some(plan) => {
-            refuse_unknown(program.unknown_of_grammar(), source)?;
             let number = number(post, &program, source)?;
             let mut checked = with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?)?;
             checked.findings.extend(number);
             Ok(checked)
         }
-        None => {
-            refuse_unknown(&program.unknown(machine, post), source)?;
-            without_plan(machine, post, source, against, &program)
+        None => without_plan(machine, post, source, against, &program),
+    }
+}
+
+impl Checked {
+    /// A program that was read and not run.
+    fn not_run(findings: Vec<Finding>) -> Self {
+        Self {
+            findings,
+            proof: Proof::default(),
+            mountings: Vec::new(),
+            touches: 0,
+            moves: 0,
+            stops: 0,
+            setups: 0,
+            declined: Vec::new(),
+            branches: 0,
+            both_ways: 0,
+            seconds: 0.0,
+            ran: false,
         }
     }
 }
 
-/// Everything that is not known, each with its first place: a person corrects or rewrites the program once.
-fn refuse_unknown(unknown: &[code::Unknown], source: &Source) -> Result<()> {
+/// Everything that is not known, each with its first place: a person corrects or rewrites the program once. Where words are known and
+/// only what they reach is not (another program, an output, another file), these are the answer.
+fn refuse_unknown(unknown: &[Unknown], source: &Source) -> Result<Vec<Finding>> {
     const SHOWN: usize = 20;
-    const HELP: &str = "it may be right; whether it is safe cannot be said";
-    let mut counts: Vec<(&code::Unknown, usize)> = Vec::new();
+    let mut counts: Vec<(&Unknown, usize)> = Vec::new();
     for one in unknown {
-        match counts.iter_mut().find(|(first, _)| first.name == one.name) {
+        match counts.iter_mut().find(|(first, _)| first.name == one.name && first.kind == one.kind) {
             Some((_, count)) => *count += 1,
             None => counts.push((one, 1)),
         }
     }
-    if counts.is_empty() {
-        return Ok(());
-    }
-    let says = |(first, count): &(&code::Unknown, usize)| {
-        let times = if *count > 1 { format!(" (it stands {count} times)") } else { String::new() };
-        Finding::error("check::not_known", format!("{} is not known to axiscal{times}", first.name))
-            .help(HELP)
-            .at(source, first.at.clone())
-    };
-    let mut findings: Vec<Finding> = counts.iter().take(SHOWN).map(says).collect();
+    let mut findings: Vec<Finding> =
+        counts.iter().take(SHOWN).map(|(first, count)| of_unknown(first, *count, source)).collect();
     if counts.len() > SHOWN {
         let rest = format!("and {} more that are not known", counts.len() - SHOWN);
-        findings.push(Finding::error("check::not_known", rest).help(HELP));
+        findings.push(Finding::error("check::not_known", rest).help(NOT_KNOWN_HELP));
     }
-    Err(Failure(findings))
+    let is_meaning = |(first, _): &(&Unknown, usize)| first.kind == UnknownKind::Meaning;
+    if counts.iter().any(is_meaning) { Err(Failure(findings)) } else { Ok(findings) }
+}
+
+const NOT_KNOWN_HELP: &str = "it may be right; whether it is safe cannot be said";
+
+/// Something that is not known, at its first place, and how often it stands in the program.
+fn of_unknown(first: &Unknown, count: usize, source: &Source) -> Finding {
+    let times = if count > 1 { format!(" (it stands {count} times)") } else { String::new() };
+    let name = &first.name;
+    let (code, says, help) = match first.kind {
+        UnknownKind::Meaning => ("check::not_known", format!("{name} is not known to axiscal"), NOT_KNOWN_HELP),
+        UnknownKind::Program => (
+            "check::foreign_program",
+            format!("{name} calls another program: what it does cannot be proven"),
+            "take the call out, or have the postprocessor file describe it (probe_on, probe_off, [[check.call]])",
+        ),
+        UnknownKind::Output => (
+            "check::output",
+            format!("{name} switches an output of the machine: what it does cannot be proven"),
+            "take it out, or have the postprocessor file name it (probe_on, probe_off)",
+        ),
+        UnknownKind::File => (
+            "check::other_file",
+            format!("{name} is not the log of the program: it would be written or deleted"),
+            "write to one log only, and delete no other file",
+        ),
+    };
+    Finding::error(code, says + &times).help(help).at(source, first.at.clone())
 }
 
 /// Beside its plan, a program has the number that the settings gave it. Another one harms nothing, unless the program would call itself.
@@ -158,7 +210,8 @@ fn number(post: &Postprocessor, program: &runs::Program, source: &Source) -> Res
 /// # Errors
 /// The first place that is not of the grammar.
 pub fn grammar(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<()> {
-    read(post, source, beside).and_then(|program| refuse_unknown(program.unknown_of_grammar(), source))
+    let foreign = refuse_unknown(read(post, source, beside)?.unknown_of_grammar(), source)?;
+    if foreign.is_empty() { Ok(()) } else { Err(Failure(foreign)) }
 }
 
 fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<runs::Program> {
@@ -315,24 +368,31 @@ fn with_parts(
         neutral: &opening.neutral,
     };
     let (mut judge, mut proving) = (Judge::new(&case), Proving::default());
-    let (mut declined, mut branches) = (Vec::new(), 0);
-    let told = runs::all(stage, &opening, &mut |told| {
-        judge.run(told);
-        proving.add(told);
-        branches += told.branches.len();
-        if told.declines() && told.from <= program.setups() {
-            declined.push(told.from);
+    let (mut declined, mut branches, mut both_ways) = (Vec::new(), 0, 0);
+    let told = runs::all(stage, &opening, &mut |kind, told| match kind {
+        Kind::Begun => {
+            judge.run(told);
+            proving.add(told);
+            branches += told.branches.len();
+            if told.declines() && told.from <= program.setups() {
+                declined.push(told.from);
+            }
+        }
+        Kind::Other => {
+            judge.other(told);
+            proving.add(told);
+        }
+        Kind::Refused => proving.add(told),
+        Kind::Doubted => {
+            judge.doubted(told);
+            both_ways += usize::from(!told.otherwise.is_empty());
         }
     });
     if against.plan.is_none() {
         program.waits_for_a_mounting(&told.whole.trunk, source).map_or(Ok(()), Err)?;
     }
-    for other in &told.others {
-        judge.other(other);
-        proving.add(other);
-    }
-    told.refused.iter().for_each(|refused| proving.add(refused));
     let mut findings = judge.finish();
+    findings.extend(told.beyond.map(|at| too_many(source, at)));
     findings.extend(
         told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
     );
@@ -354,10 +414,20 @@ fn with_parts(
         setups: told.setups,
         declined,
         branches,
+        both_ways,
         seconds: seconds::seconds(trunk),
+        ran: true,
         findings,
         proof,
     })
+}
+
+/// The first condition on an unknown value whose other way was not run.
+fn too_many(source: &Source, at: Range<usize>) -> Finding {
+    let says = "too many conditions depend on a clock or on stored values of the control: from here on their other ways were not run";
+    Finding::error("check::too_many_branches", says)
+        .help("let fewer conditions depend on them; each is run both ways")
+        .at(source, at)
 }
 
 /// Does it begin where it is meant to?

@@ -3,7 +3,8 @@
 //! It stops at every move that a probe may end ([`Pause::Probe`]); whoever runs it decides how that move ends. So one
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
-use super::code::{Code, Piece, Statement, Values, Var, What, Word};
+use super::code::{Code, Expr, Piece, Statement, UnknownKind, Values, Var, What, Word, numbered};
+use super::doubt::{Doubt, Doubts, Fork};
 use super::skew::Turn;
 use super::vm;
 use crate::axes::Position;
@@ -11,6 +12,7 @@ use crate::machine::Machine;
 use crate::post::Postprocessor;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 pub use vm::{Alarm, Event, Happened, Outcome, Probe, Rate, SPINDLE_OFF, Vm};
 
@@ -101,8 +103,12 @@ pub trait Dialect: Clone + Send + Sync {
         None
     }
     /// What axiscal does not know of a block, by name. Values that are computed are NaN.
-    fn unknown(&self, _words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+    fn unknown(&self, _words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         Vec::new()
+    }
+    /// A variable that switches an output of the machine when it is written.
+    fn is_output(&self, _var: &Var) -> bool {
+        false
     }
     /// A block of words with their values.
     ///
@@ -118,6 +124,18 @@ pub trait Dialect: Clone + Send + Sync {
     fn exists(&self, var: &Var) -> bool;
     /// Does this variable hold whether the probe is deflected?
     fn is_probe_input(&self, _var: &Var) -> bool {
+        false
+    }
+    /// Why a proof cannot know what a variable of the control holds; `None`: it can.
+    fn doubt(&self, _var: &Var, _vm: &Vm) -> Option<Doubt> {
+        None
+    }
+    /// A variable that does not exist here may be left at the control by another program.
+    fn may_exist(&self, _var: &Var) -> bool {
+        false
+    }
+    /// Each subroutine has a variable of this name of its own.
+    fn is_local(&self, _var: &Var) -> bool {
         false
     }
     /// A variable is written.
@@ -210,8 +228,10 @@ const MOST_STATEMENTS: u64 = 3_000_000;
 /// A program on its way.
 #[derive(Debug, Clone)]
 pub struct Run<'p, D> {
-    code: &'p Code,
-    next: usize,
+    pub(super) code: &'p Code,
+    /// The statement that says at which set-up it begins stands in place of the program's.
+    pub begins: Option<(usize, Arc<Statement>)>,
+    pub(super) next: usize,
     returns: Vec<usize>,
     done: u64,
     pending: Option<Probe>,
@@ -225,6 +245,9 @@ pub struct Run<'p, D> {
     /// Runs in which there is trouble at a statement are kept: place in the record, what, and the run at that statement.
     pub keeps_forks: bool,
     forks: Vec<(usize, Trouble, Self)>,
+    /// What of its values is not known.
+    pub doubts: Doubts,
+    pub(super) doubted: Vec<Fork<'p, D>>,
     /// The axes and the record.
     pub vm: Vm,
     /// The language.
@@ -236,6 +259,7 @@ impl<'p, D: Dialect> Run<'p, D> {
     pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
         Self {
             code,
+            begins: None,
             next: 0,
             returns: Vec::new(),
             done: 0,
@@ -247,9 +271,21 @@ impl<'p, D: Dialect> Run<'p, D> {
             log_is_full: false,
             keeps_forks: false,
             forks: Vec::new(),
+            doubts: Doubts::default(),
+            doubted: Vec::new(),
             vm,
             dialect,
         }
+    }
+
+    /// Takes the runs that went the other way at a condition whose values are not known.
+    pub fn take_doubted(&mut self) -> Vec<Fork<'p, D>> {
+        std::mem::take(&mut self.doubted)
+    }
+
+    /// How deep in subroutines it is.
+    pub(super) fn depth(&self) -> usize {
+        self.returns.len()
     }
 
     /// Takes the runs in which there is trouble.
@@ -257,14 +293,35 @@ impl<'p, D: Dialect> Run<'p, D> {
         std::mem::take(&mut self.forks)
     }
 
+    /// The run as it stands, without what has happened and the runs that it has kept.
+    pub(super) fn without_record(&self) -> Self {
+        Self {
+            code: self.code,
+            begins: self.begins.clone(),
+            next: self.next,
+            returns: self.returns.clone(),
+            done: self.done,
+            pending: self.pending.clone(),
+            over: self.over,
+            texts: self.texts.clone(),
+            deleted: self.deleted.clone(),
+            writes_to: self.writes_to.clone(),
+            log_is_full: self.log_is_full,
+            keeps_forks: false,
+            forks: Vec::new(),
+            doubts: self.doubts.clone(),
+            doubted: Vec::new(),
+            vm: self.vm.without_record(),
+            dialect: self.dialect.clone(),
+        }
+    }
+
     /// Keeps the run that comes to this statement again with trouble.
     fn fork(&mut self, trouble: Trouble) {
         if !self.keeps_forks {
             return;
         }
-        let (trace, forks) = (std::mem::take(&mut self.vm.trace), std::mem::take(&mut self.forks));
-        let mut fork = self.clone();
-        (self.vm.trace, self.forks) = (trace, forks);
+        let mut fork = self.without_record();
         (fork.keeps_forks, fork.next) = (false, fork.next - 1);
         match trouble {
             Trouble::LogFull => fork.log_is_full = true,
@@ -274,6 +331,11 @@ impl<'p, D: Dialect> Run<'p, D> {
             }
         }
         self.forks.push((self.vm.trace.len(), trouble, fork));
+    }
+
+    /// The statement that stands here in place of the program's.
+    pub(super) fn own(&self) -> Option<Arc<Statement>> {
+        self.begins.as_ref().filter(|(at, _)| *at == self.next).map(|(_, own)| own.clone())
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -286,7 +348,8 @@ impl<'p, D: Dialect> Run<'p, D> {
         }
         while !self.over {
             let code = self.code;
-            let Some(statement) = code.statements.get(self.next) else {
+            let own = self.own();
+            let Some(statement) = own.as_deref().or_else(|| code.statements.get(self.next)) else {
                 let end = code.statements.last().map_or(0..0, |s| s.at.clone());
                 return Err(Fault { at: end, says: "the program has no end".to_owned() });
             };
@@ -339,7 +402,7 @@ impl<'p, D: Dialect> Run<'p, D> {
         self.over
     }
 
-    fn value(&self, expr: &super::code::Expr) -> Result<f64, String> {
+    fn value(&self, expr: &Expr) -> Result<f64, String> {
         expr.value(&|var| self.dialect.read(var, &self.vm), &|var| self.dialect.exists(var))
     }
 
@@ -359,9 +422,15 @@ impl<'p, D: Dialect> Run<'p, D> {
         Ok(out)
     }
 
-    fn statement(&mut self, statement: &Statement) -> Result<Option<Probe>, String> {
+    /// The variable whose number an expression computes.
+    pub(super) fn variable(&self, number: &Expr) -> Result<Var, String> {
+        numbered(self.value(number)?)
+    }
+
+    pub(super) fn statement(&mut self, statement: &Statement) -> Result<Option<Probe>, String> {
         match &statement.what {
             What::Block(words) => {
+                self.refuse_outside(words)?;
                 let spoken = self.spoken(words)?;
                 match self.dialect.block(&spoken, &mut self.vm)? {
                     Next::On => {}
@@ -370,12 +439,15 @@ impl<'p, D: Dialect> Run<'p, D> {
                 }
             }
             What::Set(var, expr) => {
-                let value = self.value(expr)?;
+                let (value, doubt) = (self.value(expr)?, self.doubt(expr));
                 self.dialect.write(var, value, &self.vm)?;
+                self.given(var, doubt);
             }
             What::SetIndirect(number, expr) => {
-                let (number, value) = (self.value(number)?, self.value(expr)?);
-                self.dialect.write(&super::code::numbered(number)?, value, &self.vm)?;
+                let (var, value) = (self.variable(number)?, self.value(expr)?);
+                let doubt = self.doubt(number).max(self.doubt(expr));
+                self.dialect.write(&var, value, &self.vm)?;
+                self.given(&var, doubt);
             }
             What::Jump(to) => self.next = *to,
             What::JumpUnless(condition, to) => {
@@ -383,7 +455,11 @@ impl<'p, D: Dialect> Run<'p, D> {
                     self.fork(Trouble::Deflected);
                     self.vm.asked = true;
                 }
-                if self.value(condition)? == 0.0 {
+                let holds = self.value(condition)? != 0.0;
+                if let Some(doubt) = self.doubt(condition) {
+                    self.in_doubt(doubt, holds, *to);
+                }
+                if !holds {
                     self.next = *to;
                 }
             }
@@ -396,10 +472,12 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.next = *to;
                 self.dialect.entered();
             }
-            What::Return(value) => {
-                let value = value.as_ref().map(|v| self.value(v)).transpose()?;
+            What::Return(expr) => {
+                let value = expr.as_ref().map(|v| self.value(v)).transpose()?;
+                let doubt = expr.as_ref().and_then(|v| self.doubt(v));
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
                 self.dialect.left(value, &self.vm);
+                self.given(&Var::Name("_value".into()), doubt);
             }
             What::Message(text) => self.say(text, Event::Message)?,
             What::Wait(text) => self.say(text, Event::Wait)?,
@@ -432,6 +510,17 @@ impl<'p, D: Dialect> Run<'p, D> {
             What::End => self.end(Event::End),
         }
         Ok(None)
+    }
+
+    /// What a block does must not depend on a clock or an input.
+    fn refuse_outside(&self, words: &[Word]) -> Result<(), String> {
+        match words.iter().find(|w| self.doubt(&w.value) == Some(Doubt::Outside)) {
+            Some(word) => Err(format!(
+                "the value of {} depends on a clock or an input: what the block does is not known",
+                word.address
+            )),
+            None => Ok(()),
+        }
     }
 
     fn log_write(&mut self, error: &Var, name: &[Piece], text: &[Piece]) -> Result<(), String> {

@@ -1,13 +1,16 @@
 //! Which runs of a program are made: from the beginning with the control in an awkward state and with everything that may
 //! happen, once more from elsewhere with the control fresh, and from each set-up.
 
+mod doubted;
+mod files;
 mod otherwise;
 mod skewed;
 mod spindle;
 
 use super::blind;
-use super::code::{Code, Expr, Unknown, Var, What, Word};
-use super::explore::{Limits, Told, explore};
+use super::code::{Code, Expr, Statement, Unknown, UnknownKind, Var, What, Word};
+use super::doubt::Taken;
+use super::explore::{Explored, Limits, Told, explore};
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Spoken, Start, Vm};
 use super::seconds::Clock;
 use super::world::World;
@@ -79,7 +82,7 @@ impl Program {
             DialectName::Klartext => self.unknown_words::<heidenhain::Heidenhain>(machine, post),
             DialectName::Sinumerik => self.unknown_words::<sinumerik::Sinumerik>(machine, post),
         };
-        let mut all = [self.code.unknown.clone(), words].concat();
+        let mut all = [self.code.unknown.clone(), words, files::others(&self.code)].concat();
         all.sort_by_key(|unknown| unknown.at.start);
         all
     }
@@ -98,9 +101,15 @@ impl Program {
             let spoken: Vec<Spoken> =
                 words.iter().map(|w| Spoken { address: w.address, value: value(w), point: w.point }).collect();
             let names = control.unknown(&spoken, post);
-            names.into_iter().map(|name| Unknown { at: at.clone(), name }).collect::<Vec<_>>()
+            names.into_iter().map(|(kind, name)| Unknown { at: at.clone(), name, kind }).collect::<Vec<_>>()
         });
-        unknown.collect()
+        let outputs = self.code.statements.iter().filter_map(|statement| match &statement.what {
+            What::Set(var, _) if control.is_output(var) => {
+                Some(Unknown { at: statement.at.clone(), name: var.to_string(), kind: UnknownKind::Output })
+            }
+            _ => None,
+        });
+        unknown.chain(outputs).collect()
     }
 
     /// Probing moves are programmed by direction and length.
@@ -151,6 +160,14 @@ impl Program {
         at.map_or(0..0, |s| s.at.clone())
     }
 
+    /// The statement that says at which set-up it begins, for another one.
+    fn begins(&self, setup: u32) -> Option<(usize, Arc<Statement>)> {
+        let (var, at) = self.from.as_ref()?;
+        let statement = self.code.statements.get(*at)?;
+        let what = What::Set(var.clone(), Expr::Number(f64::from(setup)));
+        Some((*at, Arc::new(Statement { what, at: statement.at.clone() })))
+    }
+
     /// The program told to begin at a set-up.
     fn from(&self, setup: u32) -> Code {
         let mut code = self.code.clone();
@@ -193,15 +210,26 @@ pub struct Opening {
     pub neutral: BTreeMap<String, String>,
 }
 
-/// What the runs show together. The whole program and its runs from each set-up are told one by one while they are made: a program of
-/// 250 set-ups has 250 of them, each of which is as long as what is left of it.
+/// What a run is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The whole program, or its run from a set-up.
+    Begun,
+    /// A whole run that finds the control in another state.
+    Other,
+    /// A run that finds the machine where the program must not begin.
+    Refused,
+    /// A run that takes the other way at a condition on a value that is not known, or finds the control as the program has left it.
+    Doubted,
+}
+
+/// What the runs show together. They are told one by one while they are made: a program of 250 set-ups has 250 of them, each of which
+/// is as long as what is left of it.
 pub struct All {
     /// The run of the whole program.
     pub whole: Told,
-    /// Whole runs that find the control in other states.
-    pub others: Vec<Told>,
-    /// Runs that find the machine where the program must not begin.
-    pub refused: Vec<Told>,
+    /// The first condition whose other way was not run, where there are too many.
+    pub beyond: Option<Range<usize>>,
     /// What is wrong in the comparison of runs.
     pub findings: Vec<(Range<usize>, String)>,
     /// Set-ups at which it can begin.
@@ -237,8 +265,8 @@ pub fn opening(stage: Stage<'_>) -> Opening {
     }
 }
 
-/// Makes all runs. `each` is told of the whole program, and of its run from each set-up in their order.
-pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(&Told)) -> All {
+/// Makes all runs. `each` is told of them in the order of [`Kind`], the whole program first.
+pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(Kind, &Told)) -> All {
     match stage.program.dialect {
         DialectName::Ngc => Runs::<ngc::Ngc>::new(stage).all(opening, each),
         DialectName::MacroB => Runs::<macro_b::MacroB>::new(stage).all(opening, each),
@@ -254,18 +282,17 @@ struct Runs<'a, D> {
     program: &'a Program,
     world: &'a Arc<World>,
     scenes: &'a [Scene<'a>],
-    /// The program from its beginning.
-    whole: Code,
-    /// The program told to do no more than give the settings back.
-    gives_back: Option<Code>,
     dialect: std::marker::PhantomData<fn() -> D>,
 }
 
 impl<'a, D: Dialect> Runs<'a, D> {
     fn new(Stage { machine, post, plan, program, world, scenes }: Stage<'a>) -> Self {
-        let gives_back = program.from.is_some().then(|| program.from(program.setups + 1));
-        let (whole, dialect) = (program.from(1), std::marker::PhantomData);
-        Self { machine, post, plan, program, world, scenes, whole, gives_back, dialect }
+        Self { machine, post, plan, program, world, scenes, dialect: std::marker::PhantomData }
+    }
+
+    /// The last number at which it can be told to begin: the last set-up, and one more that only gives the settings back.
+    fn last(&self) -> u32 {
+        if self.program.from.is_some() { self.program.setups + 1 } else { 1 }
     }
 
     fn opening(&self) -> Opening {
@@ -274,7 +301,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         Opening { window, clear_from_anywhere, neutral }
     }
 
-    fn all(&self, opening: &Opening, each: &mut dyn FnMut(&Told)) -> All {
+    fn all(&self, opening: &Opening, each: &mut dyn FnMut(Kind, &Told)) -> All {
         let window = opening.window;
         let beginning = self.start(&window, 0.5, 0.3);
         // a touch takes a dozen, with the guarded moves to it
@@ -288,49 +315,72 @@ impl<'a, D: Dialect> Runs<'a, D> {
             most_probes: 10_000 + PER_TOUCH * touches,
         };
         let elsewhere = self.start(&window, if self.tcp() { 0.5 } else { 0.4 }, 0.8);
+        let whole = self.explored(1, Start::Awkward, beginning, Some(limits));
+        let (mut turns, mut dead) = (Vec::new(), Vec::new());
+        let (mut begun, mut faultless) = (Vec::new(), true);
+        let mut all_taken = Taken::new();
+        let setting = |name: &str| self.post.settings.get(name).map_or("", String::as_str);
+        let (on, off) = (setting("probe_on"), setting("probe_off"));
+        let mut looked_at = |kind: Kind, told: &Told| {
+            if matches!(kind, Kind::Begun | Kind::Doubted) {
+                turns.extend(spindle::turns(told));
+                dead.extend(spindle::searches_dead(told, on, off));
+            }
+            if kind == Kind::Begun {
+                begun.push(Begun::of(told));
+                faultless &= told.fault.is_none();
+            }
+            each(kind, told);
+        };
+        let again = self.again(&whole, beginning);
+        let Explored { told: whole, forks, .. } = whole;
+        let mut open = self.forks(&whole, forks, None);
+        note(&mut all_taken, &whole);
+        looked_at(Kind::Begun, &whole);
+        // 2 … the last set-up, and one more that only gives the settings back; as many at once as there are threads
+        let some = rayon::current_num_threads().max(1);
+        let numbers: Vec<u32> = (2..=self.last()).collect();
+        for some in numbers.chunks(some) {
+            let made: Vec<Explored<'a, D>> =
+                some.par_iter().map(|k| self.explored(*k, Start::Awkward, beginning, Some(limits))).collect();
+            for Explored { told, forks, .. } in made {
+                open.extend(self.forks(&told, forks, Some(&whole)));
+                note(&mut all_taken, &told);
+                looked_at(Kind::Begun, &told);
+            }
+        }
         // the same from elsewhere
         let starts: Vec<Start> = [Start::Fresh, Start::Third]
             .into_iter()
             .chain(D::lasting(self.tcp()).iter().map(|what| Start::Lasting(*what)))
             .collect();
-        let (whole, others) = rayon::join(
-            || self.told(1, Start::Awkward, beginning, Some(limits)),
-            || starts.par_iter().map(|start| self.told(1, *start, elsewhere, None)).collect::<Vec<Told>>(),
-        );
         let mut findings = Vec::new();
-        for other in &others {
-            findings.extend(otherwise(&whole, other).filter(|_| !stays(other)));
+        for some in starts.chunks(some) {
+            let made: Vec<Told> = some.par_iter().map(|start| self.told(1, *start, elsewhere, None)).collect();
+            for other in made {
+                findings.extend(otherwise(&whole, &other).filter(|_| !stays(&other)));
+                note(&mut all_taken, &other);
+                looked_at(Kind::Other, &other);
+            }
         }
-        let setting = |name: &str| self.post.settings.get(name).map_or("", String::as_str);
-        let (on, off) = (setting("probe_on"), setting("probe_off"));
-        let (mut turns, mut dead) = (Vec::new(), Vec::new());
-        let (mut begun, mut faultless) = (Vec::new(), true);
-        let mut looked_at = |told: &Told| {
-            turns.extend(spindle::turns(told));
-            dead.extend(spindle::searches_dead(told, on, off));
-            begun.push(Begun::of(told));
-            faultless &= told.fault.is_none();
-            each(told);
-        };
-        looked_at(&whole);
-        // 2 … the last set-up, and one more that only gives the settings back; as many at once as there are threads
-        let last = if self.program.from.is_some() { self.program.setups as usize + 1 } else { 1 };
-        let numbers: Vec<usize> = (2..=last).collect();
-        for some in numbers.chunks(rayon::current_num_threads().max(1)) {
-            let made: Vec<Told> =
-                some.par_iter().map(|k| self.told(*k, Start::Awkward, beginning, Some(limits))).collect();
-            made.iter().for_each(&mut looked_at);
+        let mut moving = Vec::new();
+        for refused in self.refused(beginning) {
+            moving.extend(moves_all_the_same(&refused, self.program.setups));
+            note(&mut all_taken, &refused);
+            looked_at(Kind::Refused, &refused);
         }
+        again.iter().for_each(|again| note(&mut all_taken, again));
+        let doubted::Doubted { runs, beyond } = self.doubted(open, &all_taken, limits);
+        runs.iter().chain(&again).for_each(|doubted| looked_at(Kind::Doubted, doubted));
         findings.extend(turns);
         findings.extend(dead);
         findings.dedup();
         if D::may_be_skewed(self.tcp()) && faultless {
             findings.extend(self.skewed(elsewhere, &begun));
         }
-        let refused = self.refused(beginning);
-        findings.extend(refused.iter().filter_map(|told| moves_all_the_same(told, self.program.setups)));
+        findings.extend(moving);
         let stops = stops(&whole.trunk);
-        All { whole, others, refused, findings, setups: self.program.setups, stops }
+        All { whole, beyond, findings, setups: self.program.setups, stops }
     }
 
     /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And those in
@@ -354,9 +404,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
             return Vec::new();
         }
         let told = |setup: u32| {
-            let code = self.program.from(setup);
-            let run = self.run(&code, Start::Awkward, beginning, 0, false);
-            Told { start: Start::Awkward, ..explore(run, setup, None, &|_| None) }
+            let run = self.run(setup, Start::Awkward, beginning, 0, false);
+            Told { start: Start::Awkward, ..explore(run, setup, None, &|_| None).told }
         };
         [0, self.program.setups + 2].map(told).into()
     }
@@ -379,7 +428,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         at
     }
 
-    fn run<'c>(&self, code: &'c Code, start: Start, at: Position, part: usize, reminded: bool) -> Run<'c, D> {
+    fn run(&self, from: u32, start: Start, at: Position, part: usize, reminded: bool) -> Run<'a, D> {
         let mut axes = [false; 6];
         self.machine.axes.iter().for_each(|a| axes[a.name.index()] = true);
         // under the control's own transformation a program sees to it that the rotary axes stand at 0 when it begins
@@ -407,31 +456,36 @@ impl<'a, D: Dialect> Runs<'a, D> {
             turned_near,
             clock: Clock::default(),
         };
-        Run::new(code, D::begin(start, self.post, self.machine), vm)
+        let mut run = Run::new(&self.program.code, D::begin(start, self.post, self.machine), vm);
+        run.begins = self.program.begins(from);
+        run
     }
 
-    fn told(&self, k: usize, start: Start, at: Position, limits: Option<Limits>) -> Told {
-        let from = k as u32;
-        let later = (k > 1).then(|| self.program.from(from));
-        let code = later.as_ref().unwrap_or(&self.whole);
-        let gives_back = self.gives_back.as_ref();
-        let restart = |run: &Run<'_, D>| {
+    fn told(&self, k: u32, start: Start, at: Position, limits: Option<Limits>) -> Told {
+        self.explored(k, start, at, limits).told
+    }
+
+    fn explored(&self, k: u32, start: Start, at: Position, limits: Option<Limits>) -> Explored<'a, D> {
+        let gives_back = self.program.from.is_some().then(|| self.last());
+        let restart = |run: &Run<'a, D>| {
             let dialect = run.dialect.after_abort()?;
             let mut again = self.run(gives_back?, start, run.vm.at, run.vm.part, false);
             again.dialect = dialect;
             Some(again)
         };
         let parts = self.world.last_part() + 1;
-        let part = if k == 1 || parts == 1 { 0 } else { self.part_of(code, from, start, at, parts) };
-        let run = self.run(code, start, at, part, k > 1 && parts > 1);
+        let part = if k == 1 || parts == 1 { 0 } else { self.part_of(k, start, at, parts) };
+        let run = self.run(k, start, at, part, k > 1 && parts > 1);
         let probes = if k > 1 { Limits::PROBES_AFTER_RESTART } else { usize::MAX };
-        Told { start, ..explore(run, from, limits.map(|l| Limits { probes, ..l }), &restart) }
+        let mut explored = explore(run, k, limits.map(|l| Limits { probes, ..l }), &restart);
+        explored.told.start = start;
+        explored
     }
 
     /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.
-    fn part_of(&self, code: &Code, from: u32, start: Start, at: Position, parts: usize) -> usize {
+    fn part_of(&self, from: u32, start: Start, at: Position, parts: usize) -> usize {
         let fits = |part: &usize| {
-            let told = explore(self.run(code, start, at, *part, true), from, None, &|_| None);
+            let told = explore(self.run(from, start, at, *part, true), from, None, &|_| None).told;
             let first = told.trunk.iter().find_map(|h| match &h.event {
                 Event::Log(text) if text.starts_with('P') => number_after_n(text),
                 _ => None,
@@ -481,7 +535,6 @@ impl<'a, D: Dialect> Runs<'a, D> {
         if clear(&window) && !self.tcp() {
             return (window, true);
         }
-        let code = &self.whole;
         // other axes stand where the program may want them: at the first angle at which it moves at all
         let rotary: Vec<AxisName> = self.machine.rotary().map(|a| a.name).collect();
         let steps = |[low, high]: [f64; 2]| {
@@ -490,7 +543,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         };
         let mut stands = self.start(&window, 0.5, 0.5);
         let consents = |at: &Position| {
-            let mut run = self.run(code, Start::Fresh, *at, 0, false);
+            let mut run = self.run(1, Start::Fresh, *at, 0, false);
             loop {
                 let paused = run.on();
                 if run.vm.trace.iter().any(|h| matches!(h.event, Event::Move { .. })) {
@@ -539,6 +592,14 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let is_clear = clear(&window);
         // the program is begun well inside of its window
         (window, is_clear)
+    }
+}
+
+/// Notes the ways that a run took at conditions on values that are not known.
+fn note(taken: &mut Taken, told: &Told) {
+    for (statement, [no, yes]) in &told.taken {
+        let ways = taken.entry(*statement).or_default();
+        *ways = [ways[0] | no, ways[1] | yes];
     }
 }
 

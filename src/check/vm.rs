@@ -182,6 +182,11 @@ pub struct Vm {
 }
 
 impl Vm {
+    /// The axes as they stand, without what has happened.
+    pub fn without_record(&self) -> Self {
+        Self { trace: Vec::new(), place: self.place.clone(), world: self.world.clone(), ..*self }
+    }
+
     /// What a clock shows that counts whole ticks of so many seconds.
     pub fn clock_s(&self, tick_s: f64) -> f64 {
         // no tick falls on a moment that a program of round numbers meets: a last digit would then be a matter of rounding

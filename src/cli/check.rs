@@ -116,6 +116,11 @@ fn good(checked: &Checked) -> bool {
 }
 
 fn say(machine: &Machine, args: &Args, checked: &Checked, io: &Io) {
+    if !checked.ran {
+        io.say(format!("{} was read and not run: it depends on what axiscal does not know", args.file.display()));
+        io.say(refused(&checked.findings));
+        return;
+    }
     let stops = match checked.stops {
         0 => String::new(),
         1 => ", 1 stop".to_owned(),
@@ -132,6 +137,12 @@ fn say(machine: &Machine, args: &Args, checked: &Checked, io: &Io) {
         program::duration(checked.seconds)
     ));
     io.say(format!("{} ways on which something goes wrong were followed", checked.branches));
+    if checked.both_ways > 0 {
+        let runs = checked.both_ways;
+        io.say(format!(
+            "{runs} more runs: conditions on a clock or a stored value of the control, taken the other way"
+        ));
+    }
     if !checked.declined.is_empty() {
         let numbers: Vec<String> = checked.declined.iter().map(u32::to_string).collect();
         io.say(format!(
@@ -166,6 +177,7 @@ fn answer(machine: &Machine, post: &Postprocessor, args: &Args, checked: &Checke
         "no_restart_at": checked.declined,
         "stops": checked.stops,
         "followed": checked.branches,
+        "both_ways": checked.both_ways,
         "time_s": checked.seconds,
         "moves_sha256": checked.proof.sha256,
         "findings": findings,

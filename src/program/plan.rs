@@ -58,7 +58,7 @@ fn is_false(value: &bool) -> bool {
 }
 
 /// What a program does, as [`crate::check`] has found it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Proof {
     /// Digest of everything that it does: moves, log, messages, and what it does when something goes wrong.
     pub sha256: String,

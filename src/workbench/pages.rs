@@ -9,11 +9,12 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, kind, contents.
-const ASSETS: [(&str, &str, &str); 13] = [
+const ASSETS: [(&str, &str, &str); 14] = [
     ("plotly.min.js", SCRIPT, include_str!("../../web/vendor/plotly.min.js")),
     ("workbench.css", STYLE, include_str!("../../web/workbench.css")),
     ("main.js", SCRIPT, include_str!("../../web/workbench/main.js")),
     ("talk.js", SCRIPT, include_str!("../../web/workbench/talk.js")),
+    ("events.js", SCRIPT, include_str!("../../web/workbench/events.js")),
     ("plots.js", SCRIPT, include_str!("../../web/workbench/plots.js")),
     ("correlation.js", SCRIPT, include_str!("../../web/workbench/correlation.js")),
     ("frame.js", SCRIPT, include_str!("../../web/workbench/frame.js")),

@@ -30,6 +30,8 @@ use tokio::sync::{Semaphore, broadcast};
 const LONGEST_BODY: usize = 512 * 1024;
 /// Connections at a time.
 const MOST_CONNECTIONS: usize = 64;
+/// Streams of events at a time: the other connections stay free for requests. The tabs of a browser share one.
+const MOST_STREAMS: usize = 24;
 /// Time for the head of a request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 /// Time for an answer.
@@ -48,6 +50,7 @@ pub struct Shared {
     busy: AtomicBool,
     wake: Mutex<mpsc::Sender<()>>,
     events: broadcast::Sender<String>,
+    streams: Arc<Semaphore>,
     guard: Guard,
     host: Arc<dyn Host>,
 }
@@ -100,6 +103,7 @@ impl Server {
             busy: AtomicBool::new(false),
             wake: Mutex::new(wake),
             events: broadcast::channel(64).0,
+            streams: Arc::new(Semaphore::new(MOST_STREAMS)),
             guard: Guard::new(port, super::guard::token()?),
             host,
         });
@@ -290,12 +294,17 @@ async fn evidence_of(State(shared): State<Arc<Shared>>) -> Response {
 }
 
 async fn events(State(shared): State<Arc<Shared>>) -> Response {
+    let Ok(place) = shared.streams.clone().try_acquire_owned() else {
+        let says = "the workbench is open in too many browsers at the same time";
+        let help = "close some of them: this page looks again by itself";
+        return refusal(StatusCode::SERVICE_UNAVAILABLE, "streams", says, Some(help));
+    };
     let heard = shared.events.subscribe();
     let version = snapshot(&shared).version;
     let hello = json!({ "what": "hello", "version": version }).to_string();
-    let stream = futures_util::stream::unfold((heard, Some(hello)), |(mut heard, hello)| async move {
+    let stream = futures_util::stream::unfold((heard, Some(hello), place), |(mut heard, hello, place)| async move {
         if let Some(hello) = hello {
-            return Some((Ok::<_, std::convert::Infallible>(Event::default().data(hello)), (heard, None)));
+            return Some((Ok::<_, std::convert::Infallible>(Event::default().data(hello)), (heard, None, place)));
         }
         let text = match heard.recv().await {
             Ok(text) => text,
@@ -303,7 +312,7 @@ async fn events(State(shared): State<Arc<Shared>>) -> Response {
             Err(broadcast::error::RecvError::Lagged(_)) => "{\"what\":\"lagged\"}".to_owned(),
             Err(broadcast::error::RecvError::Closed) => return None,
         };
-        Some((Ok(Event::default().data(text)), (heard, None)))
+        Some((Ok(Event::default().data(text)), (heard, None, place)))
     });
     Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))).into_response()
 }

@@ -335,6 +335,57 @@ async function twoTabs(t) {
   holds(!text(folder).includes("squareness-xy"), "the study has two minds");
 }
 
+/** A browser opens six connections to a server: the tabs share one stream of events. */
+async function tenTabs(t) {
+  const { address, page, seen } = await opened(t, "ten");
+  const tabs = [[page, seen]];
+  while (tabs.length < 10) {
+    const [tab, its] = await watched(t.context);
+    await tab.goto(address);
+    await tab.waitForSelector("body[data-version]");
+    tabs.push([tab, its]);
+  }
+  const streams = () => tabs.map(([, its]) => its.asked.filter((url) => url.endsWith("/api/events")).length);
+  equal(streams(), [1, 0, 0, 0, 0, 0, 0, 0, 0, 0], "streams of events");
+  const everyTabShows = async (others, v) => {
+    for (const [tab] of others) await tab.waitForFunction((least) => Number(document.body.dataset.version) >= least, v, { timeout: 20_000 });
+    const shown = new Set(await Promise.all(others.map(([tab]) => tab.textContent("#rms"))));
+    equal(shown.size, 1, `what the tabs show: ${[...shown]}`);
+  };
+  // the tenth tab is answered
+  const tenth = tabs[9][0];
+  await tenth.bringToFront();
+  await told(tenth);
+  await after(tenth, () => tenth.click("#candidates >> nth=0 >> [role=switch] >> nth=0"));
+  await tenth.waitForFunction(() => window.axiscalTimes?.answered !== undefined);
+  const { answered } = await tenth.evaluate(() => window.axiscalTimes);
+  holds(answered < 2000, `the tenth tab waits ${answered} ms for its answer`);
+  await everyTabShows(tabs, await version(tenth));
+  // the tab that listens is closed: another one takes its place, and every tab still gets every event
+  await page.close();
+  const left = tabs.slice(1);
+  const until = Date.now() + 10_000;
+  while (streams().slice(1).every((n) => n === 0) && Date.now() < until) await tenth.waitForTimeout(50);
+  equal(streams().slice(1).reduce((sum, n) => sum + n, 0), 1, "streams after the first tab was closed");
+  const fifth = tabs[4][0];
+  await fifth.bringToFront();
+  await after(fifth, () => fifth.click("#undo"));
+  await everyTabShows(left, await version(fifth));
+  for (const [, its] of tabs) equal(its.errors, [], "errors in the console");
+}
+
+/** A browser without locks: each tab listens for itself. */
+async function withoutLocks(t) {
+  await t.context.addInitScript(() => Object.defineProperty(navigator, "locks", { value: undefined }));
+  const { address, page, seen } = await opened(t, "alone");
+  const [other, its] = await watched(t.context);
+  await other.goto(address);
+  await other.waitForSelector("body[data-version]");
+  for (const { asked } of [seen, its]) equal(asked.filter((url) => url.endsWith("/api/events")).length, 1, "streams");
+  await after(other, () => page.click("#candidates >> nth=0 >> [role=switch] >> nth=0"));
+  equal(await other.textContent("#rms"), await page.textContent("#rms"));
+}
+
 async function byKeyboardAndByEar(t) {
   const { page, seen } = await opened(t, "keys");
   await told(page);
@@ -442,6 +493,8 @@ export const workbenchCases = [
   ["workbench_correlation_map", correlationMap],
   ["workbench_change_on_disk", changeOnDisk],
   ["workbench_two_tabs", twoTabs],
+  ["workbench_ten_tabs", tenTabs],
+  ["workbench_tabs_without_locks", withoutLocks],
   ["workbench_by_keyboard_and_by_ear", byKeyboardAndByEar],
   ["workbench_without_token", withoutToken],
   ["workbench_times", times],

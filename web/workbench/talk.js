@@ -1,5 +1,6 @@
 // Talks with the server, and holds what it has said: `inputs` (touches, effects), `live` (the fit) and `behind` (evidence).
 
+import { listenTogether } from "./events.js";
 import { later, soonest } from "./later.js";
 
 const TOKEN_KEY = "axiscal-token";
@@ -121,10 +122,14 @@ export async function call(what) {
   await ask("/api/call", { version: state.live.version, ...what });
 }
 
-/** Hears of every change, in this tab, in another one, and on the disk; comes back by itself when the line breaks. */
-export async function listen() {
+/** Hears of every change, in this tab, in another one, and on the disk. */
+export const listen = () => listenTogether(headers["x-axiscal-token"], stream, heard);
+
+/** Tells every event of the server; comes back by itself when the line breaks. */
+async function stream(tell) {
   let pause = 500;
   for (;;) {
+    let says = { messages: [{ message: "the workbench does not answer", help: "is it still running in the terminal? this page looks again by itself" }] };
     try {
       const response = await fetch("/api/events", { headers });
       if (!response.ok) throw await response.json();
@@ -139,16 +144,16 @@ export async function listen() {
         text = parts.pop();
         for (const part of parts) {
           const line = part.split("\n").find((l) => l.startsWith("data:"));
-          if (line) heard(JSON.parse(line.slice(5)));
+          if (line) tell(JSON.parse(line.slice(5)));
         }
       }
     } catch (error) {
-      if (error.messages && !state.live) {
-        trouble(error);
-        return;
+      if (error.messages) {
+        if (!state.live && error.error !== "streams") return trouble(error);
+        says = { messages: error.messages };
       }
     }
-    trouble({ messages: [{ message: "the workbench does not answer", help: "is it still running in the terminal? this page looks again by itself" }] });
+    tell({ what: "lost", says });
     await new Promise((again) => setTimeout(again, pause));
     pause = Math.min(5000, pause * 2);
   }
@@ -165,6 +170,7 @@ function heard(event) {
     scores: refreshBehind,
     evidence: async () => { if (!busy) await refresh(); await refreshBehind(); },
     job: refresh,
+    lost: async () => trouble(event.says),
   }[event.what];
   if (work) work().catch(trouble);
 }

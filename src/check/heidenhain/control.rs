@@ -6,7 +6,8 @@
 //! once, and the program must see to it.
 
 use crate::axes::{AxisName, Position};
-use crate::check::code::{Values, Var};
+use crate::check::code::{UnknownKind, Values, Var};
+use crate::check::doubt::Doubt;
 use crate::check::run::{
     Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
@@ -289,11 +290,11 @@ impl Dialect for Heidenhain {
         }
     }
 
-    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         const KNOWN: [f64; 9] = [0.0, 5.0, 9.0, 19.0, 30.0, 126.0, 127.0, 128.0, 129.0];
         let known = |m: &f64| KNOWN.contains(m) || self.builder.contains(m);
         let numbers = words.iter().filter(|w| w.address == "M" && w.value.is_finite()).map(|w| w.value);
-        numbers.filter(|m| !known(m)).map(|m| format!("M{m}")).collect()
+        numbers.filter(|m| !known(m)).map(|m| (UnknownKind::Meaning, format!("M{m}"))).collect()
     }
 
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
@@ -330,6 +331,20 @@ impl Dialect for Heidenhain {
             Var::Number(n) if OWN.contains(n) => own(&self.own, var).map_err(|_| format!("Q{n} has no value")),
             Var::Number(n) => Err(format!("what Q{n} holds is not known to axiscal")),
             Var::Name(data) => self.system(data, vm).ok_or_else(|| format!("{data} is no system data of this machine")),
+        }
+    }
+
+    fn doubt(&self, var: &Var, vm: &Vm) -> Option<Doubt> {
+        let Var::Name(data) = var else { return None };
+        let (id, index) = data.split_once(" IDX")?;
+        let unmoved = || {
+            let place = index.parse::<usize>().ok().and_then(|n| n.checked_sub(1));
+            place.and_then(|n| vm.known.get(n)).is_some_and(|known| !known)
+        };
+        match id {
+            "ID320" => Some(Doubt::Outside),
+            "ID240" | "ID270" => unmoved().then_some(Doubt::Stored),
+            _ => id.starts_with("ID210").then_some(Doubt::Stored),
         }
     }
 

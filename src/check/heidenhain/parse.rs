@@ -7,7 +7,7 @@ use super::formula::formula;
 use super::masks::{Masks, folder, string};
 use super::scan::Scan;
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Op, Piece, Var, What, Word};
+use crate::check::code::{Code, Expr, Op, Piece, UnknownKind, Var, What, Word};
 use crate::check::lines::{Line, lines};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
@@ -71,6 +71,19 @@ fn number(address: &'static str, value: f64) -> Word {
 
 fn word(address: &'static str, value: Expr) -> Word {
     Word { address, value, point: true }
+}
+
+/// What is not known of a block, by its first words.
+fn kind(name: &str) -> UnknownKind {
+    const PROGRAMS: [&str; 5] = ["CALL PGM", "SEL PGM", "CALL SELECTED", "CYCL DEF 12", "SEL CYCLE"];
+    const OUTPUTS: [&str; 2] = ["FN 19", "FN 29"];
+    let is_one_of = |names: &[&str]| names.iter().any(|n| name.starts_with(n));
+    match name {
+        _ if is_one_of(&PROGRAMS) => UnknownKind::Program,
+        _ if is_one_of(&OUTPUTS) => UnknownKind::Output,
+        _ if name.starts_with("FUNCTION FILE") => UnknownKind::File,
+        _ => UnknownKind::Meaning,
+    }
 }
 
 const ABSOLUTE: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
@@ -214,7 +227,7 @@ impl<'a> Reader<'a> {
         if scan.rest().is_empty() {
             return Err(scan.expected("a block"));
         }
-        self.code.is_unknown(at, name);
+        self.code.is_unknown_of(kind(&name), at, name);
         scan.all();
         Ok(())
     }

@@ -10,7 +10,8 @@ mod variables;
 use super::builder::Builder;
 use super::lasting;
 use crate::axes::{AxisName, Position};
-use crate::check::code::{Values, Var};
+use crate::check::code::{UnknownKind, Values, Var};
+use crate::check::doubt::Doubt;
 use crate::check::run::{
     Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
@@ -270,6 +271,11 @@ const GROUPS: [&[i64]; 7] = [
     &[540, 550, 560, 570, 580, 590, 541, 1540],
 ];
 
+/// A word that calls a program, where its number is one of these.
+fn calls_if(word: &Spoken, numbers: &[f64]) -> UnknownKind {
+    if numbers.contains(&word.value) { UnknownKind::Program } else { UnknownKind::Meaning }
+}
+
 impl Dialect for MacroB {
     const OBSTRUCTED: &'static [Start] = &[Start::Obstructed, Start::LengthActs];
 
@@ -350,7 +356,7 @@ impl Dialect for MacroB {
         }
     }
 
-    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         let tenth = |value: f64| (value * 10.0).round() as i64;
         let of = |address: &'static str| words.iter().filter(move |w| w.address == address && w.value.is_finite());
         // a G number that needs a P has one
@@ -360,8 +366,17 @@ impl Dialect for MacroB {
                 && (matches!(tenth(g), 0 | 10 | 310 | 434 | 520 | 650 | 2340)
                     || self.clone().mode(tenth(g), &given).is_ok())
         };
-        let gs = of("G").filter(|w| !known_g(w.value)).map(|w| format!("G{}", w.value));
-        gs.chain(of("M").filter(|w| self.knows(w.value).is_err()).map(|w| format!("M{}", w.value))).collect()
+        let calls_unknown = |p: f64| !self.calls.iter().any(|c| f64::from(c.program) == p);
+        let calls = of("P").filter(|w| of("G").any(|g| g.value == 65.0) && calls_unknown(w.value));
+        let calls = calls.map(|w| (UnknownKind::Program, format!("G65 P{}", w.value)));
+        let gs = of("G").filter(|w| !known_g(w.value)).map(|w| (calls_if(w, &[66.0, 66.1]), format!("G{}", w.value)));
+        let ms = of("M").filter(|w| self.knows(w.value).is_err());
+        let ms = ms.map(|w| (calls_if(w, &[97.0, 98.0, 198.0]), format!("M{}", w.value)));
+        calls.chain(gs).chain(ms).collect()
+    }
+
+    fn is_output(&self, var: &Var) -> bool {
+        matches!(var, Var::Number(1100..=1199))
     }
 
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
@@ -480,6 +495,20 @@ impl Dialect for MacroB {
 
     fn exists(&self, var: &Var) -> bool {
         self.own.contains_key(var)
+    }
+
+    /// Modes of two or three kinds (plane, distance, units, feed mode, length) are found each way by the runs themselves.
+    fn doubt(&self, var: &Var, vm: &Vm) -> Option<Doubt> {
+        let Var::Number(n) = var else { return None };
+        let unmoved = |number: u32| self.axis(number).is_some_and(|axis| !vm.known[axis.index()]);
+        match n {
+            1000..=1063 | 3001 | 3012 if !self.builder.is_probe_input(*n) => Some(Doubt::Outside),
+            _ if self.builder.is_probe_input(*n) => None,
+            2001..=2200 | 11_001..=11_999 | 4012 | 4014 | 4130 => Some(Doubt::Stored),
+            5021..=5026 => unmoved(n - 5020).then_some(Doubt::Stored),
+            5041..=5046 => unmoved(n - 5040).then_some(Doubt::Stored),
+            _ => None,
+        }
     }
 
     fn is_probe_input(&self, var: &Var) -> bool {

@@ -4,7 +4,8 @@
 //! probe, when a coordinate system is read again and what M73 brings back was observed on LinuxCNC 2.9.0~pre1.
 
 use crate::axes::{AxisName, Position};
-use crate::check::code::{Values, Var};
+use crate::check::code::{UnknownKind, Values, Var};
+use crate::check::doubt::Doubt;
 use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
@@ -356,7 +357,7 @@ const READ_ONLY: [&str; 18] = [
 ];
 
 impl Dialect for Ngc {
-    fn unknown(&self, words: &[Spoken], post: &Postprocessor) -> Vec<String> {
+    fn unknown(&self, words: &[Spoken], post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         let tenth = |value: f64| (value * 10.0).round();
         let whole = |value: f64| (value * 10.0 - tenth(value)).abs() < 1e-6;
         let known_g = |g: i64| matches!(g, 0 | 10 | 100 | 382..=385) || self.clone().mode(g, &[]).is_ok();
@@ -367,7 +368,7 @@ impl Dialect for Ngc {
         };
         let known_m = |m: f64| match m {
             // what they do stands outside of the program: outputs of the machine, programs of the user
-            62.0..=65.0 | 100.0..=199.0 => switches(m),
+            62.0..=65.0 | 67.0..=68.0 | 98.0 | 100.0..=199.0 => switches(m),
             _ => [0.0, 2.0, 5.0, 9.0, 19.0, 30.0, 50.0, 66.0, 73.0].contains(&m) || switches(m),
         };
         let mut unknown = Vec::new();
@@ -377,15 +378,22 @@ impl Dialect for Ngc {
                 "M" => known_m(word.value),
                 _ => true,
             };
+            let kind = match (word.address, word.value) {
+                ("M", 62.0..=65.0 | 67.0..=68.0) => UnknownKind::Output,
+                ("M", 98.0 | 100.0..=199.0) => UnknownKind::Program,
+                _ => UnknownKind::Meaning,
+            };
             if !known {
-                unknown.push(format!("{}{}", word.address, word.value));
+                unknown.push((kind, format!("{}{}", word.address, word.value)));
             }
         }
         let functions = || words.iter().filter(|w| matches!(w.address, "G" | "M"));
         if unknown.is_empty() && functions().all(|w| w.value.is_finite()) {
             let gs: Vec<i64> = words.iter().filter(|w| w.address == "G").map(|w| tenth(w.value) as i64).collect();
             let with = functions().next_back().map_or_else(String::new, |w| format!(" with {}{}", w.address, w.value));
-            unknown.extend(Self::unused(words, &gs).map(|letter| format!("the word {letter}{with}")));
+            unknown.extend(
+                Self::unused(words, &gs).map(|letter| (UnknownKind::Meaning, format!("the word {letter}{with}"))),
+            );
         }
         unknown
     }
@@ -491,6 +499,32 @@ impl Dialect for Ngc {
                 None => self.named(name, vm).ok_or_else(|| format!("#<{name}> has no value")),
             },
             Var::Name(_) => own_value(self.locals.last()),
+        }
+    }
+
+    /// Units, distance mode, G92 on or off and tool length on or off are found both ways by the runs themselves.
+    fn doubt(&self, var: &Var, vm: &Vm) -> Option<Doubt> {
+        let unmoved = |letter: &str| {
+            let axis = letter.chars().next().filter(|_| letter.len() == 1).and_then(AxisName::from_letter);
+            axis.is_some_and(|axis| !vm.known[axis.index()])
+        };
+        let stored = match var {
+            Var::Number(5211..=5216 | 5220..=5400) => true,
+            Var::Number(n @ 5420..=5425) => !vm.known[(*n - 5420) as usize],
+            Var::Name(name) => unmoved(name.strip_prefix("_abs_").or_else(|| name.strip_prefix('_')).unwrap_or("")),
+            Var::Number(_) => false,
+        };
+        stored.then_some(Doubt::Stored)
+    }
+
+    fn may_exist(&self, var: &Var) -> bool {
+        matches!(var, Var::Name(name) if name.starts_with('_')) && !self.globals.contains_key(var)
+    }
+
+    fn is_local(&self, var: &Var) -> bool {
+        match var {
+            Var::Number(n) => *n <= 30,
+            Var::Name(name) => !name.starts_with('_'),
         }
     }
 

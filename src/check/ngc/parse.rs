@@ -3,7 +3,7 @@
 //! Source: LinuxCNC 2.9 manual, chapters 11.3 (lines, words, expressions), 11.4 (comments), 11.7 (O-codes).
 
 use super::comments::{Acting, comments};
-use crate::check::code::{Code, Expr, Function, Op, Var, What, Word};
+use crate::check::code::{Code, Expr, Function, Op, UnknownKind, Var, What, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
 use nom::branch::alt;
@@ -303,10 +303,11 @@ impl Reader {
             return Err(Fault { at: end..end, says: "the program ends without its second %".to_owned() });
         }
         for (call, label, at) in std::mem::take(&mut self.calls) {
-            let Some(sub) = self.subs.get(&label).copied() else {
-                return Err(Fault { at, says: format!("there is no subroutine o<{label}>") });
-            };
-            self.aim(call, sub);
+            match self.subs.get(&label).copied() {
+                Some(sub) => self.aim(call, sub),
+                // a file of that name, in a folder of the control
+                None => self.code.is_unknown_of(UnknownKind::Program, at, format!("o<{label}> call")),
+            }
         }
         Ok(self.code)
     }

@@ -33,12 +33,12 @@ impl<D: Dialect> Runs<'_, D> {
             let places: Vec<Position> = begun.places.iter().copied().chain([elsewhere]).collect();
             // a set-up with one turn, the next with the next; the whole with all
             let some = if run == 0 { turns.clone() } else { vec![turns[run % turns.len()]] };
-            let from = begun.from as usize;
+            let from = begun.from;
             let begins = some.into_iter().flat_map(move |turn| places.clone().into_iter().map(move |at| (turn, at)));
             begins.map(move |(turn, at)| (from, turn, at))
         };
         let all: Vec<_> = runs.iter().enumerate().flat_map(of).collect();
-        let told = |(from, turn, at): &(usize, Turn, Position)| self.told(*from, Start::Skewed(*turn), *at, None);
+        let told = |(from, turn, at): &(u32, Turn, Position)| self.told(*from, Start::Skewed(*turn), *at, None);
         let fault = all.par_iter().find_map_first(|begun| told(begun).fault)?;
         Some((fault.at, fault.says))
     }

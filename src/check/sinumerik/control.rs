@@ -7,7 +7,8 @@
 
 use super::words::{Way, axis_word};
 use crate::axes::{AxisName, Position};
-use crate::check::code::{Values, Var};
+use crate::check::code::{UnknownKind, Values, Var};
+use crate::check::doubt::Doubt;
 use crate::check::run::{
     Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
@@ -310,6 +311,8 @@ impl Sinumerik {
             "$A_HOUR" => Ok((of_day / 3600.0).floor()),
             "$A_MINUTE" => Ok((of_day / 60.0).floor().rem_euclid(60.0)),
             "$A_SECOND" => Ok(of_day.floor().rem_euclid(60.0)),
+            // a condition on an input is run both ways
+            "$A_IN" => Ok(0.0),
             "$AC_MEA" => input(truth(self.triggered)),
             "$A_PROBE" => input(truth(vm.deflected())),
             "$P_ACTFRAME" => {
@@ -413,7 +416,7 @@ impl Dialect for Sinumerik {
         }
     }
 
-    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<String> {
+    fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         let known_g = |g: f64| g.fract() == 0.0 && (matches!(g as i64, 0 | 1) || self.clone().mode(g).is_ok());
         let known_m = |m: f64| [0.0, 5.0, 9.0, 30.0].contains(&m) || self.builder.contains(&m);
         let is_unknown = |w: &&Spoken| match w.address {
@@ -422,7 +425,7 @@ impl Dialect for Sinumerik {
             _ => false,
         };
         let numbers = words.iter().filter(|w| w.value.is_finite());
-        numbers.filter(is_unknown).map(|w| format!("{}{}", w.address, w.value)).collect()
+        numbers.filter(is_unknown).map(|w| (UnknownKind::Meaning, format!("{}{}", w.address, w.value))).collect()
     }
 
     fn block(&mut self, words: &[Spoken], vm: &mut Vm) -> Result<Next, String> {
@@ -514,6 +517,19 @@ impl Dialect for Sinumerik {
 
     fn exists(&self, var: &Var) -> bool {
         self.own.contains_key(var)
+    }
+
+    fn doubt(&self, var: &Var, vm: &Vm) -> Option<Doubt> {
+        let Var::Name(name) = var else { return None };
+        let unmoved = |index: &str| {
+            index.chars().next().and_then(AxisName::from_letter).is_some_and(|axis| !vm.known[axis.index()])
+        };
+        match name.split_once('[').unwrap_or((name, "")) {
+            ("$A_HOUR" | "$A_MINUTE" | "$A_SECOND" | "$AC_TIMER" | "$A_IN", _) => Some(Doubt::Outside),
+            ("$P_ACTFRAME", _) => Some(Doubt::Stored),
+            ("$AA_IM" | "$AA_IW", index) => unmoved(index).then_some(Doubt::Stored),
+            _ => None,
+        }
     }
 
     fn is_probe_input(&self, var: &Var) -> bool {

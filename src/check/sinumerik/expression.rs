@@ -40,7 +40,7 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 const OF_AXIS: [&str; 4] = ["$AA_IM", "$AA_IW", "$AA_MM", "$AA_MW"];
 /// All frames together, whose components can be read: NC Programming 12/2019, 6FC5398-2EP40-0BA0, p. 631.
 const FRAME: &str = "$P_ACTFRAME";
-const NUMBERED: [&str; 3] = ["$AC_MEA", "$A_PROBE", "$AC_TIMER"];
+const NUMBERED: [&str; 4] = ["$AC_MEA", "$A_PROBE", "$AC_TIMER", "$A_IN"];
 /// The time of day: without an index.
 const CLOCK: [&str; 3] = ["$A_HOUR", "$A_MINUTE", "$A_SECOND"];
 

@@ -7,7 +7,7 @@
 use super::expression::{Names, Type, identifier, is_truth, quoted};
 use super::words::{means_something, words};
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Function, Piece, Text, Var, What};
+use crate::check::code::{Code, Expr, Function, Piece, Text, UnknownKind, Var, What};
 use crate::check::lines::{Line, blanks, lines};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
@@ -17,6 +17,9 @@ use nom::{IResult, Parser};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Variables that switch outputs or go to the PLC.
+const OUTPUTS: [&str; 6] = ["$A_OUT[", "$A_OUTA[", "$A_DBB[", "$A_DBW[", "$A_DBD[", "$A_DBR["];
 
 type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 
@@ -154,6 +157,11 @@ impl Reader {
                 })?;
                 self.code.push(at, What::LogDelete { error, name: vec![Piece::Text(name)] });
                 left
+            }
+            _ if OUTPUTS.iter().any(|output| rest.starts_with(output)) => {
+                let name = rest.split_once('=').map_or(rest, |(name, _)| name).trim_end();
+                self.code.is_unknown_of(UnknownKind::Output, at, name);
+                return Ok(());
             }
             _ if rest.starts_with('$') => {
                 let (after, var) = self.names.system(rest).map_err(|e| line.unread(&e, "a system variable"))?;

@@ -2,7 +2,7 @@
 
 use super::expression::{Names, identifier};
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Word};
+use crate::check::code::{Code, Expr, UnknownKind, Word};
 use crate::check::lines::{Line, blanks, number, unsigned};
 use crate::check::run::Fault;
 use nom::Parser;
@@ -195,6 +195,13 @@ fn stranger<'a>(names: &Names, left: &'a str) -> Option<(&'a str, &'a str)> {
     Some((after.get(end.unwrap_or(after.len())..)?, name))
 }
 
+/// What is not known of a word: calls of programs are `L10` and these words.
+fn kind(name: &str) -> UnknownKind {
+    let number = name.strip_prefix('L').is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let calls = ["EXTCALL", "CALL", "PCALL", "ISOCALL", "MCALL"].contains(&name);
+    if number || calls { UnknownKind::Program } else { UnknownKind::Meaning }
+}
+
 /// Reads the words of a block up to the end of the line. Those that are not known to axiscal are noted in the code.
 ///
 /// # Errors
@@ -204,7 +211,7 @@ pub fn words(names: &Names, line: &Line<'_>, rest: &str, code: &mut Code) -> Res
     let mut left = rest;
     while !left.is_empty() {
         if let Some((after, name)) = stranger(names, left) {
-            code.is_unknown(line.rest(left), name);
+            code.is_unknown_of(kind(name), line.rest(left), name);
             left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;
             continue;
         }

@@ -18,6 +18,8 @@ fn time_of_day(clock_s: f64) -> f64 {
 impl MacroB {
     pub(super) fn system_variable(&self, n: u32, vm: &Vm) -> Option<f64> {
         Some(match n {
+            // inputs of the machine: a condition on one is run both ways
+            1000..=1063 if !self.builder.is_probe_input(n) => 0.0,
             2001..=2200 => self.stored_mm(n - 2000) / self.unit(AxisName::Z),
             11_001..=11_999 => self.stored_mm(n - 11_000) / self.unit(AxisName::Z),
             3001 => ((vm.clock_s(MILLISECOND_S) - self.seconds) * 1000.0).round(),
