@@ -5,6 +5,7 @@ use super::judge::{Case, SIDEWAYS_MM, Said};
 use super::run::{Alarm, Event, Happened};
 use super::settings::{compare_settings, stopped_by_itself};
 use crate::axes::Position;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// The line with which the log of a run ends.
@@ -72,7 +73,7 @@ pub fn branch_stops(case: &Case<'_>, told: &Told, last_line: Option<&str>, branc
     let alarmed = branch.trace.iter().any(
         |h| matches!(&h.event, Event::Probe { probe, outcome, .. } if probe.alarm == Alarm::AtEvent && outcome.hit),
     );
-    let mut after = branch.settings.clone();
+    let mut after = BTreeMap::clone(&branch.settings);
     if alarmed {
         // the package's own alarm: what it leaves is the package's, and the postprocessor file says what that is
         let calls = case.post.check.as_ref().map(|c| c.calls.as_slice()).unwrap_or_default();

@@ -9,6 +9,7 @@ use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, St
 use super::world::way_mm;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// What happens otherwise than it should.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,8 +50,8 @@ pub struct Branch {
     pub over: bool,
     /// It could not go on.
     pub fault: Option<Fault>,
-    /// The control's settings at the end.
-    pub settings: BTreeMap<String, String>,
+    /// The control's settings at the end; most branches end with the same.
+    pub settings: Arc<BTreeMap<String, String>>,
 }
 
 /// A run with its branches.
@@ -168,8 +169,10 @@ pub fn explore_on<'p, D: Dialect>(
     run.keeps_forks = limits.is_some();
     run.doubts.keeps = limits.map(|_| Doubt::Stored);
     let mut forks = Vec::new();
+    let mut seen = Vec::new();
     let mut probes = 0;
     loop {
+        let shared = told.branches.len();
         let part_before = run.vm.part;
         let paused = run.on();
         // events before the last stop belong to the part that was up then; a stop is at most the last of them
@@ -206,6 +209,7 @@ pub fn explore_on<'p, D: Dialect>(
                     }
                     run.vm.trace = trace;
                 }
+                share_settings(&mut seen, &mut told.branches[shared..]);
                 run.resolve(outcome);
             }
         }
@@ -215,6 +219,16 @@ pub fn explore_on<'p, D: Dialect>(
     told.trunk = run.vm.trace;
     told.taken = run.doubts.taken;
     Explored { told, forks, left: run.dialect }
+}
+
+/// Settings that are the same are kept once: a long program has a hundred thousand branches.
+fn share_settings(seen: &mut Vec<Arc<BTreeMap<String, String>>>, branches: &mut [Branch]) {
+    for branch in branches {
+        match seen.iter().find(|known| **known == branch.settings) {
+            Some(known) => branch.settings = known.clone(),
+            None => seen.push(branch.settings.clone()),
+        }
+    }
 }
 
 fn note_parts(parts: &mut Vec<usize>, vm: &Vm, before: usize) {
@@ -355,7 +369,7 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
             }
         }
     }
-    let (over, settings) = (run.is_over(), run.dialect.settings());
+    let (over, settings) = (run.is_over(), Arc::new(run.dialect.settings()));
     branches.insert(0, Branch { leaves, deviation, over, fault, settings, trace: run.vm.trace });
     branches
 }
