@@ -144,7 +144,16 @@ impl Maker<'_> {
         best = try_also(&finer, best);
         let mut tried = [&values[..], &finer].concat();
         tried.sort_by(f64::total_cmp);
-        best = try_also(&around(shape, &self.fit.data, &tried, best.0), best);
+        loop {
+            let more = around(shape, &self.fit.data, &tried, best.0);
+            best = try_also(&more, best);
+            // of a number that changes smoothly there are always more steps between
+            if more.is_empty() || shape.between.is_none() {
+                break;
+            }
+            tried.extend(more);
+            tried.sort_by(f64::total_cmp);
+        }
         if let (_, _, Some(better)) = best {
             kept.push(better);
             kept.sort_by(|a, b| a.value.total_cmp(&b.value));

@@ -17,8 +17,8 @@ use std::ops::Range;
 /// Values that are tried where the catalogue names none.
 const TRIED: usize = 12;
 
-/// More places of a jump than this are tried between index visits first.
-const MOST_PLACES: usize = 120;
+/// So many places of a jump are tried at once, however many touches there are.
+const FEWEST_PLACES: usize = 24;
 
 /// Values that are tried, times touches: more takes longer than a user waits.
 const MOST_OF_ALL: usize = 1_500_000;
@@ -162,8 +162,13 @@ fn start_of_sets(
             };
             if p.between.is_some() {
                 // a jump may also come in mid-visit
-                try_all(&common, &mut best);
-                try_all(&around(p, &fit.data, &common, best[k]), &mut best);
+                let (mut values, mut more) = (Vec::new(), common.clone());
+                while !more.is_empty() {
+                    try_all(&more, &mut best);
+                    values.extend(more);
+                    values.sort_by(f64::total_cmp);
+                    more = around(p, &fit.data, &values, best[k]);
+                }
                 usual[k] = best[k];
                 continue;
             }
@@ -229,12 +234,11 @@ pub(super) fn jumps<'e>(effect: &'e Effect, values: &[f64], data: &Data) -> Vec<
 pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
     if let (Some(variable), Some((_, low, high))) = (p.between, p.shape) {
         let mut all = places(data, variable, false);
-        let most = (MOST_OF_ALL / data.observations.len().max(1)).clamp(MOST_PLACES, 1000);
+        let most = most_places(data);
         if all.len() > most {
             // a visit may be long: some places within it, too
-            let every = all.len().div_ceil(most);
-            let within: Vec<f64> = all.iter().copied().skip(every / 2).step_by(every).collect();
-            all = places(data, variable, true);
+            let within = some_of(&all, most);
+            all = some_of(&places(data, variable, true), most);
             all.extend(within);
             all.sort_by(f64::total_cmp);
             all.dedup();
@@ -245,6 +249,17 @@ pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
         }
     }
     (!p.scan.is_empty()).then(|| p.scan.clone())
+}
+
+/// Places of a jump that are tried at once.
+fn most_places(data: &Data) -> usize {
+    (MOST_OF_ALL / data.observations.len().max(1)).clamp(FEWEST_PLACES, 1000)
+}
+
+/// At most so many of them, evenly.
+fn some_of(all: &[f64], most: usize) -> Vec<f64> {
+    let every = all.len().div_ceil(most.max(1)).max(1);
+    all.iter().copied().skip(every / 2).step_by(every).collect()
 }
 
 /// A stretch of a shape parameter in which a jump shows in the same touches, wherever in it.
@@ -281,8 +296,8 @@ pub(super) fn stretches_of_a_jump(p: &Parameter, data: &Data, block: Option<&str
     all.windows(2).map(|w| Stretch { place: half_way(w), ends: [w[0], w[1]] }).collect()
 }
 
-/// Values between one of a scan's values and its neighbours, for a closer look: the places of a jump that the scan did not try,
-/// or some steps of a number that changes smoothly.
+/// Values between one of a scan's values and its neighbours, for a closer look: places of a jump that the scan did not try (where they
+/// are many, some: look again with these among those that were tried), or some steps of a number that changes smoothly.
 #[must_use]
 pub fn around(p: &Parameter, data: &Data, scanned: &[f64], best: f64) -> Vec<f64> {
     let below = scanned.iter().copied().filter(|v| *v < best).fold(f64::NEG_INFINITY, f64::max);
@@ -292,7 +307,7 @@ pub fn around(p: &Parameter, data: &Data, scanned: &[f64], best: f64) -> Vec<f64
         None => between(scanned),
     };
     out.retain(|v| *v > below && *v < above && !scanned.contains(v));
-    out
+    if p.between.is_some() { some_of(&out, most_places(data)) } else { out }
 }
 
 /// Steps between the values of a scan.
