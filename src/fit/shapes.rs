@@ -17,6 +17,9 @@ use std::ops::Range;
 /// Values that are tried where the catalogue names none.
 const TRIED: usize = 12;
 
+/// Places of a jump that are tried at once, times touches: their columns lie in memory.
+const MOST_OF_JUMPS: usize = 400_000;
+
 /// So many places of a jump are tried at once, however many touches there are.
 const FEWEST_PLACES: usize = 24;
 
@@ -253,7 +256,7 @@ pub fn scan(p: &Parameter, data: &Data) -> Option<Vec<f64>> {
 
 /// Places of a jump that are tried at once.
 fn most_places(data: &Data) -> usize {
-    (MOST_OF_ALL / data.observations.len().max(1)).clamp(FEWEST_PLACES, 1000)
+    (MOST_OF_JUMPS / data.observations.len().max(1)).clamp(FEWEST_PLACES, 1000)
 }
 
 /// At most so many of them, evenly.
