@@ -77,7 +77,7 @@ impl Job {
         Ok(serde_json::to_string(&fit.outcome).unwrap())
     }
 
-    /// Every number of the plan by its JSON pointer, and the field that it belongs to.
+    /// Every number of the plan by its JSON pointer.
     fn numbers(&self, touches: Touches) -> Vec<String> {
         let all = self.plan["touches"].as_array().unwrap();
         let mut stages: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -209,7 +209,7 @@ fn the_verbs_refuse_a_plan_that_was_edited_after_its_log_was_made() {
     let (parsed, _) = verbs::json(at, &parse);
     assert_eq!(parsed["findings"], json!([]));
     let mut edited: Value = serde_json::from_str(&good).unwrap();
-    // a program of the same touches: the position of the face is the same with the other stylus
+    // it contradicts nothing in the plan
     edited["touches"][0]["feed_mm_min"] = json!(61.0);
     std::fs::write(&file, edited.to_string()).unwrap();
     for verb in ["identify", "compare", "diagnose", "report"] {
@@ -233,7 +233,10 @@ fn the_verbs_refuse_a_plan_that_was_edited_after_its_log_was_made() {
     without.as_object_mut().unwrap().remove("fields_sha256");
     std::fs::write(&file, without.to_string()).unwrap();
     let (parsed, code) = verbs::json(at, &parse);
-    assert_eq!((code, &parsed["findings"][0]["code"], parsed["complete"].as_bool()), (0, &json!("log::older"), Some(true)));
+    assert_eq!(
+        (code, &parsed["findings"][0]["code"], parsed["complete"].as_bool()),
+        (0, &json!("log::older"), Some(true))
+    );
     assert_eq!(verbs::json(at, &["identify", "study.toml"]).1, 0);
 }
 

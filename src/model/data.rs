@@ -126,7 +126,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
         // a log under the control's transformation has its digits in the coordinates of that; one of axis positions, in those
-        let shown = super::digits::digit_mm(logged.clone().map(|t| crate::log::as_logged(machine, run.plan, numbered.touch(t.id), t)));
+        let shown = super::digits::digit_mm(
+            logged.clone().map(|t| crate::log::as_logged(machine, run.plan, numbered.touch(t.id), t)),
+        );
         data.digits_mm.push(shown.or_else(|| super::digits::digit_mm(logged.map(|t| t.position))));
         data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run, &numbered));
         for (touch, &temperature_deg_c) in run.touches.iter().zip(&temperatures[index]) {

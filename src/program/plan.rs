@@ -332,3 +332,23 @@ impl Plan {
         guess.filter(|t| t.id == id).or_else(|| self.touches.iter().find(|t| t.id == id))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::post::tests::{machine, plan};
+
+    #[test]
+    fn touches_are_found_by_their_numbers_in_whatever_order_they_stand() {
+        let whole = plan(&machine("swivel-head"), "head", "x+");
+        for ids in [[1, 2, 3], [5, 7, 11], [2, 1, 3], [30, 20, 10]] {
+            let mut plan = whole.clone();
+            plan.touches.iter_mut().zip(ids).for_each(|(t, id)| t.id = id);
+            let numbered = plan.numbered();
+            for id in 0..40 {
+                assert_eq!(numbered.touch(id).map(|t| t.id), ids.contains(&id).then_some(id), "{ids:?}");
+                assert_eq!(numbered.touch(id), plan.touch(id));
+            }
+            assert!(numbered.touch(u64::MAX).is_none());
+        }
+    }
+}

@@ -434,7 +434,8 @@ mod tests {
         let machine = machine("swivel-head");
         let mut plan = plan(&machine, "head", "x+");
         plan.machine_sha256.clone_from(&machine.sha256);
-        plan.touches[1].nominal.set(crate::axes::AxisName::Z, plan.touches[1].nominal_position().0[2] + 0.0005);
+        let z = plan.touches[1].nominal_position().0[2];
+        plan.touches[1].nominal.set(crate::axes::AxisName::Z, z + 0.0005);
         assert!(on_machine(&plan, &machine).is_empty());
         for (length_mm, radius_mm) in [(0.005, 0.0), (0.0, 0.005)] {
             let mut edited = plan.clone();
