@@ -278,7 +278,8 @@ impl Plan {
             Some((plan, frame)) => (plan, Cow::Owned(frame)),
             None => (by_the_library(text, source)?, Cow::Borrowed(text.as_str())),
         };
-        let AsWritten { fields_sha256 } = by_the_library(&frame, source)?;
+        // what is wrong there has its place in the whole text
+        let AsWritten { fields_sha256 } = serde_json::from_str(&frame).or_else(|_| by_the_library(text, source))?;
         super::plan_check::by_itself(&plan).findings(&plan, source).finish((plan, fields_sha256))
     }
 

@@ -252,6 +252,17 @@ mod tests {
     }
 
     #[test]
+    fn digests_that_are_none_have_their_place() {
+        let text = head().to_json();
+        let at = text.find(FIELD).unwrap();
+        let broken = format!("{}{FIELD}\": 5\n}}\n", &text[..at]);
+        let line = broken.lines().count() - 1;
+        let failure = Plan::parse(&source("p", broken)).unwrap_err();
+        let place = failure.0[0].place().unwrap();
+        assert!(failure.0[0].code == "plan::not_json" && place.starts_with(&format!("p:{line}:")), "{place}");
+    }
+
+    #[test]
     fn the_digest_of_the_log_knows_every_field() {
         let before = head();
         let mut edited = before.clone();
