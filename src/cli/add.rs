@@ -1,5 +1,6 @@
 //! `axiscal add`, `remove` and `history`: the study's model is changed in place, and every model tried is kept.
 
+use super::common::of_fit;
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
 use crate::compare::{change, told};
@@ -170,7 +171,7 @@ fn run(
             "fall_um": fall.map(|f| f.0), "fall_se_um": fall.map(|f| f.1), "nested_rms_um": nested_rms_um,
         },
     }));
-    Ok(Answer::Done)
+    Ok(of_fit(&after.outcome, Answer::Done, io))
 }
 
 /// Runs `history`.

@@ -2,6 +2,7 @@
 
 use crate::diag::{Failure, Finding, Findings, Result, Severity, source};
 use crate::files;
+use crate::fit::outcome::Outcome;
 use crate::machine::{self, Machine};
 use crate::report::plot::Paper;
 use std::io::{ErrorKind, Write};
@@ -16,6 +17,17 @@ pub enum Answer {
     Done,
     /// Exit code 1: the answer is "no".
     No,
+}
+
+/// What a verb answers that shows a fit: one that did not converge is said, and the answer is "no".
+pub fn of_fit(outcome: &Outcome, answer: Answer, io: &Io) -> Answer {
+    if outcome.converged {
+        return answer;
+    }
+    io.report(&[Finding::warning("fit::not_converged", format!("the fit did not converge: {}", outcome.stopped)).help(
+        "its values are no results: check plan and log, start values and formulas of effects of your own, and use fewer effects",
+    )]);
+    Answer::No
 }
 
 /// Set when something that was printed did not arrive.

@@ -1,5 +1,6 @@
 //! `axiscal compare`: model against measurement, where it fails.
 
+use super::common::of_fit;
 use super::load::load_study;
 use super::{Answer, Io};
 use crate::compare::Lead;
@@ -61,5 +62,5 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
     }
     io.answer(&comparison);
-    Ok(Answer::Done)
+    Ok(of_fit(&fit.outcome, Answer::Done, io))
 }

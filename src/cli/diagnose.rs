@@ -1,5 +1,6 @@
 //! `axiscal diagnose`: which physical effect is missing.
 
+use super::common::of_fit;
 use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
@@ -36,5 +37,5 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     super::next::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
     io.answer(&found);
     let no = matches!(found.verdict, Verdict::MissingEffect | Verdict::Unexplained) || found.most_missed;
-    Ok(if no { Answer::No } else { Answer::Done })
+    Ok(of_fit(&fit.outcome, if no { Answer::No } else { Answer::Done }, io))
 }

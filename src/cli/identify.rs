@@ -1,5 +1,6 @@
 //! `axiscal identify`: the fit of a study.
 
+use super::common::of_fit;
 use super::load::{load_study, load_study_alone};
 use super::{Answer, Io};
 use crate::design;
@@ -66,11 +67,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     if io.json {
         io.answer(&outcome);
+        let answer = of_fit(&outcome, Answer::Done, io);
         // the process ends with its answer: to give back piece by piece what a study holds would take longer than to write it
         if !io.within {
             std::mem::forget((loaded, fit, outcome));
         }
-        return Ok(Answer::Done);
+        return Ok(answer);
     }
     io.say(crate::report::fit::outcome(&outcome, io.paper(false)));
     if let Some(residuals) = &outcome.residuals {
@@ -86,7 +88,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
-    Ok(Answer::Done)
+    Ok(of_fit(&outcome, Answer::Done, io))
 }
 
 /// No machine is as large: a reference beyond it is a slip of the keyboard, mm.

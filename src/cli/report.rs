@@ -1,5 +1,6 @@
 //! `axiscal report`: one page with everything that a study says.
 
+use super::common::of_fit;
 use super::load::load_study;
 use super::view::{history_of, view_of, work_out};
 use super::{Answer, Io};
@@ -63,5 +64,5 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         "headline": view.headline,
         "next": view.next,
     }));
-    Ok(Answer::Done)
+    Ok(of_fit(&worked.fit.outcome, Answer::Done, io))
 }

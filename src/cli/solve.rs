@@ -1,6 +1,7 @@
 //! `axiscal solve`: the loop, step by step. Each step is proposed with its reason and confirmed by the user, or by
 //! `--yes`; the loop never goes past what the test with all candidates counted in and the held-out touches allow.
 
+use super::common::of_fit;
 use super::load::{Loaded, load_study};
 use super::{Answer, Io, add};
 use crate::compare::told;
@@ -188,7 +189,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     tell(&solution, &fit, &loaded, found.mistake().is_some(), io);
     io.answer(&solution);
     let no = matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) || found.most_missed;
-    Ok(if no { Answer::No } else { Answer::Done })
+    Ok(of_fit(&fit.outcome, if no { Answer::No } else { Answer::Done }, io))
 }
 
 /// The model's cross-validated error, in words.

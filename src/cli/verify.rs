@@ -1,5 +1,6 @@
 //! `axiscal verify`: two studies side by side: did the compensation work, has the machine changed?
 
+use super::common::of_fit;
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
 use crate::compare::verify::{Figures, Question, Verdict, verify};
@@ -66,7 +67,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     io.answer(&answer);
     let no = matches!(answer.verdict, Verdict::NotImproved | Verdict::ModelsDiffer);
-    Ok(if no { Answer::No } else { Answer::Done })
+    let answer = of_fit(&first.outcome, if no { Answer::No } else { Answer::Done }, io);
+    Ok(of_fit(&second.outcome, answer, io))
 }
 
 /// What the runs after show that their model lacks: its errors are then not those of the machine.

@@ -32,8 +32,9 @@ pub use touch::{RawTouch, Status, Touch};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
-use crate::post::{Frame, Postprocessor, digest, log_word};
-use crate::program::plan::Plan;
+use crate::post::{Frame, Postprocessor, log_word};
+use crate::program::plan::{Plan, PlanTouch};
+use crate::program::plan_digest::{self, digest};
 use place::Places;
 
 /// Who wrote a log.
@@ -158,7 +159,8 @@ fn of_touches(touches: Vec<RawTouch>, ending: Ending, rejected: Rejected, runs: 
     ParsedLog { touches, header, ending, rejected, columns: false, per_touch, rows_say_status: false, runs }
 }
 
-/// Is this the log of the plan's program?
+/// Is this the log of the plan's program? A log that was written with other numbers than those of the plan is refused: the fit would
+/// read the touches with numbers that were not those of the machine.
 fn belongs(
     header: &LogHeader,
     machine: &Machine,
@@ -175,15 +177,23 @@ fn belongs(
             .help("use the plan that `axiscal generate` wrote together with the program");
         return Err(places.at_line(finding, header.line).into());
     }
-    if header.digest != digest() {
-        let message =
-            format!("the program that wrote this log was made from another plan ({} touches)", header.touches);
-        let finding = Finding::warning("log::other_plan", message).help(
-            "touches are matched by number and checked by place; better use the plan that belongs to the program",
-        );
-        findings.push(places.at_line(finding, header.line));
+    if header.digest == digest() {
+        return Ok(());
     }
-    Ok(())
+    if header.digest == plan_digest::older(plan) {
+        let message = "an earlier version wrote the program of this log: the log confirms the positions of its plan, and no other number of it";
+        let finding = Finding::info("log::older", message)
+            .help("was the plan edited since, use it as it was written; a program that is generated again writes logs that confirm all numbers");
+        findings.push(places.at_line(finding, header.line));
+        return Ok(());
+    }
+    let message = format!(
+        "the program that wrote this log was made from another plan ({} touches), or the plan was changed since",
+        header.touches
+    );
+    let finding = Finding::error("log::other_plan", message)
+        .help("use the plan that `axiscal generate` wrote together with the program");
+    Err(places.at_line(finding, header.line).into())
 }
 
 /// Makes axis positions (relative to R) of a control's own coordinates, where the plan's program was written for the
@@ -195,8 +205,9 @@ pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Resu
     if !Frame::of(machine, plan).is_tcp() {
         return Ok(());
     }
+    let numbered = plan.numbered();
     for touch in touches {
-        let planned = touch.id.and_then(|id| plan.touch(id));
+        let planned = touch.id.and_then(|id| numbered.touch(id));
         let length = planned.and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
         let mut shown = touch.position;
         // rotary axes that the log lacks stand at the plan's pose
@@ -215,10 +226,10 @@ pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Resu
     Ok(())
 }
 
-/// Where a control shows a touch: the inverse of [`to_axes`].
+/// Where a control shows a touch: the inverse of [`to_axes`]. `planned`: the touch in the plan.
 #[must_use]
-pub fn as_logged(machine: &Machine, plan: &Plan, touch: &Touch) -> Position {
-    let length = plan.touch(touch.id).and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
+pub fn as_logged(machine: &Machine, plan: &Plan, planned: Option<&PlanTouch>, touch: &Touch) -> Position {
+    let length = planned.and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
     Frame::new(machine, plan.controller_frame, length).controller_from_axes(&touch.position)
 }
 

@@ -6,7 +6,7 @@ use super::predict::{Observation, SetUp};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
 use crate::machine::{Carrier, Machine};
-use crate::program::plan::{Plan, PlanBlock, PlanTouch};
+use crate::program::plan::{Numbered, Plan, PlanBlock, PlanTouch};
 use crate::units::{hours_from_s, rad_from_deg};
 use nalgebra::Vector3;
 
@@ -118,6 +118,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     data.temperature_says = temperature_says;
     for (index, run) in runs.iter().enumerate() {
         let label = run_label(runs, index);
+        let numbered = run.plan.numbered();
         let started = run.started_s.unwrap_or(clock_s);
         let mut previous: Option<&PlanTouch> = None;
         let mut last_sense = [0.0; 6];
@@ -125,11 +126,13 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
         // a log under the control's transformation has its digits in the coordinates of that; one of axis positions, in those
-        let shown = super::digits::digit_mm(logged.clone().map(|t| crate::log::as_logged(machine, run.plan, t)));
+        let shown = super::digits::digit_mm(
+            logged.clone().map(|t| crate::log::as_logged(machine, run.plan, numbered.touch(t.id), t)),
+        );
         data.digits_mm.push(shown.or_else(|| super::digits::digit_mm(logged.map(|t| t.position))));
-        data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run));
+        data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run, &numbered));
         for (touch, &temperature_deg_c) in run.touches.iter().zip(&temperatures[index]) {
-            let Some(planned) = run.plan.touch(touch.id) else {
+            let Some(planned) = numbered.touch(touch.id) else {
                 data.unusable.push(Unusable {
                     run: index,
                     id: touch.id,
@@ -214,7 +217,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             });
             // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
             data.nominal.push(at(ideal, &mut planned_at));
-            data.repeats.push(repeat_group(&data, run.plan, planned, index));
+            data.repeats.push(repeat_group(&data, &numbered, planned, index));
             let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));
             data.visits.push(visit);
             data.observations.push(observation);
@@ -228,11 +231,11 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
 }
 
 /// What would put the touches of a run that are far from their places where they belong.
-fn elsewhere(machine: &Machine, run: &Run) -> Option<Supposed> {
+fn elsewhere(machine: &Machine, run: &Run, numbered: &Numbered<'_>) -> Option<Supposed> {
     if !run.touches.iter().any(|t| t.status == Status::Elsewhere) {
         return None;
     }
-    let planned = |t: &Touch| Some((run.plan.touch(t.id)?, t.position, [true; 6]));
+    let planned = |t: &Touch| Some((numbered.touch(t.id)?, t.position, [true; 6]));
     suppose(machine, &run.touches.iter().filter_map(planned).collect::<Vec<_>>())
 }
 
@@ -388,11 +391,11 @@ fn outward(machine: &Machine, carrier: Carrier, place: &Vector3<f64>) -> Vector3
 }
 
 /// A new number unless the touch before was made at the same point of the same set-up.
-fn repeat_group(data: &Data, plan: &Plan, touch: &PlanTouch, run: usize) -> usize {
+fn repeat_group(data: &Data, numbered: &Numbered<'_>, touch: &PlanTouch, run: usize) -> usize {
     let Some(last) = data.observations.last() else { return 0 };
     let group = data.repeats.last().copied().unwrap_or(0);
     let same = last.run == run
-        && plan.touch(last.id).is_some_and(|p| {
+        && numbered.touch(last.id).is_some_and(|p| {
             p.block == touch.block
                 && p.pose == touch.pose
                 && p.point == touch.point

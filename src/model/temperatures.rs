@@ -38,9 +38,10 @@ pub(super) fn of_runs(runs: &[Run]) -> (Temperatures, Option<String>) {
 }
 
 fn filled(run: &Run) -> Vec<Option<f64>> {
+    let numbered = run.plan.numbered();
     let hours = |i: usize| {
         let touch = &run.touches[i];
-        let planned = || run.plan.touch(touch.id).and_then(|p| p.time_s);
+        let planned = || numbered.touch(touch.id).and_then(|p| p.time_s);
         touch.time_s.or_else(planned).map(hours_from_s)
     };
     let at: Vec<Option<f64>> = (0..run.touches.len()).map(hours).collect();

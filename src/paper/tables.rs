@@ -86,10 +86,11 @@ impl Bench<'_> {
     /// Readings of touches: recorded less nominal along the outward normal.
     #[must_use]
     pub fn readings(&self, touches: &[Touch]) -> Vec<Reading> {
+        let numbered = self.plan.numbered();
         touches
             .iter()
             .filter_map(|t| {
-                let planned = self.plan.touch(t.id)?;
+                let planned = numbered.touch(t.id)?;
                 let pose = planned.pose.position();
                 let carrier = self.machine.carrier(&planned.carrier)?;
                 // the linear axes are square to each other and stand at R: the carrier's turn is all that is left

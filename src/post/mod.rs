@@ -22,7 +22,7 @@ pub use as_written::{CallRule, DialectName, Does, LengthUnit, ModuleFault, Overf
 pub use emit::TOOL_PLACE;
 pub use frame::Frame;
 pub use inherit::parse_alone as parse;
-pub use log_text::{LogRecord, digest};
+pub use log_text::LogRecord;
 pub(crate) use log_text::{VERSION as LOG_VERSION, log_word};
 pub use nc::{NcProgram, SideFile};
 pub use spelling::{CommentRule, NumberRule};

@@ -15,6 +15,7 @@ pub mod parts;
 pub mod path;
 pub mod plan;
 pub mod plan_check;
+pub mod plan_digest;
 mod plan_lines;
 mod reach;
 mod route;

@@ -1,9 +1,12 @@
 //! The plan: the touches of a program with their nominal places (`axiscal-plan/1`, docs/formats.md).
 
+use super::plan_digest::{self, Fields};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Findings, Result, Source, from_json};
 use compact_str::CompactString;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The format line of a plan.
@@ -206,27 +209,87 @@ pub struct Skipped {
     pub reason: String,
 }
 
+/// A plan's file: what it holds beside the plan.
+#[derive(Deserialize)]
+struct AsWritten {
+    #[serde(default)]
+    fields_sha256: Fields,
+}
+
+/// A plan's file, to be written.
+#[derive(Serialize)]
+struct ToWrite<'a> {
+    #[serde(flatten)]
+    plan: &'a Plan,
+    fields_sha256: Fields,
+}
+
+/// A record of a plan's text, where its lines are not as usual.
+fn by_the_library<T: DeserializeOwned>(text: &str, source: &Source) -> Result<T> {
+    Ok(serde_json::from_str(text).map_err(|e| {
+        from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
+    })?)
+}
+
+/// The touches of a plan by their numbers.
+#[derive(Debug, Clone)]
+pub struct Numbered<'a> {
+    touches: &'a [PlanTouch],
+    /// Places of the touches by their numbers; empty where the touches count upwards.
+    order: Vec<usize>,
+}
+
+impl<'a> Numbered<'a> {
+    /// A touch by its number.
+    #[must_use]
+    pub fn touch(&self, id: u64) -> Option<&'a PlanTouch> {
+        // numbers run from 1 in plans of our own: look there first
+        let guess = usize::try_from(id).ok().and_then(|i| i.checked_sub(1)).and_then(|i| self.touches.get(i));
+        if let Some(touch) = guess.filter(|t| t.id == id && self.order.is_empty()) {
+            return Some(touch);
+        }
+        let place = if self.order.is_empty() {
+            self.touches.binary_search_by_key(&id, |t| t.id).ok()?
+        } else {
+            self.order[self.order.binary_search_by_key(&id, |i| self.touches[*i].id).ok()?]
+        };
+        self.touches.get(place)
+    }
+}
+
 impl Plan {
     /// Reads a plan.
     ///
     /// # Errors
-    /// When the text is not JSON of this form, or holds what cannot be so on any machine.
+    /// When the text is not JSON of this form, holds what cannot be so on any machine, or was changed since it was written.
     pub fn parse(source: &Source) -> Result<(Self, Findings)> {
-        let by_the_library = || {
-            serde_json::from_str(source.inner()).map_err(|e| {
-                from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
-            })
-        };
-        let plan: Self = super::plan_lines::read(source.inner()).map_or_else(by_the_library, Ok)?;
-        super::plan_check::by_itself(&plan).findings(&plan, source).finish(plan)
+        let ((plan, written), mut findings) = Self::read(source)?;
+        findings.0.extend(plan_digest::changed(&written, &plan_digest::of_fields(&plan), source));
+        findings.finish(plan)
     }
 
-    /// The plan as JSON, the same bytes for the same plan; each touch in a line of its own.
+    /// The same with the digests of the fields as they were written, which are not looked at: empty in plans of earlier versions.
+    ///
+    /// # Errors
+    /// When the text is not JSON of this form, or holds what cannot be so on any machine.
+    pub(crate) fn read(source: &Source) -> Result<((Self, Fields), Findings)> {
+        let text = source.inner();
+        let (plan, frame) = match super::plan_lines::read(text) {
+            Some((plan, frame)) => (plan, Cow::Owned(frame)),
+            None => (by_the_library(text, source)?, Cow::Borrowed(text.as_str())),
+        };
+        // what is wrong there has its place in the whole text
+        let AsWritten { fields_sha256 } = serde_json::from_str(&frame).or_else(|_| by_the_library(text, source))?;
+        super::plan_check::by_itself(&plan).findings(&plan, source).finish((plan, fields_sha256))
+    }
+
+    /// The plan as JSON, the same bytes for the same plan; each touch in a line of its own, behind them the digests of the fields.
     #[must_use]
     pub fn to_json(&self) -> String {
         // a plan holds only strings and finite numbers: serialisation cannot fail
         const EMPTY: &str = "\"touches\": []";
-        let frame = Self { touches: Vec::new(), ..self.clone() };
+        let plan = &Self { touches: Vec::new(), ..self.clone() };
+        let frame = ToWrite { plan, fields_sha256: plan_digest::of_fields(self) };
         let mut text = serde_json::to_string_pretty(&frame).unwrap_or_default();
         text.push('\n');
         let lines: Vec<String> =
@@ -249,11 +312,44 @@ impl Plan {
         })
     }
 
-    /// A touch by its number.
+    /// The touches by their numbers, for who looks up many.
+    #[must_use]
+    pub fn numbered(&self) -> Numbered<'_> {
+        let touches = &self.touches[..];
+        let mut order = Vec::new();
+        // plans of our own count upwards
+        if !touches.is_sorted_by_key(|t| t.id) {
+            order.extend(0..touches.len());
+            order.sort_by_key(|i| touches[*i].id);
+        }
+        Numbered { touches, order }
+    }
+
+    /// A touch by its number; who looks up many calls [`Plan::numbered`].
     #[must_use]
     pub fn touch(&self, id: u64) -> Option<&PlanTouch> {
         // ids run from 1 in plans of our own: look there first
         let guess = usize::try_from(id).ok().and_then(|i| i.checked_sub(1)).and_then(|i| self.touches.get(i));
         guess.filter(|t| t.id == id).or_else(|| self.touches.iter().find(|t| t.id == id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::post::tests::{machine, plan};
+
+    #[test]
+    fn touches_are_found_by_their_numbers_in_whatever_order_they_stand() {
+        let whole = plan(&machine("swivel-head"), "head", "x+");
+        for ids in [[1, 2, 3], [5, 7, 11], [2, 1, 3], [30, 20, 10]] {
+            let mut plan = whole.clone();
+            plan.touches.iter_mut().zip(ids).for_each(|(t, id)| t.id = id);
+            let numbered = plan.numbered();
+            for id in 0..40 {
+                assert_eq!(numbered.touch(id).map(|t| t.id), ids.contains(&id).then_some(id), "{ids:?}");
+                assert_eq!(numbered.touch(id), plan.touch(id));
+            }
+            assert!(numbered.touch(u64::MAX).is_none());
+        }
     }
 }

@@ -17,7 +17,11 @@ const LARGEST_BALL_MM: f64 = 100.0;
 /// A normal is a direction: its length may be off 1 by this.
 const NORMAL_LENGTH: f64 = 1e-6;
 
-/// Point, normal and nominal of a touch agree to this, mm: plans are written with fewer digits than they are computed with.
+/// Point, normal, nominal, pose and tool length of a touch agree to this, mm, in plans that `generate` wrote for the machine as it is
+/// described now: they hold nine decimals, and an edit of a hundredth would make an error of the machine.
+const AGREES_AS_GENERATED_MM: f64 = 0.002;
+
+/// The same in other plans, which may hold fewer digits than they were computed with.
 const AGREES_MM: f64 = 0.05;
 
 /// Positions may be this far beyond the ranges of the axes, mm and deg: a description may have changed since the plan was made.
@@ -190,9 +194,12 @@ fn check_touch(faults: &mut Faults, part: Part, touch: &PlanTouch) {
 pub fn on_machine(plan: &Plan, machine: &Machine) -> Faults {
     let mut faults = Faults::default();
     let placement_mm = plan.placement_tolerance_mm.unwrap_or(machine.probe.placement_tolerance);
-    // a description that has changed since moves the nominal positions: by less than the search allows
-    let is_same = plan.machine_sha256.is_empty() || plan.machine_sha256 == machine.sha256;
-    let agrees_mm = if is_same { AGREES_MM } else { AGREES_MM + placement_mm };
+    let agrees_mm = match plan.machine_sha256.as_str() {
+        "" => AGREES_MM,
+        same if same == machine.sha256 => AGREES_AS_GENERATED_MM,
+        // a description that has changed since moves the nominal positions: by less than the search allows
+        _ => AGREES_MM + placement_mm,
+    };
     let mut last: Option<Places> = None;
     for (i, touch) in plan.touches.iter().enumerate() {
         let part = Part::Touch(i);
@@ -303,7 +310,7 @@ fn at_the_ball(
     let off = (Vector3::new(x, y, z) - expected).norm();
     if off.is_nan() || off > agrees_mm {
         let says = format!(
-            "nominal is {off:.3} mm off the position at which the ball touches point with this normal, pose and machine (X{:.3} Y{:.3} Z{:.3})",
+            "nominal is {off:.3} mm off the position at which the ball touches point with this normal, pose, tool length and machine (X{:.3} Y{:.3} Z{:.3})",
             expected.x, expected.y, expected.z
         );
         faults.add("plan::disagrees", (part, "nominal"), AGAIN, says);
@@ -419,6 +426,25 @@ mod tests {
         assert!(!on_machine(&plan, &machine).is_empty());
         plan.machine_sha256 = "of an earlier description".to_owned();
         assert!(on_machine(&plan, &machine).is_empty());
+    }
+
+    /// In a plan of this description of the machine an edit of some micrometres is seen.
+    #[test]
+    fn what_was_generated_agrees_to_two_micrometres() {
+        let machine = machine("swivel-head");
+        let mut plan = plan(&machine, "head", "x+");
+        plan.machine_sha256.clone_from(&machine.sha256);
+        let z = plan.touches[1].nominal_position().0[2];
+        plan.touches[1].nominal.set(crate::axes::AxisName::Z, z + 0.0005);
+        assert!(on_machine(&plan, &machine).is_empty());
+        for (length_mm, radius_mm) in [(0.005, 0.0), (0.0, 0.005)] {
+            let mut edited = plan.clone();
+            edited.tool_length_mm += length_mm;
+            edited.ball_radius_mm += radius_mm;
+            let faults = on_machine(&edited, &machine);
+            let found: Vec<(&str, Part)> = faults.0.iter().map(|f| (f.code, f.part)).collect();
+            assert_eq!(found, [("plan::disagrees", Part::Touch(0))]);
+        }
     }
 
     #[test]

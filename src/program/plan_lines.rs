@@ -19,8 +19,8 @@ const DIGITS: usize = 19;
 const POWERS: [f64; DIGITS + 1] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19];
 
-/// The plan of a text, where it is written as usual.
-pub(super) fn read(text: &str) -> Option<Plan> {
+/// The plan of a text, where it is written as usual, and the text without its touches.
+pub(super) fn read(text: &str) -> Option<(Plan, String)> {
     const BEGIN: &str = "\n  \"touches\": [";
     const END: &str = "\n  ]";
     // many bytes at a time: the end is some megabytes behind the beginning
@@ -54,7 +54,7 @@ pub(super) fn read(text: &str) -> Option<Plan> {
         return None;
     }
     let plan: Plan = serde_json::from_str(&frame).ok()?;
-    plan.touches.is_empty().then_some(Plan { touches, ..plan })
+    plan.touches.is_empty().then_some((Plan { touches, ..plan }, frame))
 }
 
 fn touch(line: &str) -> Option<PlanTouch> {
@@ -278,7 +278,7 @@ mod tests {
         fn what_is_read_quickly_is_what_the_library_reads(touches in proptest::collection::vec(a_touch(), 1..6)) {
             let text = plan(touches).to_json();
             let whole: Plan = serde_json::from_str(&text).unwrap();
-            if let Some(quick) = read(&text) {
+            if let Some((quick, _)) = read(&text) {
                 prop_assert_eq!(format!("{quick:?}"), format!("{whole:?}"));
             }
             let usual = |t: &PlanTouch| {
@@ -298,7 +298,7 @@ mod tests {
             let from = *at.get(&places);
             let to = from + text[from..].chars().next().map_or(0, char::len_utf8);
             text.replace_range(from..to, &by);
-            if let Some(quick) = read(&text) {
+            if let Some((quick, _)) = read(&text) {
                 let whole: Result<Plan, _> = serde_json::from_str(&text);
                 prop_assert!(whole.is_ok(), "{}", text);
                 prop_assert_eq!(format!("{quick:?}"), format!("{:?}", whole.unwrap()));
@@ -322,7 +322,7 @@ mod tests {
         let one: PlanTouch = serde_json::from_str(line).unwrap();
         let all: Vec<PlanTouch> = (1..=5000).map(|id| PlanTouch { id, ..one.clone() }).collect();
         let text = plan(all.clone()).to_json();
-        assert_eq!(read(&text).unwrap().touches, all);
+        assert_eq!(read(&text).unwrap().0.touches, all);
         assert_eq!(Plan::parse(&source("p", text)).unwrap().0.touches, all);
     }
 }

@@ -294,7 +294,7 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for (entry, read) in study.data.iter().zip(each) {
-        let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest }, log } =
+        let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest, .. }, log } =
             at_the_name(read, &entry.plan, &src)?;
         io.report(&findings);
         let log_path = folder.join(&entry.log);

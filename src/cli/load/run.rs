@@ -7,7 +7,7 @@ use crate::files;
 use crate::log::{self, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
-use crate::program::plan_check;
+use crate::program::{plan_check, plan_digest};
 use crate::study::DataEntry;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -41,6 +41,10 @@ pub(super) struct ReadPlan {
     pub plan: Plan,
     /// What is to be said of it.
     pub findings: Vec<Finding>,
+    /// The error where it is not as it was written.
+    changed: Option<Finding>,
+    /// What the log of its program carries.
+    log_digest: String,
     /// SHA-256 of the file.
     pub digest: Vec<u8>,
 }
@@ -52,8 +56,11 @@ impl ReadPlan {
     /// When it is unusable.
     pub fn of(path: &Path) -> Result<Self> {
         let src = source(path.display().to_string(), files::read_text(path)?);
-        let (plan, Findings(findings)) = Plan::parse(&src)?;
-        Ok(Self { plan, findings, digest: Sha256::digest(src.inner().as_bytes()).to_vec() })
+        let ((plan, written), Findings(findings)) = Plan::read(&src)?;
+        let fields = plan_digest::of_fields(&plan);
+        let changed = plan_digest::changed(&written, &fields, &src);
+        let digest = Sha256::digest(src.inner().as_bytes()).to_vec();
+        Ok(Self { plan, findings, changed, log_digest: plan_digest::of_all(&fields), digest })
     }
 
     fn check_belongs(&mut self, path: &Path, machine: &Machine) -> Result<()> {
@@ -74,12 +81,16 @@ impl ReadPlan {
                 .help("if the change moves the chain, the blocks or the probe, generate the plan again"),
             );
         }
+        // which field was changed, and at which touch that can be seen
+        let mut wrong: Vec<Finding> = self.changed.take().into_iter().collect();
         let faults = plan_check::on_machine(plan, machine);
         if !faults.is_empty() {
             // the text was not kept: it is read once more for the places
             let src = source(path.display().to_string(), files::read_text(path)?);
-            self.findings.extend(faults.findings(plan, &src).finish(())?.1.0);
+            wrong.extend(faults.findings(plan, &src).0);
         }
+        let ((), said) = Findings(wrong).finish(())?;
+        self.findings.extend(said.0);
         Ok(())
     }
 }
@@ -112,7 +123,8 @@ impl ReadRun {
         let path = folder.join(&entry.log);
         let log = files::read_bytes(&path).map(|bytes| {
             let controller = controller_path(&entry.controller, folder);
-            let (findings, mut touches) = matched(&bytes, &path, (&controller, entry.run), machine, &plan.plan);
+            let belongs = (&plan.plan, Some(plan.log_digest.as_str()));
+            let (findings, mut touches) = matched(&bytes, &path, (&controller, entry.run), machine, belongs);
             if let Ok(touches) = &mut touches
                 && controller != "csv"
             {
@@ -128,13 +140,14 @@ impl ReadRun {
 /// Without `started` the runs follow one another, by the plan's times. A touch without a time behind others that have one
 /// (the program was started again) follows the last of them as the plan has it: time does not run backward.
 fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>) {
-    let first = touches.iter().find_map(|t| Some((t.time_s?, plan.touch(t.id)?.time_s?)));
+    let numbered = plan.numbered();
+    let first = touches.iter().find_map(|t| Some((t.time_s?, numbered.touch(t.id)?.time_s?)));
     // the touch made before, once one had a time of its own: on the study's clock, and as planned
     let mut last: Option<(f64, f64)> = None;
     let mut made: Vec<&mut Touch> = touches.iter_mut().collect();
     made.sort_by_key(|t| t.line);
     for touch in made {
-        let planned = plan.touch(touch.id).and_then(|t| t.time_s);
+        let planned = numbered.touch(touch.id).and_then(|t| t.time_s);
         touch.time_s = match (started_s, first, touch.time_s) {
             (Some(started), Some((first_s, planned_s)), Some(time_s)) => Some(started + planned_s + time_s - first_s),
             // begun again at an earlier set-up it comes after the last one all the same
@@ -156,25 +169,26 @@ pub fn read_log(
     plan: &Plan,
     io: &Io,
 ) -> Result<Vec<Touch>> {
-    let (findings, touches) = matched(bytes, path, (controller, run), machine, plan);
+    let (findings, touches) = matched(bytes, path, (controller, run), machine, (plan, None));
     io.report(&findings);
     touches
 }
 
-/// What is to be said of a log, and its touches.
+/// What is to be said of a log, and its touches. With the plan the digest of its log, where it is known.
 fn matched(
     bytes: &[u8],
     path: &Path,
     (controller, run): (&str, Option<usize>),
     machine: &Machine,
-    plan: &Plan,
+    (plan, digest): (&Plan, Option<&str>),
 ) -> (Vec<Finding>, Result<Vec<Touch>>) {
     let mut findings = Vec::new();
     let mut read = || {
         let (reader, said) = log::Reader::load(controller, files::read_text)?;
         findings.extend(said);
         let name = path.display().to_string();
-        let (read, said) = log::read_run(bytes, &name, reader.writer(), machine, plan, run)?;
+        let digest = || digest.map_or_else(|| plan_digest::digest(plan), str::to_owned);
+        let (read, said) = log::read_digested(bytes, &name, reader.writer(), machine, plan, run, digest)?;
         findings.extend(said.0);
         Ok(read.touches)
     };

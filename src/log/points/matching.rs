@@ -96,7 +96,8 @@ fn pair<'a>(
     places: &Places<'_>,
     findings: &mut Findings,
 ) -> (Vec<(&'a Point, &'a PlanTouch)>, Vec<u64>) {
-    let by_number = |p: &'a Point| plan.touch(p.number).filter(|t| same(p, t)).map(|t| (p, t));
+    let numbered = plan.numbered();
+    let by_number = |p: &'a Point| numbered.touch(p.number).filter(|t| same(p, t)).map(|t| (p, t));
     if let Some(pairs) = points.iter().map(by_number).collect::<Option<Vec<_>>>() {
         return (pairs, Vec::new());
     }
