@@ -22,8 +22,9 @@ pub fn not_of_form<T: DeserializeOwned>(
     if !unknown.iter().any(|key| Some(key.span()) == error.span()) {
         return from_toml(error, source, code).help(help).into();
     }
+    let expected = known.join("`, `");
     let finding = |key: &toml::Spanned<toml::de::DeString<'_>>| {
-        let message = format!("unknown field `{}`, expected one of {}", key.get_ref(), known.join(", "));
+        let message = format!("unknown field `{}`, expected one of `{expected}`", key.get_ref());
         Finding::error(code, message).help(help).at(source, key.span())
     };
     Failure(unknown.into_iter().map(finding).collect())

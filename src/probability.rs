@@ -1,8 +1,12 @@
 //! Distribution functions that answer every input: `None` where no probability can be computed. The only place that calls the library's,
 //! which end the process where they cannot (no degrees of freedom, not a number, an argument that overflows).
 
-use statrs::distribution::{Continuous, ContinuousCDF, FisherSnedecor, Gamma, Normal, StudentsT};
+use statrs::distribution::{
+    Continuous, ContinuousCDF, DiscreteCDF, FisherSnedecor, Gamma, Hypergeometric, Normal, StudentsT,
+};
 use statrs::function::beta;
+
+pub use statrs::function::gamma::ln_gamma;
 
 /// Degrees of freedom from which the limit for endless ones is as exact as the library, and ends sooner.
 const ENDLESS: f64 = 1e8;
@@ -128,6 +132,12 @@ fn student(t: f64, dof: f64) -> Option<StudentsT> {
     StudentsT::new(0.0, 1.0, dof).ok()
 }
 
+/// P(X > x): more than x of the `drawn` ones are among the `marked` ones of `all`.
+#[must_use]
+pub fn hypergeometric_sf(x: u64, all: u64, marked: u64, drawn: u64) -> Option<f64> {
+    number(Hypergeometric::new(all, marked, drawn).ok()?.sf(x))
+}
+
 /// The regularised incomplete beta function I_x(a, b).
 #[must_use]
 pub fn beta_reg(a: f64, b: f64, x: f64) -> Option<f64> {
@@ -207,6 +217,10 @@ mod tests {
             }
         }
         assert!(answers > 300, "{answers}");
+        for (all, marked, drawn) in [(0, 0, 0), (10, 3, 5), (10, 20, 5), (10, 3, 20), (10, 0, 0), (u64::MAX, 1, 1)] {
+            let found = hypergeometric_sf(2, all, marked, drawn);
+            assert!(found.is_none_or(|p| (-1e-9..=1.0 + 1e-9).contains(&p)), "{all} {marked} {drawn}: {found:?}");
+        }
         for dof in [0.0, -1.0, f64::NAN] {
             assert_eq!(
                 [chi2_cdf(1.0, dof), chi2_quantile(0.5, dof), f_sf(1.0, dof, 3.0), f_sf(1.0, 3.0, dof)],

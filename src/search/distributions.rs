@@ -1,7 +1,6 @@
 //! Probabilities of the tests, also where they are too small for a floating-point number.
 
-use crate::probability::{beta_reg, chi2_quantile, chi2_sf, ln_beta, t_sf};
-use statrs::function::gamma::ln_gamma;
+use crate::probability::{beta_reg, chi2_quantile, chi2_sf, ln_beta, ln_gamma, t_sf};
 
 /// Below this a regularised incomplete beta function is computed by its series in logarithms.
 const SMALLEST: f64 = 1e-250;
@@ -72,6 +71,9 @@ pub fn ln_p_of_scan(ln_p: &[f64], q: usize) -> f64 {
     // the roots of a tiny p are not needed exactly: Bonferroni's factor no longer matters there
     if best < -300.0 {
         return bonferroni;
+    }
+    if q == 0 {
+        return bonferroni.min(0.0);
     }
     let root = |ln_p: f64| -> f64 {
         let p = ln_p.exp();
