@@ -5,19 +5,15 @@
 #[path = "src/model/spelling.rs"]
 mod spelling;
 #[path = "src/model/words.rs"]
+#[allow(dead_code)] // only the names are needed here
 mod words;
 
-use exmex::prelude::*;
-use exmex::{MakeOperators, Operator};
-use spelling::{bare_number, spelled_out};
+use spelling::{Steps, bare_number, fold};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::fmt::Write as _;
-use std::num::ParseFloatError;
-use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::path::PathBuf;
-use std::str::FromStr;
-use words::{Value, operators};
+use words::{One, Two};
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
@@ -39,174 +35,84 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Every formula of the rows, in the order of their texts, as `model::expression::BUILT_IN` has them.
+/// Every formula of the rows, in the order of their texts, as `model::expression::built_in` has them.
 fn formulas(rows: &[toml::Value]) -> Result<String, Box<dyn Error>> {
     let all = |list, word| {
         let entries = rows.iter().filter_map(move |row| row.get(list)?.as_array()).flatten();
         entries.filter_map(move |entry| entry.get(word)?.as_str()).collect::<BTreeSet<&str>>()
     };
     let shapes = all("shape", "parameter");
-    let mut out = String::from("&[");
-    for text in all("terms", "formula") {
-        if bare_number(text).is_some() {
-            continue;
-        }
-        let not_read = |says: &str| format!("effects.toml: formula {text:?}: {says}");
-        let plain = spelled_out(text).map_err(|says| not_read(&says))?;
-        let flat = Flat::parse(&plain).map_err(|e| not_read(e.msg()))?;
-        let variables = flat.var_names();
-        let place = |name: &String| variables.iter().position(|own| own == name);
-        // the crate takes every step of the formula, and each writes itself down
-        let body = |flat: &Flat| -> Option<String> {
-            let values = flat.var_names().iter().map(|name| Some(Code::text(format!("v[{}]", place(name)?))));
-            let Code { code, .. } = flat.eval(&values.collect::<Option<Vec<_>>>()?).ok()?;
-            Some(format!("|{}| {code}", if code.contains("v[") { "v" } else { "_" }))
-        };
-        let derivative = |at: usize| {
-            let is_shape = shapes.contains(variables[at].as_str());
-            is_shape.then(|| flat.clone().partial(at).ok().and_then(|of| body(&of))).flatten()
-        };
-        let value = body(&flat).ok_or_else(|| not_read("it has no value"))?;
-        write!(out, "BuiltIn {{ text: {text:?}, variables: &{variables:?}, value: {value}, derivatives: &[")?;
-        for at in 0..variables.len() {
-            match derivative(at) {
-                Some(derivative) => write!(out, "Some({derivative}), ")?,
-                None => out.push_str("None, "),
-            }
-        }
-        out.push_str("] },\n");
+    let (mut functions, mut table) = (String::new(), String::from("pub(super) static ALL: &[BuiltIn] = &["));
+    for (i, text) in all("terms", "formula").into_iter().filter(|text| bare_number(text).is_none()).enumerate() {
+        let Code { code, variables } = fold(text).map_err(|says| format!("effects.toml: formula {text:?}: {says}"))?;
+        let bound: String =
+            variables.iter().enumerate().map(|(at, name)| format!("let v_{name} = v[{at}]; ")).collect();
+        writeln!(functions, "fn f{i}<V: Value>(v: &[V]) -> V {{ let _ = v; {bound}{code} }}")?;
+        let has_shape = variables.iter().any(|name| shapes.contains(name.as_str()));
+        let dual = if has_shape { format!("Some(f{i}::<Dual>)") } else { "None".to_owned() };
+        writeln!(
+            table,
+            "BuiltIn {{ text: {text:?}, variables: &{variables:?}, value: f{i}::<f64>, dual: {dual} }},",
+            variables = variables.iter().collect::<Vec<_>>()
+        )?;
     }
-    out.push(']');
-    Ok(out)
+    Ok(format!("{functions}{table}];\n"))
 }
 
-/// The text of a program that computes a number.
-#[derive(Debug, Clone, Default)]
+/// The text of a program that computes a part of a formula.
 struct Code {
     code: String,
-    /// The number itself, where no variable has a part in it: the crate leaves out factors of 1 and summands of 0.
-    constant: Option<f64>,
-}
-
-impl PartialEq for Code {
-    fn eq(&self, other: &Self) -> bool {
-        match (self.constant, other.constant) {
-            (None, None) => self.code == other.code,
-            (one, two) => one == two,
-        }
-    }
-}
-
-type Flat = FlatEx<Code, Words>;
-
-/// The words of formulas, in program text.
-#[derive(Debug, Clone)]
-struct Words;
-
-impl MakeOperators<Code> for Words {
-    fn make<'a>() -> Vec<Operator<'a, Code>> {
-        operators()
-    }
+    variables: BTreeSet<String>,
 }
 
 impl Code {
+    fn then(self, step: &str) -> Self {
+        Self { code: format!("{}{step}", self.code), ..self }
+    }
+
+    fn two(mut self, name: &str, right: Self) -> Self {
+        self.variables.extend(right.variables);
+        Self { code: format!("{}.two(Two::{name}, {})", self.code, right.code), ..self }
+    }
+
+    fn number_of(value: f64) -> Self {
+        Self { code: format!("V::number({value:?})"), variables: BTreeSet::new() }
+    }
+}
+
+impl Steps for Code {
     fn number(value: f64) -> Self {
-        let code =
-            if value.is_finite() { format!("{value:?}_f64") } else { format!("f64::from_bits({})", value.to_bits()) };
-        Self { code, constant: Some(value) }
+        Self::number_of(value)
     }
 
-    fn text(code: String) -> Self {
-        Self { code, constant: None }
+    fn word(name: &str) -> Self {
+        words::constant(name).map_or_else(
+            || Self { code: format!("v_{name}"), variables: BTreeSet::from([name.to_owned()]) },
+            Self::number_of,
+        )
     }
 
-    /// A step with one number: `of` it where it is known, else its text.
-    fn one(self, of: impl Fn(f64) -> f64, text: impl Fn(&str) -> String) -> Self {
-        self.constant.map_or_else(|| Self::text(text(&self.code)), |x| Self::number(of(x)))
+    fn negative(self) -> Self {
+        self.then(".one(One::Negative)")
     }
 
-    /// A step with two.
-    fn two(self, other: Self, of: impl Fn(f64, f64) -> f64, text: impl Fn(&str, &str) -> String) -> Self {
-        match (self.constant, other.constant) {
-            (Some(a), Some(b)) => Self::number(of(a, b)),
-            _ => Self::text(text(&self.code, &other.code)),
+    fn operator(self, sign: char, right: Self) -> Self {
+        self.two(&format!("{:?}", Two::operator(sign)), right)
+    }
+
+    fn call(name: &str, arguments: Vec<Self>) -> Self {
+        let one = One::named(name).map(|of| format!(".one(One::{of:?})"));
+        let two = Two::named(name).map(|of| format!("{of:?}"));
+        let mut arguments = arguments.into_iter();
+        match (arguments.next(), arguments.next(), one, two) {
+            (Some(x), None, Some(of), _) => x.then(&of),
+            (Some(a), Some(b), _, Some(of)) => a.two(&of, b),
+            // the compiler says where this is
+            _ => Self { code: format!("no function {name}"), variables: BTreeSet::new() },
         }
     }
 
-    fn call(self, name: &str, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
-        self.two(other, of, |a, b| format!("Value::{name}({a}, {b})"))
-    }
-}
-
-impl FromStr for Code {
-    type Err = ParseFloatError;
-
-    fn from_str(digits: &str) -> Result<Self, ParseFloatError> {
-        digits.parse().map(Self::number)
-    }
-}
-
-impl From<u8> for Code {
-    fn from(value: u8) -> Self {
-        Self::number(value.into())
-    }
-}
-
-impl From<f32> for Code {
-    fn from(value: f32) -> Self {
-        Self::number(value.into())
-    }
-}
-
-/// Rust's own operators between texts.
-macro_rules! between {
-    ($($of:ident $method:ident $sign:literal)*) => {$(
-        impl $of for Code {
-            type Output = Self;
-
-            fn $method(self, other: Self) -> Self {
-                self.two(other, |a, b| $of::$method(a, b), |a, b| format!("({a} {} {b})", $sign))
-            }
-        }
-    )*};
-}
-
-between! { Add add "+" Sub sub "-" Mul mul "*" Div div "/" }
-
-impl Neg for Code {
-    type Output = Self;
-
-    fn neg(self) -> Self {
-        self.one(|x| -x, |x| format!("(-{x})"))
-    }
-}
-
-impl Value for Code {
-    fn pi() -> Self {
-        Self::number(f64::pi())
-    }
-
-    fn power(self, power: Self) -> Self {
-        self.call("power", power, Value::power)
-    }
-
-    fn atan2(self, x: Self) -> Self {
-        self.call("atan2", x, Value::atan2)
-    }
-
-    fn modulo(self, period: Self) -> Self {
-        self.call("modulo", period, Value::modulo)
-    }
-
-    fn sign(self) -> Self {
-        self.one(Value::sign, |x| format!("Value::sign({x})"))
-    }
-
-    fn step(self) -> Self {
-        self.one(Value::step, |x| format!("Value::step({x})"))
-    }
-
-    fn function(self, name: &'static str, of: fn(f64) -> f64) -> Self {
-        self.one(of, |x| format!("f64::{name}({x})"))
+    fn in_brackets(self) -> Self {
+        self
     }
 }

@@ -4,7 +4,7 @@
 //! intended; *info* = a default was taken. All findings of a file are reported at once. Only `cli` prints them.
 
 use miette::{Diagnostic, LabeledSpan, SourceCode};
-use std::{fmt, ops::Range, sync::Arc};
+use std::{collections::BTreeMap, fmt, ops::Range, sync::Arc};
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -180,6 +180,35 @@ impl Findings {
     }
 }
 
+/// Findings of one code that are shown at most: a person corrects these first.
+pub const SHOWN: usize = 20;
+
+/// What is shown of many findings: the first ones of each code, and for each code one that counts the others.
+#[must_use]
+pub fn shown(findings: &[Finding]) -> Vec<Finding> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut out = Vec::new();
+    for finding in findings {
+        let count = counts.entry(finding.code).or_default();
+        *count += 1;
+        if *count <= SHOWN {
+            out.push(finding.clone());
+        }
+    }
+    let rest = counts.into_iter().filter(|(_, count)| *count > SHOWN);
+    out.extend(rest.map(|(code, count)| {
+        let message = format!("{} more findings of the kind {code} are not listed", count - SHOWN);
+        Finding::info("diag::more", message).help("correct the listed ones and run the command again")
+    }));
+    out
+}
+
+/// Will no further finding of this code be shown? What costs time to say about it can be left out.
+#[must_use]
+pub fn enough(mut codes: impl Iterator<Item = &'static str>, code: &str) -> bool {
+    codes.by_ref().filter(|known| *known == code).nth(SHOWN - 1).is_some()
+}
+
 /// A TOML error of the parser as a finding with its place.
 #[must_use]
 pub fn from_toml(error: &toml::de::Error, source: &Source, code: &'static str) -> Finding {
@@ -276,6 +305,20 @@ mod tests {
         let finding = Finding::error("t::t", "wrong").at(&src, 9..10);
         assert_eq!(finding.place().unwrap(), "m.toml:2:4");
         assert_eq!(finding.to_string(), "m.toml:2:4: wrong");
+    }
+
+    #[test]
+    fn the_first_findings_of_a_code_are_shown_and_the_others_counted() {
+        let many = |code, n| (0..n).map(move |i| Finding::error(code, format!("{i}")));
+        let all: Vec<Finding> = many("t::many", 1000).chain(many("t::few", SHOWN)).collect();
+        let shown = shown(&all);
+        let count = |code| shown.iter().filter(|f| f.code == code).count();
+        assert_eq!((count("t::many"), count("t::few"), count("diag::more")), (SHOWN, SHOWN, 1));
+        assert_eq!(shown[SHOWN - 1].message, "19");
+        let last = shown.last().unwrap();
+        assert!(last.message.starts_with("980 more") && last.help.is_some(), "{last:?}");
+        let codes = || all.iter().map(|f| f.code);
+        assert!(enough(codes(), "t::few") && !enough(codes().take(SHOWN - 1), "t::many"));
     }
 
     #[test]

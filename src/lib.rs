@@ -10,6 +10,8 @@ pub mod axes;
 pub mod diag;
 pub mod files;
 pub mod geometry;
+pub mod keys;
+pub mod probability;
 pub mod symbols;
 pub mod units;
 

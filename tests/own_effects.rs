@@ -1,5 +1,5 @@
 //! A user's own effects are equal to the built-in ones: planted by the virtual machine from the file, predicted by the
-//! model from the same file, by two readings that share the expression crate only.
+//! model from the same file, by two readings that share no code.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod common;

@@ -593,3 +593,44 @@ fn an_effect_that_changes_on_the_disk_is_fitted_anew() {
         std::thread::sleep(Duration::from_millis(50));
     }
 }
+
+/// Formulas that are long, deep or multiply a shape parameter many times: each is tried or refused with its place, at once.
+#[test]
+fn no_formula_ends_the_process() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let version = w.version();
+    let attempt = |formula: &str, shapes: usize| {
+        let name = |i: usize| if i == 0 { "s".to_owned() } else { format!("s{i}") };
+        let shape: Vec<Value> =
+            (0..shapes).map(|i| json!({ "parameter": name(i), "unit": "mm", "start": 0.9 })).collect();
+        let term = json!({ "parameter": "p", "unit": "um", "dof": "dx", "formula": formula });
+        let draft = json!({ "id": "my-a", "at": "X", "terms": [term], "shape": shape });
+        let begun = Instant::now();
+        let answer = w.post("/api/try", &json!({ "version": version, "draft": draft }).to_string());
+        (answer, begun.elapsed())
+    };
+    for formula in [
+        format!("X{}", "*s".repeat(18)),
+        format!("X{}", "*s".repeat(100)),
+        format!("{}s", "s^".repeat(18)),
+        format!("{}s{}", "sin(".repeat(32), ")".repeat(32)),
+        vec!["cos(Y/s)"; 24].join("+"),
+        vec!["cos(Y/s)"; 60].join("+"),
+    ] {
+        let (answer, time) = attempt(&formula, 1);
+        assert_eq!(answer.status, 200, "{formula}: {:.300}", answer.body);
+        assert!(time < Duration::from_secs(20), "{formula}: {time:?}");
+    }
+    for (formula, from) in [("(".repeat(100) + "s" + &")".repeat(100), 64), ("s^".repeat(100) + "s", 129)] {
+        let (answer, _) = attempt(&formula, 1);
+        assert_eq!(answer.status, 422, "{formula}: {:.300}", answer.body);
+        let mistake = &answer.json()["mistakes"][0];
+        assert_eq!((&mistake["field"], &mistake["from"]), (&json!("terms.0.formula"), &json!(from)), "{mistake}");
+        assert!(mistake["help"].is_string(), "{mistake}");
+    }
+    let (answer, _) = attempt("s + s1 + s2 + s3 + s4 + s5 + s6 + s7 + s8", 9);
+    assert_eq!(answer.status, 422, "{:.300}", answer.body);
+    assert_eq!(answer.json()["mistakes"][0]["field"], "shape.8.parameter");
+    assert_eq!(w.version(), version);
+}

@@ -1,6 +1,6 @@
 //! What every verb shares: printing, exit codes, and finding machines.
 
-use crate::diag::{Failure, Finding, Findings, Result, Severity, source};
+use crate::diag::{Failure, Finding, Findings, Result, Severity, shown, source};
 use crate::files;
 use crate::fit::outcome::Outcome;
 use crate::machine::{self, Machine};
@@ -131,13 +131,14 @@ impl Io {
         }
     }
 
-    /// Findings to stderr, each with its place and remedy.
+    /// Findings to stderr, each with its place and remedy; of very many the first ones.
     pub fn report(&self, findings: &[Finding]) {
+        let findings = shown(findings);
         if let Some(heard) = self.heard {
-            heard.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend_from_slice(findings);
+            heard.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend(findings);
             return;
         }
-        for finding in findings {
+        for finding in &findings {
             let place = finding.place().map(|p| format!("{p}: ")).unwrap_or_default();
             let word = match finding.severity {
                 Severity::Error => "error",
@@ -181,7 +182,7 @@ impl Io {
                 self.report(&findings);
                 // one object on stdout, whatever comes of the call
                 if !ANSWERED.load(Ordering::Relaxed) {
-                    let findings: Vec<serde_json::Value> = findings.iter().map(finding_record).collect();
+                    let findings: Vec<serde_json::Value> = shown(&findings).iter().map(finding_record).collect();
                     self.answer(&serde_json::json!({ "format": "axiscal-failure/1", "findings": findings }));
                 }
                 ExitCode::from(2)

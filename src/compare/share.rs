@@ -2,8 +2,8 @@
 
 use crate::fit::whitening::Whitening;
 use crate::fit::{Fit, uncertainty};
+use crate::probability::f_sf;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Directions of which the model leaves less than this share (of the norm's square) are its own already.
 const LEAST_LEFT: f64 = 1e-3;
@@ -102,7 +102,7 @@ impl Beside {
         let per_dof = (left / rest).max(1.0);
         let excess = (self.chi2 - self.dof).max(4.0 * (2.0 * self.dof).sqrt());
         let share = ((taken - q * per_dof) / excess).clamp(0.0, 1.0);
-        let p = FisherSnedecor::new(q, rest).map_or(1.0, |f| f.sf(taken / q / (left / rest).max(1e-300)));
+        let p = f_sf(taken / q / (left / rest).max(1e-300), q, rest).unwrap_or(1.0);
         let n = self.n;
         let evidence = n * (self.chi2 / left.max(1e-9 * self.chi2)).ln() - q * n.ln();
         Share { share, p, rank, evidence }

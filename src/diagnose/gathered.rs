@@ -2,9 +2,9 @@
 //! anywhere; many from one place are a finding.
 
 use crate::fit::Fit;
+use crate::probability::hypergeometric_sf;
 use crate::search::generic::Features;
 use crate::search::multiplicity::FAMILY_LEVEL;
-use statrs::distribution::{DiscreteCDF, Hypergeometric};
 
 /// Fewer touches than this may lie together by chance.
 const LEAST: usize = 4;
@@ -49,8 +49,9 @@ pub(super) fn gathered(fit: &Fit, features: &Features) -> Option<Gathered> {
             let mut there = bad.iter().copied().filter(|&i| group.get(i) == Some(&place));
             let Some(one) = there.next() else { continue };
             let here = 1 + there.count();
-            let Ok(chance) = Hypergeometric::new(total as u64, of as u64, bad.len() as u64) else { continue };
-            let p = (places as f64 * chance.sf(here as u64 - 1)).min(1.0);
+            let [total, of_place, drawn, beside] = [total, of, bad.len(), here - 1].map(|n| n as u64);
+            let Some(chance) = hypergeometric_sf(beside, total, of_place, drawn) else { continue };
+            let p = (places as f64 * chance).min(1.0);
             if here >= LEAST && p < LEVEL && best.as_ref().is_none_or(|b| p < b.p) {
                 best = Some(Gathered { by, rejected: bad.len(), here, of, p, one });
             }
@@ -67,8 +68,9 @@ pub(super) fn faces(fit: &Fit, features: &Features) -> Vec<usize> {
     let each = (0..n_faces).filter_map(|face| {
         let of = features.face.iter().filter(|f| **f == face).count();
         let here: Vec<usize> = bad.iter().copied().filter(|&i| features.face.get(i) == Some(&face)).collect();
-        let chance = Hypergeometric::new(features.face.len() as u64, of as u64, bad.len() as u64).ok()?;
-        let p = n_faces as f64 * chance.sf((here.len() as u64).saturating_sub(1));
+        let [total, of_face, drawn, beside] =
+            [features.face.len(), of, bad.len(), here.len().saturating_sub(1)].map(|n| n as u64);
+        let p = n_faces as f64 * hypergeometric_sf(beside, total, of_face, drawn)?;
         (here.len() >= LEAST && p < FAMILY_LEVEL).then(|| here[0])
     });
     each.collect()

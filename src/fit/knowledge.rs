@@ -2,7 +2,7 @@
 
 use super::Knowledge;
 use super::candidates::without_value;
-use crate::diag::{Failure, Finding, Result};
+use crate::diag::{Failure, Finding, Result, enough};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::predict::{Model, Observation, Unknown};
@@ -26,8 +26,12 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
                     .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` tells which"),
             ),
             None => {
-                let known: Vec<&str> = catalogue.iter().filter(|e| e.applies_to(machine)).map(|e| e.id.as_str()).collect();
-                findings.push(Finding::error("model::unknown_effect", format!("no effect is called {id:?}")).help(format!("for this machine there are: {}", known.join(", "))));
+                let mut finding = Finding::error("model::unknown_effect", format!("no effect is called {id:?}"));
+                if !enough(findings.iter().map(|f: &Finding| f.code), finding.code) {
+                    let known: Vec<&str> = catalogue.iter().filter(|e| e.applies_to(machine)).map(|e| e.id.as_str()).collect();
+                    finding = finding.help(format!("for this machine there are: {}", known.join(", ")));
+                }
+                findings.push(finding);
             }
         }
     }
@@ -86,11 +90,13 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
         match matches[..] {
             [i] => out[i] = Some(*known),
             _ => {
-                let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
-                findings.push(
-                    Finding::error("model::unknown_parameter", format!("no parameter of the model is called {word:?}"))
-                        .help(format!("there are: {}", names.join(", "))),
-                );
+                let message = format!("no parameter of the model is called {word:?}");
+                let mut finding = Finding::error("model::unknown_parameter", message);
+                if !enough(findings.iter().map(|f: &Finding| f.code), finding.code) {
+                    let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
+                    finding = finding.help(format!("there are: {}", names.join(", ")));
+                }
+                findings.push(finding);
             }
         }
         // a kilometre or a billion degrees is no knowledge of a machine

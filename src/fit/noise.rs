@@ -6,9 +6,9 @@
 use super::digits::Rounding;
 use super::quantiles;
 use super::revisits::{Followed, Revisits, revisits};
+use crate::probability::{chi2_cdf, chi2_quantile};
 use crate::units::um_from_mm;
 use nalgebra::Vector3;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Fewer degrees of freedom than this say too little: their 95 % interval for σ spans more than a factor of two.
 const LEAST_REPEATS: usize = 8;
@@ -180,7 +180,7 @@ fn contradicts_visits(
     changes: bool,
 ) -> bool {
     let (ratio, k) = revisits.beside(sigma_mm, stated_mm);
-    let below = ChiSquared::new(k as f64).map_or(0.5, |d| d.cdf(ratio * k as f64));
+    let below = chi2_cdf(ratio * k as f64, k as f64).unwrap_or(0.5);
     let too_little = ratio > chi2_limit(k, sigma_dof) && !changes;
     let too_much = below < 0.5 * LEVEL;
     (too_little || too_much) && (found_mm - stated_mm).abs() > (TENTH - 1.0) * found_mm.max(stated_mm)
@@ -191,7 +191,7 @@ fn contradicts_visits(
 fn contradicts(found_mm: f64, dof: usize, stated_mm: f64) -> bool {
     let ratio = found_mm / stated_mm;
     let chi2 = ratio * ratio * dof as f64;
-    let below = ChiSquared::new(dof as f64).map_or(0.5, |d| d.cdf(chi2));
+    let below = chi2_cdf(chi2, dof as f64).unwrap_or(0.5);
     (below > 1.0 - 0.5 * LEVEL && ratio > TENTH) || (below < 0.5 * LEVEL && ratio < 1.0 / TENTH)
 }
 
@@ -330,9 +330,9 @@ impl Noise {
         /// Touches that scatter by less, mm, are made without noise.
         const WITHOUT_MM: f64 = 1e-6;
         let word = self.untold()?;
-        let distribution = ChiSquared::new(dof as f64).ok()?;
+        let below = chi2_cdf(chi2, dof as f64)?;
         let times = (chi2 / dof as f64).sqrt();
-        let says = times * ROUGH < 1.0 && times * self.sigma_mm > WITHOUT_MM && distribution.cdf(chi2) < LEVEL;
+        let says = times * ROUGH < 1.0 && times * self.sigma_mm > WITHOUT_MM && below < LEVEL;
         says.then(|| {
             format!(
                 "the touches fit {:.1} times better than the {word} noise of {:.2} um lets them: no chance makes that. It is used all the same, and \
@@ -436,7 +436,7 @@ fn coverage(dof: Option<f64>) -> f64 {
 #[must_use]
 pub fn chi2_limit(dof: usize, dof_noise: Option<f64>) -> f64 {
     match dof_noise {
-        None => ChiSquared::new(dof as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(0.999) / dof as f64),
+        None => chi2_quantile(0.999, dof as f64).map_or(f64::INFINITY, |limit| limit / dof as f64),
         Some(nu) => quantiles::fisher_999(dof as f64, nu.max(1.0)),
     }
 }

@@ -3,7 +3,7 @@
 //! The library's inverses go through an inverse of the incomplete beta function that does not end for some large degrees of
 //! freedom (t with 115 424 348.9). Newton's method within a bracket always does.
 
-use statrs::distribution::{Continuous, ContinuousCDF, FisherSnedecor, StudentsT};
+use crate::probability::{f_cdf, f_pdf, t_cdf, t_pdf};
 
 /// Upper 97.5 % point of the normal distribution.
 const Z: f64 = 1.959_963_984_540_054;
@@ -40,19 +40,22 @@ fn student(dof: f64, z: f64, level: f64, most: f64) -> f64 {
     if dof >= EXPANDED_FROM {
         return start;
     }
-    let Ok(t) = StudentsT::new(0.0, 1.0, dof) else { return start };
-    inverse(|x| t.cdf(x), |x| t.pdf(x), level, start, (z, most))
+    let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    inverse(|x| or_nan(t_cdf(x, dof)), |x| or_nan(t_pdf(x, dof)), level, start, (z, most))
 }
 
 /// Upper 99.9 % point of Fisher's F.
 #[must_use]
 pub fn fisher_999(dof: f64, dof_below: f64) -> f64 {
-    let Ok(f) = FisherSnedecor::new(dof, dof_below) else { return f64::INFINITY };
+    let cdf = |x| f_cdf(x, dof, dof_below).unwrap_or(f64::NAN);
+    if cdf(1.0).is_nan() {
+        return f64::INFINITY;
+    }
     let mut high = 2.0;
-    while f.cdf(high) < 0.999 && high < 1e9 {
+    while cdf(high) < 0.999 && high < 1e9 {
         high *= 2.0;
     }
-    inverse(|x| f.cdf(x), |x| f.pdf(x), 0.999, 0.5 * high, (0.0, high))
+    inverse(cdf, |x| f_pdf(x, dof, dof_below).unwrap_or(f64::NAN), 0.999, 0.5 * high, (0.0, high))
 }
 
 /// Where a distribution function takes a value: Newton's steps, halves of the bracket where they leave it.
@@ -116,6 +119,11 @@ mod tests {
         for (a, b) in [(1.0, 1.0), (300.0, 1.3), (300.0, 1e7 + 0.3), (1e5, 1e9), (744.0, 157.9)] {
             let f = fisher_999(a, b);
             assert!(f.is_finite() && f > 1.0, "{a} {b}: {f}");
+        }
+        // where there is no distribution, nothing is above its quantile
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e308] {
+            assert!(fisher_999(bad, 5.0) > 1.0 && fisher_999(5.0, bad) > 1.0, "{bad}");
+            assert!(student_95(bad) >= Z && student_as_4(bad) >= 4.0, "{bad}");
         }
     }
 }

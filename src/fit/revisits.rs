@@ -8,8 +8,8 @@
 //! with G the contrasts' rows of the fit's Jacobian and C its covariance, yₖ² lacks (G·C·Gᵀ)ₖₖ, which is given back.
 
 use super::noise::Sample;
+use crate::probability::chi2_quantile;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::HashMap;
 
 /// A pose visited this often at most enters the estimate of τ: the work grows with its cube.
@@ -167,7 +167,7 @@ impl Revisits {
         let tau2 = root(|tau2| sum(|c| c.square + c.followed, tau2), k);
         // what the fit followed is no longer in the contrasts
         let left = (k - sum(|c| c.followed, tau2)).max(1.0);
-        let quantile = ChiSquared::new(left).map_or(left, |d| d.inverse_cdf(0.1));
+        let quantile = chi2_quantile(0.1, left).unwrap_or(left);
         let upper2 = root(|tau2| sum(|c| c.square, tau2), quantile);
         let information = sum(|c| c.lambda, tau2);
         let dof = (tau2 * information).powi(2) / k * (left / k);

@@ -6,7 +6,8 @@ use super::as_written::{self as w, AxisKind};
 use super::check_parts::Carriers;
 use super::{Axis, Carrier, Machine, Mounting, Reference, Side, Solid};
 use crate::axes::AxisName;
-use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use crate::diag::{Finding, Findings, Result, Source};
+use crate::keys::not_of_form;
 use crate::units::Plain;
 use nalgebra::{Unit, Vector3};
 use sha2::{Digest, Sha256};
@@ -35,8 +36,8 @@ pub(super) const LARGEST_SCATTER_UM: f64 = 1000.0;
 pub fn load(source: &Source) -> Result<(Vec<Machine>, Findings)> {
     let text = source.inner();
     let file: w::File = toml::from_str(text).map_err(|e| {
-        from_toml(&e, source, "machine::not_toml")
-            .help("`axiscal schema machines` prints the form; docs/guide/machines.md explains it")
+        let help = "`axiscal schema machines` prints the form; docs/guide/machines.md explains it";
+        not_of_form::<w::File>(&e, source, "machine::not_toml", help)
     })?;
     let mut check = Check { source, findings: Findings::default() };
     if file.format.get_ref() != FORMAT {

@@ -5,7 +5,8 @@ use super::as_written::{EffectAsWritten, File};
 use super::check::Check;
 use super::formula::Formula;
 use crate::axes::AxisName;
-use crate::diag::{Findings, Result, Source, from_toml};
+use crate::diag::{Findings, Result, Source};
+use crate::keys::not_of_form;
 use crate::machine::{Machine, Side};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, OnceLock};
@@ -259,8 +260,9 @@ impl Catalogue {
 
 /// The effects of a file; `taken` says that an effect of that id exists already.
 fn read(source: &Source, taken: &dyn Fn(&Effect) -> bool) -> Result<(Vec<Effect>, Findings)> {
-    let file: File = toml::from_str(source.inner())
-        .map_err(|e| from_toml(&e, source, "effects::not_toml").help("`axiscal schema effects` prints the form"))?;
+    let file: File = toml::from_str(source.inner()).map_err(|e| {
+        not_of_form::<File>(&e, source, "effects::not_toml", "`axiscal schema effects` prints the form")
+    })?;
     let mut check = Check::new(source, false);
     check.format(&file);
     let mut fresh: Vec<Effect> = Vec::new();

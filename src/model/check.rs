@@ -4,7 +4,8 @@ use super::as_written::{
     About, EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten,
 };
 use super::catalogue::{Effect, Parameter, Place, Term};
-use super::formula::{CONSTANTS, FUNCTIONS, Formula, LONGEST, VARIABLES};
+use super::formula::{CONSTANTS, FUNCTIONS, Formula, VARIABLES};
+use super::mistake::MOST_SHAPES;
 use super::{degrees, mistake};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
@@ -192,6 +193,18 @@ impl<'a> Check<'a> {
         let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let used =
             |name: &str| w.terms.iter().any(|t| t.formula.get_ref().split(|c| !part(c)).any(|word| word == name));
+        if let Some(beyond) = w.shape.get(MOST_SHAPES) {
+            self.error(
+                &beyond.parameter.span(),
+                "effects::shape",
+                format!(
+                    "{:?} has {} shape parameters, and {MOST_SHAPES} at most are read",
+                    w.id.get_ref(),
+                    w.shape.len()
+                ),
+                "write those that are known as numbers, or make several effects of it",
+            );
+        }
         for s in &w.shape {
             let name = s.parameter.get_ref();
             if !w.terms.is_empty() && !used(name) {
@@ -413,12 +426,9 @@ impl<'a> Check<'a> {
                 Some(Term { parameter, place, component, formula })
             }
             Err(message) => {
-                let help = if text.len() > LONGEST {
-                    "write it shorter, or as several terms of one parameter"
-                } else {
-                    "angles A B C are radians inside a formula"
-                };
-                let place = mistake::find(text, &words()).and_then(|m| self.inside(&t.formula, m.at));
+                let found = mistake::find(text, &words());
+                let help = found.as_ref().and_then(|m| m.help).unwrap_or("angles A B C are radians inside a formula");
+                let place = found.and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
                     &place.unwrap_or_else(|| t.formula.span()),
                     "effects::formula",

@@ -1,69 +1,168 @@
-//! What a formula computes: a built-in one as machine code that was made of it when the program was built, any other as the expression
-//! crate reads it.
+//! What a formula computes: a built-in one as machine code that was made of it when the program was built (`build.rs`), any other as a
+//! flat list of steps.
 //!
-//! Both come of the same crate, the same words and the same steps in the same order (`build.rs`); a test holds their values together.
+//! Both are taken from the text by the same reader (`spelling`), step by step in the same order, and call the same functions (`words`). A
+//! test compares their values. Nothing here calls itself, so that no formula can exhaust the stack.
 
-use super::words::{Value, operators};
-use exmex::prelude::*;
-use exmex::{MakeOperators, Operator};
-use std::sync::{LazyLock, OnceLock};
+use super::dual::Dual;
+use super::spelling::{Steps, fold};
+use super::words::{One, Two, Value, constant};
 
-/// A function of the variables of an expression.
-type Compiled = fn(&[f64]) -> f64;
+mod built_in {
+    //! Made by `build.rs`.
+    #![allow(clippy::all, unused_parens, non_snake_case)]
+    use super::{BuiltIn, Dual, One, Two, Value};
+    include!(concat!(env!("OUT_DIR"), "/formulas.rs"));
+}
 
 /// A built-in formula.
 #[derive(Debug)]
 pub(super) struct BuiltIn {
     text: &'static str,
     variables: &'static [&'static str],
-    value: Compiled,
-    /// By variable: where it may be a parameter of the effect, and there is a derivative.
-    derivatives: &'static [Option<Compiled>],
+    value: fn(&[f64]) -> f64,
+    /// The same with a derivative, where a parameter of the effect is inside.
+    dual: Option<fn(&[Dual]) -> Dual>,
 }
 
-/// All of them, in the order of their texts.
-#[allow(clippy::all, unused_parens)] // machine-made
-static BUILT_IN: &[BuiltIn] = include!(concat!(env!("OUT_DIR"), "/formulas.rs"));
+/// Variables of a formula at most: their values fit on the stack.
+pub(super) const MOST_VARIABLES: usize = 32;
 
-/// The words that a formula may use.
-#[derive(Clone, Debug)]
-pub(super) struct Words;
-
-/// Made once: the expression crate asks for them several times for each formula.
-static WORDS: LazyLock<Vec<Operator<'static, f64>>> = LazyLock::new(operators);
-
-impl MakeOperators<f64> for Words {
-    fn make<'a>() -> Vec<Operator<'a, f64>> {
-        WORDS.clone()
-    }
-}
-
-type Flat = FlatEx<f64, Words>;
-
-/// An expression that somebody wrote.
+/// A formula of a user's file.
 #[derive(Debug)]
 pub(super) struct Read {
-    flat: Flat,
-    /// By variable: made when somebody asks for it, which takes longer than the formula itself.
-    derivatives: Vec<OnceLock<Option<Derivative>>>,
+    steps: Vec<Step>,
+    /// Names of the variables, sorted.
+    variables: Vec<String>,
+    /// Values that wait at the same time, at most.
+    most_waiting: usize,
 }
 
-/// A derivative, and which of the expression's variables its own are.
-#[derive(Debug)]
-struct Derivative {
-    flat: Flat,
-    variables: Vec<usize>,
+/// A step. It takes its values from the end of those that wait, and puts its result there.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Number(f64),
+    Variable(usize),
+    One(One),
+    Two(Two),
 }
 
 impl Read {
-    fn derivative(&self, at: usize) -> Option<&Derivative> {
-        let make = || {
-            let flat = self.flat.clone().partial(at).ok()?;
-            let of_name = |name: &String| self.flat.var_names().iter().position(|own| own == name);
-            let variables = flat.var_names().iter().map(of_name).collect::<Option<Vec<_>>>()?;
-            Some(Derivative { flat, variables })
+    /// `None` where the text is no formula, or has more than [`MOST_VARIABLES`].
+    fn of(text: &str) -> Option<Self> {
+        let written = fold::<Written>(text).ok()?.0;
+        let names = written.iter().filter_map(|step| if let Word::Name(name) = step { Some(name) } else { None });
+        let mut variables: Vec<String> = names.cloned().collect();
+        variables.sort_unstable();
+        variables.dedup();
+        let step = |word: &Word| {
+            Some(match word {
+                Word::Step(step) => *step,
+                Word::Name(name) => Step::Variable(variables.binary_search(name).ok()?),
+                Word::Unknown => return None,
+            })
         };
-        self.derivatives.get(at)?.get_or_init(make).as_ref()
+        let steps = written.iter().map(step).collect::<Option<Vec<Step>>>()?;
+        let most_waiting = most_waiting(&steps);
+        Some(Self { steps, variables, most_waiting })
+    }
+
+    fn value<V: Value>(&self, variables: &[V]) -> V {
+        /// Values that wait in usual formulas.
+        const USUAL: usize = 16;
+        let zero = V::number(0.0);
+        if self.most_waiting <= USUAL {
+            self.run(variables, &mut [zero; USUAL])
+        } else {
+            self.run(variables, &mut vec![zero; self.most_waiting])
+        }
+    }
+
+    /// Takes the steps, with room for the values that wait.
+    fn run<V: Value>(&self, variables: &[V], waiting: &mut [V]) -> V {
+        let mut count = 0;
+        for step in &self.steps {
+            match *step {
+                Step::Number(value) => {
+                    waiting[count] = V::number(value);
+                    count += 1;
+                }
+                Step::Variable(at) => {
+                    waiting[count] = variables[at];
+                    count += 1;
+                }
+                Step::One(of) => waiting[count - 1] = waiting[count - 1].one(of),
+                Step::Two(of) => {
+                    count -= 1;
+                    waiting[count - 1] = waiting[count - 1].two(of, waiting[count]);
+                }
+            }
+        }
+        waiting[0]
+    }
+}
+
+fn most_waiting(steps: &[Step]) -> usize {
+    let (mut count, mut most) = (0_usize, 0);
+    for step in steps {
+        match step {
+            Step::Number(_) | Step::Variable(_) => count += 1,
+            Step::One(_) => {}
+            Step::Two(_) => count = count.saturating_sub(1),
+        }
+        most = most.max(count);
+    }
+    most
+}
+
+/// The steps of a part of a formula while it is read.
+struct Written(Vec<Word>);
+
+enum Word {
+    Step(Step),
+    /// A variable, which has no number yet.
+    Name(String),
+    /// A function that does not exist.
+    Unknown,
+}
+
+impl Written {
+    fn then(mut self, step: Step) -> Self {
+        self.0.push(Word::Step(step));
+        self
+    }
+}
+
+impl Steps for Written {
+    fn number(value: f64) -> Self {
+        Self(vec![Word::Step(Step::Number(value))])
+    }
+
+    fn word(name: &str) -> Self {
+        Self(vec![constant(name).map_or_else(|| Word::Name(name.to_owned()), |value| Word::Step(Step::Number(value)))])
+    }
+
+    fn negative(self) -> Self {
+        self.then(Step::One(One::Negative))
+    }
+
+    fn operator(mut self, sign: char, right: Self) -> Self {
+        self.0.extend(right.0);
+        self.then(Step::Two(Two::operator(sign)))
+    }
+
+    fn call(name: &str, arguments: Vec<Self>) -> Self {
+        let step = match arguments.len() {
+            1 => One::named(name).map(Step::One),
+            _ => Two::named(name).map(Step::Two),
+        };
+        let mut all: Vec<Word> = arguments.into_iter().flat_map(|argument| argument.0).collect();
+        all.push(step.map_or(Word::Unknown, Word::Step));
+        Self(all)
+    }
+
+    fn in_brackets(self) -> Self {
+        self
     }
 }
 
@@ -72,29 +171,28 @@ impl Read {
 pub(super) enum Expression {
     /// Of the catalogue.
     BuiltIn(&'static BuiltIn),
-    /// Of a user's file. As the crate has it, it is large (twenty kilobytes, whatever stands in it).
-    Read(Box<Read>),
+    /// Of a user's file.
+    Read(Read),
 }
 
 impl Expression {
     /// A built-in one by its text.
     pub(super) fn built_in(text: &str) -> Option<Self> {
-        let found = BUILT_IN.binary_search_by(|formula| formula.text.cmp(text)).ok()?;
-        Some(Self::BuiltIn(&BUILT_IN[found]))
+        let all = built_in::ALL;
+        let found = all.binary_search_by(|formula| formula.text.cmp(text)).ok()?;
+        Some(Self::BuiltIn(&all[found]))
     }
 
-    /// Reads a text; `None` where the crate does not understand it.
+    /// Reads a text; `None` where it is no formula.
     pub(super) fn read(text: &str) -> Option<Self> {
-        let flat = Flat::parse(text).ok()?;
-        let derivatives = flat.var_names().iter().map(|_| OnceLock::new()).collect();
-        Some(Self::Read(Box::new(Read { flat, derivatives })))
+        Read::of(text).map(Self::Read)
     }
 
     /// Names of its variables, in the order in which it takes their values.
     pub(super) fn variables(&self) -> Vec<&str> {
         match self {
             Self::BuiltIn(formula) => formula.variables.to_vec(),
-            Self::Read(read) => read.flat.var_names().iter().map(String::as_str).collect(),
+            Self::Read(read) => read.variables.iter().map(String::as_str).collect(),
         }
     }
 
@@ -102,20 +200,20 @@ impl Expression {
     pub(super) fn value(&self, variables: &[f64]) -> f64 {
         match self {
             Self::BuiltIn(formula) => (formula.value)(variables),
-            Self::Read(read) => read.flat.eval(variables).unwrap_or(f64::NAN),
+            Self::Read(read) => read.value(variables),
         }
     }
 
-    /// Its derivative with respect to one of its variables, a parameter of the effect; `None` where the crate cannot differentiate it
-    /// (`floor`, `step`, …).
-    pub(super) fn derivative(&self, at: usize, variables: &[f64]) -> Option<f64> {
+    /// Its derivative by one of its variables, a parameter of the effect.
+    pub(super) fn derivative(&self, at: usize, variables: &[f64]) -> f64 {
+        let mut duals = [Dual::number(0.0); MOST_VARIABLES];
+        let duals = &mut duals[..variables.len()];
+        for (i, (dual, value)) in duals.iter_mut().zip(variables).enumerate() {
+            *dual = if i == at { Dual::variable(*value) } else { Dual::number(*value) };
+        }
         match self {
-            Self::BuiltIn(formula) => formula.derivatives.get(at).copied().flatten().map(|of| of(variables)),
-            Self::Read(read) => {
-                let of = read.derivative(at)?;
-                let own: Vec<f64> = of.variables.iter().map(|&i| variables[i]).collect();
-                Some(of.flat.eval(&own).unwrap_or(f64::NAN))
-            }
+            Self::BuiltIn(formula) => formula.dual.map_or(f64::NAN, |of| of(duals).slope),
+            Self::Read(read) => read.value(duals).slope,
         }
     }
 }

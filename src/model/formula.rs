@@ -1,10 +1,10 @@
 //! Formulas of effects: parsed once, evaluated at the state of a touch, with partial derivatives for shape parameters.
 //!
-//! The expression crate does the parsing and differentiation (`model::expression`); this module fixes the variables that a formula may
-//! use (docs/guide/effects.md) and turns a mistake into a sentence that names it.
+//! `model::expression` evaluates and differentiates; this module fixes the variables that a formula may use (docs/guide/effects.md) and
+//! turns a mistake into a sentence that names it.
 
-use super::expression::Expression;
-use super::spelling::{bare_number, spelled_out};
+use super::expression::{Expression, MOST_VARIABLES};
+use super::spelling::bare_number;
 use std::sync::{Arc, OnceLock};
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
@@ -60,9 +60,6 @@ pub const FUNCTIONS: [&str; 15] =
 /// Numbers that have a name, or that a reader takes a word for: no parameter may be called so.
 pub const CONSTANTS: [&str; 4] = ["pi", "PI", "e", "E"];
 
-/// Bytes of a formula at most: the expression crate takes a time that grows with the square of its terms.
-pub const LONGEST: usize = 4000;
-
 /// Where the value of a variable of an expression comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Origin {
@@ -117,9 +114,6 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
-        if text.len() > LONGEST {
-            return Err(format!("it is {} characters long, and {LONGEST} at most are read", text.chars().count()));
-        }
         if let Some(wrong) = super::mistake::find(text, shapes) {
             return Err(wrong.says);
         }
@@ -220,13 +214,13 @@ impl Formula {
         let of_shape =
             |(at, origin): (usize, &Origin)| if let Origin::Shape(k) = origin { Some((at, *k)) } else { None };
         self.origins().iter().enumerate().filter_map(of_shape).map(move |(at, shape)| {
-            let value = self.derivative(at, state, shapes).filter(|v| v.is_finite());
-            (shape, value.unwrap_or_else(|| self.difference(shape, state, shapes)))
+            let value = self.derivative(at, state, shapes);
+            (shape, if value.is_finite() { value } else { self.difference(shape, state, shapes) })
         })
     }
 
-    fn derivative(&self, at: usize, state: &State, shapes: &[f64]) -> Option<f64> {
-        let Some(Parts::Expression(expression, origins)) = self.parts() else { return None };
+    fn derivative(&self, at: usize, state: &State, shapes: &[f64]) -> f64 {
+        let Some(Parts::Expression(expression, origins)) = self.parts() else { return f64::NAN };
         with_values(origins, state, shapes, |values| expression.derivative(at, values))
     }
 
@@ -241,17 +235,10 @@ impl Formula {
 }
 
 fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
-    // most terms of a usual model are bare numbers, and the expression crate takes a tenth of a millisecond for each
-    if let Some(constant) = bare_number(text) {
-        return Ok(Parts::Constant(constant));
-    }
-    let cannot = |says: &str| format!("{says} (functions: {})", FUNCTIONS.join(" "));
-    let expression = Expression::read(&spelled_out(text)?).ok_or_else(|| cannot("it cannot be read"))?;
+    let cannot = || format!("it cannot be read (functions: {})", FUNCTIONS.join(" "));
+    let expression = Expression::read(text).ok_or_else(cannot)?;
     Parts::of(expression, shapes)
 }
-
-/// Variables of a formula at most: they fit on the stack.
-const MOST_VARIABLES: usize = 32;
 
 /// Hands on the values of an expression's variables.
 fn with_values<T>(origins: &[Origin], state: &State, shapes: &[f64], of: impl FnOnce(&[f64]) -> T) -> T {

@@ -1,13 +1,31 @@
-//! What is wrong with a formula, in a sentence of our own and with its place, before the expression crate sees it.
+//! What is wrong with a formula, in a sentence and with its place, before anything is made of it. Bounds on its size too: what is within
+//! them is read, fitted and differentiated in far less than a second.
 
 use super::formula::{FUNCTIONS, VARIABLES};
 use std::ops::Range;
+
+/// Bytes of a formula at most.
+pub const LONGEST: usize = 4000;
+
+/// Brackets, functions and powers inside one another at most.
+pub const DEEPEST: usize = 64;
+
+/// Operators and functions of a formula at most.
+pub const MOST_OPERATIONS: usize = 1000;
+
+/// Shape parameters of an effect at most.
+pub const MOST_SHAPES: usize = 8;
+
+/// What to do about a formula that exceeds a bound.
+const SHORTER: &str = "write it shorter, or as several terms of one parameter";
 
 /// A mistake in a formula.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mistake {
     /// In a sentence.
     pub says: String,
+    /// What to do, where the sentence does not say it.
+    pub help: Option<&'static str>,
     /// Where, in bytes of the formula.
     pub at: Range<usize>,
 }
@@ -29,20 +47,33 @@ struct Bracket<'a> {
     /// The function before it.
     function: Option<&'a str>,
     commas: usize,
+    /// Powers outside of the bracket that it is an exponent of.
+    powers_outside: usize,
 }
 
 /// The first mistake of a formula, if it has one; `shapes` are the names of parameters that may stand inside.
 #[must_use]
 pub fn find(text: &str, shapes: &[&str]) -> Option<Mistake> {
-    let tokens = match tokens(text) {
-        Ok(tokens) => tokens,
-        Err(mistake) => return Some(mistake),
-    };
-    Reader { text, shapes, tokens: &tokens, open: Vec::new() }.read().err()
+    read(text, shapes).err()
+}
+
+fn read(text: &str, shapes: &[&str]) -> Result<(), Mistake> {
+    if text.len() > LONGEST {
+        let says = format!("it is {} characters long, and {LONGEST} at most are read", text.chars().count());
+        return too_large(0..text.len(), says);
+    }
+    let tokens = tokens(text)?;
+    let reader = Reader { text, shapes, tokens: &tokens, open: Vec::new(), powers: 0 };
+    reader.few_operations()?;
+    reader.read()
 }
 
 fn mistake<T>(at: Range<usize>, says: impl Into<String>) -> Result<T, Mistake> {
-    Err(Mistake { says: says.into(), at })
+    Err(Mistake { says: says.into(), help: None, at })
+}
+
+fn too_large<T>(at: Range<usize>, says: String) -> Result<T, Mistake> {
+    Err(Mistake { says, help: Some(SHORTER), at })
 }
 
 /// The words that a formula may use, for a sentence.
@@ -102,11 +133,37 @@ struct Reader<'a> {
     shapes: &'a [&'a str],
     tokens: &'a [(Token, Range<usize>)],
     open: Vec<Bracket<'a>>,
+    /// Powers inside one another, since the innermost bracket was opened.
+    powers: usize,
 }
 
 impl<'a> Reader<'a> {
     fn word(&self, at: &Range<usize>) -> &'a str {
         self.text.get(at.clone()).unwrap_or_default()
+    }
+
+    /// Every operator is an operation, and every word with a bracket behind it.
+    fn few_operations(&self) -> Result<(), Mistake> {
+        let is_operation = |i: usize| match self.tokens[i].0 {
+            Token::Operator => true,
+            Token::Word => self.tokens.get(i + 1).is_some_and(|next| next.0 == Token::Open),
+            _ => false,
+        };
+        let mut operations = (0..self.tokens.len()).filter(|&i| is_operation(i));
+        let Some(first_beyond) = operations.nth(MOST_OPERATIONS) else { return Ok(()) };
+        let count = MOST_OPERATIONS + 1 + operations.count();
+        let says = format!("it has {count} operators and functions, and {MOST_OPERATIONS} at most are read");
+        too_large(self.tokens[first_beyond].1.clone(), says)
+    }
+
+    /// One bracket or power more inside the others.
+    fn deeper(&self, at: &Range<usize>) -> Result<(), Mistake> {
+        let outside: usize = self.open.iter().map(|bracket| 1 + bracket.powers_outside).sum();
+        if outside + self.powers < DEEPEST {
+            return Ok(());
+        }
+        let says = format!("more than {DEEPEST} brackets, functions and powers are inside one another here");
+        too_large(at.clone(), says)
     }
 
     fn read(mut self) -> Result<(), Mistake> {
@@ -135,12 +192,21 @@ impl<'a> Reader<'a> {
                     if wanted && !matches!(self.word(at), "+" | "-") {
                         return mistake(at.clone(), format!("nothing stands before {:?}", self.word(at)));
                     }
+                    if self.word(at) == "^" {
+                        self.deeper(at)?;
+                        self.powers += 1;
+                    } else if !wanted {
+                        // the exponent ends here; a sign belongs to it
+                        self.powers = 0;
+                    }
                     wanted = true;
                 }
                 Token::Open => {
                     self.no_value_before(wanted, at)?;
                     let function = last.filter(|l| l.0 == Token::Word).map(|l| self.word(&l.1));
-                    self.open.push(Bracket { at: at.start, function, commas: 0 });
+                    self.deeper(at)?;
+                    let powers_outside = std::mem::take(&mut self.powers);
+                    self.open.push(Bracket { at: at.start, function, commas: 0, powers_outside });
                     wanted = true;
                 }
                 Token::Close => {
@@ -153,7 +219,10 @@ impl<'a> Reader<'a> {
                 Token::Comma => {
                     let pair = |b: &&mut Bracket| b.function.is_some_and(takes_two);
                     match self.open.last_mut().filter(pair) {
-                        Some(bracket) if !wanted => bracket.commas += 1,
+                        Some(bracket) if !wanted => {
+                            bracket.commas += 1;
+                            self.powers = 0;
+                        }
                         Some(_) => return mistake(at.clone(), "a value is missing before the comma"),
                         None => {
                             return mistake(
@@ -216,6 +285,7 @@ impl<'a> Reader<'a> {
         let Some(bracket) = self.open.pop() else {
             return mistake(at.clone(), "this bracket closes none that was opened");
         };
+        self.powers = bracket.powers_outside;
         match bracket.function {
             Some(function) if takes_two(function) && bracket.commas != 1 => {
                 mistake(bracket.at..at.end, format!("{function:?} takes two values: {function}(a, b)"))
@@ -232,6 +302,33 @@ fn takes_two(function: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_are_named_with_their_value_and_place() {
+        let nested = |open: &str, inside: &str, close: &str, times: usize| {
+            format!("{}{inside}{}", open.repeat(times), close.repeat(times))
+        };
+        let sum = |times: usize| vec!["B"; times + 1].join("+");
+        for (good, bad, bound) in [
+            (nested("(", "B", ")", 64), nested("(", "B", ")", 65), "more than 64"),
+            (nested("sin(", "B", ")", 64), nested("sin(", "B", ")", 65), "more than 64"),
+            ("B^".repeat(64) + "B", "B^".repeat(65) + "B", "more than 64"),
+            (nested("B^(", "B", ")", 32), nested("B^(", "B", ")", 33), "more than 64"),
+            (sum(1000), sum(1001), "1001 operators and functions, and 1000 at most"),
+            ("-".repeat(999) + "sin(B)", "-".repeat(1000) + "sin(B)", "1001 operators and functions"),
+            ("B".to_owned() + &" ".repeat(3999), "B".to_owned() + &" ".repeat(4000), "4001 characters long"),
+        ] {
+            assert_eq!(find(&good, &[]), None, "{good}");
+            let found = find(&bad, &[]).unwrap_or_else(|| panic!("{bad}"));
+            assert!(found.says.contains(bound) && found.help.is_some(), "{bad}: {found:?}");
+            assert!(!found.at.is_empty() && found.at.end <= bad.len(), "{bad}: {found:?}");
+        }
+        // side by side they are not inside one another
+        assert_eq!(find(&vec!["(B^2^B)"; 100].join("*"), &[]), None);
+        assert_eq!(find(&vec!["B^2"; 100].join("*"), &[]), None);
+        let deep = "B^".repeat(65) + "B";
+        assert_eq!(find(&deep, &[]).map(|m| m.at), Some(129..130));
+    }
 
     #[test]
     fn every_mistake_has_a_sentence_and_its_place() {

@@ -7,6 +7,7 @@ mod check;
 pub mod data;
 pub mod degrees;
 mod digits;
+mod dual;
 mod expression;
 pub mod formula;
 pub mod mistake;

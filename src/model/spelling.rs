@@ -1,8 +1,4 @@
-//! A formula as it is written → its steps in the order of mathematics, and from them the text that the expression crate reads
-//! (`build.rs` shares this file).
-//!
-//! The crate binds a sign tighter than a power, takes powers from the left, reads no exponents of numbers and no function of two values
-//! inside another one. None of that reaches a formula: here the order is decided, and written out with brackets.
+//! A formula as it is written → its steps in the order of mathematics (`build.rs` shares this file).
 
 /// The value of a formula that is nothing but a number.
 pub(super) fn bare_number(text: &str) -> Option<f64> {
@@ -157,64 +153,61 @@ fn number(word: &str) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err(format!("{word:?} is too large a number")) }
 }
 
-/// A formula in the text of the expression crate.
-pub(super) fn spelled_out(text: &str) -> Result<String, String> {
-    fold(text).map(|Spelled(text)| text)
-}
-
-/// What the crate reads as it is meant.
-struct Spelled(String);
-
-impl Steps for Spelled {
-    fn number(value: f64) -> Self {
-        Self(value.to_string())
-    }
-
-    fn word(name: &str) -> Self {
-        // braces: a name that begins with the name of an operator is one word all the same
-        Self(if matches!(name, "pi" | "PI") { name.to_owned() } else { format!("{{{name}}}") })
-    }
-
-    fn negative(self) -> Self {
-        Self(format!("(-{})", self.0))
-    }
-
-    fn operator(self, sign: char, right: Self) -> Self {
-        let (left, right) = (self.0, right.0);
-        // sums and products the crate takes as they stand
-        Self(if sign == '^' { format!("({left}^{right})") } else { format!("{left}{sign}{right}") })
-    }
-
-    fn call(name: &str, arguments: Vec<Self>) -> Self {
-        Self(match &arguments[..] {
-            [Self(one), Self(two)] => format!("(({one}) {name} ({two}))"),
-            _ => format!("{name}({})", arguments.into_iter().map(|Self(text)| text).collect::<String>()),
-        })
-    }
-
-    fn in_brackets(self) -> Self {
-        Self(format!("({})", self.0))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// A formula with brackets around every step whose order could be doubted.
+    struct Spelled(String);
+
+    impl Steps for Spelled {
+        fn number(value: f64) -> Self {
+            Self(value.to_string())
+        }
+
+        fn word(name: &str) -> Self {
+            Self(name.to_owned())
+        }
+
+        fn negative(self) -> Self {
+            Self(format!("(-{})", self.0))
+        }
+
+        fn operator(self, sign: char, right: Self) -> Self {
+            Self(format!("({}{sign}{})", self.0, right.0))
+        }
+
+        fn call(name: &str, arguments: Vec<Self>) -> Self {
+            let inside: Vec<String> = arguments.into_iter().map(|Self(text)| text).collect();
+            Self(format!("{name}({})", inside.join(",")))
+        }
+
+        fn in_brackets(self) -> Self {
+            self
+        }
+    }
+
+    fn spelled_out(text: &str) -> Result<String, String> {
+        fold(text).map(|Spelled(text)| text)
+    }
+
     #[test]
     fn brackets_say_the_order() {
         for (text, written) in [
-            ("-X^2", "(-({X}^2))"),
-            ("-(X)^2", "(-(({X})^2))"),
-            ("2^-X", "(2^(-{X}))"),
+            ("-X^2", "(-(X^2))"),
+            ("-(X)^2", "(-(X^2))"),
+            ("2^-X", "(2^(-X))"),
             ("2^3^2", "(2^(3^2))"),
-            ("2^-X^2*3", "(2^(-({X}^2)))*3"),
-            ("a - b - c", "{a}-{b}-{c}"),
-            ("a*-b", "{a}*(-{b})"),
-            ("--a", "(-(-{a}))"),
-            ("1.5e-3*pi", "0.0015*pi"),
-            ("mod(a, mod(b, 2))", "(({a}) mod ((({b}) mod (2))))"),
-            ("sin(-B)", "sin((-{B}))"),
+            ("2^-X^2*3", "((2^(-(X^2)))*3)"),
+            ("a - b - c", "((a-b)-c)"),
+            ("a - b + c", "((a-b)+c)"),
+            ("a / b * c", "((a/b)*c)"),
+            ("a * b / c - d*e", "(((a*b)/c)-(d*e))"),
+            ("a*-b", "(a*(-b))"),
+            ("--a", "(-(-a))"),
+            ("1.5e-3*pi", "(0.0015*pi)"),
+            ("mod(a, mod(b, 2))", "mod(a,mod(b,2))"),
+            ("sin(-B)", "sin((-B))"),
         ] {
             assert_eq!(spelled_out(text).unwrap(), written, "{text}");
         }

@@ -1,109 +1,200 @@
-//! The words of formulas: what may stand between variables and numbers, and what it means.
-//!
-//! Generic in what a formula is worth: for the program that is a number. `build.rs` shares this file and evaluates the built-in
-//! formulas in program text.
+//! The operators and functions of formulas (docs/guide/effects.md) with their derivatives.
 
-use exmex::{BinOp, Operator};
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::f64::consts::PI;
 
-/// What the words of a formula can be applied to.
-pub trait Value:
-    Clone + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-{
-    /// The ratio of a circle's circumference to its diameter.
-    fn pi() -> Self;
-    /// `self ^ power`
-    fn power(self, power: Self) -> Self;
-    /// Angle of the direction (x, self).
-    fn atan2(self, x: Self) -> Self;
-    /// What is left of `self` after whole periods, with the period's sign.
-    fn modulo(self, period: Self) -> Self;
-    /// -1, 0 or 1.
-    fn sign(self) -> Self;
-    /// 0 below 0, else 1.
-    fn step(self) -> Self;
-    /// A function that numbers have already, with its name there.
-    fn function(self, name: &'static str, of: fn(f64) -> f64) -> Self;
+/// Functions of one value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub(super) enum One {
+    Negative,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Exp,
+    Ln,
+    Sqrt,
+    Abs,
+    Sign,
+    Floor,
+    Step,
+}
+
+/// Operators, and functions of two values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub(super) enum Two {
+    Plus,
+    Minus,
+    Times,
+    Over,
+    Power,
+    Atan2,
+    Mod,
+}
+
+/// What a formula can be computed with: numbers, and numbers that carry a derivative (`dual`).
+pub(super) trait Value: Copy {
+    /// A number of the formula.
+    fn number(value: f64) -> Self;
+    /// A function of one value.
+    fn one(self, of: One) -> Self;
+    /// An operator between two values.
+    fn two(self, of: Two, right: Self) -> Self;
 }
 
 impl Value for f64 {
-    fn pi() -> Self {
-        std::f64::consts::PI
+    #[inline]
+    fn number(value: f64) -> Self {
+        value
     }
 
-    fn power(self, power: Self) -> Self {
-        self.powf(power)
+    #[inline]
+    fn one(self, of: One) -> Self {
+        of.at(self)
     }
 
-    fn atan2(self, x: Self) -> Self {
-        self.atan2(x)
-    }
-
-    fn modulo(self, period: Self) -> Self {
-        self - period * (self / period).floor()
-    }
-
-    fn sign(self) -> Self {
-        if self == 0.0 { 0.0 } else { self.signum() }
-    }
-
-    fn step(self) -> Self {
-        if self >= 0.0 { 1.0 } else { 0.0 }
-    }
-
-    fn function(self, _name: &'static str, of: fn(f64) -> f64) -> Self {
-        of(self)
+    #[inline]
+    fn two(self, of: Two, right: Self) -> Self {
+        of.at(self, right)
     }
 }
 
-/// The operators of a formula (docs/guide/effects.md). Those that the expression crate has itself have its priorities; `mod`, `sign` and
-/// `step` are ours.
-#[must_use]
-pub fn operators<T: Value>() -> Vec<Operator<'static, T>> {
-    fn binary<T: Value>(
-        word: &'static str,
-        prio: i64,
-        is_commutative: bool,
-        apply: fn(T, T) -> T,
-    ) -> Operator<'static, T> {
-        Operator::make_bin(word, BinOp { apply, prio, is_commutative })
+/// A number with a name.
+pub(super) fn constant(name: &str) -> Option<f64> {
+    matches!(name, "pi" | "PI").then_some(PI)
+}
+
+impl One {
+    /// The function of a name.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "sin" => Self::Sin,
+            "cos" => Self::Cos,
+            "tan" => Self::Tan,
+            "asin" => Self::Asin,
+            "acos" => Self::Acos,
+            "atan" => Self::Atan,
+            "exp" => Self::Exp,
+            "ln" => Self::Ln,
+            "sqrt" => Self::Sqrt,
+            "abs" => Self::Abs,
+            "sign" => Self::Sign,
+            "floor" => Self::Floor,
+            "step" => Self::Step,
+            _ => return None,
+        })
     }
-    fn signed<T: Value>(
-        word: &'static str,
-        prio: i64,
-        is_commutative: bool,
-        apply: fn(T, T) -> T,
-        of_one: fn(T) -> T,
-    ) -> Operator<'static, T> {
-        Operator::make_bin_unary(word, BinOp { apply, prio, is_commutative }, of_one)
+
+    /// Its value.
+    #[inline]
+    pub(super) fn at(self, x: f64) -> f64 {
+        match self {
+            Self::Negative => -x,
+            Self::Sin => x.sin(),
+            Self::Cos => x.cos(),
+            Self::Tan => x.tan(),
+            Self::Asin => x.asin(),
+            Self::Acos => x.acos(),
+            Self::Atan => x.atan(),
+            Self::Exp => x.exp(),
+            Self::Ln => x.ln(),
+            Self::Sqrt => x.sqrt(),
+            Self::Abs => x.abs(),
+            Self::Sign => sign(x),
+            Self::Floor => x.floor(),
+            Self::Step => f64::from(x >= 0.0),
+        }
     }
-    macro_rules! function {
-        ($name:ident) => {
-            Operator::make_unary(stringify!($name), |x: T| x.function(stringify!($name), f64::$name))
-        };
+
+    /// Its derivative. A function that jumps has none at the jump: 0 is taken there as beside it.
+    #[inline]
+    pub(super) fn slope(self, x: f64) -> f64 {
+        match self {
+            Self::Negative => -1.0,
+            Self::Sin => x.cos(),
+            Self::Cos => -x.sin(),
+            Self::Tan => 1.0 + x.tan().powi(2),
+            Self::Asin => 1.0 / (1.0 - x * x).sqrt(),
+            Self::Acos => -1.0 / (1.0 - x * x).sqrt(),
+            Self::Atan => 1.0 / (1.0 + x * x),
+            Self::Exp => x.exp(),
+            Self::Ln => 1.0 / x,
+            Self::Sqrt => 0.5 / x.sqrt(),
+            Self::Abs => sign(x),
+            Self::Sign | Self::Floor | Self::Step => 0.0,
+        }
     }
-    vec![
-        binary("^", 4, false, T::power),
-        binary("*", 2, true, |a, b| a * b),
-        binary("/", 3, false, |a, b| a / b),
-        signed("+", 0, true, |a, b| a + b, |a| a),
-        signed("-", 1, false, |a, b| a - b, |a| -a),
-        binary("atan2", 0, false, T::atan2),
-        binary("mod", 4, false, T::modulo),
-        Operator::make_unary("sign", T::sign),
-        Operator::make_unary("step", T::step),
-        function!(sin),
-        function!(cos),
-        function!(tan),
-        function!(asin),
-        function!(acos),
-        function!(atan),
-        function!(exp),
-        function!(ln),
-        function!(sqrt),
-        function!(abs),
-        function!(floor),
-        Operator::make_constant("pi", T::pi()),
-        Operator::make_constant("PI", T::pi()),
-    ]
+}
+
+/// -1, 0 or 1.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+impl Two {
+    /// The operator of a sign.
+    pub(super) fn operator(sign: char) -> Self {
+        match sign {
+            '+' => Self::Plus,
+            '-' => Self::Minus,
+            '*' => Self::Times,
+            '/' => Self::Over,
+            _ => Self::Power,
+        }
+    }
+
+    /// The function of a name.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "atan2" => Self::Atan2,
+            "mod" => Self::Mod,
+            _ => return None,
+        })
+    }
+
+    /// Its value.
+    #[inline]
+    pub(super) fn at(self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Plus => a + b,
+            Self::Minus => a - b,
+            Self::Times => a * b,
+            Self::Over => a / b,
+            Self::Power => a.powf(b),
+            Self::Atan2 => a.atan2(b),
+            // the remainder has the sign of the period
+            Self::Mod => a - b * (a / b).floor(),
+        }
+    }
+
+    /// Its derivative by the left value.
+    #[inline]
+    pub(super) fn slope_left(self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Plus | Self::Minus | Self::Mod => 1.0,
+            Self::Times => b,
+            Self::Over => 1.0 / b,
+            Self::Power => b * a.powf(b - 1.0),
+            Self::Atan2 => b / (a * a + b * b),
+        }
+    }
+
+    /// Its derivative by the right value.
+    #[inline]
+    pub(super) fn slope_right(self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Plus => 1.0,
+            Self::Minus => -1.0,
+            Self::Times => a,
+            Self::Over => -(a / b) / b,
+            // every positive power of 0 is 0
+            Self::Power if a == 0.0 && b > 0.0 => 0.0,
+            Self::Power => a.powf(b) * a.ln(),
+            Self::Atan2 => -a / (a * a + b * b),
+            Self::Mod => -(a / b).floor(),
+        }
+    }
 }

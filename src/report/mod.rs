@@ -1,6 +1,7 @@
 //! What a person sees in the terminal: formats, never computes.
 
 pub mod assess;
+mod canvas;
 pub mod compare;
 pub mod diagnosis;
 pub mod fit;

@@ -1,8 +1,6 @@
 //! Plots in the terminal: braille where a person looks, plain ASCII in a pipe.
 
-use unicode_plot::border::BorderType;
-use unicode_plot::canvas::CanvasType;
-use unicode_plot::{LineplotOptions, Plot, lineplot, scatterplot};
+use super::canvas::Canvas;
 
 /// What a plot is drawn on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,18 +29,6 @@ impl Paper {
         }
     }
 
-    fn options(&self, title: &str, height: usize) -> LineplotOptions {
-        let mut options = LineplotOptions::default();
-        options.title = Some(title.to_owned());
-        options.width = self.canvas();
-        options.height = height;
-        options.margin = 1;
-        options.canvas = if self.ascii { CanvasType::Dot } else { CanvasType::Braille };
-        options.border = if self.ascii { BorderType::Corners } else { BorderType::Solid };
-        options.grid = true;
-        options
-    }
-
     /// Limits that a person can read: outwards to a round number, so that the axis is labelled with few digits.
     fn rounded(low: f64, high: f64) -> (f64, f64) {
         let span = high - low;
@@ -66,15 +52,13 @@ impl Paper {
         (round(low, false), round(high, true))
     }
 
-    fn text(&self, plot: Plot<unicode_plot::GridCanvas>) -> String {
-        let mut bytes = Vec::new();
-        if plot.render(&mut bytes, self.colour).is_err() {
-            return String::new();
-        }
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        // the crate's borders are no ASCII: the shape of the frame is kept
-        let text = if self.ascii { text.chars().map(plain).collect() } else { text };
-        text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n") + "\n"
+    /// A drawing with so many rows, if there is anything to draw.
+    fn drawing(&self, title: &str, rows: usize, limits: [(f64, f64); 2], draw: impl FnOnce(&mut Canvas)) -> String {
+        let [x, y] = limits;
+        let Some(mut canvas) = Canvas::new((self.canvas(), rows), self.ascii, x, y) else { return String::new() };
+        draw(&mut canvas);
+        let title: String = if self.ascii { title.chars().map(plain).collect() } else { title.to_owned() };
+        canvas.text(&title, self.colour)
     }
 }
 
@@ -82,13 +66,22 @@ impl Paper {
 fn plain(c: char) -> char {
     match c {
         c if c.is_ascii() => c,
-        '─' | '━' | '⠤' | '⠒' => '-',
-        '│' | '┃' | '⡇' => '|',
-        '┌' | '┐' | '└' | '┘' | '┼' | '├' | '┤' => '+',
+        '─' | '━' => '-',
         '·' => '.',
         '…' => '~',
         _ => ' ',
     }
+}
+
+/// Limits of an axis with these values; room on both sides where they are all the same.
+fn limits(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let room = if low == high { 1.0 } else { 0.0 };
+    Paper::rounded(low - room, high + room)
+}
+
+fn finite(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
 }
 
 /// A number at an axis that spans so much: no more digits than the eye can use.
@@ -104,31 +97,22 @@ pub fn axis_label(value: f64, span: f64) -> String {
 /// Points; empty where none is finite.
 #[must_use]
 pub fn scatter(title: &str, points: &[(f64, f64)], paper: Paper) -> String {
-    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
-    let (x, y): (Vec<f64>, Vec<f64>) = finite.into_iter().unzip();
-    let limits = |v: &[f64]| {
-        let (low, high) = v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-        Paper::rounded(low, high)
-    };
-    let mut options = paper.options(title, 10);
-    if x.len() > 1 {
-        (options.xlim, options.ylim) = (limits(&x), limits(&y));
-    }
-    scatterplot(&x, &y, options).map_or_else(|_| String::new(), |plot| paper.text(plot))
+    let points = finite(points);
+    let limits = [limits(points.iter().map(|p| p.0)), limits(points.iter().map(|p| p.1))];
+    paper.drawing(title, 10, limits, |canvas| points.iter().for_each(|p| canvas.point(*p)))
 }
 
 /// A line through points in their order; empty where fewer than two are finite.
 #[must_use]
 pub fn line(title: &str, points: &[(f64, f64)], paper: Paper) -> String {
-    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
-    if finite.len() < 2 {
+    let points = finite(points);
+    if points.len() < 2 {
         return String::new();
     }
-    let top = finite.iter().map(|p| p.1).fold(0.0, f64::max);
-    let (x, y): (Vec<f64>, Vec<f64>) = finite.into_iter().unzip();
-    let mut options = paper.options(title, 8);
-    options.ylim = (0.0, if top > 0.0 { Paper::rounded(0.0, 1.05 * top).1 } else { 1.0 });
-    lineplot(&x, &y, options).map_or_else(|_| String::new(), |plot| paper.text(plot))
+    let top = points.iter().map(|p| p.1).fold(0.0, f64::max);
+    let y = (0.0, if top > 0.0 { Paper::rounded(0.0, 1.05 * top).1 } else { 1.0 });
+    let x = limits(points.iter().map(|p| p.0));
+    paper.drawing(title, 8, [x, y], |canvas| points.windows(2).for_each(|pair| canvas.line(pair[0], pair[1])))
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@
 //! effects count as inseparable when λ stays below [`SEEN`] even at a size that is found with λ = [`CLEAR`].
 
 use super::moments::Block;
+use crate::probability::{chi2_cdf, chi2_quantile};
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::ops::Range;
 
 /// Below this p-value an effect adds something after another one: the true effect leaves its group in so many cases at most, and
@@ -38,7 +38,7 @@ pub fn chance(lambda: f64, q: usize) -> f64 {
     if q == 0 || !lambda.is_finite() {
         return if q == 0 { 0.0 } else { 1.0 };
     }
-    let Ok(limit) = ChiSquared::new(q as f64).map(|d| d.inverse_cdf(1.0 - LEVEL)) else { return 0.0 };
+    let Some(limit) = chi2_quantile(1.0 - LEVEL, q as f64) else { return 0.0 };
     // a noncentral χ² is a mixture of central ones with Poisson's weights of mean λ/2
     let mean = 0.5 * lambda;
     if mean > 200.0 {
@@ -51,7 +51,7 @@ pub fn chance(lambda: f64, q: usize) -> f64 {
         }
         total += weight;
         let dof = q as f64 + 2.0 * f64::from(k);
-        below += weight * ChiSquared::new(dof).map_or(0.0, |d| d.cdf(limit));
+        below += weight * chi2_cdf(limit, dof).unwrap_or(0.0);
         if total > 1.0 - 1e-12 {
             break;
         }

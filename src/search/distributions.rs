@@ -1,14 +1,12 @@
 //! Probabilities of the tests, also where they are too small for a floating-point number.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
-use statrs::function::beta::{beta_reg, ln_beta};
-use statrs::function::gamma::ln_gamma;
+use crate::probability::{beta_reg, chi2_quantile, chi2_sf, ln_beta, ln_gamma, t_sf};
 
 /// Below this a regularised incomplete beta function is computed by its series in logarithms.
 const SMALLEST: f64 = 1e-250;
 
 /// ln P(F > f) with f = (`part` / `d1`) / (`rest` / `d2`): a strong effect has a p below 1e-308, and must still be
-/// ranked.
+/// ranked. 0, as of no effect, where there is no such probability.
 #[must_use]
 pub fn ln_p_of_f(part: f64, d1: f64, rest: f64, d2: f64) -> f64 {
     if part <= 0.0 {
@@ -17,13 +15,13 @@ pub fn ln_p_of_f(part: f64, d1: f64, rest: f64, d2: f64) -> f64 {
     if rest <= 0.0 {
         return f64::NEG_INFINITY;
     }
-    ln_beta_reg(0.5 * d2, 0.5 * d1, rest / (rest + part))
+    ln_beta_reg(0.5 * d2, 0.5 * d1, rest / (rest + part)).unwrap_or(0.0)
 }
 
 /// P(|T| > |t|) with `dof` degrees of freedom.
 #[must_use]
 pub fn p_of_t(t: f64, dof: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |d| 2.0 * d.sf(t.abs()))
+    t_sf(t.abs(), dof).map_or(f64::NAN, |p| 2.0 * p)
 }
 
 /// P(|Z| > |z|) of a normal value.
@@ -35,13 +33,13 @@ pub fn p_of_normal(z: f64) -> f64 {
 /// P(χ² > x) with `dof` degrees of freedom.
 #[must_use]
 pub fn p_of_chi2(x: f64, dof: f64) -> f64 {
-    ChiSquared::new(dof).map_or(f64::NAN, |d| d.sf(x))
+    chi2_sf(x, dof).unwrap_or(f64::NAN)
 }
 
-fn ln_beta_reg(a: f64, b: f64, x: f64) -> f64 {
-    let direct = beta_reg(a, b, x.clamp(0.0, 1.0));
+fn ln_beta_reg(a: f64, b: f64, x: f64) -> Option<f64> {
+    let direct = beta_reg(a, b, x.clamp(0.0, 1.0))?;
     if direct > SMALLEST {
-        return direct.ln();
+        return Some(direct.ln());
     }
     // x^a / (a B(a, b)) · Σ (1 − b)_n a x^n / ((a + n) n!), Abramowitz and Stegun 26.5.4
     let (mut sum, mut term) = (1.0, 1.0);
@@ -54,7 +52,7 @@ fn ln_beta_reg(a: f64, b: f64, x: f64) -> f64 {
             break;
         }
     }
-    a * x.ln() - a.ln() - ln_beta(a, b) + sum.ln()
+    Some(a * x.ln() - a.ln() - ln_beta(a, b)? + sum.ln()).filter(|ln_p| !ln_p.is_nan())
 }
 
 /// ln of a bound on the p-value of the best of many scanned shapes.
@@ -74,10 +72,14 @@ pub fn ln_p_of_scan(ln_p: &[f64], q: usize) -> f64 {
     if best < -300.0 {
         return bonferroni;
     }
-    let Ok(chi2) = ChiSquared::new(q as f64) else { return bonferroni.min(0.0) };
+    if q == 0 {
+        return bonferroni.min(0.0);
+    }
     let root = |ln_p: f64| -> f64 {
         let p = ln_p.exp();
-        if p > 1e-12 { chi2.inverse_cdf(1.0 - p).max(0.0).sqrt() } else { tail_root(ln_p, q) }
+        // a p that is no number stands for no effect
+        let quantile = || chi2_quantile(1.0 - p, q as f64).unwrap_or(0.0).max(0.0).sqrt();
+        if p <= 1e-12 { tail_root(ln_p, q) } else { quantile() }
     };
     let roots: Vec<f64> = ln_p.iter().map(|&l| root(l)).collect();
     let variation: f64 = roots.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
@@ -117,7 +119,7 @@ mod tests {
         // F(0.95; 3, 20) = 3.0984
         assert!((ln_p_of_f(3.0 * 3.0984, 3.0, 20.0, 20.0).exp() - 0.05).abs() < 1e-5);
         // the series joins the direct value
-        let direct = beta_reg(150.0, 1.0, 0.05).ln();
+        let direct = beta_reg(150.0, 1.0, 0.05).unwrap().ln();
         assert!((direct - 150.0 * 0.05f64.ln()).abs() < 1e-9);
         let tiny = ln_p_of_f(1e6, 2.0, 300.0, 300.0);
         assert!((tiny - 150.0 * (300.0f64 / 1_000_300.0).ln()).abs() < 1e-6 * tiny.abs(), "{tiny}");
@@ -125,11 +127,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_probability_shows_no_effect() {
+        const BAD: [f64; 6] = [0.0, -1.0, 1e308, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        for a in BAD {
+            for b in BAD {
+                let all = [ln_p_of_f(a, 2.0, b, 20.0), ln_p_of_f(3.0, a, 20.0, b), ln_p_of_f(a, b, a, b)];
+                assert!(all.iter().all(|ln_p| *ln_p <= 1e-9), "{a} {b}: {all:?}");
+                let _ = (p_of_t(a, b), p_of_chi2(a, b), p_of_normal(a), ln_p_of_scan(&[a, b], 2));
+            }
+        }
+        assert_eq!(ln_p_of_f(f64::NAN, 2.0, 20.0, 20.0), 0.0);
+        assert_eq!(ln_p_of_scan(&[-1.0, -2.0], 0), (-2.0 + 2f64.ln()).min(0.0));
+    }
+
+    #[test]
     fn roots_of_small_tails_join_those_of_large_ones() {
         for q in [1, 2, 3, 6] {
-            let chi2 = ChiSquared::new(q as f64).unwrap();
             for p in [1e-6f64, 1e-9] {
-                let exact = chi2.inverse_cdf(1.0 - p).sqrt();
+                let exact = chi2_quantile(1.0 - p, q as f64).unwrap().sqrt();
                 assert!((tail_root(p.ln(), q) - exact).abs() < 0.02 * exact, "{q} {p}");
             }
         }

@@ -7,7 +7,7 @@ use super::own::{Own, converted};
 use super::rigid::Vec3;
 use super::terms::Term;
 use crate::axes::AxisName;
-use crate::diag::{Failure, Findings, Result, Source};
+use crate::diag::{Failure, Findings, Result, Source, enough};
 use crate::machine::Machine;
 use crate::units::Plain;
 use std::collections::BTreeMap;
@@ -103,7 +103,7 @@ impl Scenario {
     /// When the effect or a parameter is not known for this machine, or a value is not finite.
     pub fn with(mut self, machine: &Machine, effect: &str, values: &[(&str, f64)]) -> Result<Self> {
         let values: Vec<Value<'_>> = values.iter().map(|&(name, value)| Value { name, value, unit: None }).collect();
-        match self.plant(machine, effect, &values) {
+        match self.plant(machine, effect, &values, true) {
             Ok(()) => Ok(self),
             Err(misfits) => {
                 let findings = misfits.into_iter().map(|m| crate::diag::Finding::error(m.code, m.message).help(m.help));
@@ -129,8 +129,15 @@ impl Scenario {
         self
     }
 
-    /// Plants values of one effect; what is wrong with them comes back, and then nothing was planted.
-    pub(super) fn plant(&mut self, machine: &Machine, id: &str, values: &[Value<'_>]) -> Result<(), Vec<Misfit>> {
+    /// Plants values of one effect; what is wrong with them comes back, and then nothing was planted. `similar`: names that
+    /// are like an unknown one are searched, which takes longer than everything else.
+    pub(super) fn plant(
+        &mut self,
+        machine: &Machine,
+        id: &str,
+        values: &[Value<'_>],
+        similar: bool,
+    ) -> Result<(), Vec<Misfit>> {
         let settings = |name: &str| {
             let called = |v: &&Value<'_>| {
                 let row = Parameter::setting_named(name);
@@ -144,10 +151,12 @@ impl Scenario {
                     value: None,
                     code: "scenario::effect",
                     message: format!("no effect is called {id:?}"),
-                    help: format!(
-                        "did you mean {}? `axiscal effects` lists all",
-                        nearest(id, catalogue::ids(machine)).join(", ")
-                    ),
+                    help: if similar {
+                        let names = nearest(id, catalogue::ids(machine));
+                        format!("did you mean {}? `axiscal effects` lists all", names.join(", "))
+                    } else {
+                        "`axiscal effects` lists all".to_owned()
+                    },
                 },
                 Refusal::NotHere(why) => Misfit {
                     value: None,
@@ -161,12 +170,14 @@ impl Scenario {
         let mut terms = Vec::new();
         let mut planted = Vec::new();
         for (i, value) in values.iter().enumerate() {
+            let similar = !enough(misfits.iter().map(|m: &Misfit| m.code), "scenario::parameter");
             let mut bad = |code, message: String, help: String| {
                 misfits.push(Misfit { value: Some(i), code, message, help });
             };
             let Some(row) = rows.iter().find(|r| r.is_called(value.name)) else {
                 // those with the nearest names, as they are written
-                let near = nearest(value.name, rows.iter().map(|r| r.name.clone()).collect());
+                let names = if similar { rows.iter().map(|r| r.name.clone()).collect() } else { Vec::new() };
+                let near = nearest(value.name, names);
                 let names: Vec<String> =
                     near.iter().filter_map(|n| rows.iter().find(|r| &r.name == n)).map(Parameter::written).collect();
                 let more = rows.len() - names.len();
@@ -339,8 +350,8 @@ impl Parameter {
 /// Up to ten of the names, the likeliest meant first.
 pub(crate) fn nearest(word: &str, mut names: Vec<String>) -> Vec<String> {
     const SHOWN: usize = 10;
-    let likeness = |name: &String| strsim::jaro_winkler(word, name);
-    names.sort_by(|a, b| likeness(b).total_cmp(&likeness(a)));
+    // likeness is between 0 and 1, so that the bits of it are in its order
+    names.sort_by_cached_key(|name| std::cmp::Reverse(strsim::jaro_winkler(word, name).to_bits()));
     names.truncate(SHOWN);
     names
 }

@@ -5,7 +5,7 @@ use super::own::{self, Own};
 use super::rigid::Vec3;
 use super::scenario::{BlockError, Misfit, Scenario, Value, axis_named, blocks_of};
 use super::terms::{Shape, Target, Term};
-use crate::diag::{Failure, Finding, Findings, Result, Severity, Source, from_toml};
+use crate::diag::{Failure, Finding, Findings, Result, Severity, Source, enough, from_toml};
 use crate::machine::Machine;
 use crate::units::{Plain, mm_from_um, rad_from_deg, ratio_from_ppm};
 use std::ops::Range;
@@ -303,7 +303,10 @@ impl Reader<'_> {
             let own = self.own.iter().find(|o| o.id == **id.get_ref());
             let planted = match own {
                 Some(own) => out.plant_own(self.machine, own, &values),
-                None => out.plant(self.machine, id.get_ref(), &values),
+                None => {
+                    let similar = !enough(self.findings.0.iter().map(|f| f.code), "scenario::effect");
+                    out.plant(self.machine, id.get_ref(), &values, similar)
+                }
             };
             if let Err(misfits) = planted {
                 for Misfit { value, code, message, help } in misfits {

@@ -11,8 +11,9 @@ pub mod edit;
 pub mod history;
 pub mod tolerance;
 
-use crate::diag::{Failure, Finding, Findings, Result, Source, from_toml};
+use crate::diag::{Failure, Finding, Findings, Result, Source};
 use crate::fit::{Knowledge, Mask, Settings};
+use crate::keys::not_of_form;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -196,7 +197,7 @@ impl Study {
                 Some(key) => format!("`{key}` is a word of the whole study: put it above the first [[data]]"),
                 None => "`axiscal new` writes a study; `axiscal schema study` prints the form".to_owned(),
             };
-            from_toml(&e, source, "study::not_toml").help(help)
+            not_of_form::<AsWritten>(&e, source, "study::not_toml", &help)
         })?;
         let mut findings = Findings::default();
         if w.data.is_empty() {

@@ -221,8 +221,9 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
     for (i, t) in draft.terms.iter().enumerate() {
         if let Err(message) = Formula::parse(t.formula.trim(), &shapes) {
             let lead = t.formula.len() - t.formula.trim_start().len();
-            let at =
-                mistake::find(t.formula.trim(), &shapes).map_or_else(|| place(t.formula.trim(), &message), |m| m.at);
+            let found = mistake::find(t.formula.trim(), &shapes);
+            let help = found.as_ref().and_then(|m| m.help).map(str::to_owned);
+            let at = found.map_or_else(|| place(t.formula.trim(), &message), |m| m.at);
             let signs = |byte: usize| t.formula.get(..lead + byte).map_or(0, |text| text.chars().count());
             let (from, to) = (signs(at.start), signs(at.end));
             mistakes.push(Mistake {
@@ -230,7 +231,7 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
                 from: Some(from),
                 to: Some(to),
                 message,
-                help: None,
+                help,
             });
         }
     }

@@ -4,7 +4,7 @@ mod run;
 
 use super::common::{Io, load_machine};
 use crate::design::{Planned, keep_measured};
-use crate::diag::{Failure, Finding, Result, Source, source};
+use crate::diag::{Failure, Finding, Result, Source, shown, source};
 use crate::files;
 use crate::fit::{self, Fit, Settings};
 use crate::log::Touch;
@@ -376,7 +376,8 @@ fn placed(Failure(findings): Failure, study: &Source) -> Failure {
         Some(span) if f.source.is_none() => f.at(study, span),
         _ => f,
     };
-    Failure(findings.into_iter().map(at_its_place).collect())
+    // each place is searched in the whole text: only for those that are shown
+    Failure(shown(&findings).into_iter().map(at_its_place).collect())
 }
 
 /// A controller is a name, or a postprocessor file relative to the study.

@@ -7,7 +7,8 @@ use super::catalogue::unit::Unit;
 use super::scenario::axis_named;
 use super::terms::{Shape, Target, Term};
 use crate::axes::AxisName;
-use crate::diag::{Finding, Findings, Result, Source, from_toml};
+use crate::diag::{Finding, Findings, Result, Source};
+use crate::keys::not_of_form;
 use crate::machine::{Machine, Side};
 use formula::Formula;
 use serde::Deserialize;
@@ -169,8 +170,9 @@ pub fn converted(value: f64, from: Unit, to: Unit) -> Option<f64> {
 /// # Errors
 /// When something in the file cannot be understood: all findings, each with its place.
 pub fn read(source: &Source, machine: &Machine) -> Result<Vec<Own>> {
-    let file: OwnFile = toml::from_str(source.inner())
-        .map_err(|e| from_toml(&e, source, "effects::not_toml").help("`axiscal schema effects` prints the form"))?;
+    let file: OwnFile = toml::from_str(source.inner()).map_err(|e| {
+        not_of_form::<OwnFile>(&e, source, "effects::not_toml", "`axiscal schema effects` prints the form")
+    })?;
     let mut reader = Reader { source, machine, findings: Findings::default() };
     let mut out: Vec<Own> = Vec::new();
     for row in &file.effect {
