@@ -43,10 +43,12 @@ fn kills(program: &Program, count: usize) -> bool {
     all.iter().all(|(_, k)| k.damaged == 0 && k.not_mended == 0)
 }
 
+type Run = fn(&Program, usize) -> Races;
+
 fn races(program: &Program, count: usize) -> bool {
     println!("| who | changes | done | refused | lost |");
     println!("|---|---|---|---|---|");
-    let kinds: [(&str, fn(&Program, usize) -> Races); 3] = [
+    let kinds: [(&str, Run); 3] = [
         ("two `add`", runs::two_adds),
         ("workbench and `add`", runs::workbench_and_add),
         ("two workbenches", runs::two_workbenches),

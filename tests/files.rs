@@ -62,7 +62,18 @@ fn no_output_takes_the_place_of_an_input() {
         &["compare", "study.toml", "--csv", "study.toml"],
         &["compare", "study.toml", "--csv", "head.plan.json"],
         &["sketch-effect", "study.toml", "--out", "head.log"],
-        &["simulate", "--plan", "head.plan.json", "--machine", "swivel-head", "--scenario", "wrong.toml", "--force", "--out", "wrong.toml"],
+        &[
+            "simulate",
+            "--plan",
+            "head.plan.json",
+            "--machine",
+            "swivel-head",
+            "--scenario",
+            "wrong.toml",
+            "--force",
+            "--out",
+            "wrong.toml",
+        ],
     ] {
         let code = refused(at, call);
         // a file that is added to must be one of effects
@@ -160,7 +171,8 @@ fn an_export_replaces_its_own_files_alone() {
     // from within, where the folder cannot be exchanged
     let stale = comp.join("axiscal_stale.txt");
     std::fs::write(&stale, "").unwrap();
-    let list = text(&comp, ".axiscal-files.json").replacen("\"axiscal.hal\"", "\"axiscal.hal\", \"axiscal_stale.txt\"", 1);
+    let list =
+        text(&comp, ".axiscal-files.json").replacen("\"axiscal.hal\"", "\"axiscal.hal\", \"axiscal_stale.txt\"", 1);
     std::fs::write(comp.join(".axiscal-files.json"), list).unwrap();
     ok(&comp, &["export", "../study.toml", "--controller", "linuxcnc", "--force", "--out", "."]);
     assert!(!stale.exists() && comp.join("compensation.json").exists());
@@ -175,7 +187,8 @@ fn an_export_replaces_its_own_files_alone() {
     assert_eq!((hidden(at), hidden(&comp)), (Vec::new(), vec![".axiscal-files.json".to_owned()]));
     // the tables of another control are not touched
     let before = text(&comp, "axiscal.hal");
-    let other = ["export", "study.toml", "--controller", "sinumerik", "--accept-unverified", "--force", "--out", "comp"];
+    let other =
+        ["export", "study.toml", "--controller", "sinumerik", "--accept-unverified", "--force", "--out", "comp"];
     assert_eq!(refused(at, &other), "export::other_controller");
     assert_eq!(text(&comp, "axiscal.hal"), before);
 }

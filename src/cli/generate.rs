@@ -103,7 +103,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     generated.plan.programs.extend(proven.map(|(p, _)| (post.name.clone(), p)));
     let plan_text = generated.plan.to_json();
     let programs = files.iter().map(|(file, text)| (file.clone(), text.as_bytes()));
-    files::write_together(&std::iter::once((plan_file.clone(), plan_text.as_bytes())).chain(programs).collect::<Vec<_>>())?;
+    files::write_together(
+        &std::iter::once((plan_file.clone(), plan_text.as_bytes())).chain(programs).collect::<Vec<_>>(),
+    )?;
     let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
     summary(&machine, &post, &generated, seconds, (&written, &plan_file), io);
     Ok(Answer::Done)

@@ -18,7 +18,6 @@ pub(super) fn listen() {
         if AT_ONCE.load(Ordering::Relaxed) {
             use std::io::Write;
             let _ = writeln!(std::io::stderr(), "error: {}", says(&fault));
-            return;
         }
         FIRST.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
     }));
@@ -43,14 +42,18 @@ fn fault(info: &PanicHookInfo<'_>) -> String {
     let place = info.location().map(|at| format!("{}:{}", at.file(), at.line())).unwrap_or_default();
     // a message of several lines would look like several findings
     let payload = info.payload();
-    let message = payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    let message =
+        payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
     let message: Vec<&str> = message.unwrap_or("no message").split_whitespace().collect();
     format!("{place}: {}", message.join(" "))
 }
 
 fn says(fault: &str) -> String {
     let call: Vec<String> = std::env::args().skip(1).collect();
-    format!("internal error in `axiscal {}` at {fault}; please report this line together with the files of the call", call.join(" "))
+    format!(
+        "internal error in `axiscal {}` at {fault}; please report this line together with the files of the call",
+        call.join(" ")
+    )
 }
 
 #[cfg(test)]

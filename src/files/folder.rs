@@ -146,7 +146,9 @@ impl Folder {
             .help("nothing was written: name another folder, one for each controller"));
         }
         let is_lost = |name: &&String| {
-            !is_restoring(name) && !old.files.contains(*name) && self.real.join(name.as_str()).symlink_metadata().is_ok()
+            !is_restoring(name)
+                && !old.files.contains(*name)
+                && self.real.join(name.as_str()).symlink_metadata().is_ok()
         };
         match files.iter().map(|(name, _)| name).find(is_lost) {
             None => Ok(old),
@@ -180,6 +182,7 @@ impl Folder {
 
     /// Ends what an interrupted call began.
     fn recover(&self) -> io::Result<()> {
+        temporary::sweep(&self.real);
         let aside = self.aside();
         let Some(old) = Manifest::of(&aside) else { return Ok(()) };
         if self.real.exists() { clear(&aside, &self.real, &old) } else { fs::rename(&aside, &self.real) }

@@ -37,7 +37,7 @@ fn prefix() -> String {
 }
 
 /// Removes what killed runs left in a folder; once for each folder in the life of the process.
-fn sweep(folder: &Path) {
+pub(super) fn sweep(folder: &Path) {
     static SWEPT: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
     {
         let mut swept = SWEPT.lock().unwrap_or_else(PoisonError::into_inner);
@@ -56,11 +56,7 @@ fn sweep(folder: &Path) {
             continue;
         }
         // one that cannot be removed hurts nobody
-        let _ = if found.is_dir() {
-            std::fs::remove_dir_all(entry.path())
-        } else {
-            std::fs::remove_file(entry.path())
-        };
+        let _ = if found.is_dir() { std::fs::remove_dir_all(entry.path()) } else { std::fs::remove_file(entry.path()) };
     }
 }
 

@@ -162,6 +162,9 @@ mod tests {
             steps,
             [(1, "a".to_owned(), Some(1.0)), (2, "a+b".to_owned(), None), (3, "a+c".to_owned(), Some(2.0))]
         );
-        assert_eq!((merged.steps[2].added.clone(), merged.steps[2].removed.clone()), (vec!["c".to_owned()], vec!["b".to_owned()]));
+        assert_eq!(
+            (merged.steps[2].added.clone(), merged.steps[2].removed.clone()),
+            (vec!["c".to_owned()], vec!["b".to_owned()])
+        );
     }
 }

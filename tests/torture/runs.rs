@@ -169,8 +169,10 @@ pub fn two_workbenches(program: &Program, changes: usize) -> Races {
         let now = effects(dir.path());
         let wanted = PAIR.map(|effect| !now.contains(effect));
         let done: Vec<bool> = std::thread::scope(|scope| {
-            let clicks: Vec<_> =
-                (0..2).map(|i| (i, &pages[i])).map(|(i, page)| scope.spawn(move || page.switch(PAIR[i], wanted[i]))).collect();
+            let clicks: Vec<_> = (0..2)
+                .map(|i| (i, &pages[i]))
+                .map(|(i, page)| scope.spawn(move || page.switch(PAIR[i], wanted[i])))
+                .collect();
             clicks.into_iter().map(|click| click.join().unwrap()).collect()
         });
         races.count(dir.path(), &[(PAIR[0], wanted[0], done[0]), (PAIR[1], wanted[1], done[1])]);
@@ -286,18 +288,23 @@ impl Victim {
         let _ = child.kill();
         child.wait().unwrap();
         kills.kills += 1;
+        let own =
+            || self.own.iter().all(|name| std::fs::read(self.folder().join(name)).is_ok_and(|text| text == b"mine"));
         let found = self.its_files();
+        // between the two names of a folder there is none
+        let kept = own() || !self.folder().exists();
         let of = |all: &Files| found.iter().all(|(name, contents)| all.get(name) == Some(contents));
         match (&found == old, &found == new) {
+            _ if !kept => kills.damaged += 1,
             (true, _) => kills.before += 1,
             (_, true) => kills.after += 1,
             _ if of(new) || of(old) => kills.unfinished += 1,
             _ => kills.damaged += 1,
         }
         let again = program.call(self.dir.path(), &self.calls[way]);
-        let own = self.own.iter().all(|name| std::fs::read(self.folder().join(name)).is_ok_and(|text| text == b"mine"));
-        let left = temporary(self.dir.path()).len() + temporary(&self.folder()).iter().filter(|n| !n.ends_with(".json")).count();
-        if !again.status.success() || self.its_files() != *new || !own || left > 0 {
+        let left = temporary(self.dir.path()).len()
+            + temporary(&self.folder()).iter().filter(|n| !n.ends_with(".json")).count();
+        if !again.status.success() || self.its_files() != *new || !own() || left > 0 {
             kills.not_mended += 1;
         }
     }
@@ -324,15 +331,24 @@ fn exports(program: &Program) -> Victim {
     let other = other.replace("\"pretravel\"", "\"pretravel\", \"squareness-xy\"");
     assert!(other.contains("squareness-xy"));
     std::fs::write(dir.path().join("other.toml"), other).unwrap();
-    let call = |study| vec!["export", study, "--controller", "linuxcnc", "--date", "2026-01-01", "--force", "--out", "comp"];
+    let call =
+        |study| vec!["export", study, "--controller", "linuxcnc", "--date", "2026-01-01", "--force", "--out", "comp"];
     let is_its = |name: &str| !name.contains("notes") && !name.contains(".earlier-");
-    Victim::new(program, dir, [call("study.toml"), call("other.toml")], "comp", is_its, &["axiscal-notes.txt", "restore-notes.md"])
+    Victim::new(
+        program,
+        dir,
+        [call("study.toml"), call("other.toml")],
+        "comp",
+        is_its,
+        &["axiscal-notes.txt", "restore-notes.md"],
+    )
 }
 
 fn generates(program: &Program) -> Victim {
     let dir = tempfile::tempdir().unwrap();
     let call = |tcp: &[&'static str]| {
-        let call = ["generate", "--machine", "swivel-head", "--program", "head", "--controller", "sinumerik", "--out", "job"];
+        let call =
+            ["generate", "--machine", "swivel-head", "--program", "head", "--controller", "sinumerik", "--out", "job"];
         [&call[..], tcp].concat()
     };
     let is_its = |name: &str| !name.contains("notes");
