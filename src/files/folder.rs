@@ -206,9 +206,9 @@ impl Folder {
         if !exists {
             return fs::rename(fresh.path(), &self.real).map_err(failed);
         }
-        let permissions = fs::metadata(&self.real).map_err(failed)?.permissions();
-        fs::set_permissions(fresh.path(), permissions).map_err(failed)?;
-        carry(&self.real, fresh.path(), "", old, Carry::Link).map_err(failed)?;
+        // what cannot be carried over can stay where it is
+        let carried = carry(&self.real, fresh.path(), "", old, Carry::Link);
+        carried.and_then(|()| make_alike(&self.real, fresh.path())).map_err(|_| Stopped::Cannot)?;
         let aside = self.aside();
         // a mount point, an open file: not every folder can be moved
         fs::rename(&self.real, &aside).map_err(|_| Stopped::Cannot)?;
@@ -296,10 +296,18 @@ fn carry(from: &Path, to: &Path, within: &str, old: &Manifest, by: Carry) -> io:
         };
         let (here, there) = (entry.path(), to.join(&name));
         if entry.file_type()?.is_dir() {
-            if !old.is_ours(&relative) {
+            if by == Carry::Link && fs::metadata(&here)?.permissions().readonly() {
+                // it could not be emptied later
+                return Err(ErrorKind::PermissionDenied.into());
+            }
+            let is_made = !old.is_ours(&relative) && !there.exists();
+            if is_made {
                 fs::create_dir_all(&there)?;
             }
             carry(&here, &there, &relative, old, by)?;
+            if is_made {
+                make_alike(&here, &there)?;
+            }
             if by == Carry::Move {
                 fs::remove_dir(&here)?;
             }
@@ -310,6 +318,18 @@ fn carry(from: &Path, to: &Path, within: &str, old: &Manifest, by: Carry) -> io:
         }
     }
     Ok(())
+}
+
+/// Gives a new folder owner and permissions of an old one.
+fn make_alike(old: &Path, new: &Path) -> io::Result<()> {
+    let found = fs::metadata(old)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        // only a super-user can give a folder away
+        let _ = std::os::unix::fs::chown(new, Some(found.uid()), Some(found.gid()));
+    }
+    fs::set_permissions(new, found.permissions())
 }
 
 fn carry_file(here: &Path, there: &Path, by: Carry) -> io::Result<()> {
@@ -415,6 +435,11 @@ mod tests {
         fs::write(at.join("restore-notes.md"), "mine").unwrap();
         fs::create_dir_all(at.join("photos/empty")).unwrap();
         fs::write(at.join("photos/1.jpg"), "mine").unwrap();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            fs::set_permissions(at.join("photos"), fs::Permissions::from_mode(0o700)).unwrap();
+        }
     }
 
     fn is_new_with_the_user_s(at: &Path) {
@@ -427,6 +452,11 @@ mod tests {
             assert_eq!(text(at, name), "mine");
         }
         assert!(at.join("photos/empty").is_dir());
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            assert_eq!(fs::metadata(at.join("photos")).unwrap().permissions().mode() & 0o777, 0o700);
+        }
     }
 
     #[test]

@@ -20,8 +20,9 @@ pub struct Lock(Option<(File, PathBuf)>);
 impl Drop for Lock {
     fn drop(&mut self) {
         let Some((file, path)) = self.0.take() else { return };
-        // removed while it is still held: who waits for it sees that it is no longer the one beside the study
-        if cfg!(unix) {
+        // removed while it is still held: who waits for it sees that it is no longer the one beside the study. One that is not
+        // empty is somebody else's
+        if cfg!(unix) && file.metadata().is_ok_and(|m| m.len() == 0) {
             let _ = std::fs::remove_file(path);
         }
         let _ = file.unlock();
