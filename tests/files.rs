@@ -209,3 +209,31 @@ fn a_study_that_another_process_changes_is_not_changed() {
     ok(at, &["add", "study.toml", "squareness-xy"]);
     assert!(!at.join(".study.toml.lock").exists());
 }
+
+/// A fault that the system provokes: threads that cannot be had.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_fault_of_the_program_is_one_line_and_one_finding() {
+    let dir = folder();
+    let call = |words: &[&str]| {
+        let limited = "ulimit -v 1000000; exec \"$0\" \"$@\"";
+        let mut command = Command::new("sh");
+        command.current_dir(dir.path()).args(["-c", limited, env!("CARGO_BIN_EXE_axiscal")]).args(words);
+        command.env("RAYON_NUM_THREADS", "2000").output().unwrap()
+    };
+    let before = text(dir.path(), "study.toml");
+    for words in [&["identify", "study.toml"][..], &["add", "study.toml", "squareness-xy"]] {
+        let out = call(&[&["--json"], words].concat());
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap_or_else(|e| panic!("{e}: {said}"));
+        assert_eq!(
+            (out.status.code(), answer["findings"][0]["code"].as_str()),
+            (Some(2), Some("internal::panic")),
+            "{said}"
+        );
+        assert_eq!(said.lines().count(), 1, "{said}");
+        assert!(said.contains(words[0]) && said.contains(".rs:"), "{said}");
+    }
+    assert_eq!(text(dir.path(), "study.toml"), before);
+    assert!(!dir.path().join(".study.toml.lock").exists());
+}

@@ -49,7 +49,8 @@ fn fault(info: &PanicHookInfo<'_>) -> String {
 }
 
 fn says(fault: &str) -> String {
-    let call: Vec<String> = std::env::args().skip(1).collect();
+    // words that are no text must not be a fault of their own
+    let call: Vec<String> = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
     format!(
         "internal error in `axiscal {}` at {fault}; please report this line together with the files of the call",
         call.join(" ")

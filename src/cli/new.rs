@@ -103,7 +103,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         tolerance: crate::study::tolerance::Tolerance::default(),
     };
     let text = study.fresh()?;
-    // another call may have written it meanwhile
+    // another call may have written it meanwhile. Only beside it can be locked; that it cannot be made is said on writing
+    let _ = std::fs::create_dir_all(&folder);
     let alone = files::lock(&args.out)?;
     keep_existing(&args.out)?;
     files::write_whole(&args.out, text.as_bytes())?;
