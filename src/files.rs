@@ -1,18 +1,39 @@
 //! Reading whole files and writing them so that nobody ever sees half of one. Called from `cli` and `study` only.
+//!
+//! What is read is remembered, and no output takes its place ([`check_outputs`]); a verb that changes a file of its own on
+//! purpose says so with [`rewrite`].
 
-use crate::diag::{Failure, Finding, Result};
-use std::{io::Write, path::Path};
+mod folder;
+mod inputs;
+mod lock;
+mod size;
+mod temporary;
+
+pub use folder::{Folder, MANIFEST};
+pub use inputs::{check_outputs, forget_inputs};
+pub use lock::{Lock, lock};
+pub use size::{max_input, read_size, set_max_input};
+
+use crate::diag::{Failure, Result};
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// The bytes of a file.
 ///
 /// # Errors
-/// When it cannot be read; the message names the path and the reason.
+/// When it cannot be read, is no file or is too large; the message names the path and the reason.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|e| {
-        Finding::error("file::unreadable", format!("cannot read {}: {e}", path.display()))
-            .help("check the path, and that you may read the file")
-            .into()
-    })
+    let bytes = size::read(path)?;
+    inputs::keep(path);
+    Ok(bytes)
+}
+
+/// The bytes of a file that an earlier call of this program wrote and this one may write over.
+///
+/// # Errors
+/// As [`read_bytes`].
+pub fn read_own(path: &Path) -> Result<Vec<u8>> {
+    size::read(path)
 }
 
 /// The text of a file (UTF-8), without a byte order mark.
@@ -44,41 +65,43 @@ pub fn read_text_as_it_is(path: &Path) -> Result<String> {
 /// Writes a file whole: to a temporary file beside it, then renamed over it.
 ///
 /// # Errors
-/// When the folder cannot be written; an existing file is then untouched.
+/// When it was read by this call, or the folder cannot be written; an existing file is then untouched.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<()> {
-    let fail = |e: std::io::Error| {
-        // the reason without the name of the temporary file, which nobody has asked for
-        let reason =
-            e.raw_os_error().map_or_else(|| e.to_string(), |code| std::io::Error::from_raw_os_error(code).to_string());
-        Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display()))
-            .help("is every part of the path a folder, and may you write there?")
-    };
-    // a link is followed: the file that it names is the one that is meant
-    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let path = target.as_path();
-    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        // a device or a pipe cannot be replaced, only written to
-        let mut device = std::fs::OpenOptions::new().write(true).open(path).map_err(fail)?;
-        return device.write_all(contents).and_then(|()| device.flush()).map_err(fail);
-    }
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    std::fs::create_dir_all(folder).map_err(fail)?;
-    let mut temporary = tempfile::Builder::new().prefix(".axiscal-").tempfile_in(folder).map_err(fail)?;
-    temporary.write_all(contents).map_err(fail)?;
-    temporary.as_file().sync_all().map_err(fail)?;
-    #[cfg(unix)]
-    {
-        // a temporary file is private; the finished one is as readable as any other file of the user's
-        use std::os::unix::fs::PermissionsExt;
-        let mode = std::fs::metadata(path).map_or(0o644, |m| m.permissions().mode());
-        temporary.as_file().set_permissions(std::fs::Permissions::from_mode(mode)).map_err(fail)?;
-    }
-    temporary.persist(path).map_err(|e| fail(e.error))?;
+    check_outputs(&[path])?;
+    put(path, contents)
+}
+
+/// Writes a file whole that was read before, because this call is there to change it.
+///
+/// # Errors
+/// When the folder cannot be written; an existing file is then untouched.
+pub fn rewrite(path: &Path, contents: &[u8]) -> Result<()> {
+    put(path, contents)?;
+    inputs::replaced(path);
     Ok(())
 }
+
+/// Writes files that belong together, so that old and new ones never lie side by side: all are written beside their places,
+/// the old ones but the first go, and the new ones take their places.
+///
+/// # Errors
+/// When one of them was read by this call or cannot be written; the old ones are then untouched.
+pub fn write_together(files: &[(PathBuf, &[u8])]) -> Result<()> {
+    let paths: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
+    check_outputs(&paths)?;
+    let differs = |(path, contents): &&(PathBuf, &[u8])| std::fs::read(path).ok().as_deref() != Some(contents);
+    let mut staged = Vec::new();
+    for (path, contents) in files.iter().filter(differs) {
+        staged.push((path, Staged::of(path, contents)?));
+    }
+    for (path, file) in staged.iter().filter(|(path, _)| **path != files[0].0).rev() {
+        if file.target.exists() {
+            std::fs::remove_file(&file.target).map_err(|e| unwritable(path, &e))?;
+        }
+    }
+    staged.into_iter().try_for_each(|(path, file)| file.persist(path))
+}
+
 /// Takes a file away; one that is not there is no error.
 ///
 /// # Errors
@@ -89,6 +112,69 @@ pub fn remove(path: &Path) -> Result<()> {
             Err(Failure::new("files::remove", format!("cannot remove {}: {e}", path.display()))
                 .help("check that you may write there"))
         }
-        _ => Ok(()),
+        _ => {
+            inputs::removed(path);
+            Ok(())
+        }
     }
+}
+
+fn put(path: &Path, contents: &[u8]) -> Result<()> {
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        // a device or a pipe cannot be replaced, only written to
+        let write = || {
+            let mut device = std::fs::OpenOptions::new().write(true).open(path)?;
+            device.write_all(contents)?;
+            device.flush()
+        };
+        return write().map_err(|e| unwritable(path, &e));
+    }
+    Staged::of(path, contents)?.persist(path)
+}
+
+/// A new file, whole, beside the place that it will take.
+struct Staged {
+    file: tempfile::NamedTempFile,
+    target: PathBuf,
+}
+
+impl Staged {
+    fn of(path: &Path, contents: &[u8]) -> Result<Self> {
+        Self::try_of(path, contents).map_err(|e| unwritable(path, &e))
+    }
+
+    fn try_of(path: &Path, contents: &[u8]) -> std::io::Result<Self> {
+        // a link is followed: the file that it names is the one that is meant
+        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let folder = folder_of(&target);
+        std::fs::create_dir_all(folder)?;
+        let mut file = temporary::file_in(folder)?;
+        file.write_all(contents)?;
+        file.as_file().sync_all()?;
+        #[cfg(unix)]
+        {
+            // a temporary file is private; the finished one is as readable as any other file of the user's
+            use std::os::unix::fs::PermissionsExt;
+            let mode = std::fs::metadata(&target).map_or(0o644, |m| m.permissions().mode());
+            file.as_file().set_permissions(std::fs::Permissions::from_mode(mode))?;
+        }
+        Ok(Self { file, target })
+    }
+
+    fn persist(self, path: &Path) -> Result<()> {
+        self.file.persist(&self.target).map(drop).map_err(|e| unwritable(path, &e.error))
+    }
+}
+
+/// The folder that a path lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn unwritable(path: &Path, e: &std::io::Error) -> Failure {
+    // the reason without the name of the temporary file, which nobody has asked for
+    let reason =
+        e.raw_os_error().map_or_else(|| e.to_string(), |code| std::io::Error::from_raw_os_error(code).to_string());
+    Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display()))
+        .help("is every part of the path a folder, and may you write there?")
 }

@@ -107,6 +107,8 @@ fn run(
     nested_rms_um: Option<f64>,
     edit: impl Fn(&Loaded, &str) -> Result<String>,
 ) -> Result<Answer> {
+    // from here to the last byte written nobody else changes it
+    let _alone = if args.dry_run { None } else { Some(files::lock(&args.study)?) };
     let bytes = files::read_bytes(&args.study)?;
     let text = files::read_text(&args.study)?;
     let mut loaded = load_study(&args.study, io)?;
@@ -133,8 +135,8 @@ fn run(
         }
         // a mark at the beginning of the file is no part of the text, but of the file
         let mark: &[u8] = if bytes.starts_with(b"\xef\xbb\xbf") { &bytes[..3] } else { &[] };
-        files::write_whole(&args.study, &[mark, edited.as_bytes()].concat())?;
-        files::write_whole(&history_path, history.to_json()?.as_bytes())?;
+        files::rewrite(&args.study, &[mark, edited.as_bytes()].concat())?;
+        files::rewrite(&history_path, history.to_json()?.as_bytes())?;
     }
     let rms = |fit: &Fit| held_out::later_run(fit).map(|h| h.rms_um);
     let later = (rms(&before), rms(&after));

@@ -20,7 +20,8 @@ pub fn of_identify() -> bool {
         // it starts: a job would find it asleep
         let begin = |thread| {
             if thread == 1 {
-                read_and_wait();
+                // a fault would end the process here; who needs what is read meets it again, and says so
+                let _ = std::panic::catch_unwind(read_and_wait);
             }
         };
         let _ = rayon::ThreadPoolBuilder::new().use_current_thread().start_handler(begin).build_global();

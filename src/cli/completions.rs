@@ -48,6 +48,7 @@ pub fn man(args: &ManArgs, io: &Io) -> Result<Answer> {
     for verb in program.get_subcommands().filter(|v| v.get_name() != "help" && !v.is_hide_set()) {
         pages.push((format!("axiscal-{}.1", verb.get_name()), page(verb.clone())?));
     }
+    files::check_outputs(&pages.iter().map(|(name, _)| args.out.join(name)).collect::<Vec<_>>())?;
     for (name, bytes) in &pages {
         files::write_whole(&args.out.join(name), bytes)?;
     }

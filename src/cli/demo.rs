@@ -150,7 +150,7 @@ fn in_folder(word: &str, out: &Path) -> String {
 /// Takes the files of an earlier demo away, and writes what the machine has wrong with it. A folder of somebody else is
 /// left alone: the verbs do not write over what is there.
 fn prepare(out: &Path) -> Result<()> {
-    if files::read_text(&out.join("wrong.toml")).is_ok_and(|text| text == SCENARIO) {
+    if files::read_own(&out.join("wrong.toml")).is_ok_and(|text| text == SCENARIO.as_bytes()) {
         for name in WRITTEN {
             files::remove(&out.join(name))?;
         }

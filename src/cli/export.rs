@@ -110,7 +110,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let settings = loaded.settings();
     let fit = loaded.fit(&settings)?;
     let active = loaded.active()?;
-    free_folder(&args.out, &loaded)?;
+    let folder = files::Folder::open(&args.out)?;
+    free_folder(&args.out, &folder, &loaded)?;
     let all_acts =
         |a: &Compensation| loaded.transformation() == Some(true) || a.idle_without_transformation(&loaded.machine) == 0;
     if active.as_ref().is_some_and(all_acts) {
@@ -128,14 +129,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let correction = correction(&loaded, &fit, active.as_ref(), provenance, io)?;
     if let Some((name, tables)) = &post {
         let found = (&correction, &fit.outcome.undetermined[..], &doubts[..]);
-        return control(&loaded, name, tables, found, args, io);
+        return control(&loaded, name, tables, found, folder, args, io);
     }
     let version = release.as_ref().map(|r| r.name.clone());
     let export = export(&loaded, &correction, release, args, io)?;
-    for (name, contents) in &export.files {
-        files::write_whole(&args.out.join(name), contents)?;
-    }
-    remove_stale(&args.out, &export.files)?;
+    folder.write(&described.name, &export.files)?;
     say(&export, args, io);
     say_not_told(&fit.outcome.undetermined, io);
     io.answer(&json!({
@@ -436,6 +434,7 @@ fn control(
     name: &str,
     tables: &Tables,
     (correction, not_told, doubts): (&Correction, &[Undetermined], &[Doubt]),
+    folder: files::Folder,
     args: &Args,
     io: &Io,
 ) -> Result<Answer> {
@@ -458,10 +457,7 @@ fn control(
     let (export, findings) = control::export(machine, name, tables, correction, &options)?;
     io.report(&findings.0);
     keep_restoring(machine, tables, &export.files, args)?;
-    for (file, contents) in &export.files {
-        files::write_whole(&args.out.join(file), contents)?;
-    }
-    remove_stale(&args.out, &export.files)?;
+    folder.write(name, &export.files)?;
     let mut t = table(&["value", "old", "new", "change", "unit"]);
     for v in &export.values {
         let show = |x: f64| number(control::digits(x, v.decimals, false));
@@ -544,12 +540,12 @@ fn keep_restoring(machine: &Machine, tables: &Tables, files: &[(String, Vec<u8>)
             let new = files.iter().find(|(n, _)| n == name).map(|(_, new)| new.as_slice());
             new.is_some_and(|new| new == old || values(new).is_some_and(|v| Some(v) == values(old)))
         };
-        if std::fs::read(&path).is_ok_and(|old| !same(&old)) {
+        if files::read_own(&path).is_ok_and(|old| !same(&old)) {
             return Err(Failure::new(
                 "export::restoring",
                 format!("{} of an earlier export holds other values than this one would write", path.display()),
             )
-            .help("it brings back what the control held then: export into another folder, or --force writes over it"));
+            .help("it brings back what the control held then: export into another folder, or --force keeps it as NAME.earlier-1"));
         }
     }
     Ok(())
@@ -568,7 +564,7 @@ fn is_date(text: &str) -> bool {
 
 /// An export must not overwrite what was active during its own measurement (the next one would add to the wrong values),
 /// nor fill a folder that holds something else.
-fn free_folder(out: &Path, loaded: &Loaded) -> Result<()> {
+fn free_folder(out: &Path, files: &files::Folder, loaded: &Loaded) -> Result<()> {
     let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
     for active in loaded.runs.iter().filter_map(|r| r.compensation.as_deref()) {
         let folder = if active.is_dir() { active } else { active.parent().unwrap_or(active) };
@@ -581,35 +577,12 @@ fn free_folder(out: &Path, loaded: &Loaded) -> Result<()> {
         }
     }
     let used = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some());
-    if used && !out.join("compensation.json").is_file() {
+    if used && !files.was_written() {
         return Err(Failure::new(
             "export::folder",
             format!("{} is not empty and holds no earlier export", out.display()),
         )
         .help("name an empty folder: an export is a set of files that belong together"));
-    }
-    Ok(())
-}
-
-/// Files of an earlier export that this one does not have: loaded by mistake they would be a wrong compensation.
-fn remove_stale(out: &Path, written: &[(String, Vec<u8>)]) -> Result<()> {
-    for folder in ["", "stock"] {
-        let Ok(entries) = std::fs::read_dir(out.join(folder)) else { continue };
-        for entry in entries.flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let relative = if folder.is_empty() { name.clone() } else { format!("{folder}/{name}") };
-            let ours = name.starts_with("axiscal") || name.starts_with("restore") || name == "tool_table.ngc";
-            let is_file = entry.file_type().is_ok_and(|t| t.is_file());
-            if ours && is_file && !written.iter().any(|(n, _)| *n == relative) {
-                std::fs::remove_file(entry.path()).map_err(|e| {
-                    Failure::new(
-                        "export::stale",
-                        format!("cannot remove {} of an earlier export: {e}", entry.path().display()),
-                    )
-                    .help("remove it by hand: it does not belong to this compensation")
-                })?;
-            }
-        }
     }
     Ok(())
 }

@@ -92,10 +92,6 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
 
     let files: Vec<(PathBuf, &str)> =
         nc.files(&spec.name).into_iter().map(|(name, text)| (args.out.join(name), text)).collect();
-    let own = [Some(Path::new(&args.program)), args.postprocessor.as_deref(), args.machine.machines.as_deref()];
-    for (file, _) in &files {
-        keep_inputs(file, own.into_iter().flatten())?;
-    }
     let name = format!("{}.{}", spec.name, nc.extension);
     let proven = prove(&machine, &post, &generated.plan, &name, &nc, io)?;
     // the figure of `check`, move by move as this control makes them, and what a person needs at the stops
@@ -105,10 +101,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         generated.plan.programs = old;
     }
     generated.plan.programs.extend(proven.map(|(p, _)| (post.name.clone(), p)));
-    files::write_whole(&plan_file, generated.plan.to_json().as_bytes())?;
-    for (file, text) in &files {
-        files::write_whole(file, text.as_bytes())?;
-    }
+    let plan_text = generated.plan.to_json();
+    let programs = files.iter().map(|(file, text)| (file.clone(), text.as_bytes()));
+    files::write_together(
+        &std::iter::once((plan_file.clone(), plan_text.as_bytes())).chain(programs).collect::<Vec<_>>(),
+    )?;
     let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
     summary(&machine, &post, &generated, seconds, (&written, &plan_file), io);
     Ok(Answer::Done)
@@ -153,7 +150,7 @@ pub(super) fn prove(
 
 /// What was proven of other programs for the same plan.
 fn old_programs(file: &Path, plan: &Plan) -> Option<BTreeMap<String, Proof>> {
-    let text = files::read_text(file).ok()?;
+    let text = String::from_utf8(files::read_own(file).ok()?).ok()?;
     let (old, _) = Plan::parse(&source(file.display().to_string(), text)).ok()?;
     let same = Plan { programs: BTreeMap::new(), ..old.clone() }.to_json() == plan.to_json();
     same.then_some(old.programs)
@@ -186,31 +183,12 @@ fn lost_parameters(machine: &Machine, spec: &ProgramSpec, plan: &Plan) -> Result
     Ok(after.into_iter().filter(|name| !before.contains(name) && !name.contains('@')).collect())
 }
 
-/// Refuses to write over a file that is read.
-///
-/// # Errors
-/// When `out` is one of `inputs`, by whatever name.
-pub(super) fn keep_inputs<'a>(out: &Path, inputs: impl Iterator<Item = &'a Path>) -> Result<()> {
-    // what cannot be resolved does not exist, so it cannot be written over
-    let Ok(real) = out.canonicalize() else { return Ok(()) };
-    for input in inputs {
-        if input.canonicalize().is_ok_and(|i| i == real) {
-            return Err(Failure::new(
-                "cli::over_input",
-                format!("{} would be written over {}, which is read here", out.display(), input.display()),
-            )
-            .help("name another place with --out"));
-        }
-    }
-    Ok(())
-}
-
 /// Refuses to write over the plan of another machine or program, or over something that is no plan.
 fn keep_other_plans(plan: &Path, machine: &Machine, spec: &ProgramSpec) -> Result<()> {
     if !plan.exists() {
         return Ok(());
     }
-    let old: Option<serde_json::Value> = serde_json::from_slice(&files::read_bytes(plan)?).ok();
+    let old: Option<serde_json::Value> = serde_json::from_slice(&files::read_own(plan)?).ok();
     let word = |key: &str| old.as_ref().and_then(|o| o.get(key)?.as_str());
     let what = match (word("machine"), word("program")) {
         (Some(m), Some(p)) if m == machine.name && p == spec.name => return Ok(()),

@@ -16,6 +16,7 @@ mod diagnose;
 mod effects;
 mod export;
 mod generate;
+mod guard;
 mod identify;
 pub mod load;
 mod machines;
@@ -46,6 +47,9 @@ struct Cli<V: Subcommand = Verb> {
     /// One JSON object on stdout, messages on stderr
     #[arg(long, global = true)]
     json: bool,
+    /// Largest input that is read, in bytes; K, M and G are accepted
+    #[arg(long, global = true, value_name = "BYTES", default_value = "2G", value_parser = crate::files::read_size)]
+    max_input: u64,
     #[command(subcommand)]
     verb: V,
 }
@@ -119,13 +123,15 @@ enum Verb {
 /// Runs the program with the arguments of the process.
 #[must_use]
 pub fn main() -> ExitCode {
+    guard::listen();
     // a good call of this verb needs none of the options of the others, whose making takes a third of the time of the fit; what is wrong
     // with a bad one, all of them together say
     if ahead::of_identify()
-        && let Ok(Cli { json, verb: Often::Identify(args) }) = Cli::try_parse()
+        && let Ok(Cli { json, max_input, verb: Often::Identify(args) }) = Cli::try_parse()
     {
+        crate::files::set_max_input(max_input);
         let io = Io::new(json);
-        return io.finish(identify::run(&args, &io));
+        return io.finish(guard::guarded(|| identify::run(&args, &io)));
     }
     let cli = match Cli::<Verb>::try_parse() {
         Ok(cli) => cli,
@@ -133,7 +139,8 @@ pub fn main() -> ExitCode {
         Err(e) => e.exit(),
     };
     let io = Io::new(cli.json);
-    io.finish(dispatch(cli.verb, &io))
+    crate::files::set_max_input(cli.max_input);
+    io.finish(guard::guarded(|| dispatch(cli.verb, &io)))
 }
 
 /// Another verb, called by one of them with the words that a user would type.
@@ -142,6 +149,8 @@ fn call(words: &[String], io: &Io) -> crate::diag::Result<Answer> {
     let cli = Cli::try_parse_from(typed).map_err(|e| {
         crate::diag::Failure::new("cli::call", e.to_string()).help("report this: it is a fault of the program")
     })?;
+    // a step may write over what the one before has read
+    crate::files::forget_inputs();
     dispatch(cli.verb, io)
 }
 

@@ -54,10 +54,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         )
         .help("give one --log for each --plan, in the same order"));
     }
-    if args.out.exists() {
-        return Err(Failure::new("new::exists", format!("{} exists already", args.out.display()))
-            .help("name another file with --out, or remove it first"));
-    }
+    keep_existing(&args.out)?;
     let machine = args.machine.load(io)?;
     let mut catalogue = Catalogue::built_in()?;
     for file in &args.effects_file {
@@ -105,11 +102,25 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         masked: Vec::new(),
         tolerance: crate::study::tolerance::Tolerance::default(),
     };
-    files::write_whole(&args.out, study.fresh()?.as_bytes())?;
+    let text = study.fresh()?;
+    // another call may have written it meanwhile. Only beside it can be locked; that it cannot be made is said on writing
+    let _ = std::fs::create_dir_all(&folder);
+    let alone = files::lock(&args.out)?;
+    keep_existing(&args.out)?;
+    files::write_whole(&args.out, text.as_bytes())?;
+    drop(alone);
     io.say(format!("{}: {} run(s), model: {}", args.out.display(), args.plan.len(), effects.join(", ")));
     io.say(format!("next: axiscal identify {}", args.out.display()));
     io.answer(&json!({ "study": args.out.display().to_string(), "runs": args.plan.len(), "effects": effects }));
     Ok(Answer::Done)
+}
+
+fn keep_existing(out: &Path) -> Result<()> {
+    if !out.exists() {
+        return Ok(());
+    }
+    Err(Failure::new("new::exists", format!("{} exists already", out.display()))
+        .help("name another file with --out, or remove it first"))
 }
 
 /// What is on by default: the location errors of the machine's rotary axes, the blocks' set-up and the pre-travel.

@@ -36,20 +36,25 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let name = args.study.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let view = view_of(&loaded, &worked, &name);
     io.report(&view.ladder_notes.iter().map(|n| Finding::info("report::ladder", n.clone())).collect::<Vec<_>>());
+    let mut outputs: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     if let Some(path) = &args.view {
         let text = serde_json::to_string(&view)
             .map_err(|e| Failure::new("report::view", format!("the view cannot be written: {e}")))?;
-        files::write_whole(path, text.as_bytes())?;
+        outputs.push((path.clone(), text.into_bytes()));
     }
     let page = crate::page::page(&view)?;
-    files::write_whole(&args.out, page.as_bytes())?;
+    outputs.push((args.out.clone(), page.clone().into_bytes()));
     let mut plots = Vec::new();
     if let Some(folder) = &args.plots {
         for (name, contents) in crate::plots::files(&view)? {
             let path = folder.join(name);
-            files::write_whole(&path, &contents)?;
             plots.push(path.display().to_string());
+            outputs.push((path, contents));
         }
+    }
+    files::check_outputs(&outputs.iter().map(|(path, _)| path).collect::<Vec<_>>())?;
+    for (path, contents) in &outputs {
+        files::write_whole(path, contents)?;
     }
     io.say(&view.headline.sentence);
     io.say(format!("{}: open it in a browser, mail it, print it", args.out.display()));

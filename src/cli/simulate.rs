@@ -1,7 +1,6 @@
 //! `axiscal simulate`: the virtual machine writes the log that the controller would have written.
 
 use super::common::MachineArgs;
-use super::generate::keep_inputs;
 use super::load::load_plan;
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Findings, Result, source};
@@ -48,7 +47,6 @@ const LONG: usize = 50_000;
 /// # Errors
 /// When an input is unusable or does not fit the machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    keep_existing(args)?;
     let machine = args.machine.load(io)?;
     let plan = load_plan(&args.plan, &machine, io)?;
     let scenario = match &args.scenario {
@@ -58,7 +56,6 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             let folder = path.parent().unwrap_or(Path::new(""));
             let open = |name: &str| {
                 let file = folder.join(name);
-                keep_inputs(&args.out, [file.as_path()].into_iter())?;
                 Ok(source(file.display().to_string(), files::read_text(&file)?))
             };
             reported(simulate::scenario::parse_with(&text, &machine, &open)?, io)
@@ -77,6 +74,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             Some(post)
         }
     };
+    keep_existing(args)?;
     let bar = progress(plan.touches.len(), io);
     let touches = simulate::run_with_progress(&machine, &plan, &scenario, compensation.as_ref(), &|done| {
         bar.inc(done as u64);
@@ -114,13 +112,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     Ok(Answer::Done)
 }
 
-/// A log of a real machine cannot be made again: what exists is written over only when that is asked for, inputs never.
+/// A log of a real machine cannot be made again: what exists is written over only when that is asked for, inputs never. Asked
+/// when all inputs are read, and before the work.
 fn keep_existing(args: &Args) -> Result<()> {
-    let controller = Path::new(&args.controller);
-    let optional = [args.machine.machines.as_deref(), args.scenario.as_deref(), args.compensation.as_deref()];
-    let compensation = args.compensation.as_ref().map(|c| c.join("compensation.json"));
-    let inputs = [args.plan.as_path(), controller].into_iter().chain(optional.into_iter().flatten());
-    keep_inputs(&args.out, inputs.chain(compensation.as_deref()))?;
+    files::check_outputs(&[&args.out])?;
     if args.out.exists() && !args.force {
         return Err(Failure::new("cli::exists", format!("{} exists: it is not written over", args.out.display()))
             .help("name a new file with --out, or add --force if it may be lost"));

@@ -30,6 +30,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     settings.quick = true;
     let fit = loaded.fit(&settings)?;
     let name = args.out.display().to_string();
+    // what was read of it must still be there when it is written
+    let _alone = files::lock(&args.out)?;
     let before = if args.out.exists() { files::read_text(&args.out)? } else { String::new() };
     // what stands in the file must be readable: its ids are taken, whether or not the study names the file
     let mut own = Catalogue::default();
@@ -56,7 +58,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     let text = format!("{before}{gap}{}", made.toml);
     Catalogue::built_in()?.add_file(&source(&name, text.clone()))?;
-    files::write_whole(&args.out, text.as_bytes())?;
+    files::rewrite(&args.out, text.as_bytes())?;
     io.say(format!(
         "{}\n{} = {}\nwritten to {name}: its name is for you to change (and its id: then `add` takes the new one)",
         made.says, made.id, made.formula

@@ -38,6 +38,7 @@ pub struct Args {
 /// # Errors
 /// When the study is unusable or the port is taken.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    super::guard::say_at_once();
     let host = Desk::new(&args.study)?;
     let server = Server::new(Arc::new(host), args.port)?;
     let address = server.address();
@@ -137,6 +138,10 @@ impl Host for Desk {
         })
     }
 
+    fn alone(&self) -> Result<Box<dyn Send>> {
+        Ok(Box::new(files::lock(&self.study)?))
+    }
+
     fn read(&self, place: Place) -> Result<Option<Vec<u8>>> {
         let path = self.place(place)?;
         if path.exists() { files::read_bytes(&path).map(Some) } else { Ok(None) }
@@ -145,7 +150,7 @@ impl Host for Desk {
     fn write(&self, place: Place, bytes: Option<&[u8]>) -> Result<()> {
         let path = self.place(place)?;
         match bytes {
-            Some(bytes) => files::write_whole(&path, bytes),
+            Some(bytes) => files::rewrite(&path, bytes),
             None => files::remove(&path),
         }
     }
@@ -199,6 +204,7 @@ fn run_verb(words: &[String], folder: String) -> Result<Answered> {
     let (said, noted) = (tempfile::tempfile().map_err(fail)?, tempfile::tempfile().map_err(fail)?);
     let mut child = Command::new(program)
         .arg("--json")
+        .arg(format!("--max-input={}", files::max_input()))
         .args(words)
         .env("NO_COLOR", "1")
         .stdin(Stdio::null())

@@ -206,7 +206,8 @@ impl Catalogue {
     /// Begins to read, on another thread, all built-in rows, for who will need them; unless somebody has begun.
     pub fn read_ahead() {
         if !BEGUN.swap(true, Ordering::Relaxed) {
-            rayon::spawn(|| Self::read_rows(|| ()));
+            // a fault would end the process here; who needs the rows meets it again, and says so
+            rayon::spawn(|| drop(std::panic::catch_unwind(|| Self::read_rows(|| ()))));
         }
     }
 

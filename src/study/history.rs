@@ -109,6 +109,24 @@ impl History {
         self.steps.push(step);
     }
 
+    /// This one with the steps at its end that `other` has made since both were as `before`.
+    #[must_use]
+    pub fn followed_by(mut self, other: &Self, before: &Self) -> Self {
+        // the last step of then may have got further figures since
+        for step in other.steps.iter().skip(before.steps.len().saturating_sub(1)) {
+            let of_now = |s: &&mut Step| s.effects == step.effects && s.data_sha256 == step.data_sha256;
+            match self.steps.iter_mut().skip(before.steps.len().saturating_sub(1)).find(of_now) {
+                Some(there) if there.held_out_rms_um.is_some() => {}
+                Some(there) => {
+                    let (number, added, removed) = (there.step, there.added.clone(), there.removed.clone());
+                    *there = Step { step: number, added, removed, ..step.clone() };
+                }
+                None => self.push(step.clone()),
+            }
+        }
+        self
+    }
+
     /// Steps that were fitted on other data than these.
     #[must_use]
     pub fn on_other_data(&self, data_sha256: &str) -> Vec<usize> {
@@ -117,5 +135,36 @@ impl History {
             .filter(|s| !s.data_sha256.is_empty() && s.data_sha256 != data_sha256)
             .map(|s| s.step)
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_two_writers_are_all_kept() {
+        let step = |effects: &str, held_out_rms_um| Step {
+            effects: effects.split('+').map(str::to_owned).collect(),
+            held_out_rms_um,
+            ..Step::default()
+        };
+        let mut before = History::default();
+        before.push(step("a", None));
+        let (mut there, mut own) = (before.clone(), before.clone());
+        there.push(step("a+b", None));
+        own.push(step("a", Some(1.0)));
+        own.push(step("a+c", Some(2.0)));
+        let merged = there.followed_by(&own, &before);
+        let steps: Vec<(usize, String, Option<f64>)> =
+            merged.steps.iter().map(|s| (s.step, s.effects.join("+"), s.held_out_rms_um)).collect();
+        assert_eq!(
+            steps,
+            [(1, "a".to_owned(), Some(1.0)), (2, "a+b".to_owned(), None), (3, "a+c".to_owned(), Some(2.0))]
+        );
+        assert_eq!(
+            (merged.steps[2].added.clone(), merged.steps[2].removed.clone()),
+            (vec!["c".to_owned()], vec!["b".to_owned()])
+        );
     }
 }

@@ -89,6 +89,11 @@ pub trait Host: Send + Sync + 'static {
     /// # Errors
     /// When something is missing or unusable.
     fn open(&self) -> Result<Opened>;
+    /// Keeps other processes from changing the study until what is returned is dropped.
+    ///
+    /// # Errors
+    /// When one of them does so for longer than is waited, or nothing can be written there.
+    fn alone(&self) -> Result<Box<dyn Send>>;
     /// The bytes of a file of ours; `None` where it is not there.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use super::shelf::{self, Shelf};
 use super::{Host, Opened, Place};
 use crate::diag::{Failure, Result, source};
 use crate::fit::{self, Fit};
-use crate::study::history::Step as Rung;
+use crate::study::history::{History, Step as Rung};
 use crate::study::{Study, edit, mask};
 use std::sync::Arc;
 
@@ -112,6 +112,8 @@ pub struct Session {
     past: Vec<Made>,
     future: Vec<Made>,
     mark: u64,
+    /// The ladder as it was last read or written.
+    ladder: History,
 }
 
 impl Session {
@@ -125,6 +127,7 @@ impl Session {
         let shelf = Arc::new(Shelf::default());
         let (fit, fit_ms) = shelf.fit(&opened, 1, shelf::settings(&opened))?;
         let mut opened = opened;
+        let ladder = opened.history.clone();
         opened.history.push(rung(&opened, &fit));
         let state = Snapshot {
             version: 1,
@@ -136,7 +139,7 @@ impl Session {
             fault: None,
             fit_ms,
         };
-        Ok(Self { host, shelf, state, past: Vec::new(), future: Vec::new(), mark })
+        Ok(Self { host, shelf, state, past: Vec::new(), future: Vec::new(), mark, ladder })
     }
 
     /// The models that were fitted already.
@@ -202,6 +205,7 @@ impl Session {
                     };
                     self.remember(made);
                 }
+                self.ladder = opened.history.clone();
                 opened.history.push(rung(&opened, &fit));
                 self.state.inputs += 1;
                 self.state.opened = Arc::new(opened);
@@ -227,15 +231,33 @@ impl Session {
 
     /// Writes the ladder beside the study. Not within a step, whose answer need not wait for it: a ladder that lacks its
     /// last model is no damage, and the next one puts it there.
-    pub fn write_ladder(&self, version: u64) {
+    pub fn write_ladder(&mut self, version: u64) {
         // who only looks leaves no file
         if version != self.state.version || version == 1 || self.state.fault.is_some() {
             return;
         }
-        if let Ok(text) = self.state.opened.history.to_json() {
-            // one that cannot be written is no reason to stop
-            let _ = self.host.write(Place::History, Some(text.as_bytes()));
-        }
+        // one that cannot be written is no reason to stop
+        let _ = self.merge_ladder();
+    }
+
+    /// Puts the models that were tried here behind those that others have written meanwhile.
+    fn merge_ladder(&mut self) -> Result<()> {
+        let _alone = self.host.alone()?;
+        let there = match self.host.read(Place::History)? {
+            Some(bytes) => {
+                let text = String::from_utf8_lossy(&bytes).into_owned();
+                History::parse(&source("the history of the study", text))?
+            }
+            None => History::default(),
+        };
+        let own = &self.state.opened.history;
+        let merged = if there == self.ladder { own.clone() } else { there.followed_by(own, &self.ladder) };
+        self.host.write(Place::History, Some(merged.to_json()?.as_bytes()))?;
+        let mut opened = Opened::clone(&self.state.opened);
+        opened.history.clone_from(&merged);
+        self.state.opened = Arc::new(opened);
+        self.ladder = merged;
+        Ok(())
     }
 
     fn text(&self) -> Result<String> {
@@ -349,6 +371,8 @@ impl Session {
 
     /// Puts files in the place of those that are there, and the state that belongs to them in the place of the old one.
     fn put(&mut self, from: &Files, to: &Files) -> Result<()> {
+        // from what is compared to what is written nobody else changes the study
+        let _alone = self.host.alone()?;
         let changed = || {
             Failure::new("workbench::changed", "a file of the study was changed meanwhile")
                 .help("nothing was written: look at the new state and try again")

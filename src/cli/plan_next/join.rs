@@ -56,7 +56,7 @@ pub(super) fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, i
         stood,
     };
     let text = study::join(&files::read_text(&args.study)?, &joined)?;
-    files::write_whole(&args.study, text.as_bytes())?;
+    files::rewrite(&args.study, text.as_bytes())?;
     io.say(format!("{}: run {} with {} touches", args.study.display(), loaded.runs.len() + 1, touches.len()));
     io.answer(
         &json!({ "study": args.study.display().to_string(), "runs": loaded.runs.len() + 1, "touches": touches.len() }),

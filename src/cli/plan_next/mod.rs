@@ -63,6 +63,8 @@ fn warn<'a>(said: impl Iterator<Item = &'a String>, io: &Io) {
 /// # Errors
 /// When the study is unusable, an effect is unknown, or nothing can be reached.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
+    // a run that is joined changes the study: nobody else does so until it is written
+    let _alone = if args.join.is_some() { Some(crate::files::lock(&args.study)?) } else { None };
     let loaded = load_study(&args.study, io)?;
     let name = format!("next-{}", loaded.study.data.len() + 1);
     let plan_file = args.out.join(format!("{name}.plan.json"));

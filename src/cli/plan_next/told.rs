@@ -35,11 +35,10 @@ pub(super) fn write(
     let mut proven = plan.clone();
     proven.blocks_anew = chosen.label.is_none();
     proven.programs.extend(proof.map(|(p, _)| (post.name.clone(), p)));
-    files::write_whole(plan_file, proven.to_json().as_bytes())?;
-    files::write_whole(&form_file, chosen.text.as_bytes())?;
-    for (name, text) in nc.files(&plan.program) {
-        files::write_whole(&args.out.join(name), text.as_bytes())?;
-    }
+    let plan_text = proven.to_json();
+    let own = [(plan_file.to_path_buf(), plan_text.as_bytes()), (form_file.clone(), chosen.text.as_bytes())];
+    let programs = nc.files(&plan.program).into_iter().map(|(name, text)| (args.out.join(name), text.as_bytes()));
+    files::write_together(&own.into_iter().chain(programs).collect::<Vec<_>>())?;
     let seconds = chosen.generated.path.seconds;
     io.say(&questions.says);
     io.say(format!(
