@@ -222,7 +222,7 @@ fn a_fault_of_the_program_is_one_line_and_one_finding() {
         command.env("RAYON_NUM_THREADS", "2000").output().unwrap()
     };
     let before = text(dir.path(), "study.toml");
-    for words in [&["identify", "study.toml"][..], &["add", "study.toml", "squareness-xy"]] {
+    for words in [&["compare", "study.toml", "--csv", "new.csv"][..], &["add", "study.toml", "squareness-xy"]] {
         let out = call(&[&["--json"], words].concat());
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
         let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap_or_else(|e| panic!("{e}: {said}"));
