@@ -163,8 +163,14 @@ fn silent() -> Io {
 
 #[test]
 fn an_edited_number_gives_the_same_fit_or_is_refused() {
-    let counts = [("swivel-head", "head"), ("swivel-head", "table"), ("trunnion", "basic"), ("double-head", "head")]
-        .map(|(machine, program)| Job::new(machine, program).sweep(Touches::Some));
+    let jobs = [
+        ("swivel-head", "head"),
+        ("swivel-head", "table"),
+        ("trunnion", "basic"),
+        ("swivel-table-b", "basic"),
+        ("double-head", "double-head"),
+    ];
+    let counts = jobs.map(|(machine, program)| Job::new(machine, program).sweep(Touches::Some));
     let (numbers, refused) = counts.iter().fold((0, 0), |sum, c| (sum.0 + c.0, sum.1 + c.1));
     println!("{numbers} numbers edited, {refused} edits refused");
     assert!(numbers >= 400 && refused >= 4 * numbers, "{counts:?}");
