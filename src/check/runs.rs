@@ -289,6 +289,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             })
             .collect();
         let begun = self.forks(&mut explored);
+        let cut = explored.iter().find_map(|e| e.cut).map(|statement| self.program.place(statement));
         let again = explored.first().and_then(|whole| self.again(whole, beginning));
         let mut runs: Vec<Told> = explored.into_iter().map(|e| e.told).collect();
         let mut findings = Vec::new();
@@ -297,6 +298,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let taken = taken(runs.iter().chain(&others).chain(&refused).chain(&again));
         let doubted::Doubted { runs: mut doubted, beyond } = self.doubted(begun, &taken, limits);
         doubted.extend(again);
+        let beyond = beyond.or(cut);
         let stops = runs.first().map_or(0, |t| stops(&t.trunk));
         if let Some(awkward) = runs.first() {
             for other in &others {
