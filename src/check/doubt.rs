@@ -40,6 +40,10 @@ pub struct Doubts {
     pub keeps: Option<Doubt>,
     /// How many conditions this run has taken the other way.
     pub depth: usize,
+    /// Other ways that were kept.
+    pub kept: usize,
+    /// The first condition whose other way was not kept, because there are too many.
+    pub cut: Option<usize>,
 }
 
 /// By statement: its condition did not hold, it held.
@@ -56,8 +60,8 @@ pub struct Fork<'p, D> {
     pub run: Run<'p, D>,
 }
 
-/// Forks of one run that are kept; more are more than are run.
-pub const MOST_FORKS: usize = 24;
+/// Forks of one run that are kept.
+const MOST_FORKS: usize = 64;
 
 /// What a run has computed at a statement since it began to compute only.
 struct Computed {
@@ -107,13 +111,18 @@ impl<D: Dialect> Run<'_, D> {
         self.doubts.taken.entry(statement).or_default()[usize::from(holds)] = true;
         let ways = if holds { [here, to] } else { [to, here] };
         let kept = self.doubts.keeps.is_some_and(|least| doubt >= least);
-        if !kept || self.doubted.len() >= MOST_FORKS || self.meet(ways) {
+        if !kept || self.meet(ways) {
             return;
         }
+        if self.doubts.kept >= MOST_FORKS {
+            self.doubts.cut.get_or_insert(statement);
+            return;
+        }
+        self.doubts.kept += 1;
         let mut run = self.without_record();
         run.vm.trace.clone_from(&self.vm.trace);
         (run.next, run.keeps_forks) = (ways[1], self.keeps_forks);
-        run.doubts.depth += 1;
+        (run.doubts.depth, run.doubts.kept) = (self.doubts.depth + 1, 0);
         self.doubted.push(Fork { doubt, statement, run });
     }
 

@@ -4,7 +4,7 @@
 //! the way, contact at once, a block that stands off, a probe that does not close again, a search and a measuring touch
 //! that disagree, a person who breaks the program off. A branch is followed until the program ends or moves on.
 
-use super::doubt::{Doubt, Fork, MOST_FORKS, Taken};
+use super::doubt::{Doubt, Fork, Taken};
 use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Start, Trouble, Vm};
 use super::world::way_mm;
 use std::collections::BTreeMap;
@@ -86,6 +86,8 @@ pub struct Explored<'p, D> {
     pub told: Told,
     /// Runs that take the other way at a condition that depends on a value that is not known.
     pub forks: Vec<Fork<'p, D>>,
+    /// The first condition whose other way was not kept, because there are too many.
+    pub cut: Option<usize>,
     /// The control as it was left.
     pub left: D,
 }
@@ -180,8 +182,7 @@ pub fn explore_on<'p, D: Dialect>(
         for (leaves, trouble, fork) in run.take_forks() {
             told.branches.extend(until_it_stops(fork, trouble.into(), leaves));
         }
-        let free = MOST_FORKS - forks.len().min(MOST_FORKS);
-        forks.extend(run.take_doubted().into_iter().take(free));
+        forks.extend(run.take_doubted());
         match paused {
             Err(fault) => {
                 told.fault = Some(fault);
@@ -218,7 +219,7 @@ pub fn explore_on<'p, D: Dialect>(
     note_parts(&mut told.parts, &run.vm, run.vm.part);
     told.trunk = run.vm.trace;
     told.taken = run.doubts.taken;
-    Explored { told, forks, left: run.dialect }
+    Explored { told, forks, cut: run.doubts.cut, left: run.dialect }
 }
 
 /// Settings that are the same are kept once: a long program has a hundred thousand branches.
@@ -336,6 +337,7 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
     let logged = |run: &Run<'_, D>| run.vm.trace.iter().any(|h| matches!(h.event, Event::Log(_)));
     // stored values are others in each run that comes here; a clock may show anything
     run.doubts.keeps = run.doubts.keeps.map(|_| Doubt::Outside);
+    run.doubts.kept = 0;
     loop {
         let paused = run.on();
         for (_, trouble, fork) in run.take_forks() {

@@ -130,7 +130,7 @@ pub trait Dialect: Clone + Send + Sync {
     fn doubt(&self, _var: &Var, _vm: &Vm) -> Option<Doubt> {
         None
     }
-    /// A variable that does not exist here may be left at the control by another program.
+    /// Another program may or may not have left a variable of this name at the control.
     fn may_exist(&self, _var: &Var) -> bool {
         false
     }

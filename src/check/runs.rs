@@ -333,7 +333,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             each(kind, told);
         };
         let again = self.again(&whole, beginning);
-        let Explored { told: whole, forks, .. } = whole;
+        let Explored { told: whole, forks, mut cut, .. } = whole;
         let mut open = self.forks(&whole, forks, None);
         note(&mut all_taken, &whole);
         looked_at(Kind::Begun, &whole);
@@ -343,7 +343,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
         for some in numbers.chunks(some) {
             let made: Vec<Explored<'a, D>> =
                 some.par_iter().map(|k| self.explored(*k, Start::Awkward, beginning, Some(limits))).collect();
-            for Explored { told, forks, .. } in made {
+            for Explored { told, forks, cut: own, .. } in made {
+                cut = cut.or(own);
                 open.extend(self.forks(&told, forks, Some(&whole)));
                 note(&mut all_taken, &told);
                 looked_at(Kind::Begun, &told);
@@ -371,6 +372,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         }
         again.iter().for_each(|again| note(&mut all_taken, again));
         let doubted::Doubted { runs, beyond } = self.doubted(open, &all_taken, limits);
+        let beyond = beyond.or(cut.map(|statement| self.program.place(statement)));
         runs.iter().chain(&again).for_each(|doubted| looked_at(Kind::Doubted, doubted));
         findings.extend(turns);
         findings.extend(dead);

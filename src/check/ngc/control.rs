@@ -54,6 +54,8 @@ pub struct Ngc {
     /// Those of the tool table.
     table: [f64; 3],
     globals: Values,
+    /// Named parameters that an earlier program has left.
+    found: Values,
     locals: Vec<Values>,
     /// 5061 … 5066 in mm and deg, in the acting coordinates, and 5070.
     probed: [f64; 6],
@@ -85,6 +87,7 @@ impl Ngc {
             tool: [0.0; 3],
             table: [0.0, 0.0, 51.25],
             globals: Values::new(),
+            found: Values::new(),
             locals: vec![Values::new()],
             probed: [0.0; 6],
             hit: false,
@@ -405,6 +408,7 @@ impl Dialect for Ngc {
     fn after_abort(&self) -> Option<Self> {
         let mut next = self.clone();
         next.kept.clear();
+        next.found.clone_from(&next.globals);
         next.locals = vec![Values::new()];
         Some(next)
     }
@@ -518,7 +522,8 @@ impl Dialect for Ngc {
     }
 
     fn may_exist(&self, var: &Var) -> bool {
-        matches!(var, Var::Name(name) if name.starts_with('_')) && !self.globals.contains_key(var)
+        let is_global = matches!(var, Var::Name(name) if name.starts_with('_'));
+        is_global && (self.found.contains_key(var) || !self.globals.contains_key(var))
     }
 
     fn is_local(&self, var: &Var) -> bool {

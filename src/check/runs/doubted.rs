@@ -2,7 +2,7 @@
 
 use super::Runs;
 use crate::axes::Position;
-use crate::check::doubt::{Doubt, Fork, MOST_FORKS, Taken};
+use crate::check::doubt::{Doubt, Fork, Taken};
 use crate::check::explore::{Explored, Limits, Told, explore, explore_on};
 use crate::check::run::{Dialect, Start};
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ pub(super) struct Doubted {
 }
 
 /// Runs of this kind that are made of a program at most.
-const MOST_RUNS: usize = MOST_FORKS - 1;
+const MOST_RUNS: usize = 23;
 
 /// A run that is to begin at a condition: what was before it, and the run.
 type Begun<'c, D> = (Told, Fork<'c, D>);
@@ -40,7 +40,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
                 wave.into_par_iter().map(|(told, fork)| explore_on(fork.run, told, Some(limits), &|_| None)).collect();
             let mut next = Vec::new();
             let mut pairs = Vec::new();
-            for Explored { told, forks, .. } in explored {
+            for Explored { told, forks, cut, .. } in explored {
+                doubted.beyond = doubted.beyond.or(cut.map(|statement| self.program.place(statement)));
                 for fork in forks.into_iter().filter(is_open) {
                     let is_new = !taken.contains_key(&fork.statement);
                     let begun = (self.begun(&told, &fork), fork);
