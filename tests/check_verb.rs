@@ -234,7 +234,6 @@ fn what_linuxcnc_itself_refuses_is_refused() {
     };
     for (from, to, place) in [
         ("\no40 endif", "\no<040> endif", ""),
-        ("\no<axiscal> call", "\no<0axiscal> call", ""),
         ("\no2 if", "\no<02> if", ""),
         ("\no2 endif", "\no<0002> endif", ""),
         ("%\n", "(a remark)\n%\n", ":2:1"),
@@ -243,6 +242,8 @@ fn what_linuxcnc_itself_refuses_is_refused() {
     ] {
         check(text.replacen(from, to, 1)).code(2).stderr(predicate::str::contains(format!("edited.ngc{place}")));
     }
+    // a subroutine that is not in the program is a file of the control
+    check(text.replacen("\no<axiscal> call", "\no<0axiscal> call", 1)).code(1);
     for (from, to) in [
         ("\no40 endif", "\nO<40> ENDIF"),
         ("\no40 endif", "\no040 endif"),
