@@ -281,7 +281,9 @@ impl Victim {
     }
 
     fn its_files(&self) -> Files {
-        files(&self.folder()).into_iter().filter(|(name, _)| (self.is_its)(name)).collect()
+        // what is on its way to its place is no file of the folder yet
+        let is_its = |name: &str| !name.starts_with(".axiscal-tmp-") && (self.is_its)(name);
+        files(&self.folder()).into_iter().filter(|(name, _)| is_its(name)).collect()
     }
 
     /// Calls it in the way that it was not called last, kills it, looks, and calls it again.
