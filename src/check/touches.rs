@@ -8,7 +8,7 @@ use crate::log;
 use crate::program::plan::{ControllerFrame, PlanTouch};
 use crate::program::plan_digest::digest;
 use crate::units::Plain;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
 /// A touch that a program made. Positions are axis positions relative to R, mm and deg.
@@ -118,8 +118,8 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
         }
         return;
     }
-    // the line of each touch, by the number of the line
-    let by_line = |line: usize| made.iter().find(|m| lines.get(line - 1).is_some_and(|(at, _)| **at == m.at));
+    let made_at: HashMap<&Range<usize>, &Made> = made.iter().rev().map(|m| (&m.at, m)).collect();
+    let by_line = |line: usize| lines.get(line.checked_sub(1)?).and_then(|(at, _)| made_at.get(at)).copied();
     times(case, &parsed.touches, &lines, said);
     let numbered = plan.numbered();
     let mut ids = Vec::new();
