@@ -1,6 +1,7 @@
 //! Calls that are killed at random moments, and calls that change one study at the same time, in numbers.
 //!
-//! `cargo run --release --example torture -- kills N | races N`
+//! `cargo run --release --example torture -- [kills [N] | races [N]]`: both, 1 000 each, where nothing is said. The sweep over all
+//! numbers of a plan is `cargo test --release --test plan_sweep -- --ignored`; the readers are fuzzed by `fuzz/run-short`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 
 #[path = "../tests/torture/runs.rs"]
@@ -17,13 +18,15 @@ fn main() -> ExitCode {
         return axiscal::cli::main();
     }
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let count = words.get(1).and_then(|word| word.parse().ok()).unwrap_or(100);
+    let count = words.get(1).and_then(|word| word.parse().ok()).unwrap_or(1000);
     let program = Program { path: std::env::current_exe().unwrap(), environment: Some(AS_PROGRAM) };
     let good = match words.first().map(String::as_str) {
         Some("kills") => kills(&program, count),
         Some("races") => races(&program, count),
+        // `&`: the second is run though the first has failed
+        None => kills(&program, count) & races(&program, count),
         _ => {
-            eprintln!("usage: torture kills N | races N");
+            eprintln!("usage: torture [kills [N] | races [N]]");
             return ExitCode::from(2);
         }
     };

@@ -28,6 +28,13 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// A file that belongs to what was read, read or not: nothing is written over it, and what killed calls left beside it is
+/// removed.
+pub fn protect(path: &Path) {
+    temporary::sweep(folder_of(path));
+    inputs::keep(path);
+}
+
 /// The bytes of a file that an earlier call of this program wrote and this one may write over.
 ///
 /// # Errors
@@ -144,8 +151,8 @@ impl Staged {
     }
 
     fn try_of(path: &Path, contents: &[u8]) -> std::io::Result<Self> {
-        // a link is followed: the file that it names is the one that is meant
-        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        // the file that a link names is meant, whether or not it exists yet
+        let target = inputs::behind_links(path)?;
         let folder = folder_of(&target);
         std::fs::create_dir_all(folder)?;
         let mut file = temporary::file_in(folder)?;
@@ -172,9 +179,9 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 fn unwritable(path: &Path, e: &std::io::Error) -> Failure {
-    // the reason without the name of the temporary file, which nobody has asked for
-    let reason =
-        e.raw_os_error().map_or_else(|| e.to_string(), |code| std::io::Error::from_raw_os_error(code).to_string());
+    // `tempfile` puts the name of the temporary file around the reason; the user has not asked for that name
+    let cause = e.get_ref().and_then(std::error::Error::source).and_then(|s| s.downcast_ref::<std::io::Error>());
+    let reason = cause.unwrap_or(e);
     Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display()))
         .help("is every part of the path a folder, and may you write there?")
 }

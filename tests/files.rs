@@ -102,6 +102,34 @@ fn two_outputs_are_two_files() {
 }
 
 #[test]
+fn nothing_takes_the_place_of_the_history_and_links_are_followed() {
+    let dir = folder();
+    let at = dir.path();
+    ok(at, &["add", "study.toml", "squareness-xy"]);
+    let history = text(at, "study.history.json");
+    assert_eq!(refused(at, &["compare", "study.toml", "--csv", "study.history.json"]), "file::is_input");
+    assert_eq!(text(at, "study.history.json"), history);
+    std::os::unix::fs::symlink("there.csv", at.join("soft.csv")).unwrap();
+    std::os::unix::fs::symlink("loop", at.join("loop")).unwrap();
+    ok(at, &[&PARSE[..], &["--out", "soft.csv"]].concat());
+    assert!(at.join("soft.csv").is_symlink() && at.join("there.csv").is_file());
+    assert_eq!(refused(at, &[&PARSE[..], &["--out", "loop"]].concat()), "file::unwritable");
+    assert!(at.join("loop").is_symlink());
+}
+
+#[test]
+fn a_call_that_reads_a_study_removes_what_a_killed_one_left() {
+    let dir = folder();
+    let at = dir.path();
+    let mut child = Command::new("true").spawn().unwrap();
+    child.wait().unwrap();
+    let left = at.join(format!(".axiscal-tmp-{}-abc123", child.id()));
+    std::fs::write(&left, "").unwrap();
+    ok(at, &["identify", "study.toml"]);
+    assert!(!left.exists());
+}
+
+#[test]
 fn devices_serve_as_input_and_output() {
     let dir = folder();
     let at = dir.path();

@@ -113,9 +113,24 @@ pub fn check_outputs<P: AsRef<Path>>(outputs: &[P]) -> Result<()> {
     Ok(())
 }
 
+/// The file that is meant by a path: links are followed, also one whose file does not exist yet.
+pub(super) fn behind_links(path: &Path) -> std::io::Result<PathBuf> {
+    const MOST_LINKS: usize = 40;
+    let mut at = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        if let Ok(real) = at.canonicalize() {
+            return Ok(real);
+        }
+        let Ok(next) = std::fs::read_link(&at) else { return Ok(at) };
+        at = at.parent().map_or_else(|| next.clone(), |folder| folder.join(&next));
+    }
+    Err(std::io::Error::other("the link leads back to itself"))
+}
+
 /// The path without links and detours, also where its last parts do not exist yet.
 pub(super) fn real_path(path: &Path) -> PathBuf {
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let path = behind_links(path).unwrap_or_else(|_| path.to_path_buf());
+    let absolute = std::path::absolute(&path).unwrap_or(path);
     let mut above = absolute.as_path();
     let mut rest: Vec<OsString> = Vec::new();
     loop {

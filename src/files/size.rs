@@ -2,7 +2,7 @@
 
 use crate::diag::{Failure, Finding, Result};
 use std::fs::{File, Metadata};
-use std::io::Read;
+use std::io::{IsTerminal, Read};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -51,7 +51,10 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
     if found.len() > most {
         return Err(too_large(path, most));
     }
-    let mut bytes = Vec::with_capacity(usize::try_from(found.len()).unwrap_or_default());
+    let mut bytes = Vec::new();
+    bytes
+        .try_reserve_exact(usize::try_from(found.len()).unwrap_or(usize::MAX))
+        .map_err(|_| no_memory(path, found.len()))?;
     // a stream, and a file that grows, says nothing true of its length
     let file = File::open(path).map_err(unreadable)?;
     file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(unreadable)?;
@@ -70,8 +73,9 @@ fn is_stream(path: &Path, found: &Metadata) -> bool {
         other.is_ok_and(|other| (other.dev(), other.ino()) == (found.dev(), found.ino()))
     };
     // one with a name in a folder may wait for its writer for ever; one without is a shell's
+    let is_endless = found.file_type().is_char_device() && !is("/dev/null") && !std::io::stdin().is_terminal();
     let is_unnamed_pipe = found.file_type().is_fifo() && path.canonicalize().is_err();
-    !found.is_dir() && (is_unnamed_pipe || is("/dev/stdin") || is("/dev/null"))
+    !found.is_dir() && !is_endless && (is_unnamed_pipe || is("/dev/stdin") || is("/dev/null"))
 }
 
 #[cfg(not(unix))]
@@ -83,6 +87,11 @@ fn no_file(path: &Path, found: &Metadata) -> Failure {
     let what = if found.is_dir() { "a folder" } else { "a device or a pipe" };
     Failure::new("file::no_file", format!("{} is {what}, not a file", path.display()))
         .help("name a file; a stream can be given as /dev/stdin")
+}
+
+fn no_memory(path: &Path, bytes: u64) -> Failure {
+    Failure::new("file::no_memory", format!("{} has {bytes} bytes; there is not so much memory free", path.display()))
+        .help("close other programs, or read it on a computer with more memory")
 }
 
 fn too_large(path: &Path, most: u64) -> Failure {

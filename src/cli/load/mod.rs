@@ -2,6 +2,7 @@
 
 mod run;
 
+use super::add::history_path;
 use super::common::{Io, load_machine};
 use crate::design::{Planned, keep_measured};
 use crate::diag::{Failure, Finding, Result, Source, shown, source};
@@ -257,6 +258,7 @@ pub fn load_study_alone(path: &Path, io: &Io) -> Result<Loaded> {
 /// `whole`: the whole catalogue will be asked for; another thread begins to read it.
 fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let text = files::read_text(path)?;
+    files::protect(&history_path(path));
     if whole {
         Catalogue::read_ahead();
     }
