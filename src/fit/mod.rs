@@ -5,36 +5,36 @@
 //! nominal touches, a first fit with white noise, a robust start and data snooping, the noise from repeats and revisits,
 //! the fit with that noise, snooping again, and the answer.
 
-mod answer;
+mod assemble_result;
 pub mod candidates;
 mod contradictions;
-mod digits;
 pub mod held_out;
 mod knowledge;
-mod minima;
+mod local_minima;
 pub mod noise;
+pub mod nonlinear_scan;
 pub mod normal;
+pub mod null_space;
 pub mod outcome;
+mod outlier_loop;
+pub mod outliers;
+mod poorly_determined;
 mod profile;
 pub mod quantiles;
 mod rank;
 mod revisits;
-mod search;
-pub mod shapes;
-pub mod snoop;
+mod rounding;
 pub mod solve;
 pub mod span;
-mod starts;
-pub mod statement;
+mod start_values;
 mod type_b;
 pub mod uncertainty;
-mod weak;
 pub mod whitening;
 
 pub use knowledge::{effects_of, every_formula_has_a_value};
+pub use nonlinear_scan::{all_tried, around, between, fine, scan, start_shapes};
 pub use rank::{design_jacobian, free_in_a_design, held_first, jumps_in_a_design, observe_plan};
-pub use shapes::{all_tried, around, between, fine, scan, start_shapes};
-pub use starts::identify_data;
+pub use start_values::identify_data;
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
@@ -45,7 +45,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use noise::{Known, Noise};
 use normal::{Prior, Touches};
 use outcome::Outcome;
-use search::Search;
+use outlier_loop::Search;
 use std::collections::BTreeMap;
 use whitening::Whitening;
 
@@ -260,7 +260,7 @@ fn identify_from(
         .collect();
     let known = Known {
         declared_sigma_mm: crate::units::mm_from_um(machine.probe.repeatability_um),
-        rounding: digits::Rounding::of_touches(&data),
+        rounding: rounding::Rounding::of_touches(&data),
         declared_tau_mm: declared_tau_mm(machine, &data.observations),
         stated_sigma_mm: settings.touch_sigma_mm,
         stated_tau_mm: settings.visit_sigma_mm,
@@ -303,7 +303,7 @@ fn identify_from(
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
     let (mut outcome, other_values) =
-        answer::outcome(&fit, machine, effects, settings, (&solution, condition), (&type_b, left_out));
+        assemble_result::outcome(&fit, machine, effects, settings, (&solution, condition), (&type_b, left_out));
     outcome.warnings.extend(unknown_masks);
     (fit.outcome, fit.other_values) = (outcome, other_values);
     Ok(fit)

@@ -3,9 +3,9 @@
 //! Both from contrasts that no model error can enter: touches of one point made right after each other differ by σ only;
 //! touches of the same points in two visits of one pose differ by σ and by one displacement per visit (`revisits`).
 
-use super::digits::Rounding;
 use super::quantiles;
 use super::revisits::{Followed, Revisits, revisits};
+use super::rounding::Rounding;
 use crate::probability::{chi2_cdf, chi2_quantile};
 use crate::units::um_from_mm;
 use nalgebra::Vector3;

@@ -11,7 +11,7 @@ mod ends;
 mod held;
 
 use super::candidates::Trials;
-use super::shapes::{self, Stretch};
+use super::nonlinear_scan::{self, Stretch};
 use super::{Fit, Settings};
 use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Parameter};
@@ -141,7 +141,7 @@ pub fn intervals(
             }
             let Some(profile) = Profile::new(fit, (&model, &trials), effect, unknown) else { continue };
             if jumps {
-                let stretches = shapes::stretches_of_a_jump(p, &fit.data, u.name.split('@').nth(1));
+                let stretches = nonlinear_scan::stretches_of_a_jump(p, &fit.data, u.name.split('@').nth(1));
                 let (ends, places) = profile.ends_of_a_jump(&stretches);
                 out.ends.insert(unknown, ends);
                 // any of these moments may be it, and everything is as it is beside that one
@@ -239,7 +239,7 @@ struct Profile<'a> {
 impl<'a> Profile<'a> {
     /// `alone`: the model of the effect alone, with its columns.
     fn new(fit: &'a Fit, alone: (&'a Model, &'a Trials<'a>), effect: &'a Effect, unknown: usize) -> Option<Self> {
-        let set = shapes::set_of(alone.0, effect, &fit.model.unknowns[unknown].name)?;
+        let set = nonlinear_scan::set_of(alone.0, effect, &fit.model.unknowns[unknown].name)?;
         let own = alone.0.unknowns[set.clone()].iter();
         let places = own
             .map(|own| fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == own.name))
@@ -296,7 +296,7 @@ impl<'a> Profile<'a> {
         let mut values = self.values.clone();
         values[self.shape] = at;
         let (model, trials) = self.alone;
-        let all = trials.columns(&shapes::variant(model, &self.set, &values)).values;
+        let all = trials.columns(&nonlinear_scan::variant(model, &self.set, &values)).values;
         let mut all = all.columns_range(self.set.clone()).into_owned();
         self.fit.whitening(self.fit.noise.tau_mm).apply(&mut all);
         let size = |i: usize| if self.effect.parameters[i].shape.is_some() { 0.0 } else { values[i] };
@@ -368,9 +368,9 @@ impl<'a> Profile<'a> {
     /// Values of the shape over all of its range, near to each other; n of them where they are many.
     fn all_places(&self, p: &Parameter) -> Vec<f64> {
         if p.between.is_some() {
-            return shapes::all_tried(p, &self.fit.data);
+            return nonlinear_scan::all_tried(p, &self.fit.data);
         }
-        shapes::fine(p, self.fit.data.observations.len(), &|at| self.does(at).0)
+        nonlinear_scan::fine(p, self.fit.data.observations.len(), &|at| self.does(at).0)
     }
 
     /// Values beyond the ends of the first crossing that the touches allow as well, with by how much χ² is higher there.

@@ -1,7 +1,7 @@
 //! What everything else does while a shape is held at a value.
 
 use super::Profile;
-use crate::fit::shapes;
+use crate::fit::nonlinear_scan;
 use nalgebra::{DMatrix, DVector};
 
 /// What moves by more than this share of its usual size along with something that leaves no trace leaves none either.
@@ -35,7 +35,7 @@ impl Profile<'_> {
         // what leaves hardly a trace here would fit with any size, of metres: nobody believes that
         let limit = |c: usize| {
             let i = self.sizes[c];
-            shapes::CREDIBLE * self.effect.parameters[i].typical.max(self.values[i].abs())
+            nonlinear_scan::CREDIBLE * self.effect.parameters[i].typical.max(self.values[i].abs())
         };
         let belief = DVector::from_fn(self.sizes.len(), |c, _| limit(c).powi(-2));
         let value = DVector::from_fn(self.sizes.len(), |c, _| self.values[self.sizes[c]]);

@@ -1,6 +1,6 @@
 //! Which of several minima a fit with shape parameters takes.
 
-use super::shapes;
+use super::nonlinear_scan;
 use super::{Fit, Knowledge, Settings, identify_from};
 use crate::diag::Result;
 use crate::machine::Machine;
@@ -29,7 +29,7 @@ pub(super) fn better_moments(
     for name in settings.jumps.clone() {
         let (own, block) = name.split_once('@').map_or((name.as_str(), None), |(own, block)| (own, Some(block)));
         let Some(p) = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == own) else { continue };
-        let stretches = shapes::stretches_of_a_jump(p, &fit.data, block);
+        let stretches = nonlinear_scan::stretches_of_a_jump(p, &fit.data, block);
         for _ in 0..MOST {
             let Some(&Knowledge::Fixed(at)) = settings.knowledge.get(&name) else { break };
             let Some(here) = stretches.iter().position(|s| s.ends[0] <= at && at <= s.ends[1]) else { break };
@@ -39,7 +39,7 @@ pub(super) fn better_moments(
                 let mut moved = Settings { quick: true, ..settings.clone() };
                 hold(&mut moved, &name, stretches[k].place);
                 let other = identify_from(machine, catalogue, effects, fit.data.clone(), &moved, &values(&fit))?;
-                if shapes::out_of_range(&other, catalogue, machine).is_some() {
+                if nonlinear_scan::out_of_range(&other, catalogue, machine).is_some() {
                     continue;
                 }
                 let [here, there] = against([&fit, &other]);
@@ -52,7 +52,7 @@ pub(super) fn better_moments(
             hold(&mut settings, &name, place);
             let from = values(&fit);
             let next = identify_from(machine, catalogue, effects, fit.data.clone(), &settings, &from)?;
-            if shapes::out_of_range(&next, catalogue, machine).is_some() {
+            if nonlinear_scan::out_of_range(&next, catalogue, machine).is_some() {
                 hold(&mut settings, &name, at);
                 break;
             }
@@ -85,7 +85,7 @@ impl OutOfRange<'_> {
             let settled = identify_from(machine, catalogue, effects, fit.data, &waiting, starts)?;
             let from = values(&settled);
             fit = identify_from(machine, catalogue, effects, settled.data, held_settings, &from)?;
-            if shapes::out_of_range(&fit, catalogue, machine).is_none_or(|(other, _)| other != *name) {
+            if nonlinear_scan::out_of_range(&fit, catalogue, machine).is_none_or(|(other, _)| other != *name) {
                 return Ok((fit, None));
             }
         }
@@ -176,7 +176,7 @@ pub(super) fn best_minimum(
             hold(&mut waiting, &fit.model.unknowns[unknown].name, value);
             let settled = identify_from(machine, catalogue, effects, fit.data.clone(), &waiting, &values(&fit))?;
             let other = identify_from(machine, catalogue, effects, settled.data.clone(), &quick, &values(&settled))?;
-            if shapes::out_of_range(&other, catalogue, machine).is_some() {
+            if nonlinear_scan::out_of_range(&other, catalogue, machine).is_some() {
                 continue;
             }
             let [here, there] = against([&fit, &other]);
@@ -188,7 +188,7 @@ pub(super) fn best_minimum(
         let Some((_, lower)) = best else { break };
         let from = values(&lower);
         let next = identify_from(machine, catalogue, effects, lower.data, settings, &from)?;
-        if shapes::out_of_range(&next, catalogue, machine).is_some() {
+        if nonlinear_scan::out_of_range(&next, catalogue, machine).is_some() {
             break;
         }
         fit = next;

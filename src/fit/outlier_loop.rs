@@ -2,8 +2,8 @@
 
 use super::noise::{self, Known, Sample};
 use super::normal::Touches;
+use super::outliers::{self, Snoop};
 use super::revisits::Followed;
-use super::snoop::{self, Snoop};
 use super::solve;
 use crate::model::data::Data;
 use crate::model::formula::slot;
@@ -269,7 +269,7 @@ impl Search<'_> {
             return solution;
         }
         // several bad touches hide each other: let the rest vote first
-        let cap = (snoop::MOST_SHARE * n as f64).ceil() as usize;
+        let cap = (outliers::MOST_SHARE * n as f64).ceil() as usize;
         let mut most = cap;
         let robust = self.robust_strangers(&solution, &all);
         let mut out = if robust.is_empty() || robust.len() > cap { first } else { robust.clone() };
@@ -306,7 +306,7 @@ impl Search<'_> {
         // touches of one face that miss together say something in common: that is no matter of chips. Among many strangers
         // some meet on a face by chance
         if most == cap {
-            for cluster in snoop::clusters(&out, self.faces(), n) {
+            for cluster in outliers::clusters(&out, self.faces(), n) {
                 out.retain(|i| !cluster.contains(i));
             }
         }
@@ -316,7 +316,7 @@ impl Search<'_> {
     }
 
     /// The face of each touch.
-    fn faces(&self) -> impl Fn(usize) -> snoop::Face {
+    fn faces(&self) -> impl Fn(usize) -> outliers::Face {
         let rounded = |n: Vector3<f64>| [n.x, n.y, n.z].map(|x| (10.0 * x).round() as i8);
         move |i| {
             let o = &self.data.observations[i];
@@ -331,7 +331,7 @@ impl Search<'_> {
         let n_used = all.iter().filter(|w| **w > 0.0).count();
         let mut out = robust.to_vec();
         if out.len() as f64 > MOST_STRANGERS * n_used as f64
-            || snoop::whole_faces(&out, self.faces(), all.len()) as f64 > MOST_TOGETHER * out.len() as f64
+            || outliers::whole_faces(&out, self.faces(), all.len()) as f64 > MOST_TOGETHER * out.len() as f64
         {
             return None;
         }
@@ -364,17 +364,17 @@ impl Search<'_> {
         let mut gaps = self.gaps(&solution);
         let mut scale = gaps.iter().map(|r| r.abs()).fold(0.0, f64::max);
         loop {
-            let mut weights = snoop::robust_weights(&gaps, scale);
+            let mut weights = outliers::robust_weights(&gaps, scale);
             weights.iter_mut().zip(all).for_each(|(w, a)| *w = (*w * a).max(1e-6 * a));
             solution = self.refit(weights, &solution);
             gaps = self.gaps(&solution);
-            let floor = 3.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+            let floor = 3.0 * outliers::median_scale(&gaps).max(0.1 * sigma);
             if scale <= floor {
                 break;
             }
             scale = (scale / 3.0).max(floor);
         }
-        let limit = 4.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+        let limit = 4.0 * outliers::median_scale(&gaps).max(0.1 * sigma);
         (0..gaps.len()).filter(|&i| all[i] > 0.0 && gaps[i].abs() > limit).collect()
     }
 
@@ -389,14 +389,14 @@ impl Search<'_> {
 
     /// Does a touch that is not used agree with those that are?
     fn belongs(&self, solution: &solve::Solution, i: usize, scale2: f64, noise_dof: f64) -> bool {
-        snoop::belongs(self.off(solution, i, scale2).1, self.dof() + noise_dof)
+        outliers::belongs(self.off(solution, i, scale2).1, self.dof() + noise_dof)
     }
 
     /// How far touch i is off what the fit says, mm and in standard deviations.
     pub fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
         let (gap, row) = self.touches.row(&solution.theta, i);
         let (sigma, tau) = self.touches.noise_mm();
-        snoop::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
+        outliers::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
     }
 
     /// The rejected touches with their reasons.
@@ -407,7 +407,7 @@ impl Search<'_> {
             .filter(|&i| weights[i] == 0.0 && !self.masked[i])
             .map(|i| {
                 let (off_mm, standardised) = self.off(solution, i, scale2);
-                (i, snoop::Rejection { touch: i, off_mm, standardised, dof: self.dof() + noise_dof }.reason())
+                (i, outliers::Rejection { touch: i, off_mm, standardised, dof: self.dof() + noise_dof }.reason())
             })
             .collect()
     }

@@ -78,7 +78,7 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect], gram: &DMatrix<f64>) -> Vec<C
         let all = physical.iter().zip(direction.iter()).filter(|(_, w)| w.abs() > 0.05);
         let weights: Vec<(&Unknown, f64)> = all.map(|(&c, w)| (unknown(c), (w * 1e3).round() / 1e3)).collect();
         out.push(Combination {
-            says: super::statement::weak(&weights, effects, 1.0 / s),
+            says: super::null_space::weak(&weights, effects, 1.0 / s),
             combination: weights.iter().map(|(u, w)| (u.name.clone(), *w)).collect(),
             times_typical: (1e3 / s).round() / 1e3,
         });

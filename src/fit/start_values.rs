@@ -1,7 +1,7 @@
 //! Where a fit with shape parameters begins.
 
-use super::minima::{OutOfRange, against, best_minimum, better_moments, hold};
-use super::shapes::{self, Start};
+use super::local_minima::{OutOfRange, against, best_minimum, better_moments, hold};
+use super::nonlinear_scan::{self, Start};
 use super::{Fit, Knowledge, Mask, Settings, effects_of, identify_from};
 use crate::diag::Result;
 use crate::machine::Machine;
@@ -194,7 +194,7 @@ impl LookFor<'_> {
             let mut with_it = starts.clone();
             take(found.clone(), &mut with_it);
             let [without, with] = against([fit, &self.without(&others, self.settings, &with_it)?]);
-            if without - with > shapes::LEAST_GAIN * (sets * part.effect.parameters.len()) as f64 {
+            if without - with > nonlinear_scan::LEAST_GAIN * (sets * part.effect.parameters.len()) as f64 {
                 return Ok(Some((k, found)));
             }
         }
@@ -202,14 +202,14 @@ impl LookFor<'_> {
     }
 
     fn starts_of(&self, fit: &Fit, part: &Part) -> Vec<Start> {
-        shapes::start_shapes(fit, self.machine, part.effect, (self.alike, part.block.as_deref()))
+        nonlinear_scan::start_shapes(fit, self.machine, part.effect, (self.alike, part.block.as_deref()))
     }
 
     /// The fit of everything but some effects, or parts of them.
     fn without(&self, out: &[Part], settings: &Settings, starts: &BTreeMap<String, f64>) -> Result<Fit> {
         let whole = |part: &&Part| self.parts_of(part.effect).iter().all(|p| out.contains(p));
         let effects: Vec<&Effect> = out.iter().filter(whole).map(|part| part.effect).collect();
-        let mut base = shapes::without(settings, &effects);
+        let mut base = nonlinear_scan::without(settings, &effects);
         for (part, block) in out.iter().filter(|part| !whole(part)).filter_map(|p| Some((p, p.block.as_ref()?))) {
             for p in &part.effect.parameters {
                 hold(&mut base, &format!("{}@{block}", p.name), p.shape.map_or(0.0, |(start, _, _)| start));
@@ -244,7 +244,7 @@ fn identify_started(
             if effect.parameters.iter().zip(&values).all(|(p, v)| p.shape.is_some() || *v == 0.0) {
                 continue;
             }
-            for (name, value) in shapes::jumps(effect, &values, &data) {
+            for (name, value) in nonlinear_scan::jumps(effect, &values, &data) {
                 let name = named(name);
                 if !held_settings.knowledge.keys().any(|word| crate::symbols::same(word, &name)) {
                     held_settings.knowledge.insert(name.clone(), Knowledge::Fixed(value));
@@ -257,7 +257,7 @@ fn identify_started(
     let mut said = Vec::new();
     // each may come out of its range twice: before and after another one is held
     for _ in 0..2 * fit.model.unknowns.iter().filter(|u| u.shape).count() {
-        let Some(out) = shapes::out_of_range(&fit, catalogue, machine) else { break };
+        let Some(out) = nonlinear_scan::out_of_range(&fit, catalogue, machine) else { break };
         let of = OutOfRange { machine, catalogue, effects, settings, starts, out };
         let (next, warning) = of.back_into_it(fit, &mut held_settings)?;
         fit = next;

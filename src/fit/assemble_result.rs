@@ -1,10 +1,10 @@
 //! The answer of a fit, put together: values with their doubt, what cannot be told, what a reader must not miss.
 
+use super::nonlinear_scan::NOT_CREDIBLE;
 use super::outcome::{Combination, FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
-use super::shapes::NOT_CREDIBLE;
 use super::solve::{Problem as _, Solution};
 use super::type_b::TypeB;
-use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
+use super::{Fit, Settings, contradictions, held_out, null_space, outliers, poorly_determined, profile, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
@@ -45,7 +45,7 @@ pub(super) fn outcome(
         fit.with_touches(fit.noise.tau_mm, |touches| {
             let beside = || {
                 let normal = touches.normal(&fit.free_theta(), true);
-                let weak = if many { Vec::new() } else { weak::weak(fit, effects, &normal.gram) };
+                let weak = if many { Vec::new() } else { poorly_determined::weak(fit, effects, &normal.gram) };
                 (held_out::by_visit_of(fit, touches, normal).map(|h| h.rms_um), weak)
             };
             rayon::join(|| left_out.map(|all| uncertainty::with_unmodelled(fit, touches, all)), beside)
@@ -212,11 +212,11 @@ pub(super) fn outcome(
         visit_source: fit.noise.visit_source.into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
-        undetermined: statement::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
+        undetermined: null_space::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
         parted_together: Vec::new(),
         // how badly what is lost beside a shape is told, nobody knows: a warning names it
         weak: weak.into_iter().filter(|c| !mostly(c, |name| lost.contains(name))).collect(),
-        correlations: weak::correlations(fit, |i| parameters[i].sigma.is_some()),
+        correlations: poorly_determined::correlations(fit, |i| parameters[i].sigma.is_some()),
         parameters,
         priors: uncertainty::priors(fit),
         type_b: type_b
@@ -424,7 +424,7 @@ fn warnings(
         if straight && !u.nuisance && moves[c] * moves[c] > fit.covariance[(i, i)] {
             out.push(format!(
                 "{} follows what these touches cannot tell by more than its own uncertainty, and is not determined either",
-                statement::meaning(u, effects)
+                null_space::meaning(u, effects)
             ));
         }
     }
@@ -458,13 +458,13 @@ fn warnings(
                 1 => "only 1 is".into(),
                 n => format!("only {n} are"),
             },
-            100.0 * snoop::MOST_SHARE
+            100.0 * outliers::MOST_SHARE
         ));
-    } else if n_out as f64 > snoop::MOST_SHARE * n as f64 {
+    } else if n_out as f64 > outliers::MOST_SHARE * n as f64 {
         out.push(format!(
             "{n_out} of {n} touches ({:.1} %) do not belong to the rest and are left out; more than {:.0} % is a finding in itself: chips, a loose block or stylus, or an effect that the model lacks; look at them before you trust the values",
             share(n_out),
-            100.0 * snoop::MOST_SHARE
+            100.0 * outliers::MOST_SHARE
         ));
     }
     out.extend(fit.noise.contradiction());
