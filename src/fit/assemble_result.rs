@@ -1,14 +1,19 @@
-//! The answer of a fit, put together: values with their doubt, what cannot be told, what a reader must not miss.
+//! Puts the result of a fit together: values with their uncertainty, what cannot be determined, and the remarks.
 
-use super::nonlinear_scan::NOT_CREDIBLE;
-use super::outcome::{Combination, FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
+use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
+use super::nonlinear_scan::{self, NOT_CREDIBLE};
+use super::profile::{Ends, Intervals};
+use super::remark::Remark;
 use super::solve::{Problem as _, Solution};
+use super::start_values::ShapeSearch;
 use super::type_b::TypeB;
-use super::{Fit, Settings, contradictions, held_out, null_space, outliers, poorly_determined, profile, uncertainty};
+use super::uncertainty::{LeftOut, Unmodelled};
+use super::{Fit, contradictions, held_out, null_space, outliers, poorly_determined, profile, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
-use crate::units::{significant, um_from_mm};
+use crate::units::um_from_mm;
+use crate::words::fit as words;
 use nalgebra::DVector;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,206 +23,100 @@ const UNEVEN: f64 = 1.05;
 /// And one that is wider by this is no longer that of a standard uncertainty that holds near the solution.
 const MUCH_WIDER: f64 = 1.5;
 
-/// Other values of a shape parameter that are named.
-const NAMED: usize = 3;
-
-/// With more touches a shape parameter is known so well that its doubt is the same on both sides. A moment at which something jumps has no
-/// other than that of its profile.
+/// With more touches a shape parameter is known so well that its uncertainty is the same on both sides. A moment at which something
+/// jumps has no other than that of its profile.
 const MOST_PROFILED: usize = 20_000;
 
-/// The answer, and other values of shape parameters that fit about as well, by unknown.
-pub(super) fn outcome(
+/// The result with what only the fit itself keeps.
+pub(super) struct Assembled {
+    pub outcome: Outcome,
+    pub remarks: Vec<Remark>,
+    /// Other values of shape parameters that fit about as well, by unknown.
+    pub other_values: BTreeMap<usize, Vec<f64>>,
+}
+
+/// What is asked of the result besides the fit.
+pub(super) struct Asked<'a> {
+    pub machine: &'a Machine,
+    pub effects: &'a [&'a Effect],
+    pub search: &'a ShapeSearch,
+}
+
+/// The result of a fit.
+pub(super) fn assemble_result(
     fit: &Fit,
-    machine: &Machine,
-    effects: &[&Effect],
-    settings: &Settings,
+    asked: &Asked,
     (solution, condition): (&Solution, f64),
-    (type_b, left_out): (&[TypeB], Option<uncertainty::LeftOut>),
-) -> (Outcome, BTreeMap<usize, Vec<f64>>) {
-    let (n, n_used) = (fit.data.observations.len(), fit.n_used());
-    let p = fit.free.len();
-    let by_visits = uncertainty::visit_variance(fit);
-    let shapes_told = !settings.quick && n <= MOST_PROFILED;
-    let many = n > uncertainty::MOST_UNMODELLED;
-    let (unmodelled, (held_out_rms_um, weak)) = if settings.quick || settings.bare {
-        (None, (None, Vec::new()))
-    } else {
+    (type_b, left_out): (&[TypeB], Option<LeftOut>),
+    mut remarks: Vec<Remark>,
+) -> Assembled {
+    let (settings, effects) = (&asked.search.settings, asked.effects);
+    let n = fit.data.observations.len();
+    let (mut unmodelled, mut held_out_rms_um, mut weak) = (None, None, Vec::new());
+    if !settings.quick && !settings.bare {
         fit.with_touches(fit.noise.tau_mm, |touches| {
-            let beside = || {
-                let normal = touches.normal(&fit.free_theta(), true);
-                let weak = if many { Vec::new() } else { poorly_determined::weak(fit, effects, &normal.gram) };
-                (held_out::by_visit_of(fit, touches, normal).map(|h| h.rms_um), weak)
-            };
-            rayon::join(|| left_out.map(|all| uncertainty::with_unmodelled(fit, touches, all)), beside)
-        })
-    };
-    let noise_variance = |c: usize| fit.covariance[(fit.free[c], fit.free[c])];
-    // what the scatter of the priors makes of it
-    let prior_variance = |c: usize| {
-        let of = |&(j, _, sigma): &(usize, f64, f64)| (fit.covariance[(fit.free[c], j)] / sigma).powi(2);
-        fit.priors.iter().map(of).sum::<f64>()
-    };
-    let b_variance = DVector::from_fn(p, |c, _| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>());
-    let moves = uncertainty::moves_with_unseen(fit);
-    let unseen = |c: usize| fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
-    let factor = |c: usize| {
-        let s2 = noise_variance(c) + b_variance[c] + moves[c] * moves[c];
-        let share = if s2 > 0.0 { by_visits[c] / s2 } else { 0.0 };
-        fit.noise.coverage(share.clamp(0.0, 1.0))
-    };
-    // it leaves no trace, or follows what is not known by more than its uncertainty
-    let untold =
-        |c: usize| unseen(c) > 1e-6 || !noise_variance(c).is_finite() || moves[c] * moves[c] > noise_variance(c);
-    let spread = |i: usize| {
-        let c = fit.free.binary_search(&i).ok().filter(|&c| !untold(c))?;
-        Some((noise_variance(c).sqrt(), factor(c)))
-    };
-    let profiled = |u: &Unknown| shapes_told || !settings.quick && settings.jumps.contains(&u.name);
-    let intervals = profile::intervals(fit, machine, effects, settings, (&profiled, &spread));
-    let profile::Intervals { ends: intervals, other_values, lost_beside } = intervals;
-    // sizes beside a shape that nobody knows
-    let runs_along = |i: usize| !fit.model.unknowns[i].shape && intervals.get(&i) == Some(&[None, None]);
-    // a time constant that may as well be endless is none that is told
-    let open = |i: usize| {
-        let ends = intervals.get(&i).filter(|_| fit.model.unknowns[i].shape);
-        ends.filter(|[low, high]| low.is_none() || high.is_none()).copied()
-    };
-    // where a shape may as well have another value, what goes with it by more than its own uncertainty is not told either
-    let goes_with = |c: usize| {
-        const FAR: f64 = 2.0;
-        let i = fit.free[c];
-        let usual = factor(c) * noise_variance(c).sqrt();
-        let far = |end: Option<f64>| end.is_none_or(|end| (end - fit.theta[i]).abs() > FAR * usual);
-        !other_values.is_empty() && intervals.get(&i).is_some_and(|ends| ends.iter().any(|end| far(*end)))
-    };
-    // where a shape is not told, a set with a size that no machine has says nothing of its other sizes either
-    let sets_of = |which: &dyn Fn(usize) -> bool| -> BTreeSet<(&str, Option<usize>)> {
-        let all = (0..fit.theta.len()).filter(|&i| which(i)).map(|i| &fit.model.unknowns[i]);
-        all.map(|u| (u.effect.as_str(), u.set_up)).collect()
-    };
-    let far = sets_of(&|i| !fit.model.unknowns[i].nuisance && !fit.model.unknowns[i].shape && is_far(fit, i));
-    let told = |i: usize| fit.free.binary_search(&i).is_ok_and(|c| !untold(c)) || intervals.contains_key(&i);
-    let adrift = sets_of(&|i| fit.model.unknowns[i].shape && !told(i));
-    let nowhere = |i: usize| {
-        let u = &fit.model.unknowns[i];
-        let set = (u.effect.as_str(), u.set_up);
-        far.contains(&set) && adrift.contains(&set)
-    };
-    let parameters: Vec<Parameter> = (0..fit.theta.len())
-        .map(|i| {
-            let u = &fit.model.unknowns[i];
-            let column = fit.free.binary_search(&i).ok();
-            let jumps = settings.jumps.contains(&u.name);
-            let jump = intervals.get(&i).filter(|_| jumps).and_then(|[low, high]| Some([(*low)?, (*high)?]));
-            let status = match column {
-                None if jump.is_some() => Status::Identified,
-                None if jumps || settings.held.contains(&u.name) => Status::Undetermined,
-                None => Status::Fixed,
-                Some(c) if untold(c) || runs_along(i) || open(i).is_some() || goes_with(c) || nowhere(i) => {
-                    Status::Undetermined
-                }
-                // most of its variance is that of priors, its own or those of others: the value is theirs rather than the touches'
-                Some(c) if prior_variance(c) > 0.5 * noise_variance(c) => Status::PriorDominated,
-                _ => Status::Identified,
-            };
-            let known = column.filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
-            let sigma = known.map(|c| (noise_variance(c) + b_variance[c] + moves[c] * moves[c]).sqrt());
-            let factor = known.map(factor);
-            let usual = sigma.zip(factor).map(|(s, k)| s * k);
-            let sigma = sigma.or(jump.map(|ends| off_a_moment(fit.theta[i], ends)));
-            // the ends are those of the noise's interval, with all else that is counted
-            let interval = known.zip(factor).and_then(|(c, k)| {
-                let more = k * (b_variance[c] + moves[c] * moves[c]).sqrt();
-                let with = |end: f64| fit.theta[i] + (end - fit.theta[i]).hypot(more).copysign(end - fit.theta[i]);
-                intervals.get(&i).map(|ends| ends.map(|end| end.map(with)))
-            });
-            let one_sided = open(i).filter(|ends| *ends != [None, None]);
-            let bare = one_sided.or_else(|| other_values.get(&i).and(intervals.get(&i).copied()));
-            let interval = interval.or(jump.map(|ends| ends.map(Some))).or(bare);
-            // an end that the touches do not set is that of the range
-            let own = u.name.split('@').next().unwrap_or_default();
-            let range = effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == own).and_then(|p| p.shape);
-            let wider = |[low, high]: [Option<f64>; 2]| {
-                let (low, high) = (low.or(range.map(|r| r.1)), high.or(range.map(|r| r.2)));
-                let side = |end: Option<f64>| end.map_or(0.0, |end| (end - fit.theta[i]).abs());
-                side(low).max(side(high))
-            };
-            let expanded = interval.filter(|_| bare.is_none()).map(wider).or(usual);
-            // where the likelihood is much wider than a line through the solution says, so is the standard uncertainty
-            let by_profile =
-                expanded.zip(factor).filter(|(e, _)| usual.is_some_and(|u| *e > MUCH_WIDER * u)).map(|(e, k)| e / k);
-            let sigma = by_profile.or(sigma);
-            let interval = interval.filter(|[low, high]| u.shape || uneven(fit.theta[i], *low, *high, usual));
-            Parameter {
-                name: u.name.clone(),
-                alias: u.alias.clone(),
-                effect: u.effect.clone(),
-                value: fit.theta[i],
-                unit: u.unit.clone(),
-                sigma,
-                expanded,
-                interval,
-                sigma_noise: known.map(|c| (noise_variance(c) - by_visits[c] - prior_variance(c)).max(0.0).sqrt()),
-                sigma_type_b: known.filter(|_| !type_b.is_empty()).map(|c| b_variance[c].sqrt()),
-                moves_with_unseen: known.map(|c| moves[c]).filter(|m| *m > 0.0),
-                sigma_with_unmodelled: known
-                    .zip(unmodelled.as_ref())
-                    .zip(sigma)
-                    // what counts beside the noise counts here, too: the other values of a shape, what is not seen
-                    .map(|((c, all), s)| {
-                        (all.sigma[c] * all.sigma[c] + (s * s - noise_variance(c)).max(b_variance[c])).sqrt()
-                    })
-                    .filter(|s| s.is_finite()),
-                holds: known.zip(unmodelled.as_ref()).map_or_else(Vec::new, |(c, all)| all.holds[c].clone()),
-                status,
+            let normal = touches.normal(&fit.free_theta(), true);
+            if n <= uncertainty::MOST_UNMODELLED {
+                weak = poorly_determined::poorly_determined(fit, effects, &normal.gram);
             }
-        })
-        .collect();
-    let beside: Vec<Status> = parameters.iter().map(|p| p.status).collect();
-    let is_lost = |i: usize| runs_along(i) && fit.free.binary_search(&i).is_ok_and(|c| !untold(c));
-    let lost: Vec<&str> =
-        (0..fit.theta.len()).filter(|&i| is_lost(i)).map(|i| fit.model.unknowns[i].name.as_str()).collect();
+            let held_out = || held_out::by_visit_of(fit, touches, normal).map(|h| h.rms_um);
+            let with_all = || left_out.map(|all| uncertainty::with_unmodelled(fit, touches, all));
+            (unmodelled, held_out_rms_um) = rayon::join(with_all, held_out);
+        });
+    }
+    let evidence = Evidence::new(fit, asked, type_b, unmodelled);
+    let status: Vec<Status> = (0..fit.theta.len()).map(|i| evidence.status(i)).collect();
+    let parameters: Vec<Parameter> = (0..fit.theta.len()).map(|i| evidence.parameter(i, status[i])).collect();
+    let is_lost = |name: &String| fit.model.unknowns.iter().position(|u| u.name == *name).is_some_and(|i| evidence.is_lost(i));
+    // how badly something is determined that another value of a shape makes something else cannot be said
+    weak.retain(|c| {
+        let lost: f64 = c.combination.iter().filter(|(name, _)| is_lost(name)).map(|(_, w)| w * w).sum();
+        lost <= 0.5 * c.combination.values().map(|w| w * w).sum::<f64>()
+    });
     let free_unknowns: Vec<&Unknown> = fit.free.iter().map(|&i| &fit.model.unknowns[i]).collect();
     let squares: f64 = fit.residual_mm.iter().zip(&fit.weight).map(|(r, w)| w * r * r).sum();
-    let chi2_per_dof = if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN };
     let unusable = fit.data.unusable.iter().map(|u| Rejected {
         id: u.id,
         run: u.run + 1,
         reason: format!("{} (line {})", u.reason, u.line),
     });
-    let strangers = fit.rejected.iter().map(|(&i, reason)| {
+    let excluded = fit.rejected.iter().map(|(&i, reason)| {
         let o = &fit.data.observations[i];
-        Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
+        Rejected { id: o.id, run: o.run + 1, reason: words::reason(reason) }
     });
+    let mut undetermined =
+        null_space::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability);
+    for u in &mut undetermined {
+        u.moves_um = moves_um(fit, &u.combination);
+    }
+    let with_value = |i: usize| parameters[i].sigma.is_some();
     let mut outcome = Outcome {
         format: FORMAT.into(),
-        machine: machine.name.clone(),
+        machine: asked.machine.name.clone(),
         effects: settings.effects.clone(),
         converged: solution.converged,
         iterations: solution.iterations,
         stopped: solution.stopped.clone(),
         touches: n + fit.data.unusable.len(),
-        rejected: unusable.chain(strangers).collect(),
-        unknowns: p,
+        rejected: unusable.chain(excluded).collect(),
+        unknowns: fit.free.len(),
         rank: fit.observability.rank,
         dof: fit.dof,
         condition,
-        rms_um: um_from_mm((squares / n_used.max(1) as f64).sqrt()),
+        rms_um: um_from_mm((squares / fit.n_used().max(1) as f64).sqrt()),
         held_out_rms_um,
         noise_um: um_from_mm(fit.noise.sigma_mm),
-        noise_source: fit.noise.source.into(),
+        noise_source: fit.noise.source,
         noise_dof: fit.noise.dof,
         visit_dof: fit.noise.visit_dof,
         visit_um: um_from_mm(fit.noise.tau_mm),
-        visit_source: fit.noise.visit_source.into(),
-        noise_says: fit.noise.says(),
-        chi2_per_dof,
-        undetermined: null_space::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability),
+        visit_source: fit.noise.visit_source,
+        noise_says: words::noise(&fit.noise),
+        chi2_per_dof: if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN },
+        undetermined,
         parted_together: Vec::new(),
-        // how badly what is lost beside a shape is told, nobody knows: a warning names it
-        weak: weak.into_iter().filter(|c| !mostly(c, |name| lost.contains(name))).collect(),
-        correlations: poorly_determined::correlations(fit, |i| parameters[i].sigma.is_some()),
-        parameters,
+        weak,
+        correlations: poorly_determined::correlations(fit, with_value),
         priors: uncertainty::priors(fit),
         type_b: type_b
             .iter()
@@ -227,35 +126,205 @@ pub(super) fn outcome(
         covariance: None,
         covariance_type_a: None,
         residuals: Some(residuals(fit)),
-        warnings: [
-            warnings(fit, machine, effects, settings, (solution, chi2_per_dof)),
-            other_values
-                .iter()
-                .map(|(&i, values)| may_be_another(&fit.model.unknowns[i], fit.theta[i], values))
-                .collect(),
-            beside_a_shape_that_is_not_told(fit, &beside, settings.quick, profiled),
-            much_else(fit, &beside, &lost_beside, is_lost).into_iter().collect(),
-            type_b.iter().filter_map(|b| b.warning.clone()).collect(),
-            unmodelled.map(|all| all.left_out).unwrap_or_default(),
-        ]
-        .concat(),
+        parameters,
+        warnings: Vec::new(),
     };
-    outcome.warnings.extend(unnamed(&outcome));
-    for i in 0..outcome.undetermined.len() {
-        outcome.undetermined[i].moves_um = moves_um(fit, &outcome, i);
-    }
-    (outcome, other_values)
+    remarks.extend(of_the_fit(fit, asked, solution));
+    remarks.extend(of_shapes(&evidence, &status));
+    remarks.extend(type_b.iter().filter_map(|b| b.remark.clone()));
+    remarks.extend(evidence.unmodelled.iter().flat_map(|all| all.left_out.clone()).map(Remark::LeftOut));
+    remarks.extend(not_mentioned(&outcome, &remarks));
+    outcome.warnings = remarks.iter().map(words::remark).collect();
+    Assembled { outcome, remarks, other_values: evidence.other_values }
 }
 
-/// By how much the machine's errors in a combination that is not told move the touch that they move most, µm: what is seen of
-/// it stands in the values of those that are not held at 0.
-fn moves_um(fit: &Fit, outcome: &Outcome, which: usize) -> Option<f64> {
-    let combination = &outcome.undetermined[which].combination;
-    let member = |i: &usize| {
+/// All that the status and the uncertainty of a parameter are made of. `c` is a place among the free unknowns, `i` among all.
+struct Evidence<'a> {
+    fit: &'a Fit,
+    asked: &'a Asked<'a>,
+    /// Variance of each free unknown from the scatter of index positions and from type B rows.
+    by_visits: DVector<f64>,
+    by_type_b: DVector<f64>,
+    has_type_b: bool,
+    /// How far each moves with what leaves no trace.
+    moves: DVector<f64>,
+    unmodelled: Option<Unmodelled>,
+    intervals: BTreeMap<usize, Ends>,
+    other_values: BTreeMap<usize, Vec<f64>>,
+}
+
+impl<'a> Evidence<'a> {
+    fn new(fit: &'a Fit, asked: &'a Asked<'a>, type_b: &[TypeB], unmodelled: Option<Unmodelled>) -> Self {
+        let by_type_b = |c: usize| type_b.iter().map(|row| row.makes[c] * row.makes[c]).sum::<f64>();
+        let mut out = Self {
+            fit,
+            asked,
+            by_visits: uncertainty::visit_variance(fit),
+            by_type_b: DVector::from_fn(fit.free.len(), |c, _| by_type_b(c)),
+            has_type_b: !type_b.is_empty(),
+            moves: uncertainty::moves_with_unseen(fit),
+            unmodelled,
+            intervals: BTreeMap::new(),
+            other_values: BTreeMap::new(),
+        };
+        let spread = |i: usize| {
+            let c = out.column(i).filter(|&c| !out.is_unseen(c))?;
+            Some((out.variance(c).sqrt(), out.coverage(c)))
+        };
+        let profiled = |u: &Unknown| out.is_profiled(u);
+        let Intervals { ends, other_values } =
+            profile::intervals(fit, asked.machine, asked.effects, asked.search, (&profiled, &spread));
+        (out.intervals, out.other_values) = (ends, other_values);
+        out
+    }
+
+    fn is_profiled(&self, u: &Unknown) -> bool {
+        let is_jump = self.asked.search.jumps.contains(&u.name);
+        !self.asked.search.settings.quick && (is_jump || self.fit.data.observations.len() <= MOST_PROFILED)
+    }
+
+    fn column(&self, i: usize) -> Option<usize> {
+        self.fit.free.binary_search(&i).ok()
+    }
+
+    /// Variance from noise and priors.
+    fn variance(&self, c: usize) -> f64 {
+        self.fit.covariance[(self.fit.free[c], self.fit.free[c])]
+    }
+
+    /// What of it the priors make.
+    fn prior_variance(&self, c: usize) -> f64 {
+        let of = |&(j, _, sigma): &(usize, f64, f64)| (self.fit.covariance[(self.fit.free[c], j)] / sigma).powi(2);
+        self.fit.priors.iter().map(of).sum()
+    }
+
+    /// Variance that counts beside noise and priors.
+    fn other_variance(&self, c: usize) -> f64 {
+        self.by_type_b[c] + self.moves[c] * self.moves[c]
+    }
+
+    /// The 95 % factor.
+    fn coverage(&self, c: usize) -> f64 {
+        let all = self.variance(c) + self.other_variance(c);
+        let share = if all > 0.0 { self.by_visits[c] / all } else { 0.0 };
+        self.fit.noise.coverage(share.clamp(0.0, 1.0))
+    }
+
+    /// It leaves no trace, or follows what leaves none by more than its uncertainty.
+    fn is_unseen(&self, c: usize) -> bool {
+        let part = self.fit.observability.unseen.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
+        part > 1e-6 || !self.variance(c).is_finite() || self.moves[c] * self.moves[c] > self.variance(c)
+    }
+
+    /// It may be much else beside another value of a shape.
+    fn is_lost(&self, i: usize) -> bool {
+        !self.fit.model.unknowns[i].shape
+            && self.intervals.get(&i) == Some(&[None, None])
+            && self.column(i).is_some_and(|c| !self.is_unseen(c))
+    }
+
+    /// The interval of a shape with an end that the touches do not set.
+    fn open(&self, i: usize) -> Option<Ends> {
+        let ends = self.intervals.get(&i).filter(|_| self.fit.model.unknowns[i].shape)?;
+        ends.contains(&None).then_some(*ends)
+    }
+
+    /// The interval of a moment at which something jumps.
+    fn jump(&self, i: usize) -> Option<[f64; 2]> {
+        let is_jump = self.asked.search.jumps.contains(&self.fit.model.unknowns[i].name);
+        let [low, high] = self.intervals.get(&i).filter(|_| is_jump)?;
+        Some([(*low)?, (*high)?])
+    }
+
+    /// Where a shape is not determined, a set with a size that no machine has does not determine its other sizes either.
+    fn is_beside_a_size_of_no_machine(&self, i: usize) -> bool {
+        let unknowns = &self.fit.model.unknowns;
+        let u = &unknowns[i];
+        let mut set = (0..unknowns.len()).filter(|&k| unknowns[k].effect == u.effect && unknowns[k].set_up == u.set_up);
+        let is_determined = |k: usize| self.column(k).is_some_and(|c| !self.is_unseen(c)) || self.intervals.contains_key(&k);
+        set.clone().any(|k| unknowns[k].shape && !is_determined(k)) && set.any(|k| is_far(self.fit, k))
+    }
+
+    fn status(&self, i: usize) -> Status {
+        let u = &self.fit.model.unknowns[i];
+        let search = self.asked.search;
+        match self.column(i) {
+            None if self.jump(i).is_some() => Status::Identified,
+            None if search.jumps.contains(&u.name) || search.held.contains(&u.name) => Status::Undetermined,
+            None => Status::Fixed,
+            Some(c) if self.is_unseen(c) || self.is_lost(i) || self.open(i).is_some() => Status::Undetermined,
+            Some(_) if self.is_beside_a_size_of_no_machine(i) || self.other_values.contains_key(&i) => {
+                Status::Undetermined
+            }
+            // the value is that of priors, its own or those of others, rather than the touches'
+            Some(c) if self.prior_variance(c) > 0.5 * self.variance(c) => Status::PriorDominated,
+            Some(_) => Status::Identified,
+        }
+    }
+
+    fn parameter(&self, i: usize, status: Status) -> Parameter {
+        let (fit, u) = (self.fit, &self.fit.model.unknowns[i]);
+        let value = fit.theta[i];
+        let known = self.column(i).filter(|_| matches!(status, Status::Identified | Status::PriorDominated));
+        let linear = known.map(|c| ((self.variance(c) + self.other_variance(c)).sqrt(), self.coverage(c)));
+        let usual = linear.map(|(sigma, k)| sigma * k);
+        // ends of the noise's interval, with all else that is counted
+        let widened = known.zip(linear).and_then(|(c, (_, k))| {
+            let more = k * self.other_variance(c).sqrt();
+            let with = |end: f64| value + (end - value).hypot(more).copysign(end - value);
+            self.intervals.get(&i).map(|ends| ends.map(|end| end.map(with)))
+        });
+        let of_a_jump = self.jump(i).map(|ends| ends.map(Some));
+        // what is not determined may still have a bound on one side
+        let bound = self
+            .open(i)
+            .filter(|ends| *ends != [None, None])
+            .or_else(|| self.other_values.get(&i).and(self.intervals.get(&i).copied()));
+        let interval = widened.or(of_a_jump);
+        let range = nonlinear_scan::range_of(u, self.asked.effects);
+        let widest = |ends: Ends| {
+            let side = |k: usize| ends[k].or(range.map(|r| r[k])).map_or(0.0, |end| (end - value).abs());
+            side(0).max(side(1))
+        };
+        let expanded = interval.map(widest).or(usual);
+        // where the likelihood is much wider than a line through the solution says, so is the standard uncertainty
+        let sigma = match (linear, expanded, self.jump(i)) {
+            (Some((sigma, k)), Some(e), _) if e > MUCH_WIDER * sigma * k => Some(e / k),
+            (Some((sigma, _)), ..) => Some(sigma),
+            (None, _, jump) => jump.map(|ends| off_a_moment(value, ends)),
+        };
+        let with_unmodelled = known.zip(self.unmodelled.as_ref()).zip(sigma).map(|((c, all), s)| {
+            // what counts beside the noise counts here, too
+            (all.sigma[c] * all.sigma[c] + (s * s - self.variance(c)).max(self.by_type_b[c])).sqrt()
+        });
+        let interval = interval.or(bound).filter(|ends| u.shape || is_uneven(value, *ends, usual));
+        Parameter {
+            name: u.name.clone(),
+            alias: u.alias.clone(),
+            effect: u.effect.clone(),
+            value,
+            unit: u.unit.clone(),
+            sigma,
+            expanded,
+            interval,
+            sigma_noise: known
+                .map(|c| (self.variance(c) - self.by_visits[c] - self.prior_variance(c)).max(0.0).sqrt()),
+            sigma_type_b: known.filter(|_| self.has_type_b).map(|c| self.by_type_b[c].sqrt()),
+            moves_with_unseen: known.map(|c| self.moves[c]).filter(|m| *m > 0.0),
+            sigma_with_unmodelled: with_unmodelled.filter(|s| s.is_finite()),
+            holds: known.zip(self.unmodelled.as_ref()).map_or_else(Vec::new, |(c, all)| all.holds[c].clone()),
+            status,
+        }
+    }
+}
+
+/// By how much the machine's errors in a combination that cannot be determined move the touch that they move most, µm.
+fn moves_um(fit: &Fit, combination: &BTreeMap<String, f64>) -> Option<f64> {
+    let is_member = |i: &usize| {
         let u = &fit.model.unknowns[*i];
         !u.nuisance && !u.shape && combination.contains_key(&u.name)
     };
-    let members: Vec<usize> = (0..fit.theta.len()).filter(member).collect();
+    let members: Vec<usize> = (0..fit.theta.len()).filter(is_member).collect();
     if members.is_empty() {
         return None;
     }
@@ -271,62 +340,16 @@ fn moves_um(fit: &Fit, outcome: &Outcome, which: usize) -> Option<f64> {
     Some(um_from_mm(used.map(moved).fold(0.0, f64::max)))
 }
 
-/// Is a value further off than any machine's?
+/// Is a size further off than any machine's?
 fn is_far(fit: &Fit, i: usize) -> bool {
-    fit.theta[i].abs() > NOT_CREDIBLE * fit.model.unknowns[i].typical
+    let u = &fit.model.unknowns[i];
+    !u.shape && !u.nuisance && fit.theta[i].abs() > NOT_CREDIBLE * u.typical
 }
 
-/// What is not told and stands in no other sentence.
-fn unnamed(outcome: &Outcome) -> Option<String> {
-    let said = |name: &str| {
-        let word = |c: char| !(c.is_alphanumeric() || c == '_');
-        outcome.undetermined.iter().any(|u| u.combination.contains_key(name))
-            || outcome.warnings.iter().any(|w| w.split(word).any(|w| w == name))
-    };
-    let of = |p: &&Parameter| p.status == Status::Undetermined && !p.name.contains('@') && !said(&p.name);
-    let names: Vec<&str> = outcome.parameters.iter().filter(of).map(|p| p.name.as_str()).collect();
-    (!names.is_empty())
-        .then(|| format!("not told: {}. Beside what these touches do not tell they may be much else", names.join(", ")))
-}
-
-/// Is an interval other than the value and so many standard uncertainties on either side, by more than a twentieth?
-fn uneven(value: f64, low: Option<f64>, high: Option<f64>, usual: Option<f64>) -> bool {
+/// Is an interval other than the value and its expanded uncertainty on either side, by more than a twentieth?
+fn is_uneven(value: f64, [low, high]: Ends, usual: Option<f64>) -> bool {
     let usual = usual.map_or(f64::INFINITY, |e| e * UNEVEN);
     low.is_none_or(|low| value - low > usual) || high.is_none_or(|high| high - value > usual)
-}
-
-/// Without profiles sizes have the doubt that they have where the shape stands.
-fn beside_a_shape_that_is_not_told(
-    fit: &Fit,
-    status: &[Status],
-    quick: bool,
-    profiled: impl Fn(&Unknown) -> bool,
-) -> Vec<String> {
-    let unknowns = &fit.model.unknowns;
-    let untold = (0..unknowns.len())
-        .filter(|&i| unknowns[i].shape && status[i] == Status::Undetermined && !profiled(&unknowns[i]));
-    let more = if quick {
-        "`axiscal identify` works out all that it may be".to_owned()
-    } else {
-        format!("beside its other values it is worked out for up to {MOST_PROFILED} touches only")
-    };
-    let says = untold.filter_map(|i| {
-        let u = &unknowns[i];
-        let size = |k: &usize| {
-            unknowns[*k].effect == u.effect && unknowns[*k].set_up == u.set_up && status[*k] == Status::Identified
-        };
-        let sizes: Vec<&str> = (0..unknowns.len()).filter(size).map(|k| unknowns[k].name.as_str()).collect();
-        (!sizes.is_empty()).then(|| {
-            format!(
-                "{} is not told: the doubt of {} is what it is beside {} {}, and {more}",
-                u.name,
-                sizes.join(", "),
-                significant(fit.theta[i], 4),
-                u.unit
-            )
-        })
-    });
-    says.collect()
 }
 
 /// Standard uncertainty of the value of a moment while any moment between two ends may be it: a value at one end is off by more than
@@ -334,55 +357,6 @@ fn beside_a_shape_that_is_not_told(
 fn off_a_moment(value: f64, [low, high]: [f64; 2]) -> f64 {
     let [below, above] = [value - low, high - value];
     ((below * below - below * above + above * above) / 3.0).max(0.0).sqrt()
-}
-
-/// What is not told only because a shape is not: leaving that effect out brings it back.
-fn much_else(
-    fit: &Fit,
-    status: &[Status],
-    beside: &BTreeMap<usize, BTreeSet<usize>>,
-    lost: impl Fn(usize) -> bool,
-) -> Option<String> {
-    let unknowns = &fit.model.unknowns;
-    let names = |which: &dyn Fn(usize) -> bool| {
-        let all: Vec<&str> = (0..unknowns.len()).filter(|&i| which(i)).map(|i| unknowns[i].name.as_str()).collect();
-        all.join(", ")
-    };
-    let results = names(&|i| !unknowns[i].nuisance && lost(i));
-    let of_results = beside.iter().filter(|(i, _)| !unknowns[**i].nuisance && lost(**i));
-    let known: BTreeSet<usize> = of_results.flat_map(|(_, shapes)| shapes.iter().copied()).collect();
-    // what runs along with the end of a range does so with a shape that is held there
-    let untold = |i: usize| unknowns[i].shape && status[i] == Status::Undetermined;
-    let shapes = names(&|i| if known.is_empty() { untold(i) } else { known.contains(&i) });
-    // they are many, and all of one kind
-    let blocks = match (0..unknowns.len()).filter(|&i| unknowns[i].nuisance && lost(i)).count() {
-        0 => String::new(),
-        n => format!(", and {n} numbers of where the blocks stand"),
-    };
-    (!results.is_empty()).then(|| {
-        format!(
-            "not told beside {shapes}: {results}{blocks}. Beside some of its values, which these touches allow, they may be much else. Leave the effect out of the model where nothing needs it, or hold {shapes} at what is known of the machine"
-        )
-    })
-}
-
-/// Does more than half of a combination consist of such parameters?
-fn mostly(combination: &Combination, of: impl Fn(&&str) -> bool) -> bool {
-    let share = combination.combination.iter().filter(|(name, _)| of(&name.as_str())).map(|(_, w)| w * w).sum::<f64>();
-    share > 0.5 * combination.combination.values().map(|w| w * w).sum::<f64>()
-}
-
-/// That a shape parameter may as well have other values, in words.
-fn may_be_another(u: &Unknown, value: f64, others: &[f64]) -> String {
-    let shown = |v: f64| significant(v, 4);
-    let others: Vec<String> = others.iter().take(NAMED).map(|v| shown(*v)).collect();
-    format!(
-        "{} is not told: {} {} fits best, and {} about as well; what depends on it is as unsure. Touches at more positions would tell, or hold it at what is known of the machine (`value` and `fixed = true` or `sigma`, [model.parameters])",
-        u.name,
-        shown(value),
-        u.unit,
-        others.join(" or ")
-    )
 }
 
 fn residuals(fit: &Fit) -> Vec<Residual> {
@@ -396,94 +370,105 @@ fn residuals(fit: &Fit) -> Vec<Residual> {
     each.collect()
 }
 
-fn warnings(
-    fit: &Fit,
-    machine: &Machine,
-    effects: &[&Effect],
-    settings: &Settings,
-    (solution, chi2_per_dof): (&Solution, f64),
-) -> Vec<String> {
-    let mut out = Vec::new();
-    if fit.data.observations.iter().all(|o| !o.has_temperature) {
-        for effect in effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T"))) {
-            out.push(format!("effect {} goes with the temperature T, and no touch carries one", effect.id));
+/// What is to be remarked on shapes and on what depends on them.
+fn of_shapes(evidence: &Evidence, status: &[Status]) -> Vec<Remark> {
+    let (fit, unknowns) = (evidence.fit, &evidence.fit.model.unknowns);
+    let names = |which: &dyn Fn(usize) -> bool| -> Vec<String> {
+        (0..unknowns.len()).filter(|&i| which(i)).map(|i| unknowns[i].name.clone()).collect()
+    };
+    let mut out: Vec<Remark> = Vec::new();
+    for (&i, others) in &evidence.other_values {
+        let u = &unknowns[i];
+        out.push(Remark::OtherValues {
+            name: u.name.clone(),
+            unit: u.unit.clone(),
+            value: fit.theta[i],
+            others: others.clone(),
+        });
+    }
+    let is_undetermined_shape = |i: usize| unknowns[i].shape && status[i] == Status::Undetermined;
+    // without profiles sizes have the uncertainty that they have beside one value of the shape
+    for i in (0..unknowns.len()).filter(|&i| is_undetermined_shape(i) && !evidence.is_profiled(&unknowns[i])) {
+        let u = &unknowns[i];
+        let is_own = |k: usize| unknowns[k].effect == u.effect && unknowns[k].set_up == u.set_up;
+        let sizes = names(&|k| is_own(k) && status[k] == Status::Identified);
+        if !sizes.is_empty() {
+            let (name, unit, value) = (u.name.clone(), u.unit.clone(), fit.theta[i]);
+            let quick = evidence.asked.search.settings.quick;
+            out.push(Remark::SizesBesideOneValue { name, unit, value, sizes, quick, most_touches: MOST_PROFILED });
         }
     }
-    out.extend(fit.data.temperature_says.clone());
-    let far = |i: usize| !fit.model.unknowns[i].shape && !fit.model.unknowns[i].nuisance && is_far(fit, i);
-    for &i in fit.free.iter().filter(|&&i| far(i)) {
-        out.push(format!(
-            "{} is more than {NOT_CREDIBLE} times its usual size: no machine is like that; is the plan, a unit or a sign wrong, or does a combination of the model leave hardly a trace?",
-            fit.model.unknowns[i].name
-        ));
+    let results = names(&|i| !unknowns[i].nuisance && evidence.is_lost(i));
+    if !results.is_empty() {
+        let n_blocks = (0..unknowns.len()).filter(|&i| unknowns[i].nuisance && evidence.is_lost(i)).count();
+        out.push(Remark::LostBesideShapes { shapes: names(&is_undetermined_shape), results, n_blocks });
     }
+    out
+}
+
+/// What cannot be determined and no other remark names.
+fn not_mentioned(outcome: &Outcome, remarks: &[Remark]) -> Option<Remark> {
+    let mentioned: BTreeSet<&str> = remarks.iter().flat_map(Remark::names).collect();
+    let in_a_combination = |name: &str| outcome.undetermined.iter().any(|u| u.combination.contains_key(name));
+    let is_missing = |p: &&Parameter| {
+        p.status == Status::Undetermined
+            && !p.name.contains('@')
+            && !mentioned.contains(p.name.as_str())
+            && !in_a_combination(&p.name)
+    };
+    let names: Vec<String> = outcome.parameters.iter().filter(is_missing).map(|p| p.name.clone()).collect();
+    (!names.is_empty()).then_some(Remark::NotDetermined { names })
+}
+
+/// What is to be remarked on data, noise, outliers and misfit.
+fn of_the_fit(fit: &Fit, asked: &Asked, solution: &Solution) -> Vec<Remark> {
+    let (effects, settings) = (asked.effects, &asked.search.settings);
+    let mut out = Vec::new();
+    if fit.data.observations.iter().all(|o| !o.has_temperature) {
+        let with_t = effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T")));
+        out.extend(with_t.map(|e| Remark::NoTemperature { effect: e.id.clone() }));
+    }
+    out.extend(fit.data.temperature_says.clone().map(Remark::OfTemperatures));
+    let far = fit.free.iter().filter(|&&i| is_far(fit, i));
+    out.extend(far.map(|&i| Remark::NotCredible { name: fit.model.unknowns[i].name.clone(), times: NOT_CREDIBLE }));
     let moves = uncertainty::moves_with_unseen(fit);
     for (c, &i) in fit.free.iter().enumerate() {
-        let straight = fit.observability.unseen.iter().all(|v| v[c].abs() <= 1e-6);
+        let is_straight = fit.observability.unseen.iter().all(|v| v[c].abs() <= 1e-6);
         let u = &fit.model.unknowns[i];
-        if straight && !u.nuisance && moves[c] * moves[c] > fit.covariance[(i, i)] {
-            out.push(format!(
-                "{} follows what these touches cannot tell by more than its own uncertainty, and is not determined either",
-                null_space::meaning(u, effects)
-            ));
+        if is_straight && !u.nuisance && moves[c] * moves[c] > fit.covariance[(i, i)] {
+            out.push(Remark::FollowsUnseen { name: u.name.clone(), meaning: null_space::meaning(u, effects) });
         }
     }
     if !solution.converged {
-        out.push(format!("the search did not converge: {}", solution.stopped));
+        out.push(Remark::NotConverged { stopped: solution.stopped.clone() });
     }
     if fit.dof == 0 {
-        out.push("as many unknowns as touches: nothing is left over to judge the model by".into());
+        out.push(Remark::NoRedundancy);
     }
-    if fit.data.observations.len() > uncertainty::MOST_UNMODELLED {
-        out.push(format!(
-            "what unmodelled effects may add is worked out for up to {} touches only",
-            uncertainty::MOST_UNMODELLED
-        ));
+    let n = fit.data.observations.len();
+    if n > uncertainty::MOST_UNMODELLED {
+        out.push(Remark::UnmodelledNotCounted { most_touches: uncertainty::MOST_UNMODELLED });
     }
     if let Some(s) = &fit.data.supposed {
-        out.push(format!(
-            "{} of {} touches are far from their places; {} would be right if {}: put that right first, these values are of the touches that happen to stand where the plan has them",
-            s.far, s.of, s.right, s.says
-        ));
+        out.push(Remark::SetUpMistake { far: s.far, of: s.of, right: s.right, says: s.says.clone() });
     }
-    let n_out = fit.rejected.values().filter(|r| !r.starts_with("taken out")).count();
-    let n = fit.data.observations.len();
-    let share = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
-    if let Some(found) = fit.strangers_beyond {
-        out.push(format!(
-            "a robust fit finds {found} of {n} touches ({:.1} %) that do not belong to the rest, and without them the others still do not agree: {} left out (removal stops at {:.0} %), and the values and their uncertainties are not to be trusted; look for dirt, a loose block or stylus, or an effect that the model lacks",
-            share(found),
-            match n_out {
-                0 => "none is".into(),
-                1 => "only 1 is".into(),
-                n => format!("only {n} are"),
-            },
-            100.0 * outliers::MOST_SHARE
-        ));
-    } else if n_out as f64 > outliers::MOST_SHARE * n as f64 {
-        out.push(format!(
-            "{n_out} of {n} touches ({:.1} %) do not belong to the rest and are left out; more than {:.0} % is a finding in itself: chips, a loose block or stylus, or an effect that the model lacks; look at them before you trust the values",
-            share(n_out),
-            100.0 * outliers::MOST_SHARE
-        ));
+    let excluded = fit.rejected.values().filter(|r| r.is_outlier()).count();
+    if let Some(found) = fit.outliers_beyond {
+        out.push(Remark::OutliersBeyond { found, of: n, excluded });
+    } else if excluded as f64 > outliers::MOST_SHARE * n as f64 {
+        out.push(Remark::ManyOutliers { excluded, of: n });
     }
-    out.extend(fit.noise.contradiction());
-    out.extend(fit.noise.contradiction_of_visits());
-    out.extend(fit.noise.visits_beyond());
-    out.extend(fit.noise.coarse());
-    let contradictions = contradictions::contradictions(fit, machine, effects, settings);
+    out.extend(fit.noise.remarks());
+    let contradictions = contradictions::contradictions(fit, asked);
     // what is stated wrongly is no fault of the model
     let chi2 = fit.chi2 - contradictions.iter().map(|c| c.chi2).sum::<f64>();
     let dof = fit.dof.saturating_sub(contradictions.len());
-    out.extend(contradictions.into_iter().map(|c| c.says));
+    out.extend(contradictions.into_iter().map(Remark::Contradiction));
     let limit = fit.noise.limit(fit.dof);
-    if fit.dof > 0 && chi2_per_dof > limit && (dof == 0 || chi2 > limit * dof as f64) {
-        out.push(format!(
-            "the touches miss the model by {}: something is missing in it, and the uncertainties count {} only (`axiscal diagnose` looks for it){}",
-            fit.noise.times(chi2_per_dof.sqrt()),
-            if fit.type_b.is_empty() { "the noise" } else { "the noise and the type B rows" },
-            fit.noise.or_the_probe(chi2_per_dof.sqrt()).map_or_else(String::new, |or| format!("; {or}"))
-        ));
+    if fit.dof > 0 && fit.chi2 > limit * fit.dof as f64 && (dof == 0 || chi2 > limit * dof as f64) {
+        let times = (fit.chi2 / fit.dof as f64).sqrt();
+        let with_type_b = !settings.type_b.is_empty();
+        out.push(Remark::Misfit { times, with_type_b, noise: Box::new(fit.noise) });
     }
     out.extend(fit.noise.far_too_large(fit.chi2, fit.dof));
     out

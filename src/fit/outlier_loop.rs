@@ -3,6 +3,7 @@
 use super::noise::{self, Known, Sample};
 use super::normal::Touches;
 use super::outliers::{self, Snoop};
+use super::remark::{Reason, VisitSource};
 use super::revisits::Followed;
 use super::solve;
 use crate::model::data::Data;
@@ -18,7 +19,7 @@ const MOST_BENDS: usize = 30;
 const QUIET: f64 = 0.05;
 
 /// More than this share of the touches is never left out: the rest is no longer what most of them say.
-const MOST_STRANGERS: f64 = 0.25;
+const MOST_OUTLIERS: f64 = 0.25;
 
 /// More than this share of the strangers on faces of which most is off is no chance: of a quarter of all touches, strewn at
 /// random, every fourth has the other touch of its face with it.
@@ -29,7 +30,7 @@ const MOST_TOGETHER: f64 = 1.0 / 3.0;
 const GROSS2: f64 = 25.0;
 
 /// A fit that is being made.
-pub(super) struct Search<'a> {
+pub(super) struct OutlierLoop<'a> {
     pub data: &'a Data,
     /// What the nominal touches say, and what is held.
     pub observability: solve::Observability,
@@ -39,7 +40,7 @@ pub(super) struct Search<'a> {
     pub known: Known,
     /// Does the model hold anything that changes between the visits of a pose?
     pub moving: bool,
-    /// As [`super::Fit::strangers_beyond`].
+    /// As [`super::Fit::outliers_beyond`].
     pub beyond: Option<usize>,
     /// What the touches said of each other last.
     pub judged: Option<Judged>,
@@ -54,7 +55,7 @@ pub(super) struct Judged {
     snoop: Snoop,
 }
 
-impl Search<'_> {
+impl OutlierLoop<'_> {
     fn gaps(&self, solution: &solve::Solution) -> Vec<f64> {
         self.touches.gaps(&solution.theta)
     }
@@ -113,7 +114,7 @@ impl Search<'_> {
         for _ in 0..ROUNDS {
             solution = self.with_noise(solution, &noise);
             // what the fit follows between visits depends on how much they are taken to scatter
-            if !self.moving || noise.visit_source != "revisits" {
+            if !self.moving || noise.visit_source != VisitSource::Revisits {
                 break;
             }
             let before = noise.tau_mm;
@@ -259,7 +260,7 @@ impl Search<'_> {
 
     /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do
     /// get it back. `noise_dof` is that of σ.
-    pub fn without_strangers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
+    pub fn without_outliers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
         let n = self.data.observations.len();
         let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
         let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
@@ -271,14 +272,14 @@ impl Search<'_> {
         // several bad touches hide each other: let the rest vote first
         let cap = (outliers::MOST_SHARE * n as f64).ceil() as usize;
         let mut most = cap;
-        let robust = self.robust_strangers(&solution, &all);
+        let robust = self.robust_outliers(&solution, &all);
         let mut out = if robust.is_empty() || robust.len() > cap { first } else { robust.clone() };
         if robust.len() > cap {
-            match self.many_strangers(&robust, &all, &solution) {
+            match self.many_outliers(&robust, &all, &solution) {
                 // few of them after all: the rule for few
                 Some(many) if many.len() <= cap => out = many,
                 Some(many) => {
-                    most = (MOST_STRANGERS * n as f64) as usize;
+                    most = (MOST_OUTLIERS * n as f64) as usize;
                     out = many;
                 }
                 None => self.beyond = Some(robust.len()),
@@ -327,10 +328,10 @@ impl Search<'_> {
     /// More strangers than chips explain, where they are gross ones all the same and no missing effect: they are a
     /// minority and strewn over the faces, the others see as much without them, and the others agree to within their
     /// noise, which an effect that the model lacks would not let them do. `None` where that does not hold.
-    fn many_strangers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
+    fn many_outliers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
         let n_used = all.iter().filter(|w| **w > 0.0).count();
         let mut out = robust.to_vec();
-        if out.len() as f64 > MOST_STRANGERS * n_used as f64
+        if out.len() as f64 > MOST_OUTLIERS * n_used as f64
             || outliers::whole_faces(&out, self.faces(), all.len()) as f64 > MOST_TOGETHER * out.len() as f64
         {
             return None;
@@ -358,7 +359,7 @@ impl Search<'_> {
     }
 
     /// Touches further than 4 robust standard deviations off a fit in which far touches count little.
-    fn robust_strangers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
+    fn robust_outliers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
         let (sigma, _) = self.touches.noise_mm();
         let mut solution = plain.clone();
         let mut gaps = self.gaps(&solution);
@@ -399,16 +400,16 @@ impl Search<'_> {
         outliers::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
     }
 
-    /// The rejected touches with their reasons.
-    pub fn reasons(&self, solution: &solve::Solution, noise_dof: f64) -> BTreeMap<usize, String> {
+    /// Why each touch is excluded that the user did not mask.
+    pub fn reasons(&self, solution: &solve::Solution, noise_dof: f64) -> BTreeMap<usize, Reason> {
         let scale2 = self.scale2(solution, 0.0);
         let weights = self.touches.weights();
-        (0..weights.len())
-            .filter(|&i| weights[i] == 0.0 && !self.masked[i])
-            .map(|i| {
-                let (off_mm, standardised) = self.off(solution, i, scale2);
-                (i, outliers::Rejection { touch: i, off_mm, standardised, dof: self.dof() + noise_dof }.reason())
-            })
-            .collect()
+        let is_outlier = |i: &usize| weights[*i] == 0.0 && !self.masked[*i];
+        let reason = |i: usize| {
+            let (off_mm, standardised) = self.off(solution, i, scale2);
+            let robust_only = outliers::belongs(standardised, self.dof() + noise_dof);
+            (i, Reason::Outlier { off_mm, standardised, robust_only })
+        };
+        (0..weights.len()).filter(is_outlier).map(reason).collect()
     }
 }

@@ -6,7 +6,6 @@
 
 use super::normal::Touches;
 use super::quantiles::student_as_4;
-use crate::units::um_from_mm;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -25,41 +24,6 @@ pub const MOST_SHARE: f64 = 0.02;
 /// The scatter is never taken for less than a hundredth of the noise: what is left in a log without noise is rounding,
 /// and no touch stands out of that.
 const LEAST_SCALE2: f64 = 1e-4;
-
-/// A rejected touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rejection {
-    /// Index of the observation.
-    pub touch: usize,
-    /// By how much it misses what the other touches say, mm along the outward normal.
-    pub off_mm: f64,
-    /// The same in standard deviations.
-    pub standardised: f64,
-    /// Degrees of freedom of what a standard deviation is.
-    pub dof: f64,
-}
-
-impl Rejection {
-    /// In words.
-    #[must_use]
-    pub fn reason(&self) -> String {
-        // a touch that a wide misfit hides is told by the fit in which the rest votes first, and that is why it is out
-        if belongs(self.standardised, self.dof) {
-            return format!(
-                "{:+.1} um off what the other touches say: a robust fit, in which far touches count little, leaves it out with \
-                 others: a chip, a drop or a double touch?",
-                um_from_mm(self.off_mm)
-            );
-        }
-        // of touches without noise the scatter is rounding: its multiples say nothing
-        let times = self.standardised.abs();
-        let times = if times < 1000.0 { format!("{times:.1}") } else { "more than 1000".to_owned() };
-        format!(
-            "{:+.1} um off what the other touches say ({times} standard deviations of their scatter): a chip, a drop or a double touch?",
-            um_from_mm(self.off_mm)
-        )
-    }
-}
 
 /// What the touches say about each other at a fit.
 #[derive(Debug, Clone)]

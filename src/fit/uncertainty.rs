@@ -21,9 +21,6 @@ pub(super) const MOST_UNMODELLED: usize = 20_000;
 /// Touches whose columns of the whole catalogue are held at once.
 const UNMODELLED_AT_ONCE: usize = 128;
 
-/// Up to this number of touches their columns of the whole catalogue are made beside the fit, and held.
-const HELD: usize = 1024;
-
 /// Variance of each free unknown that goes back to the scatter of visits.
 pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
     let tau = fit.noise.tau_mm;
@@ -175,13 +172,9 @@ pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c
     catalogue.acting_on(machine).filter(|e| !held(e)).collect()
 }
 
-/// What a model leaves out (not the set-ups of blocks), and what it would do to touches. Nothing of it depends on a solution.
+/// Effects outside of a model (not the block positions) that may act on its touches.
 pub(super) struct LeftOut {
     model: Model,
-    /// Its unknowns, without those that are seen to do nothing to any touch.
-    acting: Vec<usize>,
-    /// mm at the usual size of each of these, one row per touch; `None` where there are many, whose columns are made part by part.
-    columns: Option<DMatrix<f64>>,
     /// What is said of effects that could not be counted.
     says: Vec<String>,
 }
@@ -193,14 +186,7 @@ impl LeftOut {
         effects.retain(|e| !e.per_block);
         let (effects, says) = with_values(effects, &data.observations);
         let model = Model::new(machine, &effects, &data.set_ups, model.reference);
-        let (mut acting, mut columns): (Vec<usize>, _) = ((0..model.n_unknowns()).collect(), None);
-        if data.observations.len() <= HELD {
-            let all = typical_columns(&model, &data.observations);
-            let idle: Vec<usize>;
-            (idle, acting) = acting.into_iter().partition(|&c| all.column(c).iter().all(|v| *v == 0.0));
-            columns = Some(all.remove_columns_at(&idle));
-        }
-        Self { model, acting, columns, says }
+        Self { model, says }
     }
 }
 
@@ -218,34 +204,28 @@ fn typical_columns(model: &Model, observations: &[Observation]) -> DMatrix<f64> 
 /// counted.
 pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -> Unmodelled {
     let theta = fit.free_theta();
-    let LeftOut { model, acting, columns: held, says } = left_out;
-    let (p, q) = (fit.free.len(), acting.len());
+    let LeftOut { model, says } = left_out;
+    let (p, q) = (fit.free.len(), model.n_unknowns());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
     let jacobian = |rows: &[usize]| {
         let mut jacobian = touches.unwhitened_of(&theta, rows).1;
         touches.whiten_of(rows, &mut jacobian);
         jacobian
     };
-    if let Some(mut b) = held {
-        let all: Vec<usize> = (0..b.nrows()).collect();
-        let (jacobian, ()) = rayon::join(|| jacobian(&all), || touches.whitening().apply_in_parallel(&mut b));
-        sums.add(&jacobian, &b);
-    } else {
-        // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many
-        // times the touches themselves
-        let columns = |part: &Range<usize>| {
-            let rows: Vec<usize> = part.clone().collect();
-            let mut b = typical_columns(&model, &fit.data.observations[part.clone()]);
-            touches.whiten_of(&rows, &mut b);
-            (jacobian(&rows), b)
-        };
-        let parts: Vec<Range<usize>> =
-            touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)).collect();
-        for some in parts.chunks(rayon::current_num_threads()) {
-            let made: Vec<_> = some.par_iter().map(columns).collect();
-            // in their order, so that the sums are the same on any number of processors
-            made.iter().for_each(|(jacobian, b)| sums.add(jacobian, b));
-        }
+    // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many times
+    // the touches themselves
+    let columns = |part: &Range<usize>| {
+        let rows: Vec<usize> = part.clone().collect();
+        let mut b = typical_columns(&model, &fit.data.observations[part.clone()]);
+        touches.whiten_of(&rows, &mut b);
+        (jacobian(&rows), b)
+    };
+    let parts: Vec<Range<usize>> =
+        touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)).collect();
+    for some in parts.chunks(rayon::current_num_threads()) {
+        let made: Vec<_> = some.par_iter().map(columns).collect();
+        // in their order, so that the sums are the same on any number of processors
+        made.iter().for_each(|(jacobian, b)| sums.add(jacobian, b));
     }
     for (unknown, _, sigma) in &fit.priors {
         if let Ok(c) = fit.free.binary_search(unknown) {
@@ -254,7 +234,7 @@ pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -
     }
     let (taken, sigma) = rayon::join(|| sums.taken(&fit.seen), || sums.expected(&fit.seen));
     let mut holds: Vec<Vec<String>> = (0..p).map(|_| Vec::new()).collect();
-    for (u, taken) in acting.iter().map(|&i| &model.unknowns[i]).zip(taken).filter(|(u, _)| !u.shape) {
+    for (u, taken) in model.unknowns.iter().zip(taken).filter(|(u, _)| !u.shape) {
         if let Some(c) = taken.and_then(|taken| one_result(fit, &taken))
             && !holds[c].contains(&u.effect)
         {

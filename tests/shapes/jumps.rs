@@ -5,7 +5,7 @@ use super::{common, parameter};
 use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::fit::outcome::{Parameter, Status};
-use axiscal::fit::{Knowledge, Settings};
+use axiscal::fit::{Knowledge, Remark, Settings};
 use axiscal::log::Touch;
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::Run;
@@ -118,14 +118,11 @@ fn what_may_be_much_else_beside_an_untold_moment_is_not_told() {
         }
         println!("{seed}: {lost:?}");
         let unseen: Vec<&String> = fit.outcome.undetermined.iter().flat_map(|u| u.combination.keys()).collect();
-        let said = fit.outcome.warnings.iter().find(|w| w.starts_with("not told beside from_h: "));
+        let named: Vec<&str> = fit.remarks.iter().flat_map(Remark::names).collect();
         for name in lost.iter().filter(|n| !unseen.iter().any(|u| u == *n)) {
-            assert!(said.is_some_and(|w| w.contains(name)), "{name}: {said:?}");
+            assert!(named.contains(name), "{name}: {:?}", fit.remarks);
         }
         // how badly that is told is not said: nobody knows
-        let named: Vec<&str> =
-            said.map(|w| w.split(&[':', '.'][..]).nth(1).unwrap().split(", ").collect()).unwrap_or_default();
-        let named: Vec<&str> = named.iter().map(|n| n.trim()).collect();
         for weak in &fit.outcome.weak {
             let of = |wanted: bool| -> f64 {
                 let all = weak.combination.iter().filter(|(n, _)| !wanted || named.contains(&n.as_str()));
@@ -382,12 +379,12 @@ fn quickly_a_moment_is_told_and_by_a_trial_fit_it_is_not() {
     let p = parameter(&fit, "from_h");
     assert_eq!((p.status, p.sigma, p.interval), (Status::Undetermined, None, None), "{p:?}");
     assert!((p.value - 0.4).abs() < 0.01, "{p:?}");
-    let said = fit.outcome.warnings.iter().find(|w| w.starts_with("from_h is not told: ")).unwrap();
-    assert!(["dx", "dy", "dz", "identify"].iter().all(|word| said.contains(word)), "{said}");
+    let beside = |r: &Remark| matches!(r, Remark::SizesBesideOneValue { name, sizes, quick: true, .. } if name == "from_h" && sizes.len() >= 3);
+    assert!(fit.remarks.iter().any(beside), "{:?}", fit.remarks);
     let stated = Settings { knowledge: [("from_h".to_owned(), Knowledge::Fixed(0.4))].into(), ..quick };
     let fit = identify_with(&machine, &[(&full, &touches)], &model, stated);
     assert_eq!((parameter(&fit, "from_h").status, parameter(&fit, "from_h").value), (Status::Fixed, 0.4));
-    assert!(fit.outcome.warnings.iter().all(|w| !w.contains("from_h")), "{:?}", fit.outcome.warnings);
+    assert!(fit.remarks.iter().all(|r| !r.names().contains(&"from_h")), "{:?}", fit.remarks);
 }
 
 /// Moves a touch towards the probe, as dirt does.
