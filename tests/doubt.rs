@@ -4,7 +4,7 @@
 
 mod common;
 use axiscal::fit::outcome::{Outcome, Status};
-use axiscal::fit::{Fit, Knowledge, Mask, Settings, uncertainty};
+use axiscal::fit::{Fit, Knowledge, Mask, NoiseSource, Remark, Settings, VisitSource, uncertainty};
 use axiscal::log::Touch;
 use axiscal::machine::Machine;
 use axiscal::model::catalogue::Catalogue;
@@ -474,7 +474,11 @@ fn a_sum_that_another_direction_moves_is_not_said_to_be_seen() {
         )
     };
     let one = fit_with(&machine, &runs, &effect("again"), &["again"]).unwrap().outcome;
-    assert!(one.undetermined.len() == 1 && one.undetermined[0].says.starts_with("Only the sum"), "{:?}", one.undetermined);
+    assert!(
+        one.undetermined.len() == 1 && one.undetermined[0].says.starts_with("Only the sum"),
+        "{:?}",
+        one.undetermined
+    );
     let two = fit_with(&machine, &runs, &(effect("again") + &effect("thrice")), &["again", "thrice"]).unwrap().outcome;
     assert_eq!(two.undetermined.len(), 2);
     for u in &two.undetermined {
@@ -511,9 +515,13 @@ fn what_the_touches_contradict_is_said() {
         fit(&machine, &runs, &MODEL, Settings { knowledge, ..Settings::default() })
     };
     let bare = fit(&machine, &runs, &MODEL, Settings::default());
-    let found = |fit: &Fit| fit.remarks.iter().find_map(|r| if let Remark::Contradiction(c) = r { Some(c.clone()) } else { None });
+    let found = |fit: &Fit| {
+        fit.remarks.iter().find_map(|r| if let Remark::Contradiction(c) = r { Some(c.clone()) } else { None })
+    };
     let of_misfit = |fit: &Fit| fit.remarks.iter().any(|r| matches!(r, Remark::Misfit { .. }));
-    for (known, prior) in [(Knowledge::Prior { value: 0.05, sigma: 0.001 }, Some(0.001)), (Knowledge::Fixed(0.05), None)] {
+    for (known, prior) in
+        [(Knowledge::Prior { value: 0.05, sigma: 0.001 }, Some(0.001)), (Knowledge::Fixed(0.05), None)]
+    {
         let wrong = with(known);
         let c = found(&wrong).unwrap_or_else(|| panic!("{:?}", wrong.remarks));
         assert_eq!((c.name.as_str(), c.stated, c.sigma), ("EX0B", 0.05, prior));
@@ -623,13 +631,27 @@ fn a_noise_that_no_touches_tell_is_not_taken_for_sure() {
     let is_misfit = |r: &Remark| matches!(r, Remark::Misfit { noise, .. } if noise.or_the_probe(1.0).is_some());
     let may_be_the_probe = |f: &Fit| f.remarks.iter().any(is_misfit);
     let better = |f: &Fit| {
-        f.remarks.iter().find_map(|r| if let Remark::NoiseTooLarge { times_better, .. } = r { Some(*times_better) } else { None })
+        f.remarks
+            .iter()
+            .find_map(|r| if let Remark::NoiseTooLarge { times_better, .. } = r { Some(*times_better) } else { None })
     };
     let five = said("head", 5.0);
-    assert!(five.noise.source == NoiseSource::Declared && may_be_the_probe(&five) && better(&five).is_none(), "{:?}", five.remarks);
-    assert!(five.outcome.warnings.iter().any(|w| w.contains("a touch scatters by up to 5.")), "{:?}", five.outcome.warnings);
+    assert!(
+        five.noise.source == NoiseSource::Declared && may_be_the_probe(&five) && better(&five).is_none(),
+        "{:?}",
+        five.remarks
+    );
+    assert!(
+        five.outcome.warnings.iter().any(|w| w.contains("a touch scatters by up to 5.")),
+        "{:?}",
+        five.outcome.warnings
+    );
     let small = said("head", 0.05);
-    assert!(better(&small).is_some_and(|times| (times / 20.0 - 1.0).abs() < 0.15) && !may_be_the_probe(&small), "{:?}", small.remarks);
+    assert!(
+        better(&small).is_some_and(|times| (times / 20.0 - 1.0).abs() < 0.15) && !may_be_the_probe(&small),
+        "{:?}",
+        small.remarks
+    );
     for (program, touch_um) in [("head", 1.0), ("head", 0.0), ("full", 5.0), ("full", 0.05)] {
         let o = said(program, touch_um);
         assert!(!may_be_the_probe(&o) && better(&o).is_none(), "{program} {touch_um}: {:?}", o.remarks);

@@ -1,7 +1,7 @@
 //! Puts the result of a fit together: values with their uncertainty, what cannot be determined, and the remarks.
 
-use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::nonlinear_scan::{self, NOT_CREDIBLE};
+use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::profile::{Ends, Intervals};
 use super::remark::Remark;
 use super::solve::{Problem as _, Solution};
@@ -67,7 +67,8 @@ pub(super) fn assemble_result(
     let evidence = Evidence::new(fit, asked, type_b, unmodelled);
     let status: Vec<Status> = (0..fit.theta.len()).map(|i| evidence.status(i)).collect();
     let parameters: Vec<Parameter> = (0..fit.theta.len()).map(|i| evidence.parameter(i, status[i])).collect();
-    let is_lost = |name: &String| fit.model.unknowns.iter().position(|u| u.name == *name).is_some_and(|i| evidence.is_lost(i));
+    let is_lost =
+        |name: &String| fit.model.unknowns.iter().position(|u| u.name == *name).is_some_and(|i| evidence.is_lost(i));
     // how badly something is determined that another value of a shape makes something else cannot be said
     weak.retain(|c| {
         let lost: f64 = c.combination.iter().filter(|(name, _)| is_lost(name)).map(|(_, w)| w * w).sum();
@@ -241,7 +242,8 @@ impl<'a> Evidence<'a> {
         let unknowns = &self.fit.model.unknowns;
         let u = &unknowns[i];
         let mut set = (0..unknowns.len()).filter(|&k| unknowns[k].effect == u.effect && unknowns[k].set_up == u.set_up);
-        let is_determined = |k: usize| self.column(k).is_some_and(|c| !self.is_unseen(c)) || self.intervals.contains_key(&k);
+        let is_determined =
+            |k: usize| self.column(k).is_some_and(|c| !self.is_unseen(c)) || self.intervals.contains_key(&k);
         set.clone().any(|k| unknowns[k].shape && !is_determined(k)) && set.any(|k| is_far(self.fit, k))
     }
 
@@ -307,8 +309,7 @@ impl<'a> Evidence<'a> {
             sigma,
             expanded,
             interval,
-            sigma_noise: known
-                .map(|c| (self.variance(c) - self.by_visits[c] - self.prior_variance(c)).max(0.0).sqrt()),
+            sigma_noise: known.map(|c| (self.variance(c) - self.by_visits[c] - self.prior_variance(c)).max(0.0).sqrt()),
             sigma_type_b: known.filter(|_| self.has_type_b).map(|c| self.by_type_b[c].sqrt()),
             moves_with_unseen: known.map(|c| self.moves[c]).filter(|m| *m > 0.0),
             sigma_with_unmodelled: with_unmodelled.filter(|s| s.is_finite()),

@@ -42,12 +42,12 @@ pub use remark::{Contradiction, Found, NoiseSource, Reason, Remark, VisitSource}
 pub use settings::{Knowledge, Mask, Settings};
 pub use start_values::identify_data;
 
-use assemble_result::{Asked, Assembled, assemble_result};
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::{Data, Run, assemble};
 use crate::model::predict::{Model, Observation};
+use assemble_result::{Asked, Assembled, assemble_result};
 use nalgebra::{DMatrix, DVector};
 use noise::{Known, Noise};
 use normal::{Prior, Touches};
@@ -242,7 +242,7 @@ fn find(
             covariance[(i, j)] = solution.covariance[(a, b)];
         }
     }
-    let mut studentised = search.judge(&solution, noise.dof.unwrap_or(0.0)).studentised();
+    let mut studentised = search.judge(&solution, noise.dof.unwrap_or(0.0)).each();
     // a touch that is not used stands by how far it is off what the others say
     let scale2 = search.scale2(&solution, 0.0);
     for &i in rejected.keys() {

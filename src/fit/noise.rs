@@ -151,7 +151,10 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
     });
     let visits_beyond_mm = Some(known.declared_tau_mm).filter(|declared| {
         let (ratio, k) = revisits.beside(sigma_mm, *declared);
-        visit_source == VisitSource::Revisits && *declared > 0.0 && tau_mm > BEYOND * declared && ratio > chi2_limit(k, sigma_dof)
+        visit_source == VisitSource::Revisits
+            && *declared > 0.0
+            && tau_mm > BEYOND * declared
+            && ratio > chi2_limit(k, sigma_dof)
     });
     Noise {
         sigma_mm,

@@ -169,32 +169,39 @@ impl<'a> ScoreTest<'a> {
         for _ in 0..if self.shaped.len() > 1 { 2 } else { 1 } {
             for k in 0..self.shaped.len() {
                 let p = parameter(k);
-                // the usual values first: they are where the shape stays if the touches do not show the effect
+                let is_jump = p.between.is_some();
+                let times = if is_jump { f64::INFINITY } else { CREDIBLE };
                 let mut values = scan(p, data).unwrap_or_else(|| tried(p));
                 self.try_all(&values, k, f64::INFINITY, (&mut best, &mut found));
-                let times = if p.between.is_some() { f64::INFINITY } else { CREDIBLE };
-                if p.between.is_none() {
-                    usual[k] = best[k];
-                    let others = best.clone();
-                    values.extend(fine(p, n, &|at| {
-                        let mut shapes = others.clone();
-                        shapes[k] = at;
-                        self.columns(&shapes)
-                    }));
-                    self.try_all(&values, k, times, (&mut best, &mut found));
-                }
-                // between the best one and its neighbours; a jump between any two touches
-                for _ in 0..if p.between.is_some() { usize::MAX } else { 2 } {
+                let look_closer = |values: &mut Vec<f64>, best: &mut Vec<f64>, found: &mut _| {
                     values.sort_by(f64::total_cmp);
-                    let finer = around(p, data, &values, best[k]);
-                    if finer.is_empty() {
-                        break;
-                    }
-                    self.try_all(&finer, k, times, (&mut best, &mut found));
+                    let finer = around(p, data, values, best[k]);
+                    self.try_all(&finer, k, times, (best, found));
+                    let is_done = finer.is_empty();
                     values.extend(finer);
-                }
-                if p.between.is_some() {
+                    is_done
+                };
+                if is_jump {
+                    // between any two touches
+                    while !look_closer(&mut values, &mut best, &mut found) {}
                     usual[k] = best[k];
+                    continue;
+                }
+                // near the usual values first: there the shape stays if the touches do not show the effect
+                let finer = between(&values);
+                self.try_all(&finer, k, times, (&mut best, &mut found));
+                values.extend(finer);
+                look_closer(&mut values, &mut best, &mut found);
+                usual[k] = best[k];
+                let others = best.clone();
+                let mut values = fine(p, n, &|at| {
+                    let mut shapes = others.clone();
+                    shapes[k] = at;
+                    self.columns(&shapes)
+                });
+                self.try_all(&values, k, times, (&mut best, &mut found));
+                for _ in 0..2 {
+                    look_closer(&mut values, &mut best, &mut found);
                 }
             }
         }

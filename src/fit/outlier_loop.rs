@@ -2,7 +2,7 @@
 
 use super::noise::{self, Known, Sample};
 use super::normal::Touches;
-use super::outliers::{self, Snoop};
+use super::outliers::{self, Studentised};
 use super::remark::{Reason, VisitSource};
 use super::revisits::Followed;
 use super::solve;
@@ -11,6 +11,9 @@ use crate::model::formula::slot;
 use crate::model::predict::Model;
 use nalgebra::{DVector, Vector3};
 use std::collections::{BTreeMap, HashMap};
+
+/// Rounds of excluding outliers and including what belongs to the rest after all.
+const MOST_ROUNDS: usize = 12;
 
 /// Steps at most along the bends of gauges.
 const MOST_BENDS: usize = 30;
@@ -52,7 +55,7 @@ pub(super) struct Judged {
     weights: Vec<f64>,
     noise_mm: (f64, f64),
     noise_dof: f64,
-    snoop: Snoop,
+    studentised: Studentised,
 }
 
 impl OutlierLoop<'_> {
@@ -149,7 +152,7 @@ impl OutlierLoop<'_> {
     }
 
     /// What the touches say of each other at a solution; `noise_dof` is that of σ.
-    pub fn judge(&mut self, solution: &solve::Solution, noise_dof: f64) -> &Snoop {
+    pub fn judge(&mut self, solution: &solve::Solution, noise_dof: f64) -> &Studentised {
         let known = self.judged.take().filter(|j| {
             j.noise_dof == noise_dof
                 && j.noise_mm == self.touches.noise_mm()
@@ -164,10 +167,16 @@ impl OutlierLoop<'_> {
                 weights: self.touches.weights().to_vec(),
                 noise_mm: self.touches.noise_mm(),
                 noise_dof,
-                snoop: Snoop::new(&self.touches, &solution.theta, covariance, (chi2, dof), noise_dof),
+                studentised: Studentised::new(&self.touches, &solution.theta, covariance, (chi2, dof), noise_dof),
             }
         });
-        &self.judged.insert(judged).snoop
+        &self.judged.insert(judged).studentised
+    }
+
+    /// The touches that a solution shows to be outliers, the worst first.
+    fn found(&mut self, solution: &solve::Solution, noise_dof: f64) -> Vec<usize> {
+        let visits = &self.data.visits;
+        self.judge(solution, noise_dof).outliers(visits)
     }
 
     fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
@@ -265,7 +274,7 @@ impl OutlierLoop<'_> {
         let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
         let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
         self.beyond = None;
-        let first = self.judge(&solution, noise_dof).dropped();
+        let first = self.found(&solution, noise_dof);
         if first.is_empty() && self.scale2(&solution, noise_dof) < GROSS2 {
             return solution;
         }
@@ -288,7 +297,7 @@ impl OutlierLoop<'_> {
         if out.is_empty() {
             return if self.touches.weights() == all { solution } else { self.refit(all, &solution) };
         }
-        for _ in 0..4 {
+        for _ in 0..MOST_ROUNDS {
             let mut weights = all.clone();
             out.iter().for_each(|&i| weights[i] = 0.0);
             solution = self.refit(weights, &solution);
@@ -296,7 +305,7 @@ impl OutlierLoop<'_> {
             let scale2 = self.scale2(&solution, noise_dof);
             let back: Vec<usize> =
                 out.iter().copied().filter(|&i| self.belongs(&solution, i, scale2, noise_dof)).collect();
-            let more: Vec<usize> = self.judge(&solution, noise_dof).dropped();
+            let more: Vec<usize> = self.found(&solution, noise_dof);
             if back.is_empty() && (more.is_empty() || out.len() >= most) {
                 break;
             }

@@ -1,13 +1,12 @@
-//! Data snooping: touches that do not belong to the rest, one at a time, and back again where they do.
+//! Outliers: touches that do not agree with the rest.
 //!
-//! With P = V⁻¹ − V⁻¹JCJᵀV⁻¹ and a = P·y, touch i misses the others by ∇ᵢ = aᵢ/Pᵢᵢ with the variance 1/Pᵢᵢ (Baarda's
-//! mean shift); leaving it out changes P by a rank-one term, so that no refit is needed on the way. The scale is the
-//! externally studentised one: a missing effect widens it, and good touches are not thrown after a bad model.
+//! With P = V⁻¹ − V⁻¹JCJᵀV⁻¹ and a = P·y, touch i misses the others by ∇ᵢ = aᵢ/Pᵢᵢ with the variance 1/Pᵢᵢ (Baarda's mean shift).
+//! The scale is the externally studentised one: a missing effect widens it, and good touches are not excluded because of a bad model.
 
 use super::normal::Touches;
 use super::quantiles::student_as_4;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A touch further off than 4 standard deviations is left out: the chance of a good one is 6e-5. Where few others say what a standard
 /// deviation is, it takes more for the same chance; `dof` are the degrees of freedom of that.
@@ -25,14 +24,15 @@ pub const MOST_SHARE: f64 = 0.02;
 /// and no touch stands out of that.
 const LEAST_SCALE2: f64 = 1e-4;
 
-/// What the touches say about each other at a fit.
+/// How far each touch is off what the others predict, at a fit.
 #[derive(Debug, Clone)]
-pub struct Snoop {
-    /// P·y with the dropped touches projected out.
+pub struct Studentised {
+    /// P·y.
     a: Vec<f64>,
-    /// Diagonal of P, likewise.
+    /// Diagonal of P.
     d: Vec<f64>,
-    out: Dropped,
+    /// Below this share of its own weight a touch is judged by nothing but itself.
+    least: f64,
     chi2: f64,
     dof: f64,
     /// Degrees of freedom of the noise, which has the variance 1.
@@ -135,86 +135,9 @@ impl Rows<'_, '_> {
         }
         d
     }
-
-    /// Jᵀ·x.
-    fn onto_unknowns(&self, x: &[f64], unknowns: usize) -> DVector<f64> {
-        let mut b = DVector::zeros(unknowns);
-        for (k, u) in x.iter().enumerate().filter(|(_, u)| **u != 0.0) {
-            let (columns, values) = self.row(k);
-            columns.iter().zip(values).for_each(|(&c, v)| b[c] += u * v);
-        }
-        b
-    }
-
-    /// Column i of P with the dropped touches projected out, which is then one of them.
-    fn drop_touch(&self, i: usize, covariance: &DMatrix<f64>, out: &mut Dropped) -> Vec<f64> {
-        let n = self.gap.len();
-        let unit = |at: &[(usize, f64)]| {
-            let mut x = vec![0.0; n];
-            at.iter().for_each(|(k, value)| x[*k] = *value);
-            self.inverse_noise(&mut x);
-            x
-        };
-        let mut noise = unit(&[(i, 1.0)]);
-        let mut image = self.onto_unknowns(&noise, covariance.nrows());
-        let own = image.clone();
-        let mut moved = covariance * &image;
-        let with_dropped: Vec<f64> =
-            out.touches.iter().zip(&out.images).map(|(&d, b)| noise[d] - b.dot(&moved)).collect();
-        let row = out.forward(with_dropped);
-        let by = out.backward(&row);
-        if !by.is_empty() {
-            // one product for all of them: the columns of the dropped touches themselves are not kept
-            let mut at = vec![(i, 1.0)];
-            at.extend(out.touches.iter().zip(&by).map(|(&d, w)| (d, -w)));
-            noise = unit(&at);
-            out.images.iter().zip(&by).for_each(|(b, w)| image.axpy(-w, b, 1.0));
-            moved = covariance * &image;
-        }
-        let mut column: Vec<f64> = (0..n).map(|k| self.dot(k, moved.as_slice())).collect();
-        self.inverse_noise(&mut column);
-        column.iter_mut().zip(&noise).for_each(|(c, u)| *c = u - *c);
-        out.touches.push(i);
-        out.images.push(own);
-        out.lower.push(row);
-        column
-    }
 }
 
-/// The dropped touches in their order, with the Cholesky factor of their part of P.
-#[derive(Debug, Clone, Default)]
-struct Dropped {
-    touches: Vec<usize>,
-    /// JᵀV⁻¹ of each.
-    images: Vec<DVector<f64>>,
-    /// Rows of the factor, each without its diagonal.
-    lower: Vec<Vec<f64>>,
-    diagonal: Vec<f64>,
-}
-
-impl Dropped {
-    /// L⁻¹·x.
-    fn forward(&self, mut x: Vec<f64>) -> Vec<f64> {
-        for k in 0..x.len() {
-            let sum: f64 = self.lower[k].iter().zip(&x).map(|(l, y)| l * y).sum();
-            x[k] = (x[k] - sum) / self.diagonal[k];
-        }
-        x
-    }
-
-    /// L⁻ᵀ·y.
-    fn backward(&self, y: &[f64]) -> Vec<f64> {
-        let mut x = y.to_vec();
-        for k in (0..x.len()).rev() {
-            x[k] /= self.diagonal[k];
-            let value = x[k];
-            x.iter_mut().zip(&self.lower[k]).for_each(|(x, l)| *x -= l * value);
-        }
-        x
-    }
-}
-
-impl Snoop {
+impl Studentised {
     /// At a fit: touches with weight 0 are out already and stay out. `covariance` is that of the free unknowns;
     /// `noise_dof` the degrees of freedom of σ (0 where it is not known).
     #[must_use]
@@ -237,9 +160,8 @@ impl Snoop {
         let mut a = rows.gap.clone();
         rows.inverse_noise(&mut a);
         let d = rows.diagonal(covariance);
-        let mut snoop = Self { a, d, out: Dropped::default(), chi2, dof: dof as f64, noise_dof };
-        snoop.search(&rows, covariance);
-        snoop
+        let (sigma, _) = touches.noise_mm();
+        Self { a, d, least: 1e-6 / (sigma * sigma), chi2, dof: dof as f64, noise_dof }
     }
 
     /// Scale² without touch i.
@@ -258,43 +180,21 @@ impl Snoop {
         self.a[i] / (self.d[i] * s2).sqrt()
     }
 
-    fn search(&mut self, rows: &Rows, covariance: &DMatrix<f64>) {
-        let n = self.a.len();
-        let most = (MOST_SHARE * n as f64).ceil() as usize + 1;
-        let (sigma, _) = rows.touches.noise_mm();
-        // a touch whose residual the fit takes away nearly whole cannot be judged
-        let least = 1e-6 / (sigma * sigma);
-        while self.out.touches.len() < most {
-            let worst = (0..n).map(|i| (i, self.standardised(i, least))).max_by(|x, y| x.1.abs().total_cmp(&y.1.abs()));
-            let Some((i, w)) = worst else { break };
-            if w.abs() <= LEAST_LIMIT || w.abs() <= limit(self.dof - 1.0 + self.noise_dof) {
-                break;
-            }
-            let mut column = rows.drop_touch(i, covariance, &mut self.out);
-            let root = self.d[i].sqrt();
-            self.out.diagonal.push(root);
-            column.iter_mut().for_each(|c| *c /= root);
-            let amount = self.a[i] / root;
-            self.chi2 -= amount * amount;
-            self.dof -= 1.0;
-            for ((a, d), c) in self.a.iter_mut().zip(&mut self.d).zip(&column) {
-                *a -= c * amount;
-                *d = (*d - c * c).max(0.0);
-            }
-            self.d[i] = 0.0;
-            self.a[i] = 0.0;
-        }
+    /// The touches beyond the limit, the worst first; of each index position only its worst one, whose error the others share.
+    #[must_use]
+    pub fn outliers(&self, visits: &[usize]) -> Vec<usize> {
+        let limit = LEAST_LIMIT.max(limit(self.dof - 1.0 + self.noise_dof));
+        let mut beyond: Vec<(usize, f64)> =
+            (0..self.a.len()).map(|i| (i, self.standardised(i, self.least).abs())).filter(|t| t.1 > limit).collect();
+        beyond.sort_by(|x, y| y.1.total_cmp(&x.1));
+        let mut seen = BTreeSet::new();
+        beyond.retain(|(i, _)| seen.insert(visits[*i]));
+        beyond.into_iter().map(|t| t.0).collect()
     }
 
-    /// The touches that were dropped, in their order.
+    /// Externally studentised residual of each touch that is used.
     #[must_use]
-    pub fn dropped(&self) -> Vec<usize> {
-        self.out.touches.clone()
-    }
-
-    /// Externally studentised residual of each touch that is still in.
-    #[must_use]
-    pub fn studentised(&self) -> Vec<f64> {
+    pub fn each(&self) -> Vec<f64> {
         (0..self.a.len()).map(|i| self.standardised(i, 0.0)).collect()
     }
 }
@@ -354,86 +254,4 @@ pub fn median_scale(gaps_mm: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = gaps_mm.iter().map(|r| r.abs()).collect();
     sizes.sort_unstable_by(f64::total_cmp);
     sizes.get(sizes.len() / 2).map_or(0.0, |m| 1.4826 * m)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::solve::Problem;
-    use super::*;
-    use crate::axes::AxisName;
-    use crate::diag::source;
-    use crate::log::{Status, Touch};
-    use crate::machine;
-    use crate::model::catalogue::Catalogue;
-    use crate::model::data::{Run, assemble};
-    use crate::model::predict::Model;
-    use crate::program::{self, Options};
-
-    /// The touches of a program, each off its nominal place in its own way.
-    fn touches_of(plan: &crate::program::plan::Plan) -> Vec<Touch> {
-        let touch = |p: &crate::program::plan::PlanTouch| {
-            let mut position = p.nominal_position();
-            let by = (p.id as f64 * 12.9898).sin() * 2e-3;
-            position.set(AxisName::X, position.get(AxisName::X) + by);
-            position.set(AxisName::Z, position.get(AxisName::Z) - 0.7 * by);
-            Touch { id: p.id, position, status: Status::Hit, time_s: None, temperature_deg_c: None, line: 1 }
-        };
-        plan.touches.iter().map(touch).collect()
-    }
-
-    #[test]
-    fn touches_dropped_one_by_one_leave_what_a_fit_without_them_has() {
-        let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
-        let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
-        let spec = program::choose(program::built_in().unwrap(), "head", &machine).unwrap();
-        let plan = program::generate(&machine, &spec, &Options::default()).unwrap().0.plan;
-        let measured = touches_of(&plan);
-        let data = assemble(&machine, &[Run { plan: &plan, touches: &measured, mounting: None, started_s: None }]);
-        let catalogue = Catalogue::built_in().unwrap();
-        let effects = super::super::effects_of(&["location-b".to_owned()], &catalogue, &machine).unwrap();
-        let model = Model::new(&machine, &effects, &data.set_ups, machine.reference.pivot);
-        let theta = model.start();
-        let free: Vec<usize> = (0..theta.len()).collect();
-        let batch = model.prepare(&data.observations);
-        let start = DVector::from_vec(theta.clone());
-        let n = data.observations.len();
-        for tau_mm in [0.0, 0.7e-3] {
-            let at = |weights: &[f64]| {
-                let mut touches = Touches::new(&batch, &data.visits, theta.clone(), &free, &[], (1e-3, tau_mm));
-                touches.set_weights(weights.to_vec());
-                let covariance = touches.normal(&start, true).gram.try_inverse().unwrap();
-                (touches, covariance)
-            };
-            let (touches, covariance) = at(&vec![1.0; n]);
-            let short = touches.short_rows(&start);
-            let (columns, set_up, begin) = (short.columns, short.set_up, short.start);
-            let rows = Rows { touches: &touches, columns, set_up, start: begin, values: short.values, gap: short.gap };
-            // several of one visit and several of others
-            let drops = [17, 3, 18, 19, 120, 60, 4];
-            let mut d = rows.diagonal(&covariance);
-            let mut out = Dropped::default();
-            for i in drops {
-                let column = rows.drop_touch(i, &covariance, &mut out);
-                assert!((column[i] - d[i]).abs() < 1e-9 * d[i], "tau {tau_mm}: {} and {}", column[i], d[i]);
-                out.diagonal.push(d[i].sqrt());
-                let root = d[i];
-                d.iter_mut().zip(&column).for_each(|(d, c)| *d -= c * c / root);
-            }
-            let mut weights = vec![1.0; n];
-            drops.iter().for_each(|&i| weights[i] = 0.0);
-            let (touches, covariance) = at(&weights);
-            let short = touches.short_rows(&start);
-            let (columns, set_up, begin) = (short.columns, short.set_up, short.start);
-            let rows = Rows { touches: &touches, columns, set_up, start: begin, values: short.values, gap: short.gap };
-            let without = rows.diagonal(&covariance);
-            for i in (0..n).filter(|i| !drops.contains(i)) {
-                assert!(
-                    (d[i] - without[i]).abs() < 1e-9 * without[i],
-                    "tau {tau_mm} touch {i}: {} {}",
-                    d[i],
-                    without[i]
-                );
-            }
-        }
-    }
 }

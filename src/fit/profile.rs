@@ -7,10 +7,10 @@
 //! and Its Applications*, 1988, section 6.1). Where the touches allow several values of the shape, the interval of every other
 //! unknown is the union of its intervals beside each of them.
 
+use super::Fit;
 use super::candidates::Trials;
 use super::nonlinear_scan::{self, Stretch};
 use super::start_values::ShapeSearch;
-use super::Fit;
 use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Parameter};
 use crate::model::predict::{Model, Unknown};
@@ -236,8 +236,7 @@ impl<'a> Profile<'a> {
             covariance: Inverse::new(&products, &products.diagonal()).inverse,
             rest: columns,
             priors: prior_rows.select_columns(&own),
-            prior_of_shape: here
-                .map_or_else(|| DVector::zeros(n_priors), |c| prior_rows.column(c).into_owned()),
+            prior_of_shape: here.map_or_else(|| DVector::zeros(n_priors), |c| prior_rows.column(c).into_owned()),
             residual: linear.residual,
             now: DVector::zeros(0),
         };
@@ -282,7 +281,8 @@ impl<'a> Profile<'a> {
         let mut others = self.minima(&scan, k * k + by_chance(scan.len()));
         others.retain(|(at, _)| is_beyond(*at));
         let beyond: Vec<f64> = others.iter().map(|o| o.0).collect();
-        let with_all = |end: Option<f64>, pick: fn(f64, f64) -> f64| end.map(|end| beyond.iter().copied().fold(end, pick));
+        let with_all =
+            |end: Option<f64>, pick: fn(f64, f64) -> f64| end.map(|end| beyond.iter().copied().fold(end, pick));
         out.ends.insert(self.unknown, [with_all(ends[0], f64::min), with_all(ends[1], f64::max)]);
         let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
         places.extend(&beyond);

@@ -65,21 +65,40 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
     let job = Job { machine, catalogue, effects: &effects };
     let mut starts = Starts::new();
     let mut waiting: Vec<&Effect> = effects.iter().copied().filter(|e| has_shapes(e)).collect();
-    if data.observations.is_empty() {
-        waiting.clear();
+    let tau_mm = look_for(job, &data, settings, &mut waiting, &mut starts)?;
+    let fit = identify_started(job, data, settings, &starts)?;
+    // what an effect changes from one index position to the next is scatter to a fit without it, which then hardly shows it: where
+    // less scatter is left beside it, it is judged by that
+    let n_waiting = waiting.len();
+    if n_waiting == 0 || fit.noise.tau_mm >= tau_mm {
+        return Ok(fit);
     }
-    while !waiting.is_empty() {
-        let beside = fit_without(job, &data, settings, &waiting, &starts)?;
-        let found: Vec<Start> = waiting.iter().map(|effect| start_shapes(&beside, machine, effect)).collect();
+    let calm = Settings { visit_sigma_mm: Some(fit.noise.tau_mm), ..settings.clone() };
+    look_for(job, &fit.data, &calm, &mut waiting, &mut starts)?;
+    if waiting.len() == n_waiting { Ok(fit) } else { identify_started(job, fit.data, settings, &starts) }
+}
+
+/// Finds start values of the effects that the touches show, and takes these out of `waiting`; the others stay at usual shapes. The
+/// scatter of index positions beside all that show, mm.
+fn look_for<'e>(
+    job: Job,
+    data: &Data,
+    settings: &Settings,
+    waiting: &mut Vec<&'e Effect>,
+    starts: &mut Starts,
+) -> Result<f64> {
+    while !waiting.is_empty() && !data.observations.is_empty() {
+        let beside = fit_without(job, data, settings, waiting, starts)?;
+        let found: Vec<Start> = waiting.iter().map(|effect| start_shapes(&beside, job.machine, effect)).collect();
         let shown = (0..waiting.len()).filter(|&k| found[k].shown);
         let Some(k) = shown.max_by(|&a, &b| found[a].gain.total_cmp(&found[b].gain)) else {
             starts.extend(found.into_iter().flat_map(|s| s.values));
-            break;
+            return Ok(beside.noise.tau_mm);
         };
         starts.extend(found[k].values.clone());
         waiting.remove(k);
     }
-    identify_started(job, data, settings, &starts)
+    Ok(0.0)
 }
 
 fn has_shapes(effect: &Effect) -> bool {

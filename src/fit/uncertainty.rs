@@ -12,7 +12,6 @@ use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// With more touches the whole catalogue would take longer than everything else together.
@@ -69,8 +68,13 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     if fit.seen.unseen.is_empty() {
         return DVector::zeros(p);
     }
-    let rooms = rooms_of_shapes(fit);
-    let typical = |c: usize| rooms.get(&c).copied().unwrap_or(fit.model.unknowns[fit.free[c]].typical);
+    // a shape that leaves no trace has an effect that does not show: whatever its value is, it moves nothing by more than the
+    // uncertainty of its sizes, which is counted already
+    const OF_A_SHAPE: f64 = 1e-9;
+    let typical = |c: usize| {
+        let u = &fit.model.unknowns[fit.free[c]];
+        u.typical * if u.shape { OF_A_SHAPE } else { 1.0 }
+    };
     let each: Vec<DVector<f64>> = fit
         .seen
         .unseen
@@ -114,54 +118,6 @@ fn bends(fit: &Fit, steps: &[DVector<f64>]) -> DVector<f64> {
         }
     });
     out
-}
-
-/// How far a shape parameter that leaves no trace may go, by its place among the free unknowns: until what it does has changed by all
-/// that its effect does. Where the touches do not show the effect either, whatever pitch it has moves nothing by more than the
-/// uncertainty of its size, which is counted already.
-fn rooms_of_shapes(fit: &Fit) -> BTreeMap<usize, f64> {
-    /// Standard uncertainties from which a size is shown.
-    const SHOWN: f64 = 3.0;
-    /// Share of its usual size that a shape of nothing may go.
-    const NONE: f64 = 1e-9;
-    let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
-    let is_unseen = |c: &usize| fit.seen.unseen.iter().any(|v| v[*c].abs() > 1e-9);
-    let shapes: Vec<usize> = (0..fit.free.len()).filter(|&c| unknown(c).shape).filter(is_unseen).collect();
-    if shapes.is_empty() {
-        return BTreeMap::new();
-    }
-    let theta = fit.free_theta();
-    let gram = fit.with_touches(fit.noise.tau_mm, |t| t.normal(&theta, true).gram);
-    let room = |c: usize| {
-        let own = |k: &usize| unknown(*k).effect == unknown(c).effect && !unknown(*k).shape;
-        let sizes: Vec<usize> = (0..fit.free.len()).filter(own).collect();
-        let sigma = |k: usize| fit.covariance[(fit.free[k], fit.free[k])].max(0.0).sqrt();
-        let (slope, typical) = (gram[(c, c)], unknown(c).typical);
-        // all that it does, in units of the noise
-        let product = |a: usize, b: usize| theta[a] * theta[b] * gram[(a, b)];
-        let square: f64 = sizes.iter().map(|&a| sizes.iter().map(|&b| product(a, b)).sum::<f64>()).sum();
-        let small = |k: &usize| theta[*k].abs() < SHOWN * sigma(*k);
-        // what of it the other unknowns cannot do. The shape was chosen as the best of many: chance makes more of it than of a size
-        let by_chance = SHOWN * SHOWN * (sizes.len() + 1) as f64;
-        if slope <= 0.0 || shown(fit, &sizes) < by_chance || sizes.iter().all(small) {
-            return (c, NONE * typical);
-        }
-        (c, (square.max(0.0) / slope).sqrt().clamp(NONE * typical, typical))
-    };
-    shapes.into_iter().map(room).collect()
-}
-
-/// χ² by which some of the free unknowns are not 0, with all others free to follow.
-fn shown(fit: &Fit, which: &[usize]) -> f64 {
-    let each = |k: usize| fit.free[which[k]];
-    let n = which.len();
-    let theta = DVector::from_fn(n, |k, _| fit.theta[each(k)]);
-    let covariance = DMatrix::from_fn(n, n, |a, b| fit.covariance[(each(a), each(b))]);
-    // scaled to a diagonal of ones: sizes may have different units
-    let scale = covariance.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
-    let scaled = DMatrix::from_fn(n, n, |a, b| covariance[(a, b)] / (scale[a] * scale[b]));
-    let off = theta.component_div(&scale);
-    scaled.cholesky().map_or(f64::INFINITY, |c| off.dot(&c.solve(&off)))
 }
 
 /// Effects that may act although a model with these unknowns does not hold them: all of the catalogue but those that share a

@@ -44,7 +44,9 @@ pub(crate) fn remark(remark: &Remark) -> String {
             "{meaning} depends on what these touches cannot determine by more than its own uncertainty, and is not determined either."
         ),
         Remark::NotConverged { stopped } => format!("the search did not converge: {stopped}"),
-        Remark::NoRedundancy => "There are as many unknowns as touches: nothing is left to check the model with.".into(),
+        Remark::NoRedundancy => {
+            "There are as many unknowns as touches: nothing is left to check the model with.".into()
+        }
         Remark::UnmodelledNotCounted { most_touches } => {
             format!("What effects outside of the model may add is computed for up to {most_touches} touches only.")
         }
@@ -286,16 +288,17 @@ pub(crate) fn undetermined(direction: &NullDirection) -> String {
         Kind::Shape => format!(
             "{named} cannot be determined: the touches do not show its effect clearly. It is set to the usual value that fits best. Add touches where the effect changes, or set it to what is known of the machine"
         ),
-        Kind::Single => format!("{named} has no effect on these touches and cannot be determined; it stays at its start value"),
+        Kind::Single => {
+            format!("{named} has no effect on these touches and cannot be determined; it stays at its start value")
+        }
         Kind::Pair => format!(
             "Only {} can be measured, not {named} separately. {}",
             members.first().zip(members.get(1)).map_or_else(String::new, |(a, b)| what_is_seen(a, b)),
             set_to(direction)
         ),
-        Kind::OneWithBlocks => format!(
-            "{named} cannot be separated: a shifted block looks the same. {}",
-            set_to(direction)
-        ),
+        Kind::OneWithBlocks => {
+            format!("{named} cannot be separated: a shifted block looks the same. {}", set_to(direction))
+        }
         Kind::Several => format!(
             "{named} cannot all be measured: {} has no effect on these touches. {}",
             trade(members, !blocks.is_empty()),
@@ -306,8 +309,11 @@ pub(crate) fn undetermined(direction: &NullDirection) -> String {
 
 /// What is set where, so that the rest can be solved for.
 fn set_to(direction: &NullDirection) -> String {
-    let (shapes, sizes): (Vec<String>, Vec<String>) =
-        direction.held.iter().cloned().partition(|name| direction.members.iter().any(|m| m.is_shape && m.name == *name));
+    let (shapes, sizes): (Vec<String>, Vec<String>) = direction
+        .held
+        .iter()
+        .cloned()
+        .partition(|name| direction.members.iter().any(|m| m.is_shape && m.name == *name));
     let verb = |names: &[String]| if names.len() == 1 { "is" } else { "are" };
     let mut parts = Vec::new();
     if !sizes.is_empty() {
@@ -369,7 +375,10 @@ pub(crate) fn poorly_determined(weights: &[(String, f64)], times: f64) -> String
             format!("the combination {} (each in its usual size)", list(&each))
         }
     };
-    format!("{what} is determined to {} times its usual size only: it has hardly any effect on these touches", significant(times, 3))
+    format!(
+        "{what} is determined to {} times its usual size only: it has hardly any effect on these touches",
+        significant(times, 3)
+    )
 }
 
 fn list(words: &[String]) -> String {

@@ -317,42 +317,6 @@ fn what_does_not_show_stays_where_it_stands_beside_a_jump() {
     assert!(inside * 10 >= all * 9, "{inside} of {all}");
 }
 
-/// Four blocks that slip, each at its own moment: looked for beside a fit that had none of the others, the smallest stood at the wrong moment
-/// in 5 of 6 runs, and good touches of its block were left out.
-#[test]
-fn each_block_may_slip_at_a_moment_of_its_own() {
-    const OWN: &str = "[[effect]]\nid = \"slip-each\"\nper = \"block\"\nat = \"block\"\nterms = [{ parameter = \"ex\", unit = \"um\", dof = \"dx\", \
-                       formula = \"step(t - each_h)\", typical = 8 }, { parameter = \"ez\", unit = \"um\", dof = \"dz\", formula = \
-                       \"step(t - each_h)\", typical = 8 }]\nshape = [{ parameter = \"each_h\", unit = \"h\", start = 0.5, min = 0.0, max = 100.0, \
-                       between = \"t\" }]\n";
-    let machine = machine("swivel-head");
-    let full = plan(&machine, "full");
-    let mut catalogue = Catalogue::built_in().unwrap();
-    catalogue.add_file(&source("own.toml", OWN)).unwrap();
-    let slips = [("a", 8.0, -6.0, 0.4), ("b", -7.0, 5.0, 0.9), ("f", 10.0, 5.0, 0.6), ("g", 0.0, 8.0, 1.1)];
-    let mut text = "effects_file = [\"own.toml\"]\n[effects.slip-each]\n".to_owned();
-    for (block, ex, ez, hour) in slips {
-        text += &format!(
-            "\"ex@full/{block}\" = {ex:?}\n\"ez@full/{block}\" = {ez:?}\n\"each_h@full/{block}\" = {hour:?}\n"
-        );
-    }
-    let open = |name: &str| Ok(source(name, OWN));
-    let (planted, _) = simulate::scenario::parse_with(&source("s.toml", &text), &machine, &open).unwrap();
-    let effects = ["location-b", "location-c", "block-setup", "pretravel", "slip-each"].map(str::to_owned).to_vec();
-    for seed in 1..=2 {
-        let touches = touch(&machine, &full, &planted.clone().with_noise(1e-3, 0.5e-3, seed), None);
-        let run = Run { plan: &full, touches: &touches, mounting: None, started_s: None };
-        let settings = Settings { effects: effects.clone(), ..Settings::default() };
-        let fit = axiscal::fit::identify(&machine, &catalogue, &[run], &settings).unwrap();
-        assert!(fit.rejected.len() <= 1, "{:?}", fit.rejected);
-        for (block, .., hour) in slips {
-            let p = parameter(&fit, &format!("each_h@full/{block}"));
-            println!("{seed} {hour}: {p:?}");
-            assert!(p.status == Status::Identified && holds(p, hour), "{p:?}");
-        }
-    }
-}
-
 /// Without the figures that need the catalogue what is told is the same, a moment's interval and all; a trial fit, which has no
 /// intervals, does not call what was searched for and held a word of the user's.
 #[test]

@@ -6,8 +6,8 @@
 mod common;
 mod jumps;
 
-use axiscal::fit::{Contradiction, Found, Knowledge, Remark};
 use axiscal::fit::outcome::Status;
+use axiscal::fit::{Contradiction, Found, Knowledge, Remark};
 use axiscal::fit::{Fit, Settings};
 use axiscal::simulate::Scenario;
 use common::*;
@@ -264,7 +264,11 @@ fn each_block_may_have_a_time_constant_of_its_own() {
             told += 1;
             inside += i32::from(low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high));
         }
-        assert!(!fit.outcome.undetermined.iter().any(|u| u.says.contains("position of")), "{:?}", fit.outcome.undetermined);
+        assert!(
+            !fit.outcome.undetermined.iter().any(|u| u.says.contains("position of")),
+            "{:?}",
+            fit.outcome.undetermined
+        );
     }
     println!("{inside} of {told}");
     assert!(told >= 6 && inside * 10 >= told * 9, "{inside} of {told}");
