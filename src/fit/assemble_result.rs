@@ -4,13 +4,11 @@ use super::nonlinear_scan::{self, NOT_CREDIBLE};
 use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
 use super::profile::{Ends, Intervals};
 use super::remark::Remark;
+use super::shape_search::Asked;
 use super::solve::{Problem as _, Solution};
-use super::start_values::ShapeSearch;
 use super::type_b::TypeB;
 use super::uncertainty::{LeftOut, Unmodelled};
 use super::{Fit, contradictions, held_out, null_space, outliers, poorly_determined, profile, uncertainty};
-use crate::machine::Machine;
-use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use crate::words::fit as words;
@@ -33,13 +31,6 @@ pub(super) struct Assembled {
     pub remarks: Vec<Remark>,
     /// Other values of shape parameters that fit about as well, by unknown.
     pub other_values: BTreeMap<usize, Vec<f64>>,
-}
-
-/// What is asked of the result besides the fit.
-pub(super) struct Asked<'a> {
-    pub machine: &'a Machine,
-    pub effects: &'a [&'a Effect],
-    pub search: &'a ShapeSearch,
 }
 
 /// The result of a fit.

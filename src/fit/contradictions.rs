@@ -1,8 +1,8 @@
 //! What the user states of a parameter, against what the touches say of it.
 
-use super::assemble_result::Asked;
 use super::normal::Touches;
 use super::remark::{Contradiction, Found};
+use super::shape_search::Asked;
 use super::uncertainty::free_covariance;
 use super::{Fit, Knowledge, profile};
 use nalgebra::DVector;

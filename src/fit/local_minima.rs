@@ -2,7 +2,7 @@
 
 use super::nonlinear_scan::{self, Stretch};
 use super::remark::Remark;
-use super::start_values::{Job, ShapeSearch, Starts};
+use super::shape_search::{Job, ShapeSearch, Starts};
 use super::{Fit, Knowledge};
 use crate::diag::Result;
 use crate::model::predict::Unknown;

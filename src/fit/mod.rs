@@ -27,6 +27,7 @@ mod remark;
 mod revisits;
 mod rounding;
 mod settings;
+mod shape_search;
 pub mod solve;
 pub mod span;
 mod start_values;
@@ -47,13 +48,13 @@ use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::{Data, Run, assemble};
 use crate::model::predict::{Model, Observation};
-use assemble_result::{Asked, Assembled, assemble_result};
+use assemble_result::{Assembled, assemble_result};
 use nalgebra::{DMatrix, DVector};
 use noise::{Known, Noise};
 use normal::{Prior, Touches};
 use outcome::Outcome;
 use outlier_loop::OutlierLoop;
-use start_values::ShapeSearch;
+use shape_search::{Asked, ShapeSearch};
 use std::collections::BTreeMap;
 
 /// Fits a model to runs.
@@ -173,7 +174,7 @@ struct Solved {
     unknown_masks: Vec<Remark>,
 }
 
-/// Solves a model from `theta` on: with the noise that the touches show, and without those that are strangers to it.
+/// Solves a model from `theta` on: with the noise that the touches show, and without outliers.
 fn find(
     model: &Model,
     data: &Data,
@@ -192,16 +193,8 @@ fn find(
     }
     let first = solve::Problem::normal(&touches, &start, true);
     let (observability, condition) = rank::observe(&first.gram, model, data, &theta, free, priors, touches.weights());
-    let mut search = OutlierLoop {
-        data,
-        observability: observability.clone(),
-        touches,
-        masked,
-        known,
-        moving,
-        beyond: None,
-        judged: None,
-    };
+    let mut search =
+        OutlierLoop { data, observability: observability.clone(), touches, masked, known, moving, beyond: None };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));
     let solution = search.follow_bends(solution, model, free);
     // the scale of the first pass is that of the residuals themselves: the noise is not known yet
@@ -242,7 +235,7 @@ fn find(
             covariance[(i, j)] = solution.covariance[(a, b)];
         }
     }
-    let mut studentised = search.judge(&solution, noise.dof.unwrap_or(0.0)).each();
+    let mut studentised = search.studentised(&solution, noise.dof.unwrap_or(0.0)).each();
     // a touch that is not used stands by how far it is off what the others say
     let scale2 = search.scale2(&solution, 0.0);
     for &i in rejected.keys() {

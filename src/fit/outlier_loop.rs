@@ -1,4 +1,4 @@
-//! The steps of a fit around the least squares: noise samples, touches that do not belong, gauges that bend.
+//! The steps of a fit around the least squares: noise samples, outliers, null directions that bend.
 
 use super::noise::{self, Known, Sample};
 use super::normal::Touches;
@@ -24,7 +24,7 @@ const QUIET: f64 = 0.05;
 /// More than this share of the touches is never left out: the rest is no longer what most of them say.
 const MOST_OUTLIERS: f64 = 0.25;
 
-/// More than this share of the strangers on faces of which most is off is no chance: of a quarter of all touches, strewn at
+/// More than this share of the outliers on faces of which most is off is no chance: of a quarter of all touches, strewn at
 /// random, every fourth has the other touch of its face with it.
 const MOST_TOGETHER: f64 = 1.0 / 3.0;
 
@@ -45,17 +45,6 @@ pub(super) struct OutlierLoop<'a> {
     pub moving: bool,
     /// As [`super::Fit::outliers_beyond`].
     pub beyond: Option<usize>,
-    /// What the touches said of each other last.
-    pub judged: Option<Judged>,
-}
-
-/// What the touches say of each other at a solution, and where that was: the same question is not answered twice.
-pub(super) struct Judged {
-    theta: DVector<f64>,
-    weights: Vec<f64>,
-    noise_mm: (f64, f64),
-    noise_dof: f64,
-    studentised: Studentised,
 }
 
 impl OutlierLoop<'_> {
@@ -151,32 +140,15 @@ impl OutlierLoop<'_> {
         solution
     }
 
-    /// What the touches say of each other at a solution; `noise_dof` is that of σ.
-    pub fn judge(&mut self, solution: &solve::Solution, noise_dof: f64) -> &Studentised {
-        let known = self.judged.take().filter(|j| {
-            j.noise_dof == noise_dof
-                && j.noise_mm == self.touches.noise_mm()
-                && j.theta == solution.theta
-                && j.weights == self.touches.weights()
-        });
-        let judged = known.unwrap_or_else(|| {
-            let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
-            let (chi2, covariance) = (solution.chi2, &solution.covariance);
-            Judged {
-                theta: solution.theta.clone(),
-                weights: self.touches.weights().to_vec(),
-                noise_mm: self.touches.noise_mm(),
-                noise_dof,
-                studentised: Studentised::new(&self.touches, &solution.theta, covariance, (chi2, dof), noise_dof),
-            }
-        });
-        &self.judged.insert(judged).studentised
+    /// How far each touch is off what the others predict at a solution; `noise_dof` is that of σ.
+    pub fn studentised(&self, solution: &solve::Solution, noise_dof: f64) -> Studentised {
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
+        Studentised::new(&self.touches, &solution.theta, &solution.covariance, (solution.chi2, dof), noise_dof)
     }
 
     /// The touches that a solution shows to be outliers, the worst first.
-    fn found(&mut self, solution: &solve::Solution, noise_dof: f64) -> Vec<usize> {
-        let visits = &self.data.visits;
-        self.judge(solution, noise_dof).outliers(visits)
+    fn found(&self, solution: &solve::Solution, noise_dof: f64) -> Vec<usize> {
+        self.studentised(solution, noise_dof).outliers(&self.data.visits)
     }
 
     fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
@@ -313,7 +285,7 @@ impl OutlierLoop<'_> {
             out.extend(more);
             out.truncate(most.max(1));
         }
-        // touches of one face that miss together say something in common: that is no matter of chips. Among many strangers
+        // touches of one face that miss together say something in common: that is no matter of chips. Among many outliers
         // some meet on a face by chance
         if most == cap {
             for cluster in outliers::clusters(&out, self.faces(), n) {
@@ -334,7 +306,7 @@ impl OutlierLoop<'_> {
         }
     }
 
-    /// More strangers than chips explain, where they are gross ones all the same and no missing effect: they are a
+    /// More outliers than chips explain, where they are gross ones all the same and no missing effect: they are a
     /// minority and strewn over the faces, the others see as much without them, and the others agree to within their
     /// noise, which an effect that the model lacks would not let them do. `None` where that does not hold.
     fn many_outliers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
@@ -352,7 +324,7 @@ impl OutlierLoop<'_> {
         let noise = noise::estimate(&self.samples(&solution), &self.known, None);
         self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
         solution = self.refit_here(solution.theta);
-        // touches that the robust fit took for strangers, and that are not, come back
+        // touches that the robust fit took for outliers, and that are not, come back
         let scale2 = self.scale2(&solution, noise.dof.unwrap_or(0.0));
         let noise_dof = noise.dof.unwrap_or(0.0);
         out.retain(|&i| !self.belongs(&solution, i, scale2, noise_dof));

@@ -10,7 +10,7 @@
 use super::Fit;
 use super::candidates::Trials;
 use super::nonlinear_scan::{self, Stretch};
-use super::start_values::ShapeSearch;
+use super::shape_search::ShapeSearch;
 use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Parameter};
 use crate::model::predict::{Model, Unknown};
@@ -167,8 +167,8 @@ struct Held {
 /// Which values of a shape the touches allow, and what of the other unknowns depends on that.
 struct Allowed<'p> {
     places: &'p [f64],
-    /// χ² may grow by so much more than k².
-    chance: f64,
+    /// χ² may grow by so much more than k²; none at a moment of a jump, which has a limit of its own.
+    chance: Option<f64>,
     /// The shape is not determined: then nothing else is surer than beside any allowed value.
     all_followers: bool,
     /// An interval is called one if it reaches no further than so many usual sizes, or twice its usual width.
@@ -259,7 +259,7 @@ impl<'a> Profile<'a> {
         let block = self.fit.model.unknowns[self.unknown].block();
         let (ends, places) = self.ends_of_a_jump(&nonlinear_scan::stretches_of_a_jump(p, &self.fit.data, block));
         out.ends.insert(self.unknown, ends);
-        let allowed = Allowed { places: &places, chance: 0.0, all_followers: true, typical_sizes: 5.0 };
+        let allowed = Allowed { places: &places, chance: None, all_followers: true, typical_sizes: 5.0 };
         self.widen(&allowed, spread, out);
     }
 
@@ -272,7 +272,7 @@ impl<'a> Profile<'a> {
             // it is not determined: it may be any of those that were tried
             let mut places: Vec<f64> = scan.iter().map(|s| s.0).collect();
             places.extend([low, high]);
-            let chance = by_chance(places.len());
+            let chance = Some(by_chance(places.len()));
             let allowed = Allowed { places: &places, chance, all_followers: true, typical_sizes: 5.0 };
             return self.widen(&allowed, spread, out);
         };
@@ -290,7 +290,7 @@ impl<'a> Profile<'a> {
         self.widen(
             &Allowed {
                 places: &places,
-                chance: if is_unique { 0.0 } else { by_chance(scan.len()) },
+                chance: Some(if is_unique { 0.0 } else { by_chance(scan.len()) }),
                 all_followers: !is_unique,
                 typical_sizes: if is_unique { 5.0 } else { 0.0 },
             },
@@ -393,16 +393,15 @@ impl<'a> Profile<'a> {
     /// Intervals of what follows: all that it may be beside the allowed values of the shape.
     fn widen(&self, allowed: &Allowed, spread: &Spread, out: &mut Intervals) {
         const MUCH_ELSE: f64 = 2.0;
-        let is_jump = self.effect.parameters[self.shape].between.is_some();
         let held: Vec<Held> = allowed.places.iter().map(|&at| self.held(at)).collect();
         let lowest = held.iter().map(|h| h.growth).fold(0.0, f64::min);
         let n = if allowed.all_followers { self.followers.len() } else { self.sizes.len() };
         for (c, &unknown) in self.followers[..n].iter().enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
-            let (limit, most) = match (is_jump, c < self.sizes.len()) {
-                (true, _) => (GROWTH_OF_A_JUMP, k),
-                (false, true) => (k * k + allowed.chance, f64::INFINITY),
-                (false, false) => (k * k + allowed.chance, k),
+            let (limit, most) = match (allowed.chance, c < self.sizes.len()) {
+                (None, _) => (GROWTH_OF_A_JUMP, k),
+                (Some(chance), true) => (k * k + chance, f64::INFINITY),
+                (Some(chance), false) => (k * k + chance, k),
             };
             let (value, usual) = (self.fit.theta[unknown], k * sigma);
             let (mut low, mut high) = (value - usual, value + usual);
