@@ -318,7 +318,7 @@ fn what_a_shifted_block_could_explain_is_said() {
         assert_eq!(p.status, Status::Undetermined);
         assert!(p.sigma.is_none());
         assert!(
-            o.undetermined.iter().any(|u| u.says.contains(name) && u.says.contains("set-up")),
+            o.undetermined.iter().any(|u| u.says.contains(name) && u.says.contains("position of")),
             "{:?}",
             o.undetermined
         );

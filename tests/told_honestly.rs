@@ -258,8 +258,8 @@ fn a_stated_scatter_of_visits_is_held_against_the_revisits() {
     for (stated_um, contradicted) in [(5.0, true), (0.0, true), (0.35, false), (0.5, false), (0.7, false)] {
         let settings = Settings { visit_sigma_mm: Some(1e-3 * stated_um), ..settings(&machine, &[]) };
         let fit = fitted(&machine, &plan, &touches, &settings);
-        assert_eq!((fit.noise.tau_mm, fit.noise.visit_source), (1e-3 * stated_um, "study"));
-        let said = fit.outcome.warnings.iter().any(|w| w.contains("visit_um") && w.contains("no chance makes that"));
+        assert_eq!((fit.noise.tau_mm, fit.noise.visit_source), (1e-3 * stated_um, axiscal::fit::VisitSource::Study));
+        let said = fit.remarks.iter().any(|r| matches!(r, axiscal::fit::Remark::VisitsContradicted { .. }));
         assert_eq!(said, contradicted, "{stated_um}: {:?}", fit.outcome.warnings);
     }
 }
@@ -278,7 +278,7 @@ fn an_effect_that_hides_in_the_scatter_of_visits_is_said() {
             let text = format!("seed = 6\n[noise]\ntouch_um = 1.0\nvisit_um = 0.5\n{drift}");
             let touches = touch(&machine, &plan, &scenario(&machine, &text), None);
             let fit = fitted(&machine, &plan, &touches, &settings(&machine, more));
-            let said = fit.outcome.warnings.iter().any(|w| w.contains("index visits scatter by"));
+            let said = fit.remarks.iter().any(|r| matches!(r, axiscal::fit::Remark::VisitsBeyond { .. }));
             assert_eq!(said, hides, "{name} {more:?}: {:?} {:?}", fit.noise, fit.outcome.warnings);
         }
     }

@@ -101,8 +101,12 @@ fn a_noise_that_the_repeats_contradict_is_said_and_not_judged_by() {
         let found = diagnosed(&touches, Some(stated));
         assert_eq!(found.verdict, Verdict::Adequate, "{stated}: {}", found.says);
         let fit = fitted(&touches, Some(stated));
-        assert_eq!(fit.outcome.noise_source, "study", "{stated}");
-        assert!(fit.outcome.warnings.iter().all(|w| !w.contains("miss the model")), "{:?}", fit.outcome.warnings);
+        assert_eq!(fit.outcome.noise_source, axiscal::fit::NoiseSource::Study, "{stated}");
+        assert!(
+            !fit.remarks.iter().any(|r| matches!(r, axiscal::fit::Remark::Misfit { .. })),
+            "{:?}",
+            fit.outcome.warnings
+        );
     }
 }
 
@@ -112,7 +116,8 @@ fn hardly_any_degrees_of_freedom_are_not_called_none() {
     let (touches, mut said) = (clean(1.0), Vec::new());
     let mut noise = fitted(&touches, None).noise;
     for dof in [0.002, 0.4, 10.2] {
-        (noise.visit_source, noise.visit_dof, noise.tau_test_mm) = ("revisits", Some(dof), 0.3e-3);
+        (noise.visit_source, noise.visit_dof, noise.tau_test_mm) =
+            (axiscal::fit::VisitSource::Revisits, Some(dof), 0.3e-3);
         said.push(noise.says());
     }
     assert!(said[0].contains("less than 0.1 degrees of freedom, at most 0.30 um"), "{said:?}");

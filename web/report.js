@@ -230,10 +230,10 @@
     const list = make('ul.plain');
     const effectName = (n) => d.effects[n]?.name ?? n;
     // what is said of several alike is said once
-    const NO_TRACE = ' leaves no trace in these touches';
+    const NO_TRACE = ' has no effect on these touches';
     const untold = view.undetermined.map((u) => ({ says: u.says.split('; what parts them:')[0], takes: u.parted_by?.length ? u.parted_by.join('; or ') : '' }));
     const silent = untold.filter((u) => u.says.includes(NO_TRACE));
-    const many = silent.length > 2 ? [{ says: `These leave no trace in these touches, so that their values are not known and stand at their start by convention: ${silent.map((u) => u.says.split(NO_TRACE)[0]).join('; ')}.`, takes: [...new Set(silent.map((u) => u.takes).filter(Boolean))].join('; or ') }] : silent;
+    const many = silent.length > 2 ? [{ says: `These have no effect on these touches and cannot be determined; they stay at their start values: ${silent.map((u) => u.says.split(NO_TRACE)[0]).join('; ')}.`, takes: [...new Set(silent.map((u) => u.takes).filter(Boolean))].join('; or ') }] : silent;
     const said = new Set();
     const lines = [...untold.filter((u) => !silent.includes(u)), ...many].map((u) => {
       const takes = !u.takes ? '' : said.has(u.takes) ? ' It would take the same.' : ` It would take: ${u.takes}.`;

@@ -11,7 +11,7 @@ pub mod verify;
 
 pub use share::Share;
 
-use crate::fit::{Fit, noise};
+use crate::fit::{self, Fit, noise};
 use crate::model::formula::slot;
 use crate::units::um_from_mm;
 use serde::{Deserialize, Serialize};
@@ -241,9 +241,9 @@ pub fn compare(fit: &Fit) -> Comparison {
         rms_um,
         held_out_rms_um: fit.outcome.held_out_rms_um,
         noise_um,
-        noise_source: fit.noise.source.into(),
+        noise_source: fit.noise.source.as_str().into(),
         visit_um: fit.outcome.visit_um,
-        visit_source: fit.noise.visit_source.into(),
+        visit_source: fit.noise.visit_source.as_str().into(),
         noise_says: fit.noise.says(),
         chi2_per_dof,
         dof: fit.dof,
@@ -382,7 +382,7 @@ fn worst(fit: &Fit, points: &[Point]) -> Vec<Worst> {
                 .filter(|(a, _)| matches!(a.as_str(), "A" | "B" | "C"))
                 .map(|(a, v)| (a.clone(), *v))
                 .collect(),
-            rejected: fit.rejected.get(&i).cloned(),
+            rejected: fit.rejected.get(&i).map(fit::Reason::says),
         }
     });
     each.collect()

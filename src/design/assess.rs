@@ -7,9 +7,9 @@ use super::score;
 use super::shapes::shapes;
 use super::view::{Noise, Planned, Task, View};
 use crate::diag::Result;
+use crate::fit::null_space;
 use crate::fit::solve::observe;
 use crate::fit::span::LeastNorm;
-use crate::fit::statement;
 use crate::fit::uncertainty::expected;
 use crate::fit::{declared_tau_mm, held_first};
 use crate::model::catalogue::Effect;
@@ -66,14 +66,14 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let mut observability = observe(&alone.jacobian);
     observability.hold(held_first(&alone.model, &alone.free));
     let free: Vec<_> = alone.free.iter().map(|&i| &alone.model.unknowns[i]).collect();
-    let mut undetermined = statement::undetermined(&free, &task.effects, &observability.unseen, &observability);
+    let mut undetermined = null_space::undetermined(&free, &task.effects, &observability.unseen, &observability);
     // nothing has been fitted yet: no value fits best
     for u in &mut undetermined {
         let only = free.iter().find(|f| f.shape && u.combination.len() == 1 && u.combination.contains_key(&f.name));
         if let Some(shape) = only {
             u.says = format!(
                 "{} leaves no trace in these touches where its effect has its usual size: they will not tell it",
-                statement::meaning(shape, &task.effects)
+                null_space::meaning(shape, &task.effects)
             );
         }
     }

@@ -174,10 +174,10 @@ pub(super) fn put_together(
             kind: if candidates.iter().any(|c| c.proposed) { String::new() } else { words::kind(d, fit) },
         })
     });
-    let outliers = fit.rejected.iter().filter(|(_, reason)| !reason.starts_with("taken out")).map(|(&i, reason)| {
+    let outliers = fit.rejected.iter().filter(|(_, reason)| reason.is_outlier()).map(|(&i, reason)| {
         let o = &fit.data.observations[i];
         let Origin { block, face, .. } = fit.data.origins[i].clone();
-        Outlier { id: o.id, run: o.run + 1, reason: reason.clone(), block, face, comes_back: false }
+        Outlier { id: o.id, run: o.run + 1, reason: reason.says(), block, face, comes_back: false }
     });
     let unexplained = verdict == Verdict::Unexplained;
     let first_by = depends.first().map_or("", |w| w.by.as_str());
@@ -222,7 +222,7 @@ pub(super) fn put_together(
         held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
-        visit_source: fit.noise.visit_source.to_owned(),
+        visit_source: fit.noise.visit_source.as_str().to_owned(),
         noise_says: noise_says(seen, fit),
         lack_of_fit_p: seen.lack_of_fit.p,
         depends,

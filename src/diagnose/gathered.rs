@@ -31,7 +31,7 @@ pub(super) struct Gathered {
 
 /// The place that stands out most.
 pub(super) fn gathered(fit: &Fit, features: &Features) -> Option<Gathered> {
-    let bad: Vec<usize> = fit.rejected.iter().filter(|(_, why)| !why.starts_with("taken out")).map(|r| *r.0).collect();
+    let bad: Vec<usize> = fit.rejected.iter().filter(|(_, why)| why.is_outlier()).map(|r| *r.0).collect();
     if bad.len() < LEAST {
         return None;
     }
@@ -63,7 +63,7 @@ pub(super) fn gathered(fit: &Fit, features: &Features) -> Option<Gathered> {
 /// Faces on which more of the touches that were not used lie than by chance, where it is known that faces differ: an
 /// observation of each.
 pub(super) fn faces(fit: &Fit, features: &Features) -> Vec<usize> {
-    let bad: Vec<usize> = fit.rejected.iter().filter(|(_, why)| !why.starts_with("taken out")).map(|r| *r.0).collect();
+    let bad: Vec<usize> = fit.rejected.iter().filter(|(_, why)| why.is_outlier()).map(|r| *r.0).collect();
     let n_faces = features.face.iter().max().map_or(0, |m| m + 1);
     let each = (0..n_faces).filter_map(|face| {
         let of = features.face.iter().filter(|f| **f == face).count();

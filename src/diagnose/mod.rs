@@ -31,7 +31,7 @@ pub mod words;
 
 use crate::design::Planned;
 use crate::diag::Result;
-use crate::fit::{Fit, Settings, declared_tau_mm, identify_data};
+use crate::fit::{Fit, Reason, Settings, VisitSource, declared_tau_mm, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
@@ -122,7 +122,7 @@ impl<'c> Ordering<'c> {
     /// Where the scatter of visits is only declared.
     #[must_use]
     pub fn of(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Option<Self> {
-        let declared = fit.noise.visit_source == "declared" && fit.noise.tau_test_mm > 0.0;
+        let declared = fit.noise.visit_source == VisitSource::Declared && fit.noise.tau_test_mm > 0.0;
         declared.then(|| {
             let evidence = Evidence::with_visits(fit, 0.0);
             Self { named: Named::of(fit, &evidence, machine, catalogue), evidence }
@@ -215,7 +215,7 @@ fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Feat
     const AT_MOST: usize = 4;
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
-    if fit.noise.visit_source != "revisits" || declared_mm == 0.0 || fit.noise.tau_mm <= declared_mm {
+    if fit.noise.visit_source != VisitSource::Revisits || declared_mm == 0.0 || fit.noise.tau_mm <= declared_mm {
         return None;
     }
     let evidence = Evidence::with_visits(fit, declared_mm);
@@ -251,7 +251,7 @@ fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f6
     let usual_mm = if declared_mm > 0.0 { declared_mm } else { noise.sigma_mm };
     // where an effect explains it the tests were made with the declared one
     let explained = evidence.tau_mm < noise.tau_mm;
-    let dof = noise.visit_dof.filter(|d| noise.visit_source == "revisits" && *d > 1.0 && !explained)?;
+    let dof = noise.visit_dof.filter(|d| noise.visit_source == VisitSource::Revisits && *d > 1.0 && !explained)?;
     let times = noise.tau_mm / usual_mm;
     let p = crate::search::distributions::p_of_chi2(dof * times * times, dof);
     (times > TIMES && p < LEVEL).then_some((noise.tau_mm, declared_mm))
@@ -300,7 +300,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     }
     if options.refit
         && let Some(first) = out.candidates.first_mut()
-        && (first.proposed || fit.outcome.rejected.iter().any(|r| !r.reason.starts_with("taken out")))
+        && (first.proposed || fit.rejected.values().any(Reason::is_outlier))
         && fit.outcome.rms_um <= gross::GROSS_UM
     {
         let again = with_effects(subject, &[first.effect.as_str()])?;

@@ -2,7 +2,7 @@
 
 use super::answer::Diagnosis;
 use super::features::direction_words;
-use crate::fit::Fit;
+use crate::fit::{Fit, VisitSource};
 use crate::machine::Machine;
 use crate::search::dependence::Dependence;
 use crate::search::generic::{CONSTANT, Features};
@@ -228,7 +228,7 @@ pub fn at_the_machine(found: &Diagnosis) -> String {
 
 /// Revisits show that poses come back to better than a touch can tell.
 pub(super) fn visits_come_back(fit: &Fit) -> bool {
-    fit.noise.visit_source == "revisits" && fit.noise.tau_test_mm < fit.noise.sigma_mm
+    fit.noise.visit_source == VisitSource::Revisits && fit.noise.tau_test_mm < fit.noise.sigma_mm
 }
 
 fn harmonic(d: &Dependence) -> String {

@@ -3,9 +3,10 @@
 //! Both from contrasts that no model error can enter: touches of one point made right after each other differ by σ only;
 //! touches of the same points in two visits of one pose differ by σ and by one displacement per visit (`revisits`).
 
-use super::digits::Rounding;
 use super::quantiles;
+use super::remark::{NoiseSource, Remark, VisitSource};
 use super::revisits::{Followed, Revisits, revisits};
+use super::rounding::Rounding;
 use crate::probability::{chi2_cdf, chi2_quantile};
 use crate::units::um_from_mm;
 use nalgebra::Vector3;
@@ -29,15 +30,15 @@ const LEAST_REVISITS: usize = 6;
 pub struct Noise {
     /// Standard deviation of a touch, mm.
     pub sigma_mm: f64,
-    /// `repeats`, `study` or `declared`.
-    pub source: &'static str,
+    /// Where it comes from.
+    pub source: NoiseSource,
     /// Degrees of freedom of σ; none where it is taken as known.
     pub dof: Option<f64>,
     /// Standard deviation of each component of a visit's displacement, mm: what weights and uncertainties use, from
     /// whatever source.
     pub tau_mm: f64,
-    /// `revisits`, `study`, `declared`, or `one pose`.
-    pub visit_source: &'static str,
+    /// Where it comes from.
+    pub visit_source: VisitSource,
     /// Degrees of freedom of τ; none where it is taken as known.
     pub visit_dof: Option<f64>,
     /// What tests for missing effects use, mm: the 90 % upper bound of τ, or the declared value.
@@ -124,22 +125,22 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         .filter(|s| from_repeats.is_some_and(|found| contradicts(found, dof, rounding.added_to(*s))));
     let (sigma_mm, source, sigma_dof) =
         match (known.stated_sigma_mm.filter(|_| contradicted_mm.is_none()), from_repeats) {
-            (Some(stated), _) => (rounding.added_to(stated), "study", None),
-            (None, Some(found)) => (found, "repeats", Some(dof as f64)),
-            (None, None) => (rounding.added_to(known.declared_sigma_mm), "declared", None),
+            (Some(stated), _) => (rounding.added_to(stated), NoiseSource::Study, None),
+            (None, Some(found)) => (found, NoiseSource::Repeats, Some(dof as f64)),
+            (None, None) => (rounding.added_to(known.declared_sigma_mm), NoiseSource::Declared, None),
         };
     let n_poses = samples.iter().map(|s| s.pose).collect::<std::collections::BTreeSet<_>>().len();
     let tau_fold_mm = known.stated_tau_mm.unwrap_or(if n_poses < 2 { 0.0 } else { known.declared_tau_mm });
     let fixed = |tau_mm, visit_source| (tau_mm, visit_source, None, tau_mm);
     let enough = revisits.contrasts.len() >= LEAST_REVISITS && from_repeats.is_some();
     let (tau_mm, visit_source, visit_dof, tau_test_mm) = match known.stated_tau_mm {
-        Some(stated) => fixed(stated, "study"),
+        Some(stated) => fixed(stated, VisitSource::Study),
         None if enough => {
             let (tau, dof, upper) = revisits.solve(sigma_mm);
-            (tau, "revisits", Some(dof), upper)
+            (tau, VisitSource::Revisits, Some(dof), upper)
         }
-        None if n_poses < 2 => fixed(0.0, "one pose"),
-        None => fixed(known.declared_tau_mm, "declared"),
+        None if n_poses < 2 => fixed(0.0, VisitSource::OnePose),
+        None => fixed(known.declared_tau_mm, VisitSource::Declared),
     };
     let repeats = from_repeats.map(|found| (found, dof as f64));
     let visits_contradict = known.stated_tau_mm.filter(|_| enough).and_then(|stated| {
@@ -150,7 +151,10 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
     });
     let visits_beyond_mm = Some(known.declared_tau_mm).filter(|declared| {
         let (ratio, k) = revisits.beside(sigma_mm, *declared);
-        visit_source == "revisits" && *declared > 0.0 && tau_mm > BEYOND * declared && ratio > chi2_limit(k, sigma_dof)
+        visit_source == VisitSource::Revisits
+            && *declared > 0.0
+            && tau_mm > BEYOND * declared
+            && ratio > chi2_limit(k, sigma_dof)
     });
     Noise {
         sigma_mm,
@@ -221,163 +225,59 @@ impl Noise {
     /// In words, for the screen.
     #[must_use]
     pub fn says(&self) -> String {
-        let sigma = match (self.source, self.dof) {
-            ("repeats", Some(dof)) => {
-                let from = format!("from repeated touches, {dof:.0} degrees of freedom");
-                let from = match self.contradicted_mm {
-                    Some(stated) => format!("{from}; the {:.2} um that the study states are contradicted by them", um_from_mm(stated)),
-                    None => from,
-                };
-                self.later_mm.map_or(from, |later| {
-                    format!(
-                        "from touches right after each other, {dof:.0} degrees of freedom; the same points later on differ by {:.2} um, \
-                         which is more than noise",
-                        um_from_mm(later)
-                    )
-                })
-            }
-            ("study", _) => "as the study states".to_owned(),
-            _ if self.repeats_agree => "the probe's declared repeatability: the repeats agree as far as the digits of the log show (a log that was rounded, or made without noise?)".to_owned(),
-            _ => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
-        };
-        let sigma = match self.rounding_shows() {
-            true if self.source != "repeats" => {
-                format!("{sigma}; with {:.2} um that the digits of the log make", um_from_mm(self.rounding_mm))
-            }
-            _ => sigma,
-        };
-        let tau = match (self.visit_source, self.visit_dof) {
-            // the revisits scatter by less than the touches' own noise makes: a bound of nothing says nothing
-            ("revisits", Some(_)) if self.tau_test_mm <= 0.0 => {
-                "from revisited poses, which differ by no more than the touches' own noise".to_owned()
-            }
-            ("revisits", Some(dof)) => format!(
-                "from revisited poses, {} of freedom, at most {:.2} um with 90 % certainty",
-                degrees(dof),
-                um_from_mm(self.tau_test_mm)
-            ),
-            ("study", _) => "as the study states".to_owned(),
-            ("one pose", _) => "only one pose was visited".to_owned(),
-            _ if self.repeats_agree => {
-                "the axes' declared indexing repeatability: repeats that agree exactly cannot tell it".to_owned()
-            }
-            _ => "the axes' declared indexing repeatability: the plan has too few revisits to measure it".to_owned(),
-        };
-        format!(
-            "touch {:.2} um ({sigma}); index visit {:.2} um ({tau})",
-            um_from_mm(self.sigma_mm),
-            um_from_mm(self.tau_mm)
-        )
+        crate::words::fit::noise(self)
     }
 
     /// Do the digits of the log make a part of σ that a person would miss in it, a hundredth and more?
-    fn rounding_shows(&self) -> bool {
+    pub(crate) fn rounding_shows(&self) -> bool {
         let without = (self.sigma_mm * self.sigma_mm - self.rounding_mm * self.rounding_mm).max(0.0).sqrt();
         without < 0.99 * self.sigma_mm
     }
 
-    /// What the study states of the touches' noise and the log contradicts, in words.
-    #[must_use]
-    pub fn contradiction(&self) -> Option<String> {
-        let (stated, (found, dof)) = (self.contradicted_mm?, self.repeats?);
-        Some(format!(
-            "the study states a noise of {:.2} um ([noise] touch_um), and the repeats of these touches say {:.2} um ({dof:.0} \
-             degrees of freedom): no chance makes that, and the repeats are used; take touch_um out, or find out what has changed",
-            um_from_mm(stated),
-            um_from_mm(found)
-        ))
+    /// Where the study or the machine file contradicts the touches, and where the log is too coarse.
+    pub(super) fn remarks(&self) -> Vec<Remark> {
+        let of_touch = self.contradicted_mm.zip(self.repeats);
+        let of_visits = self.visits_contradict;
+        let own2 = self.sigma_mm * self.sigma_mm - self.rounding_mm * self.rounding_mm;
+        [
+            of_touch.map(|(stated_mm, (found_mm, dof))| Remark::NoiseContradicted { stated_mm, found_mm, dof }),
+            of_visits.map(|(stated_mm, found_mm, dof)| Remark::VisitsContradicted { stated_mm, found_mm, dof }),
+            self.visits_beyond_mm.map(|declared_mm| Remark::VisitsBeyond {
+                tau_mm: self.tau_mm,
+                dof: self.visit_dof.unwrap_or(0.0),
+                declared_mm,
+            }),
+            (self.rounding_mm * self.rounding_mm > own2).then_some(Remark::CoarseLog { rounding_mm: self.rounding_mm }),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 
-    /// What the study states of the visits' scatter and the log contradicts, in words.
-    #[must_use]
-    pub fn contradiction_of_visits(&self) -> Option<String> {
-        let (stated, found, dof) = self.visits_contradict?;
-        Some(format!(
-            "the study states a scatter of index visits of {:.2} um ([noise] visit_um), and the revisited poses of these touches say {:.2} um \
-             ({} of freedom): no chance makes that. What is stated is used, and the uncertainties are those of it; take visit_um out, \
-             or find out what has changed",
-            um_from_mm(stated),
-            um_from_mm(found),
-            degrees(dof)
-        ))
-    }
-
-    /// What a misfit of so many times the noise may be as well where no touches tell how much a touch scatters, in words.
-    #[must_use]
-    pub fn or_the_probe(&self, times: f64) -> Option<String> {
-        let word = self.untold()?;
-        let um = um_from_mm(self.sigma_mm * times);
-        let visits = self.tau_mm > 0.0 && self.visit_source == "declared";
-        let (more, tells) = if visits {
-            (
-                " or the axes come back less exactly than declared",
-                "several times in a row, and poses that are come back to, would",
-            )
-        } else {
-            ("", "ten times in a row would")
-        };
-        Some(format!(
-            "or nothing is, and a touch scatters by up to {um:.2} um in place of the {word} {:.2} um{more}: no repeats tell, and a point touched {tells}",
-            um_from_mm(self.sigma_mm)
-        ))
-    }
-
-    /// That the touches scatter by far less than the noise which no touches tell, in words; χ² and its degrees of freedom.
-    #[must_use]
-    pub fn far_too_large(&self, chi2: f64, dof: usize) -> Option<String> {
+    /// The touches scatter by far less than a noise that no repeats confirm; χ² and its degrees of freedom.
+    pub(super) fn far_too_large(&self, chi2: f64, dof: usize) -> Option<Remark> {
         /// A noise that is larger than the scatter by less than this is a rough figure.
         const ROUGH: f64 = 1.5;
         /// Touches that scatter by less, mm, are made without noise.
         const WITHOUT_MM: f64 = 1e-6;
-        let word = self.untold()?;
+        let source = self.unconfirmed()?;
         let below = chi2_cdf(chi2, dof as f64)?;
         let times = (chi2 / dof as f64).sqrt();
-        let says = times * ROUGH < 1.0 && times * self.sigma_mm > WITHOUT_MM && below < LEVEL;
-        says.then(|| {
-            format!(
-                "the touches fit {:.1} times better than the {word} noise of {:.2} um lets them: no chance makes that. It is used all the same, and \
-                 uncertainties that are the noise's are too large; state what the probe repeats to ([noise] touch_um)",
-                1.0 / times,
-                um_from_mm(self.sigma_mm)
-            )
-        })
+        let is_too_large = times * ROUGH < 1.0 && times * self.sigma_mm > WITHOUT_MM && below < LEVEL;
+        let (times_better, sigma_mm) = (1.0 / times, self.sigma_mm);
+        is_too_large.then_some(Remark::NoiseTooLarge { times_better, sigma_mm, source })
     }
 
-    /// Where σ comes from, if no touches tell it.
-    fn untold(&self) -> Option<&'static str> {
-        match self.source {
-            _ if self.repeats.is_some() || self.repeats_agree => None,
-            "declared" => Some("declared"),
-            "study" => Some("stated"),
-            _ => None,
-        }
+    /// Where σ comes from, if no repeats confirm it.
+    pub(crate) fn unconfirmed(&self) -> Option<NoiseSource> {
+        let has_repeats = self.repeats.is_some() || self.repeats_agree;
+        (!has_repeats && self.source != NoiseSource::Repeats).then_some(self.source)
     }
 
-    /// What else the scatter of index visits holds, in words.
+    /// What else a misfit of so many times the noise may be, in words.
     #[must_use]
-    pub fn visits_beyond(&self) -> Option<String> {
-        let declared = self.visits_beyond_mm?;
-        Some(format!(
-            "index visits scatter by {:.2} um (revisited poses, {} of freedom), and the axes declare an indexing repeatability of {:.2} um: \
-             what changes between the visits and the model lacks (drift, warming up, a slip) counts as scatter here, chi2/dof does not show \
-             it, and values may be off by more than their uncertainties; see what `axiscal diagnose` finds, or declare what the axes repeat \
-             to (indexing_repeatability_um in machines.toml)",
-            um_from_mm(self.tau_mm),
-            degrees(self.visit_dof.unwrap_or(0.0)),
-            um_from_mm(declared)
-        ))
-    }
-
-    /// What digits too few make of the answer, in words.
-    #[must_use]
-    pub fn coarse(&self) -> Option<String> {
-        let own2 = self.sigma_mm * self.sigma_mm - self.rounding_mm * self.rounding_mm;
-        (self.rounding_mm * self.rounding_mm > own2).then(|| {
-            format!(
-                "the digits of the log take away {:.2} um, more than the touches' own noise: that is the same wherever a place is touched again, so that uncertainties may be too small and a pattern be seen that is none; let the program write more decimals",
-                um_from_mm(self.rounding_mm)
-            )
-        })
+    pub fn or_the_probe(&self, times: f64) -> Option<String> {
+        crate::words::fit::or_the_probe(self, times)
     }
 
     /// χ²/dof above this says that the model fails, whatever σ is taken: with a stated σ that repeats do not bear out quite,
@@ -418,15 +318,6 @@ fn immediate_repeats(samples: &[Sample]) -> (f64, usize) {
     (squares, dof)
 }
 
-/// Degrees of freedom as a person reads them: effective ones may be far below one, and none at all is something else.
-fn degrees(dof: f64) -> String {
-    match dof {
-        d if d < 0.05 => "less than 0.1 degrees".to_owned(),
-        d if d < 9.5 => format!("{d:.1} degrees"),
-        d => format!("{d:.0} degrees"),
-    }
-}
-
 /// Two-sided 95 % factor of Student's t, or of the normal distribution where the uncertainty is taken as known.
 fn coverage(dof: Option<f64>) -> f64 {
     quantiles::student_95(dof.unwrap_or(f64::INFINITY))
@@ -460,7 +351,7 @@ mod tests {
         let at = |i: usize| 0.01 * (i / 2) as f64 + if i.is_multiple_of(2) { 1e-3 } else { -1e-3 };
         let samples: Vec<Sample> = (0..20).map(|i| sample(at(i), i / 2)).collect();
         let noise = estimate(&samples, &known(), None);
-        assert_eq!((noise.source, noise.visit_source), ("repeats", "one pose"));
+        assert_eq!((noise.source, noise.visit_source), (NoiseSource::Repeats, VisitSource::OnePose));
         assert!((noise.sigma_mm - 2f64.sqrt() * 1e-3).abs() < 1e-15);
         assert!((noise.coverage(0.0) - 2.228).abs() < 1e-3);
     }
@@ -500,14 +391,14 @@ mod tests {
         let grown = run(6e-3);
         assert_eq!(grown.dof, Some(60.0));
         assert!((grown.sigma_mm / 1e-3 - 1.0).abs() < 0.3, "{grown:?}");
-        assert!(grown.later_mm.is_some_and(|l| l > 2e-3) && grown.says().contains("more than noise"), "{grown:?}");
+        assert!(grown.later_mm.is_some_and(|l| l > 2e-3), "{grown:?}");
     }
 
     #[test]
     fn too_few_repeats_mean_the_declared_value() {
         let samples = [sample(0.1, 0), sample(0.2, 0), sample(0.3, 1)];
         let noise = estimate(&samples, &known(), None);
-        assert_eq!((noise.sigma_mm, noise.source), (5.0, "declared"));
+        assert_eq!((noise.sigma_mm, noise.source), (5.0, NoiseSource::Declared));
         assert!((noise.coverage(0.5) - 1.96).abs() < 1e-3);
     }
 
@@ -541,7 +432,7 @@ mod tests {
                 }
             }
             let noise = estimate(&samples, &known(), None);
-            assert_eq!((noise.source, noise.visit_source), ("repeats", "revisits"));
+            assert_eq!((noise.source, noise.visit_source), (NoiseSource::Repeats, VisitSource::Revisits));
             mean_tau2 += noise.tau_mm.powi(2) / f64::from(runs);
             mean_sigma2 += noise.sigma_mm.powi(2) / f64::from(runs);
             below += i32::from(noise.tau_test_mm < tau);

@@ -1,5 +1,6 @@
 //! What a fit says: values with their doubt, what cannot be told, and why it stopped (`axiscal-fit/1`).
 
+use super::remark::{NoiseSource, VisitSource};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -40,16 +41,16 @@ pub struct Outcome {
     pub held_out_rms_um: Option<f64>,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,
-    /// Where that comes from: `repeats`, `declared`, `study`.
-    pub noise_source: String,
+    /// Where that comes from.
+    pub noise_source: NoiseSource,
     /// Degrees of freedom of that; none where it is taken as known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_dof: Option<f64>,
     /// Scatter per index visit, µm.
     pub visit_um: f64,
-    /// Where that comes from: `revisits`, `declared`, `study`, `one pose`.
+    /// Where that comes from.
     #[serde(default)]
-    pub visit_source: String,
+    pub visit_source: VisitSource,
     /// Degrees of freedom of that; none where it is taken as known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub visit_dof: Option<f64>,

@@ -1,101 +1,145 @@
-//! The interval of a shape parameter: how far a time constant or a pitch may go before the touches contradict it.
+//! The likelihood profile of a shape parameter (a time constant, a pitch, a moment): its 95 % interval, other local minima, and the
+//! intervals of what depends on it.
 //!
-//! Sizes enter the touches linearly and their intervals are as wide on either side. A shape does not: a time constant that
-//! came out too short looks better known than it is. So each of its values is held in turn, everything else follows, and the
-//! interval ends where χ² has grown by k² (the likelihood profile of D. M. Bates and D. G. Watts, *Nonlinear Regression
-//! Analysis and Its Applications*, 1988, section 6.1). All but the effect's own sizes follow linearly, as they nearly do. A size
-//! beside a shape that is told weakly may be all that it is beside any of the shape's values that the touches allow.
+//! A size enters the touches linearly, and its interval is as wide on either side. A shape does not: a time constant that came out
+//! too short looks better known than it is. So the shape is held at one value after another over its whole range, everything else
+//! follows linearly, and the interval ends where χ² has grown by k² (D. M. Bates and D. G. Watts, *Nonlinear Regression Analysis
+//! and Its Applications*, 1988, section 6.1). Where the touches allow several values of the shape, the interval of every other
+//! unknown is the union of its intervals beside each of them.
 
-mod alone;
-mod ends;
-mod held;
-
+use super::Fit;
 use super::candidates::Trials;
-use super::shapes::{self, Stretch};
-use super::{Fit, Settings};
+use super::nonlinear_scan::{self, Stretch};
+use super::shape_search::ShapeSearch;
 use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Parameter};
 use crate::model::predict::{Model, Unknown};
-pub use alone::without_prior;
-use ends::{also, hull, with_all};
-use held::{Held, inverse};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Steps from the value to the end of its usual interval: a profile that goes up and down is followed to its first crossing.
-const STEPS: f64 = 4.0;
-/// After so many steps each goes further than the one before.
-const EVEN: usize = 32;
-/// Steps at most: they reach the end of any range.
-const MOST_STEPS: usize = 120;
-/// Halvings between two steps.
+/// Halvings between two values of the scan.
 const HALVINGS: usize = 30;
 
 /// χ² grows by this much at the ends of the 95 % interval of a moment at which something jumps: it is flat between two touches
 /// and a random walk from one to the next (B. E. Hansen, Econometrica 68, 2000, p. 575, table I).
 const GROWTH_OF_A_JUMP: f64 = 7.35;
+
 /// χ² grows by this much at the ends of a 95 % interval.
 const GROWTH_95: f64 = 3.841;
-/// Values at which χ² has grown by no more than so many times the limit may have a better one beside them.
+
+/// A value of the scan at which χ² has grown by no more than so many times the limit may have a better one beside it.
 const NEARLY: f64 = 8.0;
-/// So many places behind one that the touches contradict are looked at before the rest counts as contradicted.
+
+/// So many moments behind one that the touches contradict are looked at before the rest counts as contradicted.
 const LOOKED_AHEAD: usize = 40;
+
+/// An end of an interval; `None` where the touches set none.
+pub type Ends = [Option<f64>; 2];
 
 /// What the profiles say, by index among the unknowns.
 #[derive(Debug, Default)]
 pub struct Intervals {
-    /// 95 % intervals of shape parameters and of what depends on them, in their units.
-    pub ends: BTreeMap<usize, [Option<f64>; 2]>,
-    /// Other values of a shape parameter, apart from its own, that fit about as well: nobody knows which it is.
+    /// 95 % intervals of shape parameters and of what depends on them, in their units. Both ends of what is not a shape are open
+    /// where it may be so much else beside another value of a shape that it is not determined.
+    pub ends: BTreeMap<usize, Ends>,
+    /// Other values of a shape parameter that fit about as well, the best first.
     pub other_values: BTreeMap<usize, Vec<f64>>,
-    /// What may be much else beside some values of a shape, with those shapes.
-    pub lost_beside: BTreeMap<usize, BTreeSet<usize>>,
 }
 
-/// How far χ² may grow at a value of a shape before the touches contradict it.
-#[derive(Debug, Clone, Copy)]
-struct Room {
-    growth: f64,
-    /// Nothing beside that value is less sure than by so many standard uncertainties.
-    most: f64,
-}
-
-impl Room {
-    /// At one of so many values of which the best was taken, beside an interval of k standard uncertainties.
-    fn of_the_best(tried: usize) -> impl Fn(f64) -> Self {
-        let chance = by_chance(tried);
-        move |k| Self { growth: k * k + chance, most: f64::INFINITY }
-    }
-
-    /// At a moment at which something jumps.
-    fn of_a_jump(k: f64) -> Self {
-        Self { growth: GROWTH_OF_A_JUMP, most: k }
-    }
-
-    /// Standard uncertainties on either side where χ² has grown by so much; none where the touches contradict that value.
-    fn factor(self, growth: f64) -> Option<f64> {
-        let left = self.growth - growth;
-        (left > 0.0).then(|| left.sqrt().min(self.most))
-    }
-}
+/// Standard uncertainty and t-factor of a free unknown, by its index among all; none where it is not determined.
+pub type Spread<'a> = dyn Fn(usize) -> Option<(f64, f64)> + 'a;
 
 /// The best of so many values is better by chance, as χ² falls.
 fn by_chance(tried: usize) -> f64 {
     2.0 * (tried.max(1) as f64).ln()
 }
 
-/// Beside a shape that is not told something may be much else than beside the shape's value, and more than anybody expects of it: then
-/// it is not told either. `usual`: half of its interval beside the value alone.
-fn is_told(ends: [Option<f64>; 2], value: f64, usual: f64, typical: f64) -> bool {
-    const MUCH_ELSE: f64 = 2.0;
-    const TYPICAL: f64 = 5.0;
-    let most = (MUCH_ELSE * usual).max(TYPICAL * typical);
-    ends.iter().flatten().all(|end| (end - value).abs() <= most)
+/// Profiles of the shape parameters that are `asked` for.
+#[must_use]
+pub fn intervals(
+    fit: &Fit,
+    machine: &Machine,
+    effects: &[&Effect],
+    search: &ShapeSearch,
+    (asked, spread): (&dyn Fn(&Unknown) -> bool, &Spread),
+) -> Intervals {
+    let mut out = Intervals::default();
+    let has_asked = |effect: &Effect| fit.model.unknowns.iter().any(|u| u.shape && u.effect == effect.id && asked(u));
+    for effect in effects.iter().filter(|e| has_asked(e)) {
+        let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+        let trials = Trials::of(&model, &fit.data.observations);
+        // an effect of blocks has a set of parameters for each
+        for (u, p) in model.unknowns.iter().zip(effect.parameters.iter().cycle()).filter(|(u, _)| u.shape && asked(u)) {
+            let unknown = fit.model.unknowns.iter().position(|v| v.effect == u.effect && v.name == u.name);
+            let by_search = search.jumps.contains(&u.name) || search.held.contains(&u.name);
+            let Some(unknown) = unknown.filter(|i| by_search || fit.free.contains(i)) else { continue };
+            let Some(profile) = Profile::new(fit, (&model, &trials), effect, unknown) else { continue };
+            if search.jumps.contains(&u.name) {
+                profile.of_a_jump(p, spread, &mut out);
+            } else {
+                profile.of_a_smooth_shape(p, spread, &mut out);
+            }
+        }
+    }
+    // a straight line beside another shape may lead out of a range
+    for (i, ends) in &mut out.ends {
+        if let Some([low, high]) = nonlinear_scan::range_of(&fit.model.unknowns[*i], effects) {
+            *ends = [ends[0].filter(|end| *end >= low), ends[1].filter(|end| *end <= high)];
+        }
+    }
+    out
 }
 
-/// Some of the values that fit best, each with its χ²; those that are next to a better one are the same.
+/// A shape parameter as the touches alone determine it, without what the user states of it.
+pub struct WithoutPrior {
+    /// Its best value, in its unit.
+    pub value: f64,
+    /// 95 % interval; an end of its range where the touches set none.
+    pub interval: [f64; 2],
+    /// By how much χ² falls.
+    pub falls: f64,
+}
+
+/// The best value and interval of a shape parameter without its prior, or without being held. `scale2`: the variance of the touches'
+/// scatter, as a multiple of their noise, where χ² falls by so much.
+#[must_use]
+pub fn without_prior(
+    fit: &Fit,
+    machine: &Machine,
+    effects: &[&Effect],
+    unknown: usize,
+    scale2: impl Fn(f64) -> f64,
+) -> Option<WithoutPrior> {
+    let u = &fit.model.unknowns[unknown];
+    let effect = effects.iter().find(|e| e.id == u.effect)?;
+    let p = effect.parameters.iter().find(|p| p.name == u.own_name())?;
+    let (_, low, high) = p.shape?;
+    let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
+    let trials = Trials::of(&model, &fit.data.observations);
+    let mut profile = Profile::new(fit, (&model, &trials), effect, unknown)?;
+    let whole = profile.residual.norm_squared();
+    profile.drop_prior_of_shape();
+    let scan = profile.scan(p);
+    let (value, least) = profile.minima(&scan, f64::INFINITY).into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    // what the others would still gain, where they have not settled, they gain at any value
+    let falls = whole - profile.residual.norm_squared() + profile.growth(profile.values[profile.shape]) - least;
+    let ends = profile.ends(&scan, value, least + GROWTH_95 * scale2(falls));
+    Some(WithoutPrior { value, interval: [ends[0].unwrap_or(low), ends[1].unwrap_or(high)], falls })
+}
+
+/// Places from one end to the other, by equal factors where both are above 0.
+fn between([low, high]: [f64; 2]) -> Vec<f64> {
+    const PLACES: usize = 40;
+    let at = |k: usize| {
+        let share = k as f64 / PLACES as f64;
+        if low > 0.0 { low * (high / low).powf(share) } else { low + (high - low) * share }
+    };
+    (0..=PLACES).map(at).collect()
+}
+
+/// Some of the values that fit best, the best first; those that are next to a better one are the same.
 fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
     const KEPT: usize = 12;
     const SAME: f64 = 0.02;
@@ -109,99 +153,26 @@ fn best_of(mut values: Vec<(f64, f64)>) -> Vec<f64> {
     out
 }
 
-/// Standard uncertainty and t-factor of a free unknown, by its index among all.
-type Spread<'a> = dyn Fn(usize) -> Option<(f64, f64)> + 'a;
+/// Values of a shape over its range, in order, with by how much χ² is higher there.
+type Scan = Vec<(f64, f64)>;
 
-/// 95 % intervals of shape parameters and of the sizes beside them, by index among the unknowns, in their units; an end is none
-/// where the touches set none within the range of the shape. `settings`: which shapes the search holds; `of`: which shapes are asked
-/// for; `spread`: standard uncertainty and t-factor of a free unknown at the solution.
-#[must_use]
-pub fn intervals(
-    fit: &Fit,
-    machine: &Machine,
-    effects: &[&Effect],
-    settings: &Settings,
-    (of, spread): (&dyn Fn(&Unknown) -> bool, &Spread),
-) -> Intervals {
-    let mut out = Intervals::default();
-    let asked = |effect: &Effect| fit.model.unknowns.iter().any(|u| u.shape && u.effect == effect.id && of(u));
-    for effect in effects.iter().filter(|e| asked(e)) {
-        let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
-        let trials = Trials::of(&model, &fit.data.observations);
-        // an effect of blocks has a set of parameters for each
-        let all = model.unknowns.iter().zip(effect.parameters.iter().cycle());
-        for (u, p, (_, low, high)) in all.filter(|(u, _)| of(u)).filter_map(|(u, p)| Some((u, p, p.shape?))) {
-            let Some(unknown) = fit.model.unknowns.iter().position(|v| v.effect == u.effect && v.name == u.name) else {
-                continue;
-            };
-            let free = fit.free.contains(&unknown);
-            let jumps = settings.jumps.contains(&u.name);
-            if !free && !jumps && !settings.held.contains(&u.name) {
-                continue;
-            }
-            let Some(profile) = Profile::new(fit, (&model, &trials), effect, unknown) else { continue };
-            if jumps {
-                let stretches = shapes::stretches_of_a_jump(p, &fit.data, u.name.split('@').nth(1));
-                let (ends, places) = profile.ends_of_a_jump(&stretches);
-                out.ends.insert(unknown, ends);
-                // any of these moments may be it, and everything is as it is beside that one
-                profile.widen(&places, &Room::of_a_jump, spread, &mut out);
-                profile.widen_others(&places, &Room::of_a_jump, spread, &mut out);
-                continue;
-            }
-            // a shape that the touches do not tell may be any of those that were tried
-            let (places, tried) = match spread(unknown).filter(|_| free) {
-                Some(of) => {
-                    let ends = profile.ends(of, [low, high]);
-                    let all = profile.all_places(p);
-                    let beyond = profile.beyond(&all, ends, of.1 * of.1 + by_chance(all.len()));
-                    let at: Vec<f64> = beyond.iter().map(|b| b.0).collect();
-                    also(&mut out.ends, unknown, hull(ends, &at));
-                    let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
-                    let tried = if beyond.is_empty() { 1 } else { all.len() };
-                    if !beyond.is_empty() {
-                        // another value altogether: then everything else may be otherwise, too
-                        profile.widen_others(&at, &Room::of_the_best(tried), spread, &mut out);
-                        out.other_values.insert(unknown, best_of(beyond));
-                    }
-                    places.extend(at);
-                    (places, tried)
-                }
-                None => {
-                    let mut places = profile.all_places(p);
-                    places.extend([low, high, fit.theta[unknown]]);
-                    let n = places.len();
-                    // any of them may be it, and everything else as it is beside that one
-                    profile.widen_others(&places, &Room::of_the_best(n), spread, &mut out);
-                    (places, n)
-                }
-            };
-            profile.widen(&places, &Room::of_the_best(tried), spread, &mut out);
-            if !free {
-                profile.size_runs_along([low, high], spread, &mut out.ends);
-            }
-        }
-    }
-    // beside another shape a line may lead out of a range: nothing sets that end
-    for (i, ends) in &mut out.ends {
-        let u = &fit.model.unknowns[*i];
-        let name = u.name.split('@').next().unwrap_or_default();
-        let own = effects.iter().filter(|e| e.id == u.effect).flat_map(|e| &e.parameters);
-        if let Some((_, low, high)) = own.filter(|p| p.name == name).find_map(|p| p.shape) {
-            *ends = [ends[0].filter(|end| *end >= low), ends[1].filter(|end| *end <= high)];
-        }
-    }
-    out
+/// What follows while a shape is held.
+struct Held {
+    /// By how much χ² has grown.
+    growth: f64,
+    /// Value and standard uncertainty of each of the profile's followers.
+    followers: Vec<(f64, f64)>,
 }
 
-/// Places from one end to the other, by equal factors where both are above 0.
-fn between([low, high]: [f64; 2]) -> Vec<f64> {
-    const PLACES: usize = 40;
-    let at = |k: usize| {
-        let share = k as f64 / PLACES as f64;
-        if low > 0.0 { low * (high / low).powf(share) } else { low + (high - low) * share }
-    };
-    (0..=PLACES).map(at).collect()
+/// Which values of a shape the touches allow, and what of the other unknowns depends on that.
+struct Allowed<'p> {
+    places: &'p [f64],
+    /// χ² may grow by so much more than k²; none at a moment of a jump, which has a limit of its own.
+    chance: Option<f64>,
+    /// The shape is not determined: then nothing else is surer than beside any allowed value.
+    all_followers: bool,
+    /// An interval is called one if it reaches no further than so many usual sizes, or twice its usual width.
+    typical_sizes: f64,
 }
 
 /// χ² as a function of one shape parameter, everything else following.
@@ -219,16 +190,13 @@ struct Profile<'a> {
     values: Vec<f64>,
     /// Places of the free sizes among the effect's parameters.
     sizes: Vec<usize>,
+    /// Indices among the unknowns of all that follows: the sizes first, then the rest.
+    followers: Vec<usize>,
     /// Whitened residuals of touches and priors.
     residual: DVector<f64>,
-    /// Whitened Jacobian of all free unknowns but the shape and the sizes.
-    others: DMatrix<f64>,
-    /// Their indices among the unknowns.
-    rest: Vec<usize>,
-    /// The others' covariance.
+    /// Whitened Jacobian of the rest, and its covariance.
+    rest: DMatrix<f64>,
     covariance: DMatrix<f64>,
-    /// Index of each size among the unknowns.
-    unknowns: Vec<usize>,
     /// Rows of the priors in the columns of the sizes, and in that of the shape.
     priors: DMatrix<f64>,
     prior_of_shape: DVector<f64>,
@@ -239,27 +207,22 @@ struct Profile<'a> {
 impl<'a> Profile<'a> {
     /// `alone`: the model of the effect alone, with its columns.
     fn new(fit: &'a Fit, alone: (&'a Model, &'a Trials<'a>), effect: &'a Effect, unknown: usize) -> Option<Self> {
-        let set = shapes::set_of(alone.0, effect, &fit.model.unknowns[unknown].name)?;
-        let own = alone.0.unknowns[set.clone()].iter();
-        let places = own
-            .map(|own| fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == own.name))
-            .collect::<Option<Vec<usize>>>()?;
+        let set = nonlinear_scan::set_of(alone.0, effect, &fit.model.unknowns[unknown].name)?;
+        let index = |own: &Unknown| fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == own.name);
+        let places = alone.0.unknowns[set.clone()].iter().map(index).collect::<Option<Vec<usize>>>()?;
         let shape = places.iter().position(|&i| i == unknown)?;
-        let free = |i: usize| fit.free.binary_search(&places[i]).ok();
-        let sizes: Vec<usize> =
-            (0..places.len()).filter(|&i| effect.parameters[i].shape.is_none() && free(i).is_some()).collect();
-        let own: Vec<usize> = sizes.iter().filter_map(|&i| free(i)).collect();
-        let here = free(shape);
+        let column = |i: usize| fit.free.binary_search(&places[i]).ok();
+        let is_size = |i: &usize| effect.parameters[*i].shape.is_none() && column(*i).is_some();
+        let sizes: Vec<usize> = (0..places.len()).filter(is_size).collect();
+        let own: Vec<usize> = sizes.iter().filter_map(|&i| column(i)).collect();
+        let here = column(shape);
         let linear = fit.linear(fit.noise.tau_mm);
-        let n = fit.data.observations.len();
         let rest: Vec<usize> = (0..fit.free.len()).filter(|c| Some(*c) != here && !own.contains(c)).collect();
-        let others = linear.jacobian.select_columns(&rest);
-        let products = others.tr_mul(&others);
-        let covariance = inverse(&products, &products.diagonal()).inverse;
+        let columns = linear.jacobian.select_columns(&rest);
+        let products = columns.tr_mul(&columns);
+        let n = fit.data.observations.len();
         let n_priors = linear.jacobian.nrows() - n;
         let prior_rows = linear.jacobian.rows(n, n_priors);
-        let priors = prior_rows.select_columns(&own);
-        let prior_of_shape = here.map_or_else(|| DVector::zeros(n_priors), |c| prior_rows.column(c).into_owned());
         let mut out = Self {
             fit,
             alone,
@@ -268,14 +231,13 @@ impl<'a> Profile<'a> {
             unknown,
             shape,
             values: places.iter().map(|&i| fit.theta[i]).collect(),
-            unknowns: sizes.iter().map(|&i| places[i]).collect(),
             sizes,
+            followers: own.iter().chain(&rest).map(|&c| fit.free[c]).collect(),
+            covariance: Inverse::new(&products, &products.diagonal()).inverse,
+            rest: columns,
+            priors: prior_rows.select_columns(&own),
+            prior_of_shape: here.map_or_else(|| DVector::zeros(n_priors), |c| prior_rows.column(c).into_owned()),
             residual: linear.residual,
-            covariance,
-            rest: rest.iter().map(|&c| fit.free[c]).collect(),
-            others,
-            priors,
-            prior_of_shape,
             now: DVector::zeros(0),
         };
         out.now = out.does(out.values[shape]).1;
@@ -291,64 +253,127 @@ impl<'a> Profile<'a> {
         }
     }
 
-    /// Whitened columns of the effect's free sizes at a value of the shape, and what its sizes do there (touches only).
-    fn does(&self, at: f64) -> (DMatrix<f64>, DVector<f64>) {
-        let mut values = self.values.clone();
-        values[self.shape] = at;
-        let (model, trials) = self.alone;
-        let all = trials.columns(&shapes::variant(model, &self.set, &values)).values;
-        let mut all = all.columns_range(self.set.clone()).into_owned();
-        self.fit.whitening(self.fit.noise.tau_mm).apply(&mut all);
-        let size = |i: usize| if self.effect.parameters[i].shape.is_some() { 0.0 } else { values[i] };
-        let does = &all * DVector::from_fn(values.len(), |i, _| size(i));
-        (all.select_columns(&self.sizes), does)
+    /// The interval of a moment at which something jumps. Any of the moments in it may be the right one, and everything else is
+    /// as it is beside that one.
+    fn of_a_jump(&self, p: &Parameter, spread: &Spread, out: &mut Intervals) {
+        let block = self.fit.model.unknowns[self.unknown].block();
+        let (ends, places) = self.ends_of_a_jump(&nonlinear_scan::stretches_of_a_jump(p, &self.fit.data, block));
+        out.ends.insert(self.unknown, ends);
+        let allowed = Allowed { places: &places, chance: None, all_followers: true, typical_sizes: 5.0 };
+        self.widen(&allowed, spread, out);
     }
 
-    /// The values below and above the shape's at which χ² has grown by k².
-    fn ends(&self, (sigma, k): (f64, f64), range: [f64; 2]) -> [Option<f64>; 2] {
-        let (value, width) = (self.values[self.shape], k * sigma);
-        let inside = |at: f64| self.held(at).growth < k * k;
-        let end = |side: f64, limit: f64| -> Option<f64> {
-            if width.is_nan() || width <= 0.0 {
-                return None;
-            }
-            let (mut last, mut stride) = (value, width / STEPS);
-            for step in 0..MOST_STEPS {
-                let at = last + side * stride;
-                let (at, over) = if side * (at - limit) >= 0.0 { (limit, true) } else { (at, false) };
-                if !inside(at) {
-                    let (mut from, mut to) = (last, at);
-                    for _ in 0..HALVINGS {
-                        let middle = 0.5 * (from + to);
-                        if inside(middle) { from = middle } else { to = middle }
-                    }
-                    return Some(0.5 * (from + to));
-                }
-                if over {
-                    return None;
-                }
-                last = at;
-                if step > EVEN {
-                    stride *= 1.2;
-                }
-            }
-            None
+    /// Interval and other minima of a shape on which the touches depend smoothly.
+    fn of_a_smooth_shape(&self, p: &Parameter, spread: &Spread, out: &mut Intervals) {
+        let Some((_, low, high)) = p.shape else { return };
+        let scan = self.scan(p);
+        let is_free = self.fit.free.binary_search(&self.unknown).is_ok();
+        let Some((_, k)) = spread(self.unknown).filter(|_| is_free) else {
+            // it is not determined: it may be any of those that were tried
+            let mut places: Vec<f64> = scan.iter().map(|s| s.0).collect();
+            places.extend([low, high]);
+            let chance = Some(by_chance(places.len()));
+            let allowed = Allowed { places: &places, chance, all_followers: true, typical_sizes: 5.0 };
+            return self.widen(&allowed, spread, out);
         };
-        [end(-1.0, range[0]), end(1.0, range[1])]
+        let ends = self.ends(&scan, self.values[self.shape], k * k);
+        let is_beyond = |at: f64| ends[0].is_some_and(|low| at < low) || ends[1].is_some_and(|high| at > high);
+        let mut others = self.minima(&scan, k * k + by_chance(scan.len()));
+        others.retain(|(at, _)| is_beyond(*at));
+        let beyond: Vec<f64> = others.iter().map(|o| o.0).collect();
+        let with_all =
+            |end: Option<f64>, pick: fn(f64, f64) -> f64| end.map(|end| beyond.iter().copied().fold(end, pick));
+        out.ends.insert(self.unknown, [with_all(ends[0], f64::min), with_all(ends[1], f64::max)]);
+        let mut places = between([ends[0].unwrap_or(low), ends[1].unwrap_or(high)]);
+        places.extend(&beyond);
+        let is_unique = beyond.is_empty();
+        self.widen(
+            &Allowed {
+                places: &places,
+                chance: Some(if is_unique { 0.0 } else { by_chance(scan.len()) }),
+                all_followers: !is_unique,
+                typical_sizes: if is_unique { 5.0 } else { 0.0 },
+            },
+            spread,
+            out,
+        );
+        if !is_unique {
+            out.other_values.insert(self.unknown, best_of(others));
+        }
+    }
+
+    /// χ² over the whole range, at values near to each other, and at the solution.
+    fn scan(&self, p: &Parameter) -> Scan {
+        let mut places = if p.between.is_some() {
+            nonlinear_scan::all_tried(p, &self.fit.data)
+        } else {
+            nonlinear_scan::fine(p, self.fit.data.observations.len(), &|at| self.does(at).0)
+        };
+        places.push(self.values[self.shape]);
+        places.sort_by(f64::total_cmp);
+        places.dedup();
+        places.par_iter().map(|&at| (at, self.growth(at))).collect()
+    }
+
+    /// Local minima at which χ² has grown by less than a limit, each with its growth.
+    fn minima(&self, scan: &Scan, limit: f64) -> Vec<(f64, f64)> {
+        let growth = |by: usize| scan.get(by).map_or(f64::INFINITY, |s| s.1);
+        let mut out = Vec::new();
+        for k in 0..scan.len() {
+            // a value that is worse than the one beside it belongs to that one
+            let is_lowest = growth(k) <= growth(k.wrapping_sub(1)) && growth(k) <= growth(k + 1);
+            if !is_lowest || growth(k) >= NEARLY * limit {
+                continue;
+            }
+            let (mut from, mut to) = (scan[k.saturating_sub(1)].0, scan[(k + 1).min(scan.len() - 1)].0);
+            for _ in 0..HALVINGS {
+                let third = (to - from) / 3.0;
+                if self.growth(from + third) < self.growth(to - third) { to -= third } else { from += third }
+            }
+            let best = 0.5 * (from + to);
+            let least = self.growth(best);
+            if least < limit {
+                out.push((best, least));
+            }
+        }
+        out
+    }
+
+    /// The nearest values below and above one of the shape's at which χ² has grown by a limit; none where the range ends before.
+    fn ends(&self, scan: &Scan, value: f64, limit: f64) -> Ends {
+        let is_inside = |growth: f64| growth < limit;
+        let end = |further: &mut dyn Iterator<Item = &(f64, f64)>| -> Option<f64> {
+            let (mut inside, mut outside) = (value, None);
+            for &(at, growth) in further {
+                if !is_inside(growth) {
+                    outside = Some(at);
+                    break;
+                }
+                inside = at;
+            }
+            let mut outside = outside?;
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (inside + outside);
+                if is_inside(self.growth(middle)) { inside = middle } else { outside = middle }
+            }
+            Some(0.5 * (inside + outside))
+        };
+        let below = scan.partition_point(|s| s.0 < value);
+        let above = scan.partition_point(|s| s.0 <= value);
+        [end(&mut scan[..below].iter().rev()), end(&mut scan[above..].iter())]
     }
 
     /// The first and the last moment of a jump that the touches do not contradict, and a place in each stretch between them that they
     /// do not; `stretches`: where it may be, in order.
-    fn ends_of_a_jump(&self, stretches: &[Stretch]) -> ([Option<f64>; 2], Vec<f64>) {
+    fn ends_of_a_jump(&self, stretches: &[Stretch]) -> (Ends, Vec<f64>) {
         let value = self.values[self.shape];
-        let allowed = |at: &Stretch| self.held(at.place).growth < GROWTH_OF_A_JUMP;
         let here = stretches.iter().position(|s| s.ends[0] <= value && value <= s.ends[1]);
         let Some(here) = here else { return ([None, None], Vec::new()) };
         let mut places = vec![value];
         let mut end = |further: &mut dyn Iterator<Item = &Stretch>, side: usize| -> Option<f64> {
             let (mut last, mut beyond) = (stretches[here].ends[side], 0);
             for stretch in further {
-                if allowed(stretch) {
+                if self.growth(stretch.place) < GROWTH_OF_A_JUMP {
                     (last, beyond) = (stretch.ends[side], 0);
                     places.push(stretch.place);
                 } else {
@@ -365,106 +390,144 @@ impl<'a> Profile<'a> {
         (ends, places)
     }
 
-    /// Values of the shape over all of its range, near to each other; n of them where they are many.
-    fn all_places(&self, p: &Parameter) -> Vec<f64> {
-        if p.between.is_some() {
-            return shapes::all_tried(p, &self.fit.data);
-        }
-        shapes::fine(p, self.fit.data.observations.len(), &|at| self.does(at).0)
-    }
-
-    /// Values beyond the ends of the first crossing that the touches allow as well, with by how much χ² is higher there.
-    fn beyond(&self, places: &[f64], [low, high]: [Option<f64>; 2], growth: f64) -> Vec<(f64, f64)> {
-        let outside = |at: f64| low.is_some_and(|low| at < low) || high.is_some_and(|high| at > high);
-        let growth_at = |at: f64| self.held(at).growth;
-        let growths: Vec<f64> = places.par_iter().map(|&at| growth_at(at)).collect();
-        let neighbour = |by: usize| growths.get(by).copied().unwrap_or(f64::INFINITY);
-        let mut out = Vec::new();
-        for k in 0..places.len() {
-            // a value that is worse than the one beside it belongs to that one
-            let lowest = growths[k] <= neighbour(k.wrapping_sub(1)) && growths[k] <= neighbour(k + 1);
-            if !lowest || growths[k] >= NEARLY * growth {
-                continue;
-            }
-            let (mut from, mut to) = (places[k.saturating_sub(1)], places[(k + 1).min(places.len() - 1)]);
-            for _ in 0..HALVINGS {
-                let third = (to - from) / 3.0;
-                if growth_at(from + third) < growth_at(to - third) { to -= third } else { from += third }
-            }
-            let best = 0.5 * (from + to);
-            let least = growth_at(best);
-            if least < growth && outside(best) {
-                out.push((best, least));
-            }
-        }
-        out
-    }
-
-    /// Intervals of everything else that is told, beside values of the shape that fit as well.
-    fn widen_others(&self, places: &[f64], room: &dyn Fn(f64) -> Room, spread: &Spread, out: &mut Intervals) {
-        let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
-        for (r, &unknown) in self.rest.iter().enumerate() {
-            let Some((sigma, k)) = spread(unknown) else { continue };
-            let beside = held.iter().filter_map(|h| {
-                let factor = room(k).factor(h.growth)?;
-                h.others.get(r).map(|of| (*of, factor.min(k)))
-            });
-            let value = self.fit.theta[unknown];
-            let typical = self.fit.model.unknowns[unknown].typical;
-            self.found(unknown, with_all((value, sigma, k), beside), (value, k * sigma, typical), out);
-        }
-    }
-
-    /// Intervals of the sizes: all that each may be beside some places of the shape.
-    fn widen(&self, places: &[f64], room: &dyn Fn(f64) -> Room, spread: &Spread, out: &mut Intervals) {
-        let held: Vec<Held> = places.iter().map(|&at| self.held(at)).collect();
+    /// Intervals of what follows: all that it may be beside the allowed values of the shape.
+    fn widen(&self, allowed: &Allowed, spread: &Spread, out: &mut Intervals) {
+        const MUCH_ELSE: f64 = 2.0;
+        let held: Vec<Held> = allowed.places.iter().map(|&at| self.held(at)).collect();
         let lowest = held.iter().map(|h| h.growth).fold(0.0, f64::min);
-        for (c, (&i, &unknown)) in self.sizes.iter().zip(&self.unknowns).enumerate() {
+        let n = if allowed.all_followers { self.followers.len() } else { self.sizes.len() };
+        for (c, &unknown) in self.followers[..n].iter().enumerate() {
             let Some((sigma, k)) = spread(unknown) else { continue };
-            let beside = held.iter().filter_map(|h| {
-                let factor = room(k).factor(h.growth - lowest)?;
-                h.sizes.get(c).map(|of| (*of, factor))
-            });
-            let (value, typical) = (self.values[i], self.effect.parameters[i].typical);
-            self.found(unknown, with_all((value, sigma, k), beside), (value, k * sigma, typical), out);
+            let (limit, most) = match (allowed.chance, c < self.sizes.len()) {
+                (None, _) => (GROWTH_OF_A_JUMP, k),
+                (Some(chance), true) => (k * k + chance, f64::INFINITY),
+                (Some(chance), false) => (k * k + chance, k),
+            };
+            let (value, usual) = (self.fit.theta[unknown], k * sigma);
+            let (mut low, mut high) = (value - usual, value + usual);
+            for h in &held {
+                let left = limit - (h.growth - lowest);
+                if let Some((at, sigma)) = h.followers.get(c).filter(|_| left > 0.0) {
+                    let by = sigma * left.sqrt().min(most);
+                    (low, high) = (low.min(at - by), high.max(at + by));
+                }
+            }
+            let room = (MUCH_ELSE * usual).max(allowed.typical_sizes * self.fit.model.unknowns[unknown].typical);
+            let is_determined = value - low <= room && high - value <= room;
+            let ends = if is_determined { [Some(low), Some(high)] } else { [None, None] };
+            // beside each of several shapes it may be something else
+            let known = out.ends.entry(unknown).or_insert(ends);
+            *known = [known[0].zip(ends[0]).map(|(a, b)| a.min(b)), known[1].zip(ends[1]).map(|(a, b)| a.max(b))];
         }
     }
 
-    /// The ends of an interval, or none where it may be much else.
-    fn found(
-        &self,
-        unknown: usize,
-        ends: [Option<f64>; 2],
-        (value, usual, typical): (f64, f64, f64),
-        out: &mut Intervals,
-    ) {
-        let told = is_told(ends, value, usual, typical);
-        also(&mut out.ends, unknown, if told { ends } else { [None, None] });
-        if !told {
-            out.lost_beside.entry(unknown).or_default().insert(self.unknown);
+    /// Whitened columns of the effect's free sizes at a value of the shape, and what its sizes do there (touches only).
+    fn does(&self, at: f64) -> (DMatrix<f64>, DVector<f64>) {
+        let mut values = self.values.clone();
+        values[self.shape] = at;
+        let (model, trials) = self.alone;
+        let all = trials.columns(&nonlinear_scan::variant(model, &self.set, &values)).values;
+        let mut all = all.columns_range(self.set.clone()).into_owned();
+        self.fit.whitening(self.fit.noise.tau_mm).apply(&mut all);
+        let size = |i: usize| if self.effect.parameters[i].shape.is_some() { 0.0 } else { values[i] };
+        let does = &all * DVector::from_fn(values.len(), |i, _| size(i));
+        (all.select_columns(&self.sizes), does)
+    }
+
+    /// By how much χ² grows while the shape is held at a value.
+    fn growth(&self, at: f64) -> f64 {
+        self.held(at).growth
+    }
+
+    /// What χ² and all that follows are while the shape is held at a value.
+    fn held(&self, at: f64) -> Held {
+        /// What moves by more than this share of its usual size along with something that leaves no trace leaves none either.
+        const NO_TRACE: f64 = 0.01;
+        let (columns, does) = self.does(at);
+        let n = columns.nrows();
+        if does.iter().any(|x| !x.is_finite()) {
+            return Held { growth: f64::INFINITY, followers: Vec::new() };
         }
+        let mut y = self.residual.clone();
+        let mut touches = y.rows_mut(0, n);
+        touches += does - &self.now;
+        let n_priors = y.len() - n;
+        let mut known = y.rows_mut(n, n_priors);
+        known += &self.prior_of_shape * (at - self.values[self.shape]);
+        let mut a = DMatrix::zeros(y.len(), columns.ncols());
+        a.rows_mut(0, n).copy_from(&columns);
+        a.rows_mut(n, n_priors).copy_from(&self.priors);
+        let follow = &self.covariance * self.rest.tr_mul(&a);
+        let followed = &self.covariance * self.rest.tr_mul(&y);
+        // what the rest cannot do, row by row: as a difference of products what is next to nothing would be rounding
+        let own = &a - &self.rest * &follow;
+        let left = &y - &self.rest * &followed;
+        let slope = own.tr_mul(&left);
+        let raw = DVector::from_iterator(a.ncols(), a.column_iter().map(|c| c.norm_squared()));
+        let gram = own.tr_mul(&own);
+        // a size with hardly a trace here would fit with any value, of metres: a wide prior keeps it within what machines have
+        let typical = |c: usize| self.fit.model.unknowns[self.followers[c]].typical;
+        let value = DVector::from_fn(self.sizes.len(), |c, _| self.values[self.sizes[c]]);
+        let prior = DVector::from_fn(self.sizes.len(), |c, _| {
+            (nonlinear_scan::CREDIBLE * typical(c).max(value[c].abs())).powi(-2)
+        });
+        let from_prior = |size: &DVector<f64>| size.component_mul(&prior).dot(size);
+        let lost = Inverse::new(&gram, &raw).lost;
+        let inverse = Inverse::new(&(&gram + DMatrix::from_diagonal(&prior)), &raw).inverse;
+        let step = &inverse * (&slope + prior.component_mul(&value));
+        let growth = left.norm_squared() - 2.0 * slope.dot(&step) + step.dot(&(&gram * &step))
+            - self.residual.norm_squared()
+            + from_prior(&(&value - &step))
+            - from_prior(&value);
+        // a size that leaves no trace here may be anything, and so may what follows it
+        let free: Vec<DVector<f64>> = lost
+            .iter()
+            .map(|v| v / v.iter().enumerate().map(|(c, w)| w.abs() / typical(c)).fold(0.0, f64::max))
+            .collect();
+        let sigma = |along: f64, c: usize, variance: f64| {
+            if along > NO_TRACE * typical(c) { f64::INFINITY } else { variance.max(0.0).sqrt() }
+        };
+        let of_sizes = (0..self.sizes.len()).map(|c| {
+            let along = free.iter().map(|v| v[c].abs()).fold(0.0, f64::max);
+            (value[c] - step[c], sigma(along, c, inverse[(c, c)]))
+        });
+        // how the rest moves while it and the sizes settle, and how far it scatters there
+        let moved = &follow * &step - &followed;
+        let scatter = &follow * &inverse;
+        let of_rest = (0..self.covariance.nrows()).map(|r| {
+            let c = self.sizes.len() + r;
+            let variance = self.covariance[(r, r)] + scatter.row(r).dot(&follow.row(r));
+            let along = free.iter().map(|v| (follow.row(r) * v).x.abs()).fold(0.0, f64::max);
+            (self.fit.theta[self.followers[c]] + moved[r], sigma(along, c, variance))
+        });
+        Held { growth, followers: of_sizes.chain(of_rest).collect() }
     }
 }
 
-impl Profile<'_> {
-    /// Sizes that run away along with a shape that is held at an end of its range: how large they are is what the end was chosen to
-    /// be, and no interval holds that.
-    fn size_runs_along(&self, [low, high]: [f64; 2], spread: &Spread, out: &mut BTreeMap<usize, [Option<f64>; 2]>) {
-        /// The range would end so much earlier.
-        const SHARE: f64 = 0.2;
-        let value = self.values[self.shape];
-        let part = |end: f64| SHARE * if low > 0.0 { end } else { high - low };
-        let inner = match value {
-            v if v == low => low + part(low),
-            v if v == high => high - part(high),
-            _ => return,
-        };
-        let (at, aside) = (self.held(value), self.held(inner));
-        for (&unknown, (one, other)) in self.unknowns.iter().zip(at.sizes.iter().zip(&aside.sizes)) {
-            let Some((sigma, k)) = spread(unknown) else { continue };
-            if (one.0 - other.0).abs() > k * sigma {
-                out.insert(unknown, [None, None]);
-            }
+/// The inverse of a matrix of products, without what leaves no trace in it, and the directions that leave none.
+struct Inverse {
+    inverse: DMatrix<f64>,
+    lost: Vec<DVector<f64>>,
+}
+
+impl Inverse {
+    /// `raw`: the squares by which it is scaled.
+    fn new(gram: &DMatrix<f64>, raw: &DVector<f64>) -> Self {
+        /// Smaller eigenvalues of the scaled matrix are rounding.
+        const LEAST: f64 = 1e-10;
+        let scale = raw.map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
+        let n = gram.nrows();
+        if n == 0 {
+            return Self { inverse: gram.clone(), lost: Vec::new() };
+        }
+        let eigen = DMatrix::from_fn(n, n, |a, b| gram[(a, b)] / (scale[a] * scale[b])).symmetric_eigen();
+        let of = |v: f64| if v > LEAST { 1.0 / v } else { 0.0 };
+        let inverse =
+            &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(of)) * eigen.eigenvectors.transpose();
+        let lost = (0..n).filter(|&k| eigen.eigenvalues[k] <= LEAST);
+        Self {
+            inverse: DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] / (scale[a] * scale[b])),
+            lost: lost.map(|k| eigen.eigenvectors.column(k).component_div(&scale)).collect(),
         }
     }
 }

@@ -148,7 +148,7 @@ pub fn free_in_a_design(model: &Model, effects: &[&Effect], data: &Data, held: &
 #[must_use]
 pub fn jumps_in_a_design<'e>(effect: &'e Effect, data: &Data) -> Vec<&'e Parameter> {
     let usual: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(p.typical, |s| s.0)).collect();
-    let names = super::shapes::jumps(effect, &usual, data);
+    let names = super::nonlinear_scan::jumps(effect, &usual, data);
     effect.parameters.iter().filter(|p| names.iter().any(|(name, _)| *name == p.name)).collect()
 }
 

@@ -3,6 +3,7 @@
 
 use super::Fit;
 use super::candidates::{columns, without_value};
+use super::remark::Remark;
 use super::uncertainty::free_covariance;
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::Machine;
@@ -20,8 +21,8 @@ pub(super) struct TypeB {
     pub sigma: f64,
     /// What one standard uncertainty of it makes of each free unknown, with its sign, in the unknown's unit.
     pub makes: DVector<f64>,
-    /// What a reader must not miss.
-    pub warning: Option<String>,
+    /// What a reader must know.
+    pub remark: Option<Remark>,
 }
 
 /// The type B row of the thermometer, K: what the temperature's own uncertainty makes of all that goes with the temperature.
@@ -29,20 +30,13 @@ const THERMOMETER: &str = "temperature";
 
 impl TypeB {
     fn new(name: &str, unit: &str, sigma: f64, moved: &DVector<f64>, per_kelvin: bool) -> Self {
-        let warning = if per_kelvin {
-            Some(format!(
-                "type B: {name} goes with the temperature, and no touch carries one: it is counted as if everything had been \
-                 touched 1 K off 20 °C; multiply its uncertainty by the kelvins that the room may be off, or log the temperature"
-            ))
-        } else if moved.amax() == 0.0 {
-            Some(format!(
-                "type B: {name} makes nothing of these touches, and adds nothing to any uncertainty; where it goes with the \
-                 temperature they are at 20 °C: state the doubt of the thermometer, {THERMOMETER} = … (K)"
-            ))
-        } else {
-            None
+        let name = name.to_owned();
+        let remark = match (per_kelvin, moved.amax() == 0.0) {
+            (true, _) => Some(Remark::TypeBPerKelvin { name: name.clone() }),
+            (false, true) => Some(Remark::TypeBWithoutEffect { name: name.clone() }),
+            (false, false) => None,
         };
-        Self { name: name.to_owned(), unit: unit.to_owned(), sigma, makes: moved * sigma, warning }
+        Self { name, unit: unit.to_owned(), sigma, makes: moved * sigma, remark }
     }
 }
 

@@ -12,7 +12,6 @@ use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// With more touches the whole catalogue would take longer than everything else together.
@@ -20,9 +19,6 @@ pub(super) const MOST_UNMODELLED: usize = 20_000;
 
 /// Touches whose columns of the whole catalogue are held at once.
 const UNMODELLED_AT_ONCE: usize = 128;
-
-/// Up to this number of touches their columns of the whole catalogue are made beside the fit, and held.
-const HELD: usize = 1024;
 
 /// Variance of each free unknown that goes back to the scatter of visits.
 pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
@@ -72,8 +68,13 @@ pub(super) fn moves_with_unseen(fit: &Fit) -> DVector<f64> {
     if fit.seen.unseen.is_empty() {
         return DVector::zeros(p);
     }
-    let rooms = rooms_of_shapes(fit);
-    let typical = |c: usize| rooms.get(&c).copied().unwrap_or(fit.model.unknowns[fit.free[c]].typical);
+    // a shape that leaves no trace has an effect that does not show: whatever its value is, it moves nothing by more than the
+    // uncertainty of its sizes, which is counted already
+    const OF_A_SHAPE: f64 = 1e-9;
+    let typical = |c: usize| {
+        let u = &fit.model.unknowns[fit.free[c]];
+        u.typical * if u.shape { OF_A_SHAPE } else { 1.0 }
+    };
     let each: Vec<DVector<f64>> = fit
         .seen
         .unseen
@@ -119,54 +120,6 @@ fn bends(fit: &Fit, steps: &[DVector<f64>]) -> DVector<f64> {
     out
 }
 
-/// How far a shape parameter that leaves no trace may go, by its place among the free unknowns: until what it does has changed by all
-/// that its effect does. Where the touches do not show the effect either, whatever pitch it has moves nothing by more than the
-/// uncertainty of its size, which is counted already.
-fn rooms_of_shapes(fit: &Fit) -> BTreeMap<usize, f64> {
-    /// Standard uncertainties from which a size is shown.
-    const SHOWN: f64 = 3.0;
-    /// Share of its usual size that a shape of nothing may go.
-    const NONE: f64 = 1e-9;
-    let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
-    let is_unseen = |c: &usize| fit.seen.unseen.iter().any(|v| v[*c].abs() > 1e-9);
-    let shapes: Vec<usize> = (0..fit.free.len()).filter(|&c| unknown(c).shape).filter(is_unseen).collect();
-    if shapes.is_empty() {
-        return BTreeMap::new();
-    }
-    let theta = fit.free_theta();
-    let gram = fit.with_touches(fit.noise.tau_mm, |t| t.normal(&theta, true).gram);
-    let room = |c: usize| {
-        let own = |k: &usize| unknown(*k).effect == unknown(c).effect && !unknown(*k).shape;
-        let sizes: Vec<usize> = (0..fit.free.len()).filter(own).collect();
-        let sigma = |k: usize| fit.covariance[(fit.free[k], fit.free[k])].max(0.0).sqrt();
-        let (slope, typical) = (gram[(c, c)], unknown(c).typical);
-        // all that it does, in units of the noise
-        let product = |a: usize, b: usize| theta[a] * theta[b] * gram[(a, b)];
-        let square: f64 = sizes.iter().map(|&a| sizes.iter().map(|&b| product(a, b)).sum::<f64>()).sum();
-        let small = |k: &usize| theta[*k].abs() < SHOWN * sigma(*k);
-        // what of it the other unknowns cannot do. The shape was chosen as the best of many: chance makes more of it than of a size
-        let by_chance = SHOWN * SHOWN * (sizes.len() + 1) as f64;
-        if slope <= 0.0 || shown(fit, &sizes) < by_chance || sizes.iter().all(small) {
-            return (c, NONE * typical);
-        }
-        (c, (square.max(0.0) / slope).sqrt().clamp(NONE * typical, typical))
-    };
-    shapes.into_iter().map(room).collect()
-}
-
-/// χ² by which some of the free unknowns are not 0, with all others free to follow.
-fn shown(fit: &Fit, which: &[usize]) -> f64 {
-    let each = |k: usize| fit.free[which[k]];
-    let n = which.len();
-    let theta = DVector::from_fn(n, |k, _| fit.theta[each(k)]);
-    let covariance = DMatrix::from_fn(n, n, |a, b| fit.covariance[(each(a), each(b))]);
-    // scaled to a diagonal of ones: sizes may have different units
-    let scale = covariance.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
-    let scaled = DMatrix::from_fn(n, n, |a, b| covariance[(a, b)] / (scale[a] * scale[b]));
-    let off = theta.component_div(&scale);
-    scaled.cholesky().map_or(f64::INFINITY, |c| off.dot(&c.solve(&off)))
-}
-
 /// Effects that may act although a model with these unknowns does not hold them: all of the catalogue but those that share a
 /// parameter with the model, the paper's sets and whole hypotheses.
 #[must_use]
@@ -175,13 +128,9 @@ pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c
     catalogue.acting_on(machine).filter(|e| !held(e)).collect()
 }
 
-/// What a model leaves out (not the set-ups of blocks), and what it would do to touches. Nothing of it depends on a solution.
+/// Effects outside of a model (not the block positions) that may act on its touches.
 pub(super) struct LeftOut {
     model: Model,
-    /// Its unknowns, without those that are seen to do nothing to any touch.
-    acting: Vec<usize>,
-    /// mm at the usual size of each of these, one row per touch; `None` where there are many, whose columns are made part by part.
-    columns: Option<DMatrix<f64>>,
     /// What is said of effects that could not be counted.
     says: Vec<String>,
 }
@@ -193,14 +142,7 @@ impl LeftOut {
         effects.retain(|e| !e.per_block);
         let (effects, says) = with_values(effects, &data.observations);
         let model = Model::new(machine, &effects, &data.set_ups, model.reference);
-        let (mut acting, mut columns): (Vec<usize>, _) = ((0..model.n_unknowns()).collect(), None);
-        if data.observations.len() <= HELD {
-            let all = typical_columns(&model, &data.observations);
-            let idle: Vec<usize>;
-            (idle, acting) = acting.into_iter().partition(|&c| all.column(c).iter().all(|v| *v == 0.0));
-            columns = Some(all.remove_columns_at(&idle));
-        }
-        Self { model, acting, columns, says }
+        Self { model, says }
     }
 }
 
@@ -218,34 +160,28 @@ fn typical_columns(model: &Model, observations: &[Observation]) -> DMatrix<f64> 
 /// counted.
 pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -> Unmodelled {
     let theta = fit.free_theta();
-    let LeftOut { model, acting, columns: held, says } = left_out;
-    let (p, q) = (fit.free.len(), acting.len());
+    let LeftOut { model, says } = left_out;
+    let (p, q) = (fit.free.len(), model.n_unknowns());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
     let jacobian = |rows: &[usize]| {
         let mut jacobian = touches.unwhitened_of(&theta, rows).1;
         touches.whiten_of(rows, &mut jacobian);
         jacobian
     };
-    if let Some(mut b) = held {
-        let all: Vec<usize> = (0..b.nrows()).collect();
-        let (jacobian, ()) = rayon::join(|| jacobian(&all), || touches.whitening().apply_in_parallel(&mut b));
-        sums.add(&jacobian, &b);
-    } else {
-        // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many
-        // times the touches themselves
-        let columns = |part: &Range<usize>| {
-            let rows: Vec<usize> = part.clone().collect();
-            let mut b = typical_columns(&model, &fit.data.observations[part.clone()]);
-            touches.whiten_of(&rows, &mut b);
-            (jacobian(&rows), b)
-        };
-        let parts: Vec<Range<usize>> =
-            touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)).collect();
-        for some in parts.chunks(rayon::current_num_threads()) {
-            let made: Vec<_> = some.par_iter().map(columns).collect();
-            // in their order, so that the sums are the same on any number of processors
-            made.iter().for_each(|(jacobian, b)| sums.add(jacobian, b));
-        }
+    // part by part, as many at once as there are processors: the columns of the whole catalogue at all touches would be many times
+    // the touches themselves
+    let columns = |part: &Range<usize>| {
+        let rows: Vec<usize> = part.clone().collect();
+        let mut b = typical_columns(&model, &fit.data.observations[part.clone()]);
+        touches.whiten_of(&rows, &mut b);
+        (jacobian(&rows), b)
+    };
+    let parts: Vec<Range<usize>> =
+        touches.parts().iter().flat_map(|p| touches.cut(p.clone(), UNMODELLED_AT_ONCE)).collect();
+    for some in parts.chunks(rayon::current_num_threads()) {
+        let made: Vec<_> = some.par_iter().map(columns).collect();
+        // in their order, so that the sums are the same on any number of processors
+        made.iter().for_each(|(jacobian, b)| sums.add(jacobian, b));
     }
     for (unknown, _, sigma) in &fit.priors {
         if let Ok(c) = fit.free.binary_search(unknown) {
@@ -254,7 +190,7 @@ pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -
     }
     let (taken, sigma) = rayon::join(|| sums.taken(&fit.seen), || sums.expected(&fit.seen));
     let mut holds: Vec<Vec<String>> = (0..p).map(|_| Vec::new()).collect();
-    for (u, taken) in acting.iter().map(|&i| &model.unknowns[i]).zip(taken).filter(|(u, _)| !u.shape) {
+    for (u, taken) in model.unknowns.iter().zip(taken).filter(|(u, _)| !u.shape) {
         if let Some(c) = taken.and_then(|taken| one_result(fit, &taken))
             && !holds[c].contains(&u.effect)
         {

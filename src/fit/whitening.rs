@@ -1,7 +1,6 @@
 //! V^(−1/2) of the touches, made once and applied to any number of columns.
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVectorViewMut, Matrix3, Vector3};
-use rayon::prelude::*;
 
 /// What turns columns of gaps (one row per touch, mm or mm per unit) into rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,15 +64,6 @@ impl Whitening {
         }
         out.unscale_mut(self.sigma_mm);
         out
-    }
-
-    /// The same for many columns, on all processors.
-    pub(super) fn apply_in_parallel(&self, columns: &mut DMatrix<f64>) {
-        /// Columns that one of them takes at once.
-        const SOME: usize = 16;
-        let rows = columns.nrows();
-        let parts = columns.as_mut_slice().par_chunks_mut((rows * SOME).max(1));
-        parts.for_each(|part| self.apply_to(DMatrixViewMut::from_slice(part, rows, part.len() / rows)));
     }
 
     /// The same for a part of a matrix.

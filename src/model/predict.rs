@@ -52,6 +52,18 @@ impl Unknown {
     pub fn is_set_up(&self) -> bool {
         self.nuisance && self.set_up.is_some()
     }
+
+    /// Its name without the block that it is of.
+    #[must_use]
+    pub fn own_name(&self) -> &str {
+        self.name.split('@').next().unwrap_or_default()
+    }
+
+    /// Label of the block that it is of.
+    #[must_use]
+    pub fn block(&self) -> Option<&str> {
+        self.name.split_once('@').map(|(_, block)| block)
+    }
 }
 
 /// A block as it stood during a run: what `block-setup` has a set of parameters for.

@@ -324,8 +324,6 @@ impl Study {
             masked: self.masked.clone(),
             bare: false,
             quick: false,
-            held: Vec::new(),
-            jumps: Vec::new(),
             all_in: false,
         }
     }

@@ -277,8 +277,8 @@ fn odd_touches(m: &Material, out: &mut Vec<Next>) {
         let o = &m.fit.data.observations[i];
         m.diagnosis.outliers.iter().any(|x| x.comes_back && x.id == o.id && x.run == o.run + 1)
     };
-    let odd: Vec<(&usize, &String)> =
-        m.fit.rejected.iter().filter(|(i, reason)| !reason.starts_with("taken out") && !back(**i)).collect();
+    let odd: Vec<(&usize, &crate::fit::Reason)> =
+        m.fit.rejected.iter().filter(|(i, reason)| reason.is_outlier() && !back(**i)).collect();
     if odd.is_empty() {
         return;
     }

@@ -3,7 +3,7 @@
 use super::Material;
 use super::record::{Compensation, Correlation, Judgement, LeftRecord, ParameterRecord, ShapeRecord};
 use crate::fit::outcome::{Parameter, Status};
-use crate::fit::{Fit, effects_of, statement, uncertainty};
+use crate::fit::{Fit, effects_of, null_space, uncertainty};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::study::tolerance::Tolerance;
@@ -21,7 +21,7 @@ pub fn results(fit: &Fit, catalogue: &Catalogue, machine: &Machine, tolerance: &
     let effects = effects_of(&fit.outcome.effects, catalogue, machine).unwrap_or_default();
     let each = fit.outcome.parameters.iter().zip(&fit.model.unknowns);
     each.filter(|(_, u)| !u.nuisance)
-        .map(|(p, u)| record(tolerance, p, &statement::meaning(u, &effects), &effects))
+        .map(|(p, u)| record(tolerance, p, &null_space::meaning(u, &effects), &effects))
         .collect()
 }
 

@@ -57,7 +57,7 @@ pub(super) fn touches(m: &Material) -> Touches {
         sign: points.iter().map(|p| if direction(&p.normal).1 < 0.0 { -1 } else { 1 }).collect(),
         residual_um: m.ladder.rungs.iter().map(|r| r.residual_um.iter().map(|x| nanometre(*x)).collect()).collect(),
         standardised: points.iter().map(|p| short(p.standardised)).collect(),
-        rejected: (0..points.len()).map(|i| fit.rejected.get(&i).cloned()).collect(),
+        rejected: (0..points.len()).map(|i| fit.rejected.get(&i).map(crate::fit::Reason::says)).collect(),
     }
 }
 

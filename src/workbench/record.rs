@@ -124,7 +124,7 @@ struct Live<'a> {
     /// Externally studentised.
     standardised: Vec<f64>,
     /// Index among the touches, and why it is not used.
-    rejected: Vec<(usize, &'a str)>,
+    rejected: Vec<(usize, String)>,
     /// Indices of those that the study itself takes out.
     masked: Vec<usize>,
     ladder: &'a History,
@@ -178,7 +178,7 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         warnings: &o.warnings,
         residual_um: fit.residual_mm.iter().map(|r| short(um_from_mm(*r), 1e4)).collect(),
         standardised: fit.studentised.iter().map(|s| short(*s, 1e3)).collect(),
-        rejected: fit.rejected.iter().map(|(i, why)| (*i, why.as_str())).collect(),
+        rejected: fit.rejected.iter().map(|(i, why)| (*i, why.says())).collect(),
         masked: (0..observations.len())
             .filter(|&i| masked.contains(&(observations[i].run, observations[i].id)))
             .collect(),

@@ -275,7 +275,7 @@ pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
                 covered,
                 chi2: fit.outcome.chi2_per_dof * scale * scale,
                 tail: lack_of_fit(fit.chi2, fit.dof, fit.noise.dof),
-                tau_estimated: fit.noise.visit_source == "revisits",
+                tau_estimated: fit.noise.visit_source == fit::VisitSource::Revisits,
                 tau2: fit.noise.tau_mm.powi(2),
                 rejected: fit.rejected.len(),
             }

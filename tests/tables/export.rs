@@ -36,7 +36,6 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
         condition: 13.7,
         rms_um: 1.0,
         noise_um: 1.0,
-        noise_source: "declared".to_owned(),
         chi2_per_dof: 1.0,
         parameters,
         ..Outcome::default()

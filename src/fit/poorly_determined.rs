@@ -1,11 +1,13 @@
 //! Which parameters, and which combinations of them, the touches tell badly.
 
 use super::Fit;
+use super::null_space::meaning;
 use super::outcome::{Combination, Correlation};
 use super::solve::RANK_TOLERANCE;
 use super::span::span;
 use crate::model::catalogue::Effect;
 use crate::model::predict::Unknown;
+use crate::words::fit as words;
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Correlations above this are worth a line.
@@ -50,7 +52,7 @@ pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<
 /// Combinations of results that these touches determine no better than their typical sizes: columns scaled by typical
 /// size, nuisance projected out, singular values below 1 (in units of the noise). Without those that leave no trace, which
 /// are said elsewhere. `gram`: that of the fit's touches and priors.
-pub(super) fn weak(fit: &Fit, effects: &[&Effect], gram: &DMatrix<f64>) -> Vec<Combination> {
+pub(super) fn poorly_determined(fit: &Fit, effects: &[&Effect], gram: &DMatrix<f64>) -> Vec<Combination> {
     let is_nuisance = |c: &usize| fit.model.unknowns[fit.free[*c]].nuisance;
     let (nuisance, physical): (Vec<usize>, Vec<usize>) = (0..fit.free.len()).partition(is_nuisance);
     if physical.is_empty() {
@@ -77,8 +79,9 @@ pub(super) fn weak(fit: &Fit, effects: &[&Effect], gram: &DMatrix<f64>) -> Vec<C
         let unknown = |c: usize| &fit.model.unknowns[fit.free[c]];
         let all = physical.iter().zip(direction.iter()).filter(|(_, w)| w.abs() > 0.05);
         let weights: Vec<(&Unknown, f64)> = all.map(|(&c, w)| (unknown(c), (w * 1e3).round() / 1e3)).collect();
+        let meanings: Vec<(String, f64)> = weights.iter().map(|(u, w)| (meaning(u, effects), *w)).collect();
         out.push(Combination {
-            says: super::statement::weak(&weights, effects, 1.0 / s),
+            says: words::poorly_determined(&meanings, 1.0 / s),
             combination: weights.iter().map(|(u, w)| (u.name.clone(), *w)).collect(),
             times_typical: (1e3 / s).round() / 1e3,
         });

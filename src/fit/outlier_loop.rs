@@ -1,15 +1,19 @@
-//! The steps of a fit around the least squares: noise samples, touches that do not belong, gauges that bend.
+//! The steps of a fit around the least squares: noise samples, outliers, null directions that bend.
 
 use super::noise::{self, Known, Sample};
 use super::normal::Touches;
+use super::outliers::{self, Studentised};
+use super::remark::{Reason, VisitSource};
 use super::revisits::Followed;
-use super::snoop::{self, Snoop};
 use super::solve;
 use crate::model::data::Data;
 use crate::model::formula::slot;
 use crate::model::predict::Model;
 use nalgebra::{DVector, Vector3};
 use std::collections::{BTreeMap, HashMap};
+
+/// Rounds of excluding outliers and including what belongs to the rest after all.
+const MOST_ROUNDS: usize = 12;
 
 /// Steps at most along the bends of gauges.
 const MOST_BENDS: usize = 30;
@@ -18,9 +22,9 @@ const MOST_BENDS: usize = 30;
 const QUIET: f64 = 0.05;
 
 /// More than this share of the touches is never left out: the rest is no longer what most of them say.
-const MOST_STRANGERS: f64 = 0.25;
+const MOST_OUTLIERS: f64 = 0.25;
 
-/// More than this share of the strangers on faces of which most is off is no chance: of a quarter of all touches, strewn at
+/// More than this share of the outliers on faces of which most is off is no chance: of a quarter of all touches, strewn at
 /// random, every fourth has the other touch of its face with it.
 const MOST_TOGETHER: f64 = 1.0 / 3.0;
 
@@ -29,7 +33,7 @@ const MOST_TOGETHER: f64 = 1.0 / 3.0;
 const GROSS2: f64 = 25.0;
 
 /// A fit that is being made.
-pub(super) struct Search<'a> {
+pub(super) struct OutlierLoop<'a> {
     pub data: &'a Data,
     /// What the nominal touches say, and what is held.
     pub observability: solve::Observability,
@@ -39,22 +43,11 @@ pub(super) struct Search<'a> {
     pub known: Known,
     /// Does the model hold anything that changes between the visits of a pose?
     pub moving: bool,
-    /// As [`super::Fit::strangers_beyond`].
+    /// As [`super::Fit::outliers_beyond`].
     pub beyond: Option<usize>,
-    /// What the touches said of each other last.
-    pub judged: Option<Judged>,
 }
 
-/// What the touches say of each other at a solution, and where that was: the same question is not answered twice.
-pub(super) struct Judged {
-    theta: DVector<f64>,
-    weights: Vec<f64>,
-    noise_mm: (f64, f64),
-    noise_dof: f64,
-    snoop: Snoop,
-}
-
-impl Search<'_> {
+impl OutlierLoop<'_> {
     fn gaps(&self, solution: &solve::Solution) -> Vec<f64> {
         self.touches.gaps(&solution.theta)
     }
@@ -113,7 +106,7 @@ impl Search<'_> {
         for _ in 0..ROUNDS {
             solution = self.with_noise(solution, &noise);
             // what the fit follows between visits depends on how much they are taken to scatter
-            if !self.moving || noise.visit_source != "revisits" {
+            if !self.moving || noise.visit_source != VisitSource::Revisits {
                 break;
             }
             let before = noise.tau_mm;
@@ -147,26 +140,15 @@ impl Search<'_> {
         solution
     }
 
-    /// What the touches say of each other at a solution; `noise_dof` is that of σ.
-    pub fn judge(&mut self, solution: &solve::Solution, noise_dof: f64) -> &Snoop {
-        let known = self.judged.take().filter(|j| {
-            j.noise_dof == noise_dof
-                && j.noise_mm == self.touches.noise_mm()
-                && j.theta == solution.theta
-                && j.weights == self.touches.weights()
-        });
-        let judged = known.unwrap_or_else(|| {
-            let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
-            let (chi2, covariance) = (solution.chi2, &solution.covariance);
-            Judged {
-                theta: solution.theta.clone(),
-                weights: self.touches.weights().to_vec(),
-                noise_mm: self.touches.noise_mm(),
-                noise_dof,
-                snoop: Snoop::new(&self.touches, &solution.theta, covariance, (chi2, dof), noise_dof),
-            }
-        });
-        &self.judged.insert(judged).snoop
+    /// How far each touch is off what the others predict at a solution; `noise_dof` is that of σ.
+    pub fn studentised(&self, solution: &solve::Solution, noise_dof: f64) -> Studentised {
+        let dof = solve::Problem::n_rows(&self.touches).saturating_sub(self.observability.rank);
+        Studentised::new(&self.touches, &solution.theta, &solution.covariance, (solution.chi2, dof), noise_dof)
+    }
+
+    /// The touches that a solution shows to be outliers, the worst first.
+    fn found(&self, solution: &solve::Solution, noise_dof: f64) -> Vec<usize> {
+        self.studentised(solution, noise_dof).outliers(&self.data.visits)
     }
 
     fn refit(&mut self, weights: Vec<f64>, from: &solve::Solution) -> solve::Solution {
@@ -259,26 +241,26 @@ impl Search<'_> {
 
     /// Data snooping from a robust start: touches that do not belong to the rest get the weight 0, and those that do
     /// get it back. `noise_dof` is that of σ.
-    pub fn without_strangers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
+    pub fn without_outliers(&mut self, plain: solve::Solution, noise_dof: f64) -> solve::Solution {
         let n = self.data.observations.len();
         let all: Vec<f64> = self.masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect();
         let mut solution = if self.touches.weights() == all { plain } else { self.refit(all.clone(), &plain) };
         self.beyond = None;
-        let first = self.judge(&solution, noise_dof).dropped();
+        let first = self.found(&solution, noise_dof);
         if first.is_empty() && self.scale2(&solution, noise_dof) < GROSS2 {
             return solution;
         }
         // several bad touches hide each other: let the rest vote first
-        let cap = (snoop::MOST_SHARE * n as f64).ceil() as usize;
+        let cap = (outliers::MOST_SHARE * n as f64).ceil() as usize;
         let mut most = cap;
-        let robust = self.robust_strangers(&solution, &all);
+        let robust = self.robust_outliers(&solution, &all);
         let mut out = if robust.is_empty() || robust.len() > cap { first } else { robust.clone() };
         if robust.len() > cap {
-            match self.many_strangers(&robust, &all, &solution) {
+            match self.many_outliers(&robust, &all, &solution) {
                 // few of them after all: the rule for few
                 Some(many) if many.len() <= cap => out = many,
                 Some(many) => {
-                    most = (MOST_STRANGERS * n as f64) as usize;
+                    most = (MOST_OUTLIERS * n as f64) as usize;
                     out = many;
                 }
                 None => self.beyond = Some(robust.len()),
@@ -287,7 +269,7 @@ impl Search<'_> {
         if out.is_empty() {
             return if self.touches.weights() == all { solution } else { self.refit(all, &solution) };
         }
-        for _ in 0..4 {
+        for _ in 0..MOST_ROUNDS {
             let mut weights = all.clone();
             out.iter().for_each(|&i| weights[i] = 0.0);
             solution = self.refit(weights, &solution);
@@ -295,7 +277,7 @@ impl Search<'_> {
             let scale2 = self.scale2(&solution, noise_dof);
             let back: Vec<usize> =
                 out.iter().copied().filter(|&i| self.belongs(&solution, i, scale2, noise_dof)).collect();
-            let more: Vec<usize> = self.judge(&solution, noise_dof).dropped();
+            let more: Vec<usize> = self.found(&solution, noise_dof);
             if back.is_empty() && (more.is_empty() || out.len() >= most) {
                 break;
             }
@@ -303,10 +285,10 @@ impl Search<'_> {
             out.extend(more);
             out.truncate(most.max(1));
         }
-        // touches of one face that miss together say something in common: that is no matter of chips. Among many strangers
+        // touches of one face that miss together say something in common: that is no matter of chips. Among many outliers
         // some meet on a face by chance
         if most == cap {
-            for cluster in snoop::clusters(&out, self.faces(), n) {
+            for cluster in outliers::clusters(&out, self.faces(), n) {
                 out.retain(|i| !cluster.contains(i));
             }
         }
@@ -316,7 +298,7 @@ impl Search<'_> {
     }
 
     /// The face of each touch.
-    fn faces(&self) -> impl Fn(usize) -> snoop::Face {
+    fn faces(&self) -> impl Fn(usize) -> outliers::Face {
         let rounded = |n: Vector3<f64>| [n.x, n.y, n.z].map(|x| (10.0 * x).round() as i8);
         move |i| {
             let o = &self.data.observations[i];
@@ -324,14 +306,14 @@ impl Search<'_> {
         }
     }
 
-    /// More strangers than chips explain, where they are gross ones all the same and no missing effect: they are a
+    /// More outliers than chips explain, where they are gross ones all the same and no missing effect: they are a
     /// minority and strewn over the faces, the others see as much without them, and the others agree to within their
     /// noise, which an effect that the model lacks would not let them do. `None` where that does not hold.
-    fn many_strangers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
+    fn many_outliers(&mut self, robust: &[usize], all: &[f64], from: &solve::Solution) -> Option<Vec<usize>> {
         let n_used = all.iter().filter(|w| **w > 0.0).count();
         let mut out = robust.to_vec();
-        if out.len() as f64 > MOST_STRANGERS * n_used as f64
-            || snoop::whole_faces(&out, self.faces(), all.len()) as f64 > MOST_TOGETHER * out.len() as f64
+        if out.len() as f64 > MOST_OUTLIERS * n_used as f64
+            || outliers::whole_faces(&out, self.faces(), all.len()) as f64 > MOST_TOGETHER * out.len() as f64
         {
             return None;
         }
@@ -342,7 +324,7 @@ impl Search<'_> {
         let noise = noise::estimate(&self.samples(&solution), &self.known, None);
         self.touches.set_noise(noise.sigma_mm, noise.tau_mm);
         solution = self.refit_here(solution.theta);
-        // touches that the robust fit took for strangers, and that are not, come back
+        // touches that the robust fit took for outliers, and that are not, come back
         let scale2 = self.scale2(&solution, noise.dof.unwrap_or(0.0));
         let noise_dof = noise.dof.unwrap_or(0.0);
         out.retain(|&i| !self.belongs(&solution, i, scale2, noise_dof));
@@ -358,23 +340,23 @@ impl Search<'_> {
     }
 
     /// Touches further than 4 robust standard deviations off a fit in which far touches count little.
-    fn robust_strangers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
+    fn robust_outliers(&mut self, plain: &solve::Solution, all: &[f64]) -> Vec<usize> {
         let (sigma, _) = self.touches.noise_mm();
         let mut solution = plain.clone();
         let mut gaps = self.gaps(&solution);
         let mut scale = gaps.iter().map(|r| r.abs()).fold(0.0, f64::max);
         loop {
-            let mut weights = snoop::robust_weights(&gaps, scale);
+            let mut weights = outliers::robust_weights(&gaps, scale);
             weights.iter_mut().zip(all).for_each(|(w, a)| *w = (*w * a).max(1e-6 * a));
             solution = self.refit(weights, &solution);
             gaps = self.gaps(&solution);
-            let floor = 3.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+            let floor = 3.0 * outliers::median_scale(&gaps).max(0.1 * sigma);
             if scale <= floor {
                 break;
             }
             scale = (scale / 3.0).max(floor);
         }
-        let limit = 4.0 * snoop::median_scale(&gaps).max(0.1 * sigma);
+        let limit = 4.0 * outliers::median_scale(&gaps).max(0.1 * sigma);
         (0..gaps.len()).filter(|&i| all[i] > 0.0 && gaps[i].abs() > limit).collect()
     }
 
@@ -389,26 +371,26 @@ impl Search<'_> {
 
     /// Does a touch that is not used agree with those that are?
     fn belongs(&self, solution: &solve::Solution, i: usize, scale2: f64, noise_dof: f64) -> bool {
-        snoop::belongs(self.off(solution, i, scale2).1, self.dof() + noise_dof)
+        outliers::belongs(self.off(solution, i, scale2).1, self.dof() + noise_dof)
     }
 
     /// How far touch i is off what the fit says, mm and in standard deviations.
     pub fn off(&self, solution: &solve::Solution, i: usize, scale2: f64) -> (f64, f64) {
         let (gap, row) = self.touches.row(&solution.theta, i);
         let (sigma, tau) = self.touches.noise_mm();
-        snoop::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
+        outliers::judge(gap, &row, &solution.covariance, sigma * sigma + tau * tau, scale2)
     }
 
-    /// The rejected touches with their reasons.
-    pub fn reasons(&self, solution: &solve::Solution, noise_dof: f64) -> BTreeMap<usize, String> {
+    /// Why each touch is excluded that the user did not mask.
+    pub fn reasons(&self, solution: &solve::Solution, noise_dof: f64) -> BTreeMap<usize, Reason> {
         let scale2 = self.scale2(solution, 0.0);
         let weights = self.touches.weights();
-        (0..weights.len())
-            .filter(|&i| weights[i] == 0.0 && !self.masked[i])
-            .map(|i| {
-                let (off_mm, standardised) = self.off(solution, i, scale2);
-                (i, snoop::Rejection { touch: i, off_mm, standardised, dof: self.dof() + noise_dof }.reason())
-            })
-            .collect()
+        let is_outlier = |i: &usize| weights[*i] == 0.0 && !self.masked[*i];
+        let reason = |i: usize| {
+            let (off_mm, standardised) = self.off(solution, i, scale2);
+            let robust_only = outliers::belongs(standardised, self.dof() + noise_dof);
+            (i, Reason::Outlier { off_mm, standardised, robust_only })
+        };
+        (0..weights.len()).filter(is_outlier).map(reason).collect()
     }
 }

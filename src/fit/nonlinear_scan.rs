@@ -5,13 +5,15 @@
 //! taken with the size that it asks for.
 
 use super::candidates::{Trials, Variant};
-use super::{Fit, Settings, uncertainty};
+use super::whitening::Whitening;
+use super::{Fit, uncertainty};
 use crate::machine::Machine;
-use crate::model::catalogue::{Catalogue, Effect, Parameter};
+use crate::model::catalogue::{Effect, Parameter};
 use crate::model::data::Data;
-use crate::model::predict::{Model, Observation};
+use crate::model::predict::{Model, Observation, Unknown};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Values that are tried where the catalogue names none.
@@ -39,16 +41,14 @@ pub(super) const NOT_CREDIBLE: f64 = 300.0;
 /// χ² must fall by this for each parameter, or the data does not show the effect and cannot tell its shape.
 pub(super) const LEAST_GAIN: f64 = 9.0;
 
-/// Where to begin.
+/// Where the search for the parameters of an effect begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
-    /// Names of the unknowns.
-    pub names: Vec<String>,
-    /// Values of all parameters of the effect in their order, in their units; sizes are 0 where the data does not show it.
-    pub values: Vec<f64>,
+    /// Value of each unknown, by name, in its unit; sizes are 0 where the touches do not show the effect.
+    pub values: BTreeMap<String, f64>,
     /// By how much χ² falls.
     pub gain: f64,
-    /// Does the data show the effect?
+    /// Do the touches show the effect?
     pub shown: bool,
 }
 
@@ -68,153 +68,177 @@ pub(super) fn variant(alone: &Model, set: &Range<usize>, values: &[f64]) -> Vari
     Variant { effects: vec![0], shapes }
 }
 
-/// The best start for the parameters of an effect that is not in a fit: one for each block where it has a set of its own for each,
-/// none where it has no shape parameters. `alike`: the search begins with the same shapes for every block; `only`: that of one block,
-/// by its label.
+/// The best start for the parameters of an effect with shape parameters that is not in a fit. Where each block has a set of its own,
+/// all sets begin at the same shapes.
 #[must_use]
-pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect, (alike, only): (bool, Option<&str>)) -> Vec<Start> {
-    let shaped: Vec<usize> = (0..effect.parameters.len()).filter(|&i| effect.parameters[i].shape.is_some()).collect();
-    if shaped.is_empty() {
-        return Vec::new();
-    }
+pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Start {
     let alone = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
     let trials = Trials::of(&alone, &fit.data.observations);
-    let is_of = |set: &Range<usize>| {
-        only.is_none_or(|label| alone.unknowns[set.start].name.split_once('@').is_some_and(|(_, of)| of == label))
-    };
-    let all = alone.instances(0).iter().map(|&(first, count)| first..first + count);
-    let sets: Vec<Range<usize>> = all.filter(is_of).collect();
-    let together = if alike { sets.len().max(1) } else { 1 };
-    sets.chunks(together).flat_map(|sets| start_of_sets(fit, effect, &shaped, (&alone, &trials), sets)).collect()
+    let instances = alone.instances(0).iter().map(|&(first, count)| first..first + count);
+    ScoreTest::new(fit, effect, (&alone, &trials), instances.collect()).best_start()
 }
 
-/// The best start of some sets of an effect's parameters, which have the same shapes and sizes of their own.
-fn start_of_sets(
-    fit: &Fit,
-    effect: &Effect,
-    shaped: &[usize],
-    (alone, trials): (&Model, &Trials),
-    sets: &[Range<usize>],
-) -> Vec<Start> {
-    let linear = fit.linear(fit.noise.tau_mm);
-    let n = fit.data.observations.len();
-    let (jacobian, residual) = (linear.jacobian.rows(0, n).into_owned(), linear.residual.rows(0, n).into_owned());
-    let covariance = uncertainty::free_covariance(fit);
-    let sizes: Vec<usize> = (0..effect.parameters.len()).filter(|i| !shaped.contains(i)).collect();
-    let whitening = fit.whitening(fit.noise.tau_mm);
-    let n_sizes = sets.len() * sizes.len();
-    let does = |shapes: &[f64]| -> DMatrix<f64> {
-        let mut values = vec![0.0; effect.parameters.len()];
-        shaped.iter().zip(shapes).for_each(|(&i, v)| values[i] = *v);
-        let mut a = DMatrix::zeros(n, n_sizes);
-        for (k, set) in sets.iter().enumerate() {
-            let columns: Vec<usize> = sizes.iter().map(|i| set.start + i).collect();
-            let own = trials.columns(&variant(alone, set, &values)).values.select_columns(&columns);
-            a.columns_mut(k * sizes.len(), sizes.len()).copy_from(&own);
+/// The score test of an effect beside a fit, at any values of its shapes.
+struct ScoreTest<'a> {
+    fit: &'a Fit,
+    effect: &'a Effect,
+    /// The effect alone, and its columns at any shapes.
+    alone: (&'a Model, &'a Trials<'a>),
+    /// One set of the effect's parameters, or one for each block.
+    sets: Vec<Range<usize>>,
+    /// Places of shapes and of sizes among the effect's parameters.
+    shaped: Vec<usize>,
+    sizes: Vec<usize>,
+    residual: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    whitening: Whitening,
+}
+
+impl<'a> ScoreTest<'a> {
+    fn new(fit: &'a Fit, effect: &'a Effect, alone: (&'a Model, &'a Trials<'a>), sets: Vec<Range<usize>>) -> Self {
+        let linear = fit.linear(fit.noise.tau_mm);
+        let n = fit.data.observations.len();
+        let (shaped, sizes) = (0..effect.parameters.len()).partition(|&i| effect.parameters[i].shape.is_some());
+        Self {
+            fit,
+            effect,
+            alone,
+            sets,
+            shaped,
+            sizes,
+            residual: linear.residual.rows(0, n).into_owned(),
+            jacobian: linear.jacobian.rows(0, n).into_owned(),
+            covariance: uncertainty::free_covariance(fit),
+            whitening: fit.whitening(fit.noise.tau_mm),
         }
-        whitening.apply(&mut a);
-        a
-    };
-    let judge = |shapes: &[f64]| -> (f64, DVector<f64>) {
-        let a = does(shapes);
-        let seen = jacobian.tr_mul(&a);
+    }
+
+    /// Whitened columns of the sizes of all sets.
+    fn columns(&self, shapes: &[f64]) -> DMatrix<f64> {
+        let mut values = vec![0.0; self.effect.parameters.len()];
+        self.shaped.iter().zip(shapes).for_each(|(&i, v)| values[i] = *v);
+        let k = self.sizes.len();
+        let mut out = DMatrix::zeros(self.residual.len(), self.sets.len() * k);
+        let (model, trials) = self.alone;
+        for (s, set) in self.sets.iter().enumerate() {
+            let own: Vec<usize> = self.sizes.iter().map(|i| set.start + i).collect();
+            let all = trials.columns(&variant(model, set, &values)).values;
+            out.columns_mut(s * k, k).copy_from(&all.select_columns(&own));
+        }
+        self.whitening.apply(&mut out);
+        out
+    }
+
+    /// By how much χ² falls at some shapes, and the sizes there.
+    fn at(&self, shapes: &[f64]) -> (f64, DVector<f64>) {
+        let a = self.columns(shapes);
+        let n = a.ncols();
+        let seen = self.jacobian.tr_mul(&a);
         let raw = a.tr_mul(&a);
-        let gram = &raw - seen.tr_mul(&(&covariance * &seen));
-        let slope = a.tr_mul(&residual);
+        let gram = &raw - seen.tr_mul(&(&self.covariance * &seen));
         let scale = raw.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
-        let scaled = DMatrix::from_fn(n_sizes, n_sizes, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
-        let rhs = slope.component_div(&scale);
+        let scaled = DMatrix::from_fn(n, n, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
+        let slope = a.tr_mul(&self.residual).component_div(&scale);
         let eigen = scaled.symmetric_eigen();
-        let (mut gain, mut step) = (0.0, DVector::zeros(n_sizes));
+        let (mut gain, mut step) = (0.0, DVector::zeros(n));
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             if *value > LEAST_OWN {
-                let along = vector.dot(&rhs);
+                let along = vector.dot(&slope);
                 gain += along * along / value;
                 step -= vector * (along / value);
             }
         }
         (gain, step.component_div(&scale))
-    };
-    let mut best: Vec<f64> =
-        shaped.iter().map(|&i| effect.parameters[i].shape.map_or(0.0, |(start, _, _)| start)).collect();
-    // touches on a grid all but stand still in a wave that is as short as its steps: it then follows where each was made, its noise too,
-    // with an amplitude as large as the wave is long
-    let credible = |size: &DVector<f64>| {
-        sizes.iter().cycle().zip(size.iter()).all(|(&i, v)| v.abs() < CREDIBLE * effect.parameters[i].typical)
-    };
-    let mut found = judge(&best);
-    let mut usual = best.clone();
-    // one after another, twice: shapes of one effect are few
-    for _ in 0..if shaped.len() > 1 { 2 } else { 1 } {
-        for (k, &i) in shaped.iter().enumerate() {
-            let p = &effect.parameters[i];
-            let common = scan(p, &fit.data).unwrap_or_else(|| tried(p));
-            let mut try_all = |values: &[f64], best: &mut Vec<f64>| {
-                let at = |value: &f64| {
-                    let mut shapes = best.clone();
-                    shapes[k] = *value;
-                    judge(&shapes)
-                };
-                let all: Vec<(f64, DVector<f64>)> = values.par_iter().map(at).collect();
-                for (&value, now) in values.iter().zip(all) {
-                    if now.0 > found.0 && (common.contains(&value) || credible(&now.1)) {
-                        best[k] = value;
-                        found = now;
-                    }
-                }
-            };
-            if p.between.is_some() {
-                // a jump may also come in mid-visit
-                let (mut values, mut more) = (Vec::new(), common.clone());
-                while !more.is_empty() {
-                    try_all(&more, &mut best);
-                    values.extend(more);
+    }
+
+    /// Are all sizes below so many usual ones?
+    fn is_credible(&self, sizes: &DVector<f64>, times: f64) -> bool {
+        let usual = self.sizes.iter().cycle().map(|&i| self.effect.parameters[i].typical);
+        usual.zip(sizes.iter()).all(|(usual, v)| v.abs() < times * usual)
+    }
+
+    /// The shapes at which χ² falls most: one shape after another, twice, because an effect has few.
+    fn best_start(&self) -> Start {
+        let (data, n) = (&self.fit.data, self.residual.len());
+        let parameter = |k: usize| &self.effect.parameters[self.shaped[k]];
+        let mut best: Vec<f64> =
+            (0..self.shaped.len()).map(|k| parameter(k).shape.map_or(0.0, |(start, _, _)| start)).collect();
+        let mut found = self.at(&best);
+        let mut usual = best.clone();
+        for _ in 0..if self.shaped.len() > 1 { 2 } else { 1 } {
+            for k in 0..self.shaped.len() {
+                let p = parameter(k);
+                let is_jump = p.between.is_some();
+                let times = if is_jump { f64::INFINITY } else { CREDIBLE };
+                let mut values = scan(p, data).unwrap_or_else(|| tried(p));
+                self.try_all(&values, k, f64::INFINITY, (&mut best, &mut found));
+                let look_closer = |values: &mut Vec<f64>, best: &mut Vec<f64>, found: &mut _| {
                     values.sort_by(f64::total_cmp);
-                    more = around(p, &fit.data, &values, best[k]);
+                    let finer = around(p, data, values, best[k]);
+                    self.try_all(&finer, k, times, (best, found));
+                    let is_done = finer.is_empty();
+                    values.extend(finer);
+                    is_done
+                };
+                if is_jump {
+                    // between any two touches
+                    while !look_closer(&mut values, &mut best, &mut found) {}
+                    usual[k] = best[k];
+                    continue;
                 }
-                usual[k] = best[k];
-                continue;
-            }
-            let others = best.clone();
-            let at = |value: f64| {
-                let mut shapes = others.clone();
-                shapes[k] = value;
-                does(&shapes)
-            };
-            // the usual values first: they stand where nothing shows
-            try_all(&common, &mut best);
-            let mut values = common.clone();
-            let finer = between(&values);
-            try_all(&finer, &mut best);
-            values.extend(finer);
-            values.sort_by(f64::total_cmp);
-            try_all(&around(p, &fit.data, &values, best[k]), &mut best);
-            usual[k] = best[k];
-            let mut values = fine(p, n, &at);
-            try_all(&values, &mut best);
-            for _ in 0..2 {
-                // between the best one and its neighbours
-                let finer = around(p, &fit.data, &values, best[k]);
-                try_all(&finer, &mut best);
+                // near the usual values first: there the shape stays if the touches do not show the effect
+                let finer = between(&values);
+                self.try_all(&finer, k, times, (&mut best, &mut found));
                 values.extend(finer);
-                values.sort_by(f64::total_cmp);
+                look_closer(&mut values, &mut best, &mut found);
+                usual[k] = best[k];
+                let others = best.clone();
+                let mut values = fine(p, n, &|at| {
+                    let mut shapes = others.clone();
+                    shapes[k] = at;
+                    self.columns(&shapes)
+                });
+                self.try_all(&values, k, times, (&mut best, &mut found));
+                for _ in 0..2 {
+                    look_closer(&mut values, &mut best, &mut found);
+                }
+            }
+        }
+        let (gain, size) = found;
+        let n_parameters = (self.shaped.len() + size.len()) as f64;
+        let shown = gain > LEAST_GAIN * n_parameters && self.is_credible(&size, NOT_CREDIBLE);
+        let mut values = BTreeMap::new();
+        for (s, set) in self.sets.iter().enumerate() {
+            let unknowns = &self.alone.0.unknowns[set.clone()];
+            for (&i, v) in self.shaped.iter().zip(if shown { &best } else { &usual }) {
+                values.insert(unknowns[i].name.clone(), *v);
+            }
+            for (j, &i) in self.sizes.iter().enumerate() {
+                let value = if shown { size[s * self.sizes.len() + j] } else { 0.0 };
+                values.insert(unknowns[i].name.clone(), value);
+            }
+        }
+        Start { values, gain, shown }
+    }
+
+    /// Tries values of one shape beside the others' best. Touches on a grid hardly see a wave that is as short as its steps: it follows
+    /// the noise with an amplitude as large as the wave is long, so that sizes beyond `times` the usual ones do not count.
+    fn try_all(&self, values: &[f64], k: usize, times: f64, (best, found): (&mut [f64], &mut (f64, DVector<f64>))) {
+        let others = best.to_vec();
+        let at = |value: &f64| {
+            let mut shapes = others.clone();
+            shapes[k] = *value;
+            self.at(&shapes)
+        };
+        let all: Vec<(f64, DVector<f64>)> = values.par_iter().map(at).collect();
+        for (&value, now) in values.iter().zip(all) {
+            if now.0 > found.0 && self.is_credible(&now.1, times) {
+                best[k] = value;
+                *found = now;
             }
         }
     }
-    let (gain, size) = found;
-    let credible = |(&i, v): (&usize, &f64)| v.abs() < NOT_CREDIBLE * effect.parameters[i].typical;
-    let shown =
-        gain > LEAST_GAIN * (shaped.len() + n_sizes) as f64 && sizes.iter().cycle().zip(size.iter()).all(credible);
-    let best = if shown { best } else { usual };
-    let start_of = |(k, set): (usize, &Range<usize>)| {
-        let mut values = vec![0.0; effect.parameters.len()];
-        shaped.iter().zip(&best).for_each(|(&i, v)| values[i] = *v);
-        if shown {
-            sizes.iter().enumerate().for_each(|(j, &i)| values[i] = size[k * sizes.len() + j]);
-        }
-        Start { names: alone.unknowns[set.clone()].iter().map(|u| u.name.clone()).collect(), values, gain, shown }
-    };
-    sets.iter().enumerate().map(start_of).collect()
 }
 
 /// Shape parameters at which something jumps, as the moment at which a block slips: there is no slope that a search could
@@ -385,20 +409,6 @@ fn tried(p: &Parameter) -> Vec<f64> {
     (0..TRIED).map(at).chain([start]).collect()
 }
 
-/// Settings of the fit beside which the shapes of some effects are tried: everything but them, and quickly.
-pub(super) fn without(settings: &Settings, shaped: &[&Effect]) -> Settings {
-    let own = |name: &str| name.split('@').next().unwrap_or_default().to_owned();
-    let of_them =
-        |name: &str| shaped.iter().any(|e| e.parameters.iter().any(|p| crate::symbols::same(&p.name, &own(name))));
-    Settings {
-        effects: settings.effects.iter().filter(|id| !shaped.iter().any(|e| e.id == **id)).cloned().collect(),
-        knowledge: settings.knowledge.iter().filter(|(name, _)| !of_them(name)).map(|(n, k)| (n.clone(), *k)).collect(),
-        type_b: Default::default(),
-        quick: true,
-        ..settings.clone()
-    }
-}
-
 /// All values of a shape parameter that a scan tries.
 #[must_use]
 pub fn all_tried(p: &Parameter, data: &Data) -> Vec<f64> {
@@ -409,15 +419,18 @@ pub fn all_tried(p: &Parameter, data: &Data) -> Vec<f64> {
     values
 }
 
-/// A shape that ran out of its range, with the ends of that.
-pub(super) fn out_of_range(fit: &Fit, catalogue: &Catalogue, machine: &Machine) -> Option<(String, [f64; 2])> {
+/// The range of a shape parameter; none of a size.
+pub(super) fn range_of(unknown: &Unknown, effects: &[&Effect]) -> Option<[f64; 2]> {
+    let effect = effects.iter().find(|e| e.id == unknown.effect)?;
+    let (_, low, high) = effect.parameters.iter().find(|p| p.name == unknown.own_name())?.shape?;
+    Some([low, high])
+}
+
+/// A free shape that ran out of its range, with the ends of that.
+pub(super) fn out_of_range(fit: &Fit, effects: &[&Effect]) -> Option<(String, [f64; 2])> {
     fit.free.iter().find_map(|&i| {
         let u = &fit.model.unknowns[i];
-        let name = u.name.split('@').next().unwrap_or(&u.name);
-        let p = catalogue.get(&u.effect, machine)?.parameters.iter().find(|p| p.name == name)?;
-        let (_, low, high) = p.shape?;
-        let value = fit.theta[i];
-        let out = !(low..=high).contains(&value);
-        out.then(|| (u.name.clone(), [low, high]))
+        let [low, high] = range_of(u, effects)?;
+        (!(low..=high).contains(&fit.theta[i])).then(|| (u.name.clone(), [low, high]))
     })
 }
