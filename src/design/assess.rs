@@ -77,7 +77,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
             );
         }
     }
-    let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
+    let seen = power(&view.base, &view.library, &view.raw_um);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();
     let results = Results::new(&alone.model, &alone.free);
@@ -85,7 +85,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         .into_iter()
         .map(|habit| {
             let varied = View::new(task, &habit.runs, &habit.known, acting)?;
-            let power = power(&varied.base, &varied.library, Some(&varied.raw_um), varied.noise.sigma_mm);
+            let power = power(&varied.base, &varied.library, &varied.raw_um);
             let pairs = alias_pairs(&varied.base, &varied.library);
             // further blocks bring further unknowns: only what was unknown before counts
             let nullity = (varied.jacobian.ncols() - varied.base.rank()).min(nullity);
@@ -203,8 +203,7 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
 
 /// Largest displacement over the touches with every parameter of an effect at its typical size, µm.
 fn peak_um(view: &View, candidate: usize) -> f64 {
-    let span = view.library.candidates()[candidate].variants[0].columns.clone();
-    view.raw_um.columns(span.start, span.len()).row_iter().map(|r| r.norm()).fold(0.0, f64::max)
+    view.raw_um[candidate].row_iter().map(|r| r.norm()).fold(0.0, f64::max)
 }
 
 /// Which parameters of the model take an effect that leaves no trace of its own.

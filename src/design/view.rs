@@ -199,8 +199,8 @@ pub struct View {
     pub base: Basis,
     /// The effects that it leaves out: whitened columns in units of typical sizes, one variant each.
     pub library: Library,
-    /// Their columns before whitening, µm at typical size.
-    pub raw_um: DMatrix<f64>,
+    /// Their columns before whitening, µm at typical size, effect by effect.
+    pub raw_um: Vec<DMatrix<f64>>,
     /// Value of the scanned shape at which each candidate stands; `None` where it has none.
     pub shapes: Vec<Option<f64>>,
     /// Effects whose formula has no value at some of these touches, with what is said of them: they stand in the library with
@@ -284,8 +284,7 @@ impl View {
         }
         let base = Basis::new(&jacobian);
         let library = Library::new(jacobian.nrows());
-        let raw_um = DMatrix::zeros(jacobian.nrows(), 0);
-        let (shapes, left_out) = (Vec::new(), Vec::new());
+        let (raw_um, shapes, left_out) = (Vec::new(), Vec::new(), Vec::new());
         Ok(Self { data, model, theta, free, jacobian, base, library, raw_um, shapes, left_out, noise, end_s })
     }
 
@@ -295,7 +294,6 @@ impl View {
         let plain: Vec<&Effect> = effects.iter().map(|e| e.0).collect();
         let all = columns(task.machine, &plain, &self.data, &self.data.nominal, task.reference, None);
         let rows = self.jacobian.nrows();
-        let mut raw = Vec::new();
         for (effect, given) in effects {
             let bad = if effect.built_in { Vec::new() } else { without_value(effect, &self.data.nominal) };
             if let Some(bad) = bad.first() {
@@ -360,14 +358,7 @@ impl View {
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             self.library.push(effect.id.clone(), origin, &whitened);
             self.shapes.push(shape);
-            raw.push(plain);
-        }
-        let count = raw.iter().map(DMatrix::ncols).sum();
-        self.raw_um = DMatrix::zeros(rows, count);
-        let mut at = 0;
-        for part in raw {
-            self.raw_um.columns_mut(at, part.ncols()).copy_from(&part.map(um_from_mm));
-            at += part.ncols();
+            self.raw_um.push(plain.map(um_from_mm));
         }
     }
 

@@ -13,7 +13,7 @@ use crate::search::dependence::Dependence;
 use crate::search::generic::{Direction, Features, Kind};
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
-use crate::search::power;
+use crate::search::{Score, power};
 use crate::units::{mm_from_um, um_from_mm};
 use nalgebra::DMatrix;
 
@@ -63,7 +63,8 @@ pub(super) fn put_together(
         .filter(|g| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL))
         .collect();
     let powers = if options.power {
-        let detectable = power::power(&seen.evidence.base, &seen.named.library, Some(&used_rows(seen)), noise_um(fit));
+        let first: Vec<(usize, usize)> = (0..seen.named.effects.len()).map(|c| (c, 0)).collect();
+        let detectable = power::power(&seen.evidence.base, &seen.named.library, &seen.named.raw_um(&first));
         let not_found = detectable.iter().filter(|p| !found.iter().any(|g| g.holds(p.candidate)));
         // how far what would be found is from the usual size: noncentrality goes with the square of the size
         let mut powers: Vec<(f64, Power)> = not_found
@@ -392,15 +393,6 @@ pub(super) fn beyond_the_noise(evidence: &Evidence, share: f64, n_parameters: us
     ((taken - q * per_dof) / (total - dof).max(4.0 * (2.0 * dof).sqrt())).clamp(0.0, 1.0)
 }
 
-/// Columns in µm at the rows of the regression; rows of priors are zero.
-fn used_rows(seen: &Examination) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(seen.evidence.n_rows(), seen.named.raw_um.ncols());
-    for (row, &i) in seen.evidence.used.iter().enumerate() {
-        out.row_mut(row).copy_from(&seen.named.raw_um.row(i));
-    }
-    out
-}
-
 fn candidate(
     fit: &Fit,
     seen: &Examination,
@@ -456,11 +448,11 @@ fn candidate(
             sigma: None,
         });
     }
-    let moves = moves(seen, chosen);
+    let raw_um = seen.raw_um(chosen);
+    let moves = moves(seen, score, &raw_um);
     let question = seen.order.question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
-    let span = seen.ordered.library.candidates()[chosen].variants[score.variant].columns.clone();
-    let raw_mm = seen.ordered.raw_um.columns(span.start, span.len()).map(mm_from_um);
+    let raw_mm = raw_um.map(mm_from_um);
     Candidate {
         effect: effect.id.clone(),
         name: effect.name.clone(),
@@ -501,13 +493,10 @@ fn candidate(
 
 /// By how much an effect of the expected size moves the touch that it moves most, with its standard uncertainty, µm: told
 /// where its parameters are not told one by one.
-fn moves(seen: &Examination, chosen: usize) -> Option<(f64, f64)> {
-    let score = &seen.order.scores[chosen];
-    let span = seen.ordered.library.candidates()[chosen].variants[score.variant].columns.clone();
-    let columns = seen.ordered.raw_um.columns(span.start, span.len());
-    let at = columns * &score.estimate;
+fn moves(seen: &Examination, score: &Score, raw_um: &DMatrix<f64>) -> Option<(f64, f64)> {
+    let at = raw_um * &score.estimate;
     let most = seen.evidence.used.iter().copied().max_by(|&a, &b| at[a].abs().total_cmp(&at[b].abs()))?;
-    let row = columns.row(most).transpose();
+    let row = raw_um.row(most).transpose();
     Some((at[most].abs(), row.dot(&(&score.covariance * &row)).max(0.0).sqrt()))
 }
 

@@ -108,6 +108,13 @@ pub struct Examination<'a> {
     pub folds: folds::Folds,
 }
 
+impl Examination<'_> {
+    /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
+    fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
+        self.ordered.raw_um(&[(candidate, self.order.scores[candidate].variant)]).remove(0)
+    }
+}
+
 /// The same touches with index visits that come back exactly.
 ///
 /// Where the scatter of visits is only declared, tests must allow for it, and it takes most of what a plan with few
@@ -177,7 +184,7 @@ pub fn examine<'a>(
         lack_of_fit: lack_of_fit(&question),
         nested: behind.unwrap_or(nested),
         given,
-        folds: folds::Folds::of(fit, evidence, named),
+        folds: folds::Folds::of(fit, evidence),
         evidence,
         named,
         search,

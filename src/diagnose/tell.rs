@@ -195,9 +195,7 @@ fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String 
     let chosen = group.first();
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
     let trace = |c: usize| -> DVector<f64> {
-        let score = &seen.order.scores[c];
-        let span = seen.ordered.library.candidates()[c].variants[score.variant].columns.clone();
-        seen.ordered.raw_um.columns(span.start, span.len()) * &score.estimate
+        seen.raw_um(c) * &seen.order.scores[c].estimate
     };
     let difference = trace(chosen) - trace(rival);
     let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
