@@ -4,8 +4,8 @@
 //! The tests allow for the scatter of index positions that revisited poses show. That may hold the missing effect itself, so that the
 //! choice is left to the tests and the errors are worked out with the noise of cross-validation (`Noise::tau_fold_mm`).
 
+use super::candidate_effects::Named;
 use super::evidence::Evidence;
-use super::named::Named;
 use crate::fit::{Fit, held_out};
 use crate::search::held_out::{Choice, Colours, HeldOut, held_out_in};
 use crate::units::mm_from_um;
@@ -37,8 +37,8 @@ impl Folds {
     /// Of a fit; `evidence` is that of the tests.
     pub(super) fn of(fit: &Fit, evidence: &Evidence) -> Self {
         let model = held_out::by_visit(fit);
-        let otherwise = (evidence.tau_mm != fit.noise.tau_fold_mm)
-            .then(|| Evidence::with_visits(fit, fit.noise.tau_fold_mm));
+        let otherwise =
+            (evidence.tau_mm != fit.noise.tau_fold_mm).then(|| Evidence::with_visits(fit, fit.noise.tau_fold_mm));
         let colours = otherwise.as_ref().unwrap_or(evidence).colours_um(fit);
         Self { model, otherwise, colours }
     }
@@ -70,9 +70,9 @@ impl Folds {
     fn held_out(&self, evidence: &Evidence, named: &Named, candidates: &[usize], choice: Choice) -> HeldOut {
         let mut library = named.library.some(|c| candidates.contains(&c));
         if let Some(own) = &self.otherwise {
-            let all = candidates.iter().flat_map(|&c| {
-                (0..named.library.candidates()[c].variants.len()).map(move |variant| (c, variant))
-            });
+            let all = candidates
+                .iter()
+                .flat_map(|&c| (0..named.library.candidates()[c].variants.len()).map(move |variant| (c, variant)));
             let raw = named.raw_um(&all.collect::<Vec<_>>());
             let white: Vec<DMatrix<f64>> = raw.into_iter().map(|um| own.whiten(um.map(mm_from_um))).collect();
             library = library.with_variants(own.n_rows(), &white);

@@ -2,7 +2,7 @@
 
 use super::Examination;
 use super::answer::{Candidate, Diagnosis, Verdict};
-use super::gathered::Gathered;
+use super::clustered_rejections::Gathered;
 use crate::fit::Fit;
 use crate::search::held_out::HeldOut;
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -31,7 +31,7 @@ pub struct Decision {
 
 /// What else the touches say, beside the tests of effects.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Beside {
+pub(super) struct OtherEvidence {
     /// Shapes without a name say what is left clearly better than names do.
     pub shapes_win: bool,
     /// What the best shape depends on, where it is better than the first effect.
@@ -51,7 +51,7 @@ pub fn bears_out(nested: &HeldOut) -> bool {
 
 /// From the tests.
 #[must_use]
-pub(super) fn of(seen: &Examination, beside: &Beside) -> Decision {
+pub(super) fn decide(seen: &Examination, beside: &OtherEvidence) -> Decision {
     let testable = seen.search.scores.iter().any(|s| s.visible());
     if seen.evidence.dof() < LEAST_DOF || !testable {
         return Decision { verdict: Verdict::TooLittleData, borne_out: false, named: false };
@@ -90,7 +90,7 @@ fn faint(out: &Diagnosis, fit: &Fit) -> bool {
 }
 
 /// Says the verdict in a sentence: the terminal, the report and the workbench say it as it is said here.
-pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decision, beside: &Beside) {
+pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decision, beside: &OtherEvidence) {
     let fit = subject.fit;
     out.faint = beside.gathered.is_none() && beside.scatter.is_none() && faint(out, fit);
     let against = format!("{:.2} um RMS against {:.2} um noise", out.rms_um, out.noise_um);
@@ -150,7 +150,7 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             let gross = out
                 .gross
                 .first()
-                .filter(|g| g.rms_um < super::gross::RIGHT * out.rms_um)
+                .filter(|g| g.rms_um < super::setup_mistakes::RIGHT * out.rms_um)
                 .map(|g| format!(" {}.", g.says));
             let one = out.candidates.first().map_or_else(
                 || "an effect".to_owned(),
@@ -217,7 +217,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
              Correct it in the machine file or the log and measure again; nothing can be said about small effects before.",
             s.far, s.of, s.right
         );
-        out.candidates.extend(super::gross::of_misses(subject, &[first]));
+        out.candidates.extend(super::setup_mistakes::of_misses(subject, &[first]));
         out.verdict = Verdict::MissingEffect;
         return;
     }
@@ -225,7 +225,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
     if let Some(first) = named.first() {
         let alike: Vec<&super::answer::Gross> = named.iter().copied().filter(|g| g.agrees == first.agrees).collect();
         let supposed: Vec<&str> = alike.iter().map(|g| g.says.as_str()).collect();
-        out.candidates.extend(super::gross::of_misses(subject, &alike));
+        out.candidates.extend(super::setup_mistakes::of_misses(subject, &alike));
         out.verdict = Verdict::MissingEffect;
         out.says = format!(
             "{missed} of {made} touches cannot be used, most of them because the search found nothing. It looks as if {}: that \

@@ -5,7 +5,7 @@ use super::features::direction_words;
 use crate::fit::Fit;
 use crate::machine::Machine;
 use crate::search::dependence::Dependence;
-use crate::search::generic::{CONSTANT, Features};
+use crate::search::pattern_tests::{CONSTANT, Features};
 use crate::units::deg_from_rad;
 
 /// What a shape depends on where one block stands elsewhere from some moment on.

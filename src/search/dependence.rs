@@ -2,10 +2,10 @@
 
 use super::KEPT;
 use super::distributions::p_of_t;
-use super::generic::{CONSTANT, Features, Generics, Shape};
 use super::groups::Member;
 use super::library::{Library, Origin};
 use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
+use super::pattern_tests::{CONSTANT, Features, Generics, Shape};
 use super::score::{Question, Score, Search};
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, DVector};

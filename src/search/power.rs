@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-pub use super::apart::SEEN;
+pub use super::distinguishability::SEEN;
 
 /// Directions over which the median is taken.
 const DIRECTIONS: usize = 401;

@@ -1,7 +1,7 @@
 //! Generic shapes on a small plan: which variable is named, how often clean data are suspected, and how long it takes.
 
 use super::dependence::{Dependence, dependences, serial};
-use super::generic::{Direction, Features, Generics, Kind, Rows, Variable, generics};
+use super::pattern_tests::{Direction, Features, Generics, Kind, Rows, Variable, generics};
 use super::testing::{noise, rng};
 use super::tests::{ask, correlated_library};
 use super::*;

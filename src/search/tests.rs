@@ -200,7 +200,7 @@ fn aliases_stand_in_one_group() {
     let second: Vec<&str> = groups[1].members.iter().map(|m| library.candidates()[m.candidate].id.as_str()).collect();
     assert_eq!(second, ["relative"], "nearly the same, and told apart all the same");
     let relative = library.position("relative").unwrap();
-    let products = super::apart::Products::new(&base, &library.matrix().into_owned());
+    let products = super::distinguishability::Products::new(&base, &library.matrix().into_owned());
     let span = |c: usize| library.candidates()[c].variants[0].columns.clone();
     let truth = groups[0].leader;
     let left = products.left(&span(truth), Some(&search.scores[truth].estimate), Some(&span(relative)));

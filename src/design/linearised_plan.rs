@@ -1,6 +1,6 @@
 //! A plan linearised at an errorless machine (a time constant or a pitch where its effect has its typical size): the whitened columns of a model and of every effect that it leaves out.
 
-use super::shapes::{Moments, every_slope_is_a_number};
+use super::shape_parameters::{Moments, every_slope_is_a_number};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Result};
 use crate::fit::candidates::{NoValue, columns, without_value};
@@ -184,7 +184,7 @@ pub struct Known {
 
 /// What planned touches see.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct LinearisedPlan {
     /// The touches as an errorless machine makes them.
     pub data: Data,
     /// The model.
@@ -212,7 +212,7 @@ pub struct View {
     pub end_s: f64,
 }
 
-impl View {
+impl LinearisedPlan {
     /// Looks at planned runs.
     ///
     /// # Errors

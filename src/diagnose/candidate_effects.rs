@@ -247,9 +247,9 @@ impl<'c> Named<'c> {
         let each = wanted.par_iter().map(|&(candidate, variant)| {
             let effect = self.effects[candidate];
             let value = self.library.candidates()[candidate].variants[variant].shape;
-            let which = self.scanned[candidate].as_ref().and_then(|s| {
-                effect.parameters.iter().filter(|p| p.shape.is_some()).position(|p| p.name == s.name)
-            });
+            let which = self.scanned[candidate]
+                .as_ref()
+                .and_then(|s| effect.parameters.iter().filter(|p| p.shape.is_some()).position(|p| p.name == s.name));
             let mut values = made(&trials, candidate, effect, which.map(|which| (which, value))).values;
             for mut column in values.column_iter_mut() {
                 column.iter_mut().zip(&self.weight).for_each(|(mm, weight)| *mm = um_from_mm(*mm) * weight);

@@ -5,11 +5,11 @@
 //! credit.
 
 use super::bundle::{Bundle, cost_s};
+use super::linearised_plan::LinearisedPlan;
 use super::questions::{Pair, Questions};
-use super::view::View;
 use crate::fit::candidates::without_value;
 use crate::model::catalogue::Effect;
-use crate::search::apart::{Left, Products, chance};
+use crate::search::distinguishability::{Left, Products, chance};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -82,7 +82,7 @@ impl Design {
     /// `view`: all touches so far and then those of the pool, with the columns of the effects in question.
     /// `n_given`: how many touches there are already.
     #[must_use]
-    pub fn new(view: &View, n_given: usize, pool: &[Bundle], questions: &Questions) -> Self {
+    pub fn new(view: &LinearisedPlan, n_given: usize, pool: &[Bundle], questions: &Questions) -> Self {
         let n_base = view.free.len();
         let mut spans = Vec::new();
         let mut columns = view.jacobian.clone();
@@ -387,7 +387,7 @@ impl Choice {
 /// `view` holds `n_given` touches and then those of the pool, in its order.
 #[must_use]
 pub fn where_all_have_values(
-    view: &View,
+    view: &LinearisedPlan,
     n_given: usize,
     effects: &[(&Effect, Option<f64>)],
     pool: &[Bundle],

@@ -3,16 +3,16 @@
 use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Power, Shape, Verdict, Weakened, Where};
 use super::evidence::Evidence;
 use super::first_order::FirstOrder;
-use super::verdict::{Beside, Decision};
-use super::{Examination, Subject, gross, noise_um, tell, words};
+use super::verdict::{Decision, OtherEvidence};
+use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes, words};
 use crate::fit::Fit;
 use crate::model::catalogue::Place;
 use crate::model::data::Origin;
 use crate::model::formula::slot;
 use crate::search::dependence::Dependence;
-use crate::search::generic::{Direction, Features, Kind};
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
+use crate::search::pattern_tests::{Direction, Features, Kind};
 use crate::search::{Score, power};
 use crate::units::{mm_from_um, um_from_mm};
 use nalgebra::DMatrix;
@@ -30,7 +30,7 @@ pub(super) fn put_together(
     subject: Subject,
     seen: &Examination,
     features: &Features,
-    (decision, beside): (Decision, &Beside),
+    (decision, beside): (Decision, &OtherEvidence),
     gross: Vec<Gross>,
     options: &super::Options,
 ) -> Diagnosis {
@@ -38,18 +38,18 @@ pub(super) fn put_together(
     let mut verdict = decision.verdict;
     // what passes the test and is not borne out stays a question, too
     let asked = verdict == Verdict::MissingEffect || (decision.named && !beside.shapes_win);
-    let open = if asked { super::open::open(seen) } else { super::open::Open::default() };
+    let open = if asked { super::unresolved_pairs::open(seen) } else { super::unresolved_pairs::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
-    let gross_found = gross.first().is_some_and(|g| g.rms_um < gross::RIGHT * fit.outcome.rms_um);
+    let gross_found = gross.first().is_some_and(|g| g.rms_um < setup_mistakes::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
-        && let Some(candidate) = gross::candidate(subject, first)
+        && let Some(candidate) = setup_mistakes::candidate(subject, first)
     {
         verdict = Verdict::MissingEffect;
         candidates.push(candidate);
     }
     if verdict != Verdict::TooLittleData {
         let first_order = FirstOrder::of(fit);
-        let tell_apart = tell::words(subject, seen, options);
+        let tell_apart = separating_touches::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
             tell_apart: told.says,
             never_parted: told.never,
@@ -119,7 +119,7 @@ pub(super) fn put_together(
     {
         let share = beyond_the_noise(seen.evidence, first.share, first.parameters.len() + first.not_told.len());
         depends.retain(|w| w.by != by(on));
-        own_curve = super::own_curve::curve(seen, features, on, &by(on));
+        own_curve = super::effect_curve::curve(seen, features, on, &by(on));
         depends.insert(
             0,
             Where {
@@ -142,7 +142,7 @@ pub(super) fn put_together(
     }
     beside_the_tests(&mut depends, seen, fit, (beside, verdict == Verdict::MissingEffect));
     // as the splits of `compare` and the sentences count: of what the noise does not explain
-    let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == gross::EFFECT));
+    let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
         c.share = beyond_the_noise(seen.evidence, c.share, seen.order.scores[group.first()].n_parameters);
     }
@@ -185,7 +185,7 @@ pub(super) fn put_together(
     let faces = if unexplained && first_by == "face" { faces(fit, seen, features, drawn) } else { Vec::new() };
     let blocks: Vec<String> = match drawn.filter(|d| unexplained && first_by == "block" && d.on == "block") {
         Some(d) => {
-            let found = super::standing_out::groups(seen.evidence, features, d, &features.block);
+            let found = super::outlying_groups::groups(seen.evidence, features, d, &features.block);
             found.into_iter().filter_map(|b| words::group("block", b, fit, features)).collect()
         }
         None => Vec::new(),
@@ -292,7 +292,7 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
     let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
     let columns = seen.evidence.whiten(raw_mm);
-    if super::rivals::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
+    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }
@@ -300,7 +300,7 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
 /// Faces that lie elsewhere: those on which touches were left out, or else those that stand out from the others, each with the
 /// face opposite to it.
 fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
-    let of_touches = super::gathered::faces(fit, features);
+    let of_touches = super::clustered_rejections::faces(fit, features);
     let named = |number: usize| words::group("face", number, fit, features);
     // where four of five touches of a face are not used the whole face lies elsewhere, and not a chip on it
     let whole = |face: usize| {
@@ -309,14 +309,14 @@ fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Depe
     };
     let found: Vec<(usize, bool)> = if of_touches.is_empty() {
         let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
-        let out = super::standing_out::groups(seen.evidence, features, d, &features.face);
+        let out = super::outlying_groups::groups(seen.evidence, features, d, &features.face);
         out.into_iter().map(|face| (face, true)).collect()
     } else {
         of_touches.iter().map(|&i| (features.face[i], whole(features.face[i]))).collect()
     };
     let mut out: Vec<usize> = Vec::new();
     for (face, whole) in found {
-        let other = if whole { super::standing_out::opposite(fit, features, face) } else { None };
+        let other = if whole { super::outlying_groups::opposite(fit, features, face) } else { None };
         for one in std::iter::once(face).chain(other) {
             if !out.contains(&one) {
                 out.push(one);
@@ -327,7 +327,7 @@ fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Depe
 }
 
 /// What is no shape and no effect, but a finding: scatter of visits, and bad touches that lie together.
-fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (beside, named): (&Beside, bool)) {
+fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (beside, named): (&OtherEvidence, bool)) {
     if let Some((tau_mm, declared_mm)) = beside.scatter {
         let (sigma2, tau2) = (fit.noise.sigma_mm.powi(2), tau_mm.powi(2));
         let finding = Where {

@@ -4,8 +4,8 @@
 //! the typical sizes. That another value would do the same to these touches the slope there does not show; so each value of
 //! the range is tried against it, as the fit does with what was measured.
 
+use super::linearised_plan::{LinearisedPlan, Task};
 use super::record::Expected;
-use super::view::{Task, View};
 use crate::diag::{Failure, Result};
 use crate::fit::candidates::{Trials, Variant};
 use crate::fit::span::LeastNorm;
@@ -31,7 +31,7 @@ const MOST_SIGNS: usize = 4;
 
 /// What is said of the shape parameters of a model; those that will not be told, and what is another beside another value, lose
 /// their uncertainty in `expected`.
-pub(super) fn shapes(task: &Task, view: &View, expected: &mut [Expected]) -> Vec<String> {
+pub(super) fn shapes(task: &Task, view: &LinearisedPlan, expected: &mut [Expected]) -> Vec<String> {
     let shaped = task.effects.iter().flat_map(|e| e.parameters.iter().filter_map(move |p| Some((*e, p, p.shape?))));
     // an effect of blocks has one for each
     let is =
@@ -132,7 +132,7 @@ fn may_be_below(growth: f64, limit: f64) -> bool {
 
 /// What an effect with its typical sizes at the start of a shape could be taken for.
 /// `name`: of the unknown, one of a block where the effect has one for each.
-fn others(task: &Task, view: &View, (effect, p, start): (&Effect, &Parameter, f64), name: &str) -> Others {
+fn others(task: &Task, view: &LinearisedPlan, (effect, p, start): (&Effect, &Parameter, f64), name: &str) -> Others {
     let model = Model::new(task.machine, &[effect], &view.data.set_ups, task.reference);
     let trials = Trials::of(&model, &view.data.nominal);
     let shaped: Vec<&Unknown> = model.unknowns.iter().filter(|u| u.shape).collect();
