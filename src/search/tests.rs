@@ -1,6 +1,5 @@
 //! Distributions, algebra and decisions of the search, against simulation and against plain least squares.
 
-use super::forward::{forward, wald};
 use super::groups::alias_pairs;
 use super::held_out::{Choice, held_out};
 use super::power::{power, separation};
@@ -235,38 +234,6 @@ fn minimal_detectable_size_has_noncentrality_25() {
     let theta = DVector::from_element(1, size);
     assert!(separation(&base, &library, 0, &theta, 1) > 20.0);
     assert!(separation(&base, &library, 0, &theta, 0) < 1e-9);
-}
-
-#[test]
-fn the_loop_finds_two_and_stops() {
-    let mut rng = rng(17);
-    let base = Basis::new(&noise_matrix(&mut rng, ROWS, 10));
-    let library = mixtures(&mut rng, ROWS, 60, 4.0);
-    let (mut both, mut more, runs) = (0, 0, 60);
-    for run in 0..runs {
-        let truth = [run % 60, (run * 7 + 5) % 60];
-        let mut r = noise(&mut rng, ROWS);
-        for c in truth {
-            let columns = library.columns(c, 0);
-            let theta = noise(&mut rng, columns.ncols());
-            let trace = base.project(&(&columns * &theta));
-            let wanted = 49.0 + 30.0 * rng.random::<f64>();
-            r -= columns * theta * (wanted / trace.norm_squared()).sqrt();
-        }
-        let end = forward(ask(&r, &base), &library, 6, None);
-        both += usize::from(truth.iter().all(|c| end.steps.iter().any(|s| s.group.holds(*c))));
-        more += usize::from(end.chosen().len() > 2);
-        // whatever was chosen, the result is that of the model with exactly those columns
-        let chosen: Vec<DMatrix<f64>> = end.chosen().iter().map(|&c| library.columns(c, 0)).collect();
-        assert!(chosen.len() < 2 || wald(ask(&r, &base), &chosen).iter().all(|p| *p <= 0.05));
-        let mut model = base.clone();
-        for c in &chosen {
-            model.extend(c, KEPT);
-        }
-        assert!((model.project(&r) - &end.residual).amax() < 1e-9);
-    }
-    println!("two hidden: both in a group in {both} of {runs}, more than two chosen in {more}");
-    assert!(both * 100 >= 85 * runs && more * 100 <= 12 * runs, "{both} {more}");
 }
 
 /// Base with one offset per group and common columns; the group's own offset is unknown without its touches.
