@@ -190,7 +190,7 @@ pub struct Shape {
 }
 
 /// An effect that may be missing.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// Its id.
     pub effect: String,

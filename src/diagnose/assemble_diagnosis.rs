@@ -4,7 +4,7 @@ use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Pow
 use super::evidence::Evidence;
 use super::first_order::FirstOrder;
 use super::verdict::{Decision, OtherEvidence};
-use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes, words};
+use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes};
 use crate::fit::Fit;
 use crate::model::catalogue::Place;
 use crate::model::data::Origin;
@@ -15,6 +15,7 @@ use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::pattern_tests::{Direction, Features, Kind};
 use crate::search::{Score, power};
 use crate::units::{mm_from_um, um_from_mm};
+use crate::words::diagnose as words;
 use nalgebra::DMatrix;
 
 /// A parameter is flagged when an added effect makes it this many times less certain.

@@ -18,6 +18,7 @@ pub mod features;
 mod first_order;
 pub mod folds;
 mod missed_touches;
+pub mod next_step;
 mod no_usable_touches;
 mod not_identifiable;
 mod outlying_groups;
@@ -27,7 +28,6 @@ pub mod sketch;
 pub mod solving;
 pub mod unresolved_pairs;
 mod verdict;
-pub mod words;
 
 use crate::design::Planned;
 use crate::diag::Result;
@@ -349,6 +349,11 @@ fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let generics = features::shapes(&evidence, &features);
     dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < verdict::LACK_OF_FIT
+}
+
+/// Is the scatter of index positions named first?
+pub(crate) fn scatter_leads(found: &Diagnosis) -> bool {
+    found.depends.first().is_some_and(|w| w.id.starts_with("scatter:"))
 }
 
 /// Standard deviation of a touch in µm, for figures in units of the noise.

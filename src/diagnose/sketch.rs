@@ -4,10 +4,10 @@ use super::Subject;
 use super::error_locations;
 use super::evidence::Evidence;
 use super::features::{features, shapes};
-use super::words;
 use crate::diag::{Failure, Result};
 use crate::fit::Fit;
 use crate::search::dependence::{Dependence, dependences};
+use crate::words::diagnose as words;
 use std::fmt::Write as _;
 
 /// A starting effect.

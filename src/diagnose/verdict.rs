@@ -115,18 +115,19 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             let better = beside.better.as_ref().and_then(|on| out.depends.iter().find(|w| w.on == *on));
             // what rounds to nothing is said of no name
             let worth = |w: &&super::answer::Where| {
-                let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
+                let own =
+                    out.candidates.first().filter(|c| crate::words::diagnose::speaks_of(subject, &c.effect, &w.on));
                 own.is_none_or(|c| w.share - c.share >= WORTH_SAYING)
             };
             let better = better.filter(worth).map_or_else(String::new, |w| {
                 // what depends on the effect's own variable has the same words: what counts is what goes beyond it
-                let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
+                let own = out.candidates.first().filter(|c| crate::words::diagnose::speaks_of(subject, &c.effect, &w.on));
                 match own {
                     Some(c) => format!(
                         " Another form of the same dependence describes it better: {:.0} % more of what is left goes with {} \
                          than {} takes, so that the name may be wrong or not all.",
                         100.0 * (w.share - c.share),
-                        super::words::plain(&w.by),
+                        crate::words::diagnose::plain(&w.by),
                         c.effect
                     ),
                     None => format!(
@@ -162,7 +163,7 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             );
             let share = out.candidates.first().map_or(0.0, |c| c.share);
             let part = format!("{:.0} %", (100.0 * share).round());
-            let scatter_first = out.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
+            let scatter_first = super::scatter_leads(out);
             match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
                 (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
                 (_, true, true) => format!(
@@ -258,7 +259,7 @@ fn missing(c: &Candidate, against: &str) -> String {
         let other = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
         format!(
             "Missing: {}{other}; these touches cannot tell them apart.",
-            super::words::one_of(&c.effect, &c.same_as)
+            crate::words::diagnose::one_of(&c.effect, &c.same_as)
         )
     };
     format!("{what} It would bring the error from {against} to {:.2} um.{rest}", c.rms_after_um)

@@ -6,7 +6,7 @@ use super::plot::{Paper, axis_label};
 use super::prose::sentence;
 use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape, Verdict};
 use crate::diagnose::setup_mistakes;
-use crate::diagnose::words::plain;
+use crate::words::diagnose::plain;
 use comfy_table::Cell;
 
 /// Rows of the small plot.

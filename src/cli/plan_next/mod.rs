@@ -129,7 +129,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if unexplained && !(found.faint && sketched.is_some()) {
         let help = match found.sketchable {
             true => format!("{} writes what is seen as a formula", super::next::sketch_effect(&loaded)),
-            false => diagnose::words::at_the_machine(&found),
+            false => crate::words::diagnose::machine_check(found.machine_check()),
         };
         return Ok(refuse(
             &format!("nothing here to part: no known effect explains what is left. {}", found.says),
