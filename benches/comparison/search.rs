@@ -68,7 +68,7 @@ fn measure(n_touches: usize, n_unknowns: usize) -> ScoreTests {
         n_touches,
         n_unknowns,
         candidates: named.effects.len(),
-        columns: named.raw_um.ncols(),
+        columns: named.library.n_columns(),
         columns_s,
         tests_s,
         solves_s,

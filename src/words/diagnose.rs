@@ -274,3 +274,20 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
     };
     text.to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variables_and_groups_have_names() {
+        let rotary = |name: &str| name == "C";
+        assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C stood before");
+        assert_eq!(plain(&by("C before", &rotary)), "where C stood before");
+        let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
+        assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
+        assert_eq!(one_of("backlash-x", &[]), "backlash-x");
+        assert_eq!(plain("sX*C"), "the product of the sense of X's last motion and C");
+        assert_eq!(plain("time*block"), "time and block");
+    }
+}
