@@ -7,8 +7,8 @@
 mod problems;
 
 use axiscal::diag::source;
+use axiscal::diagnose::candidate_effects::Named;
 use axiscal::diagnose::evidence::Evidence;
-use axiscal::diagnose::named::Named;
 use axiscal::fit::normal::Touches;
 use axiscal::fit::solve::Problem as _;
 use axiscal::fit::{self, Settings};

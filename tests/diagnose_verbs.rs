@@ -360,15 +360,6 @@ fn a_sketch_has_the_terms_that_these_touches_tell() {
 
 #[test]
 fn words_are_words() {
-    use axiscal::diagnose::words::{by, one_of, plain};
-    let rotary = |name: &str| name == "C";
-    assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C stood before");
-    assert_eq!(plain(&by("C before", &rotary)), "where C stood before");
-    let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
-    assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
-    assert_eq!(one_of("backlash-x", &[]), "backlash-x");
-    assert_eq!(plain("sX*C"), "the product of the sense of X's last motion and C");
-    assert_eq!(plain("time*block"), "time and block");
     // with scatter of visits in it the figure is no ratio of the two in um beside it, and says so
     use axiscal::fit::noise::times_in_words;
     assert_eq!(times_in_words(2.2, 0.0), "2.2 times their noise");

@@ -144,7 +144,7 @@ fn a_moved_block_is_drawn_and_sketched() {
     assert!((x[jumps[0]] - 0.83).abs() < 0.1, "{}", x[jumps[0]]);
     let said = diagnosed(at);
     assert!(
-        said.contains("next: clamp block full/b anew") && unwrapped(&said).contains("the time on block full/b"),
+        said.contains("next: clamp block full/b again") && unwrapped(&said).contains("the time on block full/b"),
         "{said}"
     );
     let listed = said.lines().filter(|l| l.contains("not used:") && l.contains("full/b")).count();

@@ -12,7 +12,7 @@ use axiscal::machine::Machine;
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::Run;
 use axiscal::program::plan::Plan;
-use axiscal::search::apart::Products;
+use axiscal::search::distinguishability::Products;
 use axiscal::simulate::Scenario;
 use common::*;
 use std::sync::OnceLock;
@@ -171,7 +171,7 @@ fn a_room_that_goes_on_parts_nothing_from_time() {
             ..design::Planned::new(plan.clone())
         });
         let runs: Vec<design::Planned> = std::iter::once(made.clone()).chain(next).collect();
-        let view = design::View::with_effects(&task, &runs, &[], noise, &effects).unwrap();
+        let view = design::LinearisedPlan::with_effects(&task, &runs, &[], noise, &effects).unwrap();
         let products = Products::new(&view.base, &view.library.matrix().into_owned());
         let span = |i: usize| view.library.candidates()[i].variants[0].columns.clone();
         products.left(&span(0), None, Some(&span(1))).lambda

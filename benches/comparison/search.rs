@@ -1,8 +1,8 @@
 //! The score tests of all candidates against what they replace: a refit of the model with each of them.
 
 use crate::problems::{Problem, SIGMA_MM, try_solve};
+use axiscal::diagnose::candidate_effects::Named;
 use axiscal::diagnose::evidence::Evidence;
-use axiscal::diagnose::named::Named;
 use axiscal::fit::{self, Settings};
 use axiscal::search::Search;
 use std::time::Instant;
@@ -68,7 +68,7 @@ fn measure(n_touches: usize, n_unknowns: usize) -> ScoreTests {
         n_touches,
         n_unknowns,
         candidates: named.effects.len(),
-        columns: named.raw_um.ncols(),
+        columns: named.library.n_columns(),
         columns_s,
         tests_s,
         solves_s,

@@ -3,7 +3,7 @@
 use super::common::of_fit;
 use super::load::{Loaded, load_study};
 use super::{Answer, Io};
-use crate::compare::{change, told};
+use crate::compare::{change, parameter_combinations};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::fit::{self, Fit, held_out};
 use crate::study::edit;
@@ -150,9 +150,10 @@ fn run(
     io.say(report::ladder::change((&before.outcome, &after.outcome), &changes, later, &doubt, io.paper(false)));
     // what has no size of its own is told together, and a jump by the touches on both sides of it
     let fresh: Vec<&String> = after.outcome.effects.iter().filter(|e| !before.outcome.effects.contains(e)).collect();
-    let together: Vec<told::Together> = fresh.iter().filter_map(|id| told::together(&after, id)).collect();
-    let brackets: Vec<told::Bracket> =
-        changes.new.iter().filter_map(|p| told::bracket(&after, &loaded.catalogue, p)).collect();
+    let together: Vec<parameter_combinations::Together> =
+        fresh.iter().filter_map(|id| parameter_combinations::together(&after, id)).collect();
+    let brackets: Vec<parameter_combinations::Bracket> =
+        changes.new.iter().filter_map(|p| parameter_combinations::bracket(&after, &loaded.catalogue, p)).collect();
     for t in &together {
         io.say(format!("{}: what has no value here cannot be told alone; {}", t.effect, t.says()));
     }

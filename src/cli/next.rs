@@ -3,8 +3,9 @@
 
 use super::load::{Loaded, controller_path};
 use crate::diagnose::answer::Diagnosis;
-use crate::diagnose::{Verdict, words};
+use crate::diagnose::next_step::NextStep;
 use crate::post::Postprocessor;
+use crate::words::diagnose as words;
 use std::path::{Path, PathBuf};
 
 /// A path as a shell takes it: in quotes where it has signs that a shell reads.
@@ -57,35 +58,25 @@ const MOST_IDS: usize = 3;
 #[must_use]
 pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
     let study = quoted(&loaded.path);
-    if found.mistake().is_some() {
-        return vec!["next: put that right and measure again; smaller errors can be spoken of afterwards".to_owned()];
-    }
-    match found.verdict {
-        Verdict::MissingEffect => {
-            let Some(first) = found.candidates.first().filter(|c| c.proposed) else { return Vec::new() };
-            if first.same_as.is_empty() {
-                return match &first.or_else {
-                    None => vec![format!("next: axiscal add {study} {}", first.effect)],
-                    Some(other) => vec![
-                        format!("next: look at the machine whether it is that, or whether {other}"),
-                        format!(
-                            "  either way this takes it out of the other errors: axiscal add {study} {}",
-                            first.effect
-                        ),
-                    ],
-                };
-            }
-            if first.never_parted {
-                let how = match first.tell_apart.as_str() {
-                    crate::diagnose::NEVER_PARTED => "look at the machine which of them it is: no touches tell",
-                    other => other,
-                };
-                return vec![
-                    format!("next: {how}"),
-                    format!("  either way this takes it out of the other errors: axiscal add {study} {}", first.effect),
-                ];
-            }
-            // which of them it is, is for touches or a person to say
+    let add =
+        |effect: &str| format!("  either way this takes it out of the other errors: axiscal add {study} {effect}");
+    match found.next_step() {
+        NextStep::CorrectSetupMistake => {
+            vec!["next: put that right and measure again; smaller errors can be spoken of afterwards".to_owned()]
+        }
+        NextStep::Add(first) => vec![format!("next: axiscal add {study} {}", first.effect)],
+        NextStep::AddOrCheck(first, other) => {
+            vec![format!("next: look at the machine whether it is that, or whether {other}"), add(&first.effect)]
+        }
+        NextStep::CheckWhich(first) => {
+            let how = match first.tell_apart.as_str() {
+                crate::diagnose::NEVER_PARTED => "look at the machine which of them it is: no touches tell",
+                other => other,
+            };
+            vec![format!("next: {how}"), add(&first.effect)]
+        }
+        // which of them it is, is for touches or a person to say
+        NextStep::Separate(first) => {
             let ids: Vec<&str> = std::iter::once(&first.effect).chain(&first.same_as).map(String::as_str).collect();
             let more = match ids.len().saturating_sub(MOST_IDS) {
                 0 => String::new(),
@@ -98,16 +89,16 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                 format!("  with one of {some}{more} in place of EFFECT"),
             ]
         }
-        Verdict::Unexplained if found.leaves_open() || (found.faint && found.touches_would_tell()) => {
+        NextStep::MeasureMore => {
             let sketch = found.sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
             std::iter::once(format!("next: {}", plan_next(loaded))).chain(sketch).collect()
         }
-        Verdict::Unexplained if found.moved_block.is_some() && found.sketchable => vec![
-            format!("next: {}", words::at_the_machine(found)),
-            format!("  or, to take it out of the other errors: {}", sketch_effect(loaded)),
-        ],
-        Verdict::Unexplained if found.sketchable => vec![format!("next: {}", sketch_effect(loaded))],
-        Verdict::Unexplained => vec![format!("next: {}", words::at_the_machine(found))],
-        Verdict::Adequate | Verdict::TooLittleData => Vec::new(),
+        NextStep::Sketch => vec![format!("next: {}", sketch_effect(loaded))],
+        NextStep::CorrectAtMachine(check) => {
+            let sketch = || format!("  or, to take it out of the other errors: {}", sketch_effect(loaded));
+            let what = format!("next: {}", words::machine_check(check));
+            std::iter::once(what).chain(found.sketchable.then(sketch)).collect()
+        }
+        NextStep::Nothing => Vec::new(),
     }
 }

@@ -4,17 +4,17 @@
 use super::common::of_fit;
 use super::load::{Loaded, load_study};
 use super::{Answer, Io, add};
-use crate::compare::told;
+use crate::compare::parameter_combinations;
 use crate::diag::{Failure, Result};
 use crate::diagnose::answer::{Candidate, Diagnosis};
 use crate::diagnose::solving::{self, Added, Change, Host, Refusal, Request, State, Stop, Visited, Why};
-use crate::diagnose::words::{list, one_of};
 use crate::diagnose::{Options, Verdict};
 use crate::fit::Fit;
 use crate::fit::outcome::{Outcome, Parameter};
 use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
 use crate::search::groups::PLAUSIBLE;
+use crate::words::diagnose::{list, one_of};
 use serde::Serialize;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
@@ -394,13 +394,13 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
         let words: Vec<String> = of
             .map(|p| match p.sigma {
                 Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, p.sigma), significant(sigma), p.unit),
-                None => match told::bracket(fit, &loaded.catalogue, p) {
+                None => match parameter_combinations::bracket(fit, &loaded.catalogue, p) {
                     Some(b) => b.says(),
                     None => format!("{} not told alone", p.name),
                 },
             })
             .collect();
-        let together = told::together(fit, id).map(|t| t.says());
+        let together = parameter_combinations::together(fit, id).map(|t| t.says());
         words.into_iter().chain(together).collect::<Vec<_>>().join(", ")
     };
     if !s.steps.is_empty() {

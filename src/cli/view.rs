@@ -4,7 +4,7 @@ use super::add::{history_path, read_history};
 use super::compare::leads;
 use super::export::newest_log;
 use super::load::Loaded;
-use crate::compare::rungs::{Kind, Ladder, Rung, climb};
+use crate::compare::model_ladder::{Kind, Ladder, Rung, climb};
 use crate::compare::{Comparison, compare};
 use crate::diag::Result;
 use crate::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose, with_effects};

@@ -4,9 +4,9 @@
 
 pub mod change;
 mod factors;
-pub mod rungs;
+pub mod model_ladder;
+pub mod parameter_combinations;
 mod share;
-pub mod told;
 pub mod verify;
 
 pub use share::Share;

@@ -1,11 +1,11 @@
 //! What a plan will be able to tell, before the first touch.
 
 use super::explain::{Remedy, Results, part};
-use super::habits::{Habit, habits};
+use super::linearised_plan::{LinearisedPlan, Noise, Planned, Task};
+use super::plan_variations::{Variation, variations};
 use super::record::{Advice, Assessment, Expected, FORMAT, Seen};
 use super::score;
-use super::shapes::shapes;
-use super::view::{Noise, Planned, Task, View};
+use super::shape_parameters::shapes;
 use crate::diag::Result;
 use crate::fit::null_space;
 use crate::fit::solve::observe;
@@ -45,7 +45,7 @@ pub struct Request<'a> {
 
 /// A variation and what it sees.
 struct Tried {
-    habit: Habit,
+    variation: Variation,
     power: Vec<Power>,
     pairs: Vec<AliasPair>,
     nullity: usize,
@@ -58,10 +58,10 @@ struct Tried {
 /// When no touch can be used.
 pub fn assess(request: &Request) -> Result<Assessment> {
     let task = &request.task;
-    let alone = View::of_model(task, &request.runs, &[], request.probe)?;
+    let alone = LinearisedPlan::of_model(task, &request.runs, &[], request.probe)?;
     let tau_mm = request.acting_tau_mm.unwrap_or_else(|| declared_tau_mm(task.machine, &alone.data.nominal));
     let acting = Noise { tau_mm, ..request.probe };
-    let view = View::new(task, &request.runs, &[], acting)?;
+    let view = LinearisedPlan::new(task, &request.runs, &[], acting)?;
     let parameters = parameters(task, &alone, &view);
     let mut observability = observe(&alone.jacobian);
     observability.hold(held_first(&alone.model, &alone.free));
@@ -77,20 +77,20 @@ pub fn assess(request: &Request) -> Result<Assessment> {
             );
         }
     }
-    let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
+    let seen = power(&view.base, &view.library, &view.raw_um);
     let pairs = alias_pairs(&view.base, &view.library);
     let nullity = view.jacobian.ncols() - view.base.rank();
     let results = Results::new(&alone.model, &alone.free);
-    let tried: Vec<Tried> = habits(task.machine, &request.runs, &view.model)
+    let tried: Vec<Tried> = variations(task.machine, &request.runs, &view.model)
         .into_iter()
-        .map(|habit| {
-            let varied = View::new(task, &habit.runs, &habit.known, acting)?;
-            let power = power(&varied.base, &varied.library, Some(&varied.raw_um), varied.noise.sigma_mm);
+        .map(|variation| {
+            let varied = LinearisedPlan::new(task, &variation.runs, &variation.known, acting)?;
+            let power = power(&varied.base, &varied.library, &varied.raw_um);
             let pairs = alias_pairs(&varied.base, &varied.library);
             // further blocks bring further unknowns: only what was unknown before counts
             let nullity = (varied.jacobian.ncols() - varied.base.rank()).min(nullity);
-            let remedy = (!observability.unseen.is_empty()).then(|| Remedy::new(&habit, &varied, &results));
-            Ok(Tried { habit, power, pairs, nullity, remedy })
+            let remedy = (!observability.unseen.is_empty()).then(|| Remedy::new(&variation, &varied, &results));
+            Ok(Tried { variation, power, pairs, nullity, remedy })
         })
         .collect::<Result<_>>()?;
     let remedies: Vec<Remedy> = tried.iter().filter_map(|t| t.remedy.clone()).collect();
@@ -129,7 +129,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         });
     }
     let mut parameters = parameters;
-    let of_shapes = shapes(task, &view, &mut parameters);
+    let of_shapes = shapes(task, &view, &parameters);
     for p in &mut parameters {
         // where the lines of two axes miss each other, a turn about the first moves the second in more than one way
         let equal = effects.iter().filter(|e| !e.visible && e.habits.is_empty() && e.absorbed_by.contains(&p.name));
@@ -160,12 +160,12 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         compared: Vec::new(),
         warnings: view.left_out.iter().map(|(_, says)| says.clone()).chain(of_shapes).collect(),
     };
-    (out.score, out.says) = score::of(&out, task);
+    (out.score, out.says) = score::score(&out, task);
     Ok(out)
 }
 
 /// Expected uncertainties of the parameters that are results.
-fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
+fn parameters(task: &Task, alone: &LinearisedPlan, view: &LinearisedPlan) -> Vec<Expected> {
     let seen = observe(&alone.jacobian);
     let sigma = expected(&alone.jacobian, None, &seen);
     let beside: Vec<usize> = view
@@ -202,9 +202,8 @@ fn parameters(task: &Task, alone: &View, view: &View) -> Vec<Expected> {
 }
 
 /// Largest displacement over the touches with every parameter of an effect at its typical size, µm.
-fn peak_um(view: &View, candidate: usize) -> f64 {
-    let span = view.library.candidates()[candidate].variants[0].columns.clone();
-    view.raw_um.columns(span.start, span.len()).row_iter().map(|r| r.norm()).fold(0.0, f64::max)
+fn peak_um(view: &LinearisedPlan, candidate: usize) -> f64 {
+    view.raw_um[candidate].row_iter().map(|r| r.norm()).fold(0.0, f64::max)
 }
 
 /// Which parameters of the model take an effect that leaves no trace of its own.
@@ -214,7 +213,7 @@ struct Absorbed {
 }
 
 impl Absorbed {
-    fn new(view: &View) -> Self {
+    fn new(view: &LinearisedPlan) -> Self {
         let mut scaled = view.jacobian.clone();
         let norms: Vec<f64> = scaled
             .column_iter_mut()
@@ -230,7 +229,7 @@ impl Absorbed {
     }
 
     /// Names, largest first; the blocks' set-ups are one name.
-    fn of(&self, view: &View, candidate: usize) -> Vec<String> {
+    fn of(&self, view: &LinearisedPlan, candidate: usize) -> Vec<String> {
         let columns: DMatrix<f64> = view.library.columns(candidate, 0);
         let x = self.least.solve(&columns);
         // in units of what it does to the touches, so that unlike units compare
@@ -261,7 +260,13 @@ fn minutes(seconds: f64) -> String {
 }
 
 /// Touches that make an effect visible.
-fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String], blind: bool) -> (String, Vec<String>) {
+fn to_show(
+    c: usize,
+    tried: &[Tried],
+    view: &LinearisedPlan,
+    absorbed_by: &[String],
+    blind: bool,
+) -> (String, Vec<String>) {
     let shows = |limit: f64| -> Vec<&Tried> {
         tried.iter().filter(|t| t.power.get(c).is_some_and(|p| p.q > 0 && p.at_typical >= limit)).collect()
     };
@@ -284,13 +289,13 @@ fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String], blind
         Some(first) => {
             let more = found
                 .get(1)
-                .map_or_else(String::new, |t| format!("; or {} (+{})", t.habit.says, minutes(t.habit.seconds)));
+                .map_or_else(String::new, |t| format!("; or {} (+{})", t.variation.says, minutes(t.variation.seconds)));
             let says = format!(
                 "not observable with this plan: {why}; {} (+{}){more}",
-                first.habit.says,
-                minutes(first.habit.seconds)
+                first.variation.says,
+                minutes(first.variation.seconds)
             );
-            (says, found.iter().map(|t| t.habit.id.clone()).collect())
+            (says, found.iter().map(|t| t.variation.id.clone()).collect())
         }
         None if absorbed_by.iter().any(|name| name != SET_UPS) => (
             format!(
@@ -309,7 +314,7 @@ fn to_show(c: usize, tried: &[Tried], view: &View, absorbed_by: &[String], blind
 }
 
 /// Touches that part an effect from those that it cannot be told from.
-fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (String, Vec<String>) {
+fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &LinearisedPlan) -> (String, Vec<String>) {
     let others: Vec<usize> = pairs.iter().filter(|p| p.explained == c).map(|p| p.by).collect();
     if others.is_empty() {
         return (String::new(), Vec::new());
@@ -329,7 +334,7 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (Stri
         return ("no single variation of the touches parts them".into(), Vec::new());
     }
     // the cheapest that parts it from all; else the one that parts it from most
-    found.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.habit.seconds.total_cmp(&b.1.habit.seconds)));
+    found.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.variation.seconds.total_cmp(&b.1.variation.seconds)));
     let (count, best, from) = &found[0];
     let whom = if *count == others.len() {
         if others.len() == 1 {
@@ -340,8 +345,8 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &View) -> (Stri
     } else {
         format!("from {count} of {}", others.len())
     };
-    let says = format!("{} (+{}) tells the effect {whom}", best.habit.says, minutes(best.habit.seconds));
-    (says, found.iter().map(|f| f.1.habit.id.clone()).collect())
+    let says = format!("{} (+{}) tells the effect {whom}", best.variation.says, minutes(best.variation.seconds));
+    (says, found.iter().map(|f| f.1.variation.id.clone()).collect())
 }
 
 /// Effects that are the same both ways, largest group first.
@@ -367,7 +372,7 @@ fn groups(effects: &[Seen]) -> Vec<Vec<String>> {
 }
 
 /// The variations that bring most for their time.
-fn advice(view: &View, seen: &[Power], pairs: &[AliasPair], nullity: usize, tried: &[Tried]) -> Vec<Advice> {
+fn advice(view: &LinearisedPlan, seen: &[Power], pairs: &[AliasPair], nullity: usize, tried: &[Tried]) -> Vec<Advice> {
     let mut out: Vec<(f64, Advice)> = tried
         .iter()
         .filter_map(|t| {
@@ -380,17 +385,17 @@ fn advice(view: &View, seen: &[Power], pairs: &[AliasPair], nullity: usize, trie
             let determines = nullity - t.nullity;
             let worth = (5 * shows.len() + parts + 5 * determines) as f64;
             (worth > 0.0).then(|| {
-                let habit = &t.habit;
+                let variation = &t.variation;
                 let advice = Advice {
-                    habit: habit.id.clone(),
-                    says: habit.says.clone(),
-                    touches: habit.touches,
-                    time_s: habit.seconds,
+                    habit: variation.id.clone(),
+                    says: variation.says.clone(),
+                    touches: variation.touches,
+                    time_s: variation.seconds,
                     shows,
                     parts,
                     determines,
                 };
-                (worth / habit.seconds.max(60.0), advice)
+                (worth / variation.seconds.max(60.0), advice)
             })
         })
         .collect();

@@ -1,7 +1,7 @@
 //! Bundles of touches that a further program may be made of: one block in one pose, and the program file of a choice.
 
+use super::linearised_plan::{INDEX_S, STYLUS_S, TOUCH_S};
 use super::vary::faces_the_spindle;
-use super::view::{INDEX_S, STYLUS_S, TOUCH_S};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::machine::{Block, Machine, Mounting};
 use crate::program::plan::{self, ControllerFrame, Plan, PlanBlock, PlanTouch};

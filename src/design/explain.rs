@@ -1,7 +1,7 @@
 //! Which touches would part what a fit cannot tell apart.
 
-use super::habits::{Habit, habits};
-use super::view::{Known, Noise, Planned, Task, View, keep_measured};
+use super::linearised_plan::{Known, LinearisedPlan, Noise, Planned, Task, keep_measured};
+use super::plan_variations::{Variation, variations};
 use crate::diag::Result;
 use crate::fit::outcome::Undetermined;
 use crate::fit::solve::{Observability, observe};
@@ -64,10 +64,10 @@ pub(super) struct Remedy {
 }
 
 impl Remedy {
-    pub fn new(habit: &Habit, varied: &View, results: &Results) -> Self {
-        let minutes = (habit.seconds / 60.0).round().max(1.0);
+    pub fn new(variation: &Variation, varied: &LinearisedPlan, results: &Results) -> Self {
+        let minutes = (variation.seconds / 60.0).round().max(1.0);
         let left = unseen(varied, &results.names, &results.typical);
-        Self { says: format!("{} (+{minutes} min)", habit.says), seconds: habit.seconds, left }
+        Self { says: format!("{} (+{minutes} min)", variation.says), seconds: variation.seconds, left }
     }
 }
 
@@ -180,11 +180,11 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
     // what was planned and not made tells nothing: a run may have been broken off
     let mut planned: Vec<Planned> = runs.iter().map(Planned::of).collect();
     keep_measured(&mut planned, &fit.data);
-    let remedies: Vec<Remedy> = habits(machine, &planned, &fit.model)
+    let remedies: Vec<Remedy> = variations(machine, &planned, &fit.model)
         .into_iter()
-        .map(|habit| {
-            let known: Vec<Known> = priors.iter().chain(&habit.known).cloned().collect();
-            Ok(Remedy::new(&habit, &View::of_model(&task, &habit.runs, &known, noise)?, &results))
+        .map(|variation| {
+            let known: Vec<Known> = priors.iter().chain(&variation.known).cloned().collect();
+            Ok(Remedy::new(&variation, &LinearisedPlan::of_model(&task, &variation.runs, &known, noise)?, &results))
         })
         .collect::<Result<_>>()?;
     fit.outcome.parted_together = part(&directions, &remedies, &mut fit.outcome.undetermined);
@@ -192,7 +192,7 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
 }
 
 /// Orthonormal basis of what leaves no trace in a view, seen from the named unknowns in units of their typical sizes.
-fn unseen(view: &View, names: &[String], typical: &[f64]) -> DMatrix<f64> {
+fn unseen(view: &LinearisedPlan, names: &[String], typical: &[f64]) -> DMatrix<f64> {
     let seen = observe(&view.jacobian);
     let columns: Vec<Option<usize>> =
         names.iter().map(|n| view.free.iter().position(|&i| view.model.unknowns[i].name == *n)).collect();

@@ -1,6 +1,6 @@
 //! What a further program is to settle: pairs of effects of which the data cannot say which one acts.
 
-use super::view::View;
+use super::linearised_plan::LinearisedPlan;
 use crate::search::groups::{PLAUSIBLE, alias_pairs};
 use crate::search::power::power;
 use nalgebra::DVector;
@@ -94,8 +94,8 @@ impl Questions {
 
     /// The pairs that a plan confounds both ways, those first that would be seen best at typical size.
     #[must_use]
-    pub fn of_plan(view: &View) -> Self {
-        let seen = power(&view.base, &view.library, Some(&view.raw_um), view.noise.sigma_mm);
+    pub fn of_plan(view: &LinearisedPlan) -> Self {
+        let seen = power(&view.base, &view.library, &view.raw_um);
         let id = |c: usize| view.library.candidates()[c].id.clone();
         let mut pairs: Vec<(f64, Pair)> = alias_pairs(&view.base, &view.library)
             .into_iter()

@@ -1,7 +1,7 @@
 //! One word for a plan, with the reason (the thresholds stand in docs/guide/assess.md).
 
+use super::linearised_plan::Task;
 use super::record::{Assessment, Expected, Score};
-use super::view::Task;
 
 /// The noise of a touch alone must leave a location error to this share of its typical size.
 const NOISE_SHARE: f64 = 0.25;
@@ -21,7 +21,7 @@ const MOST_INVISIBLE: usize = 4;
 const PAIRS_PER_EFFECT: f64 = 0.5;
 
 /// Score and reason.
-pub(super) fn of(a: &Assessment, task: &Task) -> (Score, String) {
+pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     // an axis that no touch sees is not what this plan is for
     let unseen_effect = |effect: &str| a.parameters.iter().filter(|p| p.effect == effect).all(|p| p.sigma.is_none());
     let location: Vec<&Expected> = a.parameters.iter().filter(|p| is_location(&p.effect)).collect();

@@ -1,6 +1,6 @@
 //! A touch made another way: another pose, spindle, stylus, feed or face, with all axis positions anew.
 
-use super::view::{INDEX_S, TOUCH_S, times_s};
+use super::linearised_plan::{INDEX_S, TOUCH_S, times_s};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Plan, PlanTouch};

@@ -98,7 +98,7 @@ pub struct Diagnosis {
     pub consequences: Vec<super::consequence::Consequence>,
     /// What is left open, for a further program.
     #[serde(skip)]
-    pub open: super::open::Open,
+    pub open: super::unresolved_pairs::Open,
     /// Remarks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -136,8 +136,8 @@ impl Diagnosis {
             let none = || "most touches found nothing".to_owned();
             return Some(self.candidates.first().map(|c| c.name.clone()).or(named).unwrap_or_else(none));
         }
-        let right = |g: &&Gross| g.rms_um < super::gross::RIGHT * self.rms_um;
-        let elsewhere = |g: &&Gross| g.hypothesis == super::gross::ELSEWHERE;
+        let right = |g: &&Gross| g.rms_um < super::setup_mistakes::RIGHT * self.rms_um;
+        let elsewhere = |g: &&Gross| g.hypothesis == super::setup_mistakes::ELSEWHERE;
         let found = self.gross.first().filter(right).or_else(|| self.gross.iter().find(elsewhere));
         found.map(|g| g.says.clone())
     }
@@ -190,7 +190,7 @@ pub struct Shape {
 }
 
 /// An effect that may be missing.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// Its id.
     pub effect: String,

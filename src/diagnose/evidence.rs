@@ -3,8 +3,8 @@
 
 use crate::fit::Fit;
 use crate::fit::whitening::Whitening;
-use crate::search::generic::Rows;
 use crate::search::held_out::Colours;
+use crate::search::pattern_tests::Rows;
 use crate::search::{Basis, PureError, Question};
 use crate::units::mm_from_um;
 use nalgebra::{DMatrix, DVector};

@@ -7,7 +7,7 @@ use crate::fit::candidates::columns;
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::slot;
-use crate::search::generic::{Direction, Features, Generics, Kind, Variable, generics};
+use crate::search::pattern_tests::{Direction, Features, Generics, Kind, Variable, generics};
 use crate::units::um_from_mm;
 use nalgebra::Vector3;
 use std::sync::Arc;

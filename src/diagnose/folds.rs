@@ -4,12 +4,12 @@
 //! The tests allow for the scatter of index positions that revisited poses show. That may hold the missing effect itself, so that the
 //! choice is left to the tests and the errors are worked out with the noise of cross-validation (`Noise::tau_fold_mm`).
 
+use super::candidate_effects::Named;
 use super::evidence::Evidence;
-use super::named::Named;
 use crate::fit::{Fit, held_out};
-use crate::search::Library;
 use crate::search::held_out::{Choice, Colours, HeldOut, held_out_in};
 use crate::units::mm_from_um;
+use nalgebra::DMatrix;
 
 /// What cross-validated errors are worked out from.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub struct Folds {
     /// The model's own error.
     model: Option<held_out::HeldOut>,
     /// Rows with the noise of cross-validation, where the tests use another one.
-    otherwise: Option<(Evidence, Library)>,
+    otherwise: Option<Evidence>,
     /// Whitened rows as µm of touches.
     colours: Colours,
 }
@@ -34,16 +34,12 @@ pub struct Errors {
 }
 
 impl Folds {
-    /// Of a fit; `evidence` and `named` are those of the tests.
-    pub(super) fn of(fit: &Fit, evidence: &Evidence, named: &Named) -> Self {
+    /// Of a fit; `evidence` is that of the tests.
+    pub(super) fn of(fit: &Fit, evidence: &Evidence) -> Self {
         let model = held_out::by_visit(fit);
-        let otherwise = (evidence.tau_mm != fit.noise.tau_fold_mm).then(|| {
-            let own = Evidence::with_visits(fit, fit.noise.tau_fold_mm);
-            let library = named.library.with_columns(own.whiten(named.raw_um.map(mm_from_um)))?;
-            Some((own, library))
-        });
-        let otherwise = otherwise.flatten();
-        let colours = otherwise.as_ref().map_or(evidence, |(own, _)| own).colours_um(fit);
+        let otherwise =
+            (evidence.tau_mm != fit.noise.tau_fold_mm).then(|| Evidence::with_visits(fit, fit.noise.tau_fold_mm));
+        let colours = otherwise.as_ref().unwrap_or(evidence).colours_um(fit);
         Self { model, otherwise, colours }
     }
 
@@ -55,16 +51,34 @@ impl Folds {
 
     /// With what the tests chose in each fold.
     pub(super) fn chosen(&self, evidence: &Evidence, named: &Named, tested: &HeldOut) -> HeldOut {
-        let (own, library) =
-            self.otherwise.as_ref().map_or((evidence, &named.library), |(own, library)| (own, library));
-        held_out_in(own.question(), library, &own.visits, Choice::AsIn(&tested.folds), &self.colours)
+        let mut chosen: Vec<usize> = tested.folds.iter().filter_map(|f| f.chosen).collect();
+        chosen.sort_unstable();
+        chosen.dedup();
+        let mut folds = tested.folds.clone();
+        for fold in &mut folds {
+            fold.chosen = fold.chosen.and_then(|c| chosen.iter().position(|k| *k == c));
+        }
+        self.held_out(evidence, named, &chosen, Choice::AsIn(&folds))
     }
 
     /// With a candidate of the tests.
     pub(super) fn given(&self, evidence: &Evidence, named: &Named, candidate: usize) -> HeldOut {
-        let (own, library) =
-            self.otherwise.as_ref().map_or((evidence, &named.library), |(own, library)| (own, library));
-        held_out_in(own.question(), &library.only(candidate), &own.visits, Choice::Given(0), &self.colours)
+        self.held_out(evidence, named, &[candidate], Choice::Given(0))
+    }
+
+    /// Of some candidates of the tests, in ascending order.
+    fn held_out(&self, evidence: &Evidence, named: &Named, candidates: &[usize], choice: Choice) -> HeldOut {
+        let mut library = named.library.some(|c| candidates.contains(&c));
+        if let Some(own) = &self.otherwise {
+            let all = candidates
+                .iter()
+                .flat_map(|&c| (0..named.library.candidates()[c].variants.len()).map(move |variant| (c, variant)));
+            let raw = named.raw_um(&all.collect::<Vec<_>>());
+            let white: Vec<DMatrix<f64>> = raw.into_iter().map(|um| own.whiten(um.map(mm_from_um))).collect();
+            library = library.with_variants(own.n_rows(), &white);
+        }
+        let own = self.otherwise.as_ref().unwrap_or(evidence);
+        held_out_in(own.question(), &library, &own.visits, choice, &self.colours)
     }
 
     /// As they are shown. The linear folds come to the model's own error but for rounding: it is the one figure.

@@ -6,28 +6,28 @@
 //! tell apart stand together; and where nothing fits, the variable is named on which the misfit depends.
 
 pub mod answer;
+mod assemble_diagnosis;
+pub mod candidate_effects;
+mod clustered_rejections;
 pub mod consequence;
+mod effect_curve;
+mod effects_versus_patterns;
+pub mod error_locations;
 pub mod evidence;
 pub mod features;
-mod findings;
 mod first_order;
 pub mod folds;
-mod gathered;
-pub mod gross;
-mod missed;
-pub mod named;
-mod nothing;
-pub mod open;
-mod own_curve;
-pub mod places;
-mod rivals;
+mod missed_touches;
+pub mod next_step;
+mod no_usable_touches;
+mod not_identifiable;
+mod outlying_groups;
+mod separating_touches;
+pub mod setup_mistakes;
 pub mod sketch;
 pub mod solving;
-mod standing_out;
-mod tell;
-mod untold;
+pub mod unresolved_pairs;
 mod verdict;
-pub mod words;
 
 use crate::design::Planned;
 use crate::diag::Result;
@@ -35,17 +35,17 @@ use crate::fit::{Fit, Reason, Settings, VisitSource, declared_tau_mm, identify_d
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
-use crate::search::generic::{Features, Generics};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, HeldOut, held_out};
+use crate::search::pattern_tests::{Features, Generics};
 use crate::search::{LackOfFit, Question, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::{Diagnosis, Verdict};
+use candidate_effects::Named;
 use evidence::Evidence;
 use nalgebra::DMatrix;
-use named::Named;
+pub use separating_touches::NEVER as NEVER_PARTED;
 use std::sync::Arc;
-pub use tell::NEVER as NEVER_PARTED;
 
 /// What is diagnosed.
 #[derive(Debug, Clone, Copy)]
@@ -106,6 +106,13 @@ pub struct Examination<'a> {
     pub given: bool,
     /// What cross-validated errors are worked out from.
     pub folds: folds::Folds,
+}
+
+impl Examination<'_> {
+    /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
+    fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
+        self.ordered.raw_um(&[(candidate, self.order.scores[candidate].variant)]).remove(0)
+    }
 }
 
 /// The same touches with index visits that come back exactly.
@@ -177,7 +184,7 @@ pub fn examine<'a>(
         lack_of_fit: lack_of_fit(&question),
         nested: behind.unwrap_or(nested),
         given,
-        folds: folds::Folds::of(fit, evidence, named),
+        folds: folds::Folds::of(fit, evidence),
         evidence,
         named,
         search,
@@ -264,7 +271,7 @@ fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f6
 pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let Subject { machine, catalogue, fit, .. } = subject;
     if fit.n_used() == 0 {
-        return Ok(nothing::used(subject, options));
+        return Ok(no_usable_touches::used(subject, options));
     }
     let features = Arc::new(features::features(fit, machine));
     let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
@@ -273,27 +280,28 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     let ordering = Ordering::of(fit, machine, catalogue);
     let seen = examine(fit, &evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
     let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
-        Some(group) => rivals::weigh(evidence.question(), &named.library, &generics, group.first()),
-        None => rivals::Weighed::default(),
+        Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first()),
+        None => effects_versus_patterns::Weighed::default(),
     };
-    let beside = verdict::Beside {
+    let beside = verdict::OtherEvidence {
         shapes_win: weighed.shapes_win,
         // a shape that goes with the first by probability says nothing against the one that is borne out behind it
         better: weighed.better.filter(|_| !seen.given).map(|shape| generics.shapes[shape].depends_on.clone()),
-        gathered: gathered::gathered(fit, &features),
+        gathered: clustered_rejections::gathered(fit, &features),
         scatter: scatter(fit, machine, &evidence),
     };
-    let verdict = verdict::of(&seen, &beside);
-    let mut gross = if fit.outcome.rms_um > gross::GROSS_UM { gross::hypotheses(subject) } else { Vec::new() };
-    if let Some(supposed) = gross::of_log(subject) {
+    let verdict = verdict::decide(&seen, &beside);
+    let mut gross =
+        if fit.outcome.rms_um > setup_mistakes::GROSS_UM { setup_mistakes::hypotheses(subject) } else { Vec::new() };
+    if let Some(supposed) = setup_mistakes::of_log(subject) {
         gross.retain(|g| g.hypothesis != supposed.hypothesis);
         gross.insert(0, supposed);
     } else if let Some(planned) = options.planned.filter(|_| fit.data.mostly_missed()) {
-        let missed = missed::hypotheses(subject, planned);
+        let missed = missed_touches::hypotheses(subject, planned);
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);
     }
-    let mut out = findings::put_together(subject, &seen, &features, (verdict, &beside), gross, options);
+    let mut out = assemble_diagnosis::put_together(subject, &seen, &features, (verdict, &beside), gross, options);
     if out.mistake().is_none() {
         let of = (out.verdict, beside.gathered.is_some());
         out.consequences = consequence::consequences(subject, &seen, &generics, of)?;
@@ -301,18 +309,18 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     if options.refit
         && let Some(first) = out.candidates.first_mut()
         && (first.proposed || fit.rejected.values().any(Reason::is_outlier))
-        && fit.outcome.rms_um <= gross::GROSS_UM
+        && fit.outcome.rms_um <= setup_mistakes::GROSS_UM
     {
         let again = with_effects(subject, &[first.effect.as_str()])?;
         if first.proposed {
             first.rms_after_um = again.outcome.rms_um;
             first.remains = Some(still_fails(&again, machine, catalogue));
         }
-        findings::outliers_again(&mut out, fit, &again);
+        assemble_diagnosis::outliers_again(&mut out, fit, &again);
     }
     verdict::says(&mut out, subject, verdict, &beside);
     verdict::not_when_touches_are_missing(&mut out, subject);
-    untold::not_when_nothing_is_told(&mut out, subject);
+    not_identifiable::not_when_nothing_is_told(&mut out, subject);
     Ok(out)
 }
 
@@ -341,6 +349,11 @@ fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let generics = features::shapes(&evidence, &features);
     dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < verdict::LACK_OF_FIT
+}
+
+/// Is the scatter of index positions named first?
+pub(crate) fn scatter_leads(found: &Diagnosis) -> bool {
+    found.depends.first().is_some_and(|w| w.id.starts_with("scatter:"))
 }
 
 /// Standard deviation of a touch in µm, for figures in units of the noise.

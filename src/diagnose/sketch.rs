@@ -1,13 +1,13 @@
 //! What no effect explains, as a starting effect in the user's own file.
 
 use super::Subject;
+use super::error_locations;
 use super::evidence::Evidence;
 use super::features::{features, shapes};
-use super::places;
-use super::words;
 use crate::diag::{Failure, Result};
 use crate::fit::Fit;
 use crate::search::dependence::{Dependence, dependences};
+use crate::words::diagnose as words;
 use std::fmt::Write as _;
 
 /// A starting effect.
@@ -24,7 +24,7 @@ pub struct Sketch {
     /// Sizes of its terms as the data have them, in their typical sizes.
     pub sizes: Vec<f64>,
     /// Places where it may act, the one that leaves least first.
-    pub tried: Vec<places::Tried>,
+    pub tried: Vec<error_locations::Tried>,
 }
 
 /// The best starting formula for what is left over. `taken` are ids that exist.
@@ -38,11 +38,11 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
     let generics = shapes(&evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let best = best(&all, subject.fit)?;
-    let share = super::findings::beyond_the_noise(&evidence, best.share, best.terms.len());
+    let share = super::assemble_diagnosis::beyond_the_noise(&evidence, best.share, best.terms.len());
     if best.on == words::MOVED_BLOCK {
         return Ok(write_moved(subject, (best, share), taken));
     }
-    let tried = places::tried(subject, &evidence, best);
+    let tried = error_locations::tried(subject, &evidence, best);
     Ok(write(subject, (best, share), &tried, taken))
 }
 
@@ -104,7 +104,7 @@ fn plain(x: f64) -> String {
 fn write(
     subject: Subject,
     (d, share): (&Dependence, f64),
-    tried: &[places::Tried],
+    tried: &[error_locations::Tried],
     taken: &dyn Fn(&str) -> bool,
 ) -> Sketch {
     let stem: String = d.on.to_lowercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
@@ -112,7 +112,7 @@ fn write(
     let prefix: String = id.replace('-', "_");
     let says = words::says(d, share, subject.fit, subject.machine);
     let shape_name = d.shape.as_ref().map(|s| format!("{prefix}_{}", s.name));
-    let own = places::Tried::of(d);
+    let own = error_locations::Tried::of(d);
     let place = tried.first().unwrap_or(&own);
     let mut terms = String::new();
     let (mut formula, mut sizes) = (Vec::new(), Vec::new());
@@ -122,7 +122,7 @@ fn write(
             (Some(shape), Some(name)) => replace_word(&text, &shape.name, name),
             _ => text,
         };
-        let (unit, typical) = (places::unit_of(dof), size.abs().max(*sigma).max(0.1));
+        let (unit, typical) = (error_locations::unit_of(dof), size.abs().max(*sigma).max(0.1));
         sizes.push(size / typical);
         let _ = writeln!(
             terms,
@@ -137,7 +137,7 @@ fn write(
         d.on,
         says.replace('"', "'"),
         words::kind(d, subject.fit).replace('"', "'"),
-        places::comment(tried),
+        error_locations::comment(tried),
         place.at,
     );
     if let (Some(shape), Some(name)) = (&d.shape, &shape_name) {

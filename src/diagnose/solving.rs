@@ -4,7 +4,7 @@
 //! What a step does to the study, and who agrees to it, is up to the [`Host`].
 
 use super::answer::{Candidate, Diagnosis, Verdict};
-use super::{Options, Subject, diagnose, words};
+use super::{Options, Subject, diagnose};
 use crate::diag::Result;
 use crate::fit::outcome::{Parameter, Status};
 use crate::fit::{Fit, Settings, held_out};
@@ -12,6 +12,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::distributions::{ln_p_of_f, p_of_chi2};
 use crate::search::groups::PLAUSIBLE;
+use crate::words::diagnose as words;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -310,7 +311,7 @@ fn proposed(found: &Diagnosis, added: usize, at_most: usize) -> std::result::Res
             Err(Stop::InQuestion(Box::new(first.clone())))
         }
         (Verdict::Unexplained, _) if found.sketchable => Err(Stop::Sketchable),
-        (Verdict::Unexplained, _) => Err(Stop::Unexplained(words::at_the_machine(found))),
+        (Verdict::Unexplained, _) => Err(Stop::Unexplained(words::machine_check(found.machine_check()))),
         (Verdict::TooLittleData, _) => Err(Stop::TooLittleData),
         (Verdict::Adequate, _) => Err(Stop::Nothing),
     }

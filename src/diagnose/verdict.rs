@@ -2,7 +2,7 @@
 
 use super::Examination;
 use super::answer::{Candidate, Diagnosis, Verdict};
-use super::gathered::Gathered;
+use super::clustered_rejections::Gathered;
 use crate::fit::Fit;
 use crate::search::held_out::HeldOut;
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -31,7 +31,7 @@ pub struct Decision {
 
 /// What else the touches say, beside the tests of effects.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Beside {
+pub(super) struct OtherEvidence {
     /// Shapes without a name say what is left clearly better than names do.
     pub shapes_win: bool,
     /// What the best shape depends on, where it is better than the first effect.
@@ -51,7 +51,7 @@ pub fn bears_out(nested: &HeldOut) -> bool {
 
 /// From the tests.
 #[must_use]
-pub(super) fn of(seen: &Examination, beside: &Beside) -> Decision {
+pub(super) fn decide(seen: &Examination, beside: &OtherEvidence) -> Decision {
     let testable = seen.search.scores.iter().any(|s| s.visible());
     if seen.evidence.dof() < LEAST_DOF || !testable {
         return Decision { verdict: Verdict::TooLittleData, borne_out: false, named: false };
@@ -90,7 +90,7 @@ fn faint(out: &Diagnosis, fit: &Fit) -> bool {
 }
 
 /// Says the verdict in a sentence: the terminal, the report and the workbench say it as it is said here.
-pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decision, beside: &Beside) {
+pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decision, beside: &OtherEvidence) {
     let fit = subject.fit;
     out.faint = beside.gathered.is_none() && beside.scatter.is_none() && faint(out, fit);
     let against = format!("{:.2} um RMS against {:.2} um noise", out.rms_um, out.noise_um);
@@ -115,18 +115,19 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             let better = beside.better.as_ref().and_then(|on| out.depends.iter().find(|w| w.on == *on));
             // what rounds to nothing is said of no name
             let worth = |w: &&super::answer::Where| {
-                let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
+                let own =
+                    out.candidates.first().filter(|c| crate::words::diagnose::speaks_of(subject, &c.effect, &w.on));
                 own.is_none_or(|c| w.share - c.share >= WORTH_SAYING)
             };
             let better = better.filter(worth).map_or_else(String::new, |w| {
                 // what depends on the effect's own variable has the same words: what counts is what goes beyond it
-                let own = out.candidates.first().filter(|c| super::words::speaks_of(subject, &c.effect, &w.on));
+                let own = out.candidates.first().filter(|c| crate::words::diagnose::speaks_of(subject, &c.effect, &w.on));
                 match own {
                     Some(c) => format!(
                         " Another form of the same dependence describes it better: {:.0} % more of what is left goes with {} \
                          than {} takes, so that the name may be wrong or not all.",
                         100.0 * (w.share - c.share),
-                        super::words::plain(&w.by),
+                        crate::words::diagnose::plain(&w.by),
                         c.effect
                     ),
                     None => format!(
@@ -150,7 +151,7 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             let gross = out
                 .gross
                 .first()
-                .filter(|g| g.rms_um < super::gross::RIGHT * out.rms_um)
+                .filter(|g| g.rms_um < super::setup_mistakes::RIGHT * out.rms_um)
                 .map(|g| format!(" {}.", g.says));
             let one = out.candidates.first().map_or_else(
                 || "an effect".to_owned(),
@@ -162,7 +163,7 @@ pub(super) fn says(out: &mut Diagnosis, subject: super::Subject, decision: Decis
             );
             let share = out.candidates.first().map_or(0.0, |c| c.share);
             let part = format!("{:.0} %", (100.0 * share).round());
-            let scatter_first = out.depends.first().is_some_and(|w| w.id.starts_with("scatter:"));
+            let scatter_first = super::scatter_leads(out);
             match (beside.scatter.filter(|_| scatter_first), decision.named, beside.shapes_win) {
                 (Some(_), false, _) => format!("{}. {against}.", out.depends.first().map_or("", |w| w.says.as_str())),
                 (_, true, true) => format!(
@@ -217,7 +218,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
              Correct it in the machine file or the log and measure again; nothing can be said about small effects before.",
             s.far, s.of, s.right
         );
-        out.candidates.extend(super::gross::of_misses(subject, &[first]));
+        out.candidates.extend(super::setup_mistakes::of_misses(subject, &[first]));
         out.verdict = Verdict::MissingEffect;
         return;
     }
@@ -225,7 +226,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
     if let Some(first) = named.first() {
         let alike: Vec<&super::answer::Gross> = named.iter().copied().filter(|g| g.agrees == first.agrees).collect();
         let supposed: Vec<&str> = alike.iter().map(|g| g.says.as_str()).collect();
-        out.candidates.extend(super::gross::of_misses(subject, &alike));
+        out.candidates.extend(super::setup_mistakes::of_misses(subject, &alike));
         out.verdict = Verdict::MissingEffect;
         out.says = format!(
             "{missed} of {made} touches cannot be used, most of them because the search found nothing. It looks as if {}: that \
@@ -258,7 +259,7 @@ fn missing(c: &Candidate, against: &str) -> String {
         let other = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
         format!(
             "Missing: {}{other}; these touches cannot tell them apart.",
-            super::words::one_of(&c.effect, &c.same_as)
+            crate::words::diagnose::one_of(&c.effect, &c.same_as)
         )
     };
     format!("{what} It would bring the error from {against} to {:.2} um.{rest}", c.rms_after_um)

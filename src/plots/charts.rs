@@ -2,7 +2,7 @@
 
 use super::chart::{Axis, Chart, Colour, Look, Mark, Point, Shape};
 use super::machine;
-use crate::compare::rungs::{Curve, Kind};
+use crate::compare::model_ladder::{Curve, Kind};
 use crate::diagnose::Verdict;
 use crate::fit::outcome::Status;
 use crate::report::fit::significant;

@@ -5,8 +5,8 @@ use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
 use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape, Verdict};
-use crate::diagnose::gross;
-use crate::diagnose::words::plain;
+use crate::diagnose::setup_mistakes;
+use crate::words::diagnose::plain;
 use comfy_table::Cell;
 
 /// Rows of the small plot.
@@ -123,7 +123,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     let missing = d.verdict != Verdict::Adequate;
     let mut t = table(&["candidate", "p (Holm)", "error um", "held out um", "share"]);
     for c in &d.candidates {
-        if c.effect == gross::EFFECT {
+        if c.effect == setup_mistakes::EFFECT {
             // a mistake of yes or no: it has neither a size nor a chance, and an error only where it was fitted
             let (error, share) = match c.proposed {
                 true => (significant(c.rms_after_um), format!("{:.0} %", 100.0 * c.share)),
@@ -152,7 +152,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
     let mut out = if missing { String::new() } else { "tried, and none of them needed:\n".to_owned() };
     out += &format!("{t}\n");
     let rises = |c: &Candidate| c.held_out_before_um.zip(c.held_out_after_um).is_some_and(|(b, a)| a >= b);
-    let tested = || d.candidates.iter().filter(|c| c.proposed && c.effect != gross::EFFECT);
+    let tested = || d.candidates.iter().filter(|c| c.proposed && c.effect != setup_mistakes::EFFECT);
     if tested().any(rises) {
         out += &wrapped(
             "* passes the test with all candidates counted in; with so few index visits those left out speak neither for \
@@ -166,7 +166,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
             2,
         );
     }
-    let sized = || d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0 && c.effect != gross::EFFECT);
+    let sized = || d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0 && c.effect != setup_mistakes::EFFECT);
     if sized().any(|c| c.moves_sigma_um.is_some() || c.parameters.iter().any(|p| p.sigma.is_some())) {
         out += "expected sizes, ± one standard uncertainty:\n";
     }

@@ -1,11 +1,10 @@
 //! On what the misfit depends: variables ranked, with the curve itself and a formula to start from.
 
 use super::KEPT;
-use super::distributions::p_of_t;
-use super::generic::{CONSTANT, Features, Generics, Shape};
 use super::groups::Member;
 use super::library::{Library, Origin};
 use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
+use super::pattern_tests::{CONSTANT, Features, Generics, Shape};
 use super::score::{Question, Score, Search};
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, DVector};
@@ -295,42 +294,4 @@ fn curve(search: &Search, score: &Score, shape: &Shape, features: &Features, kep
         }
         _ => Vec::new(),
     }
-}
-
-/// Does a residual remember the one before? Rows in the order of the run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Serial {
-    /// Correlation of neighbours.
-    pub lag_1: f64,
-    /// Two-sided p-value of it.
-    pub lag_1_p: f64,
-    /// Number of runs of one sign.
-    pub runs: usize,
-    /// Two-sided p-value of so few or many (Wald and Wolfowitz, normal approximation).
-    pub runs_p: f64,
-}
-
-/// Lag-1 autocorrelation and runs test of residuals in run order. `None` with fewer than ten or all of one sign.
-#[must_use]
-pub fn serial(residual: &[f64]) -> Option<Serial> {
-    let n = residual.len() as f64;
-    let mean = residual.iter().sum::<f64>() / n;
-    let square: f64 = residual.iter().map(|r| (r - mean) * (r - mean)).sum();
-    let above = residual.iter().filter(|r| **r > 0.0).count() as f64;
-    if residual.len() < 10 || square <= 0.0 || above == 0.0 || above == n {
-        return None;
-    }
-    let lag_1 = residual.windows(2).map(|w| (w[0] - mean) * (w[1] - mean)).sum::<f64>() / square;
-    let runs = 1 + residual.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0)).count();
-    let below = n - above;
-    let expected = 2.0 * above * below / n + 1.0;
-    let variance = (expected - 1.0) * (expected - 2.0) / (n - 1.0);
-    let normal = |z: f64| p_of_t(z, 1e6);
-    Some(Serial {
-        lag_1,
-        // its standard error is 1/√n and its mean −1/n
-        lag_1_p: normal((lag_1 + 1.0 / n) * n.sqrt()),
-        runs,
-        runs_p: normal((runs as f64 - expected) / variance.max(1e-12).sqrt()),
-    })
 }

@@ -1,7 +1,7 @@
 //! Findings as groups: candidates whose traces these touches cannot tell apart stand together under one leader.
 
-pub use super::apart::ALIGNED;
-use super::apart::adds_nothing;
+pub use super::distinguishability::ALIGNED;
+use super::distinguishability::adds_nothing;
 use super::distributions::ln_p_of_f;
 use super::library::Origin;
 use super::moments::{Block, Moments};

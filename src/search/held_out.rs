@@ -23,8 +23,6 @@ const LOST: f64 = 1e-8;
 pub enum Choice<'a> {
     /// The choice is redone in each training set: the leader with a name that passes Holm, or none.
     Redone,
-    /// The same among generic shapes.
-    ShapeRedone,
     /// A given candidate, with the variant that fits the training set best; the choice is not tested.
     Given(usize),
     /// As these folds chose, with the variants that fit best here.
@@ -204,7 +202,6 @@ fn fold(
     let scores = score(&training, library, question.pure);
     let chosen = match choice {
         Choice::Redone => leader(&scores, library, false),
-        Choice::ShapeRedone => leader(&scores, library, true),
         Choice::Given(c) => scores[c].visible().then_some(c),
         Choice::AsIn(folds) => {
             folds.iter().find(|f| f.group == group).and_then(|f| f.chosen).filter(|&c| scores[c].visible())

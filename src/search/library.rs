@@ -296,14 +296,11 @@ impl Library {
         out
     }
 
-    /// The same candidates with columns that were whitened otherwise, in the same order; `None` for a matrix of another shape.
+    /// The same candidates with columns that were whitened otherwise, variant by variant.
     #[must_use]
-    pub fn with_columns(&self, columns: DMatrix<f64>) -> Option<Self> {
-        if columns.ncols() != self.n_columns() {
-            return None;
-        }
-        let n_rows = columns.nrows();
-        Some(Self { candidates: self.candidates.clone(), ..Self::kept(n_rows, Vec::from(columns.data)) })
+    pub fn with_variants(&self, n_rows: usize, columns: &[DMatrix<f64>]) -> Self {
+        let data = columns.iter().flat_map(|c| c.as_slice()).copied().collect();
+        Self { candidates: self.candidates.clone(), ..Self::kept(n_rows, data) }
     }
 
     /// A library of one of the candidates, with all its variants.

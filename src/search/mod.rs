@@ -2,20 +2,19 @@
 //!
 //! A [`Question`] is one linearised regression, a [`Library`] the candidates with their columns. [`Search`] tests all
 //! of them at once, [`groups`] says which of them these data cannot tell apart, [`held_out`] redoes the choice without
-//! the touches that judge it, [`apart`] is the criterion by which two are told apart, [`forward`] goes on until nothing is left to find, [`power`] says before any measurement
-//! what a plan can see, and [`generic`] and [`dependence`] say on what the misfit depends where no candidate explains it.
+//! the touches that judge it, [`distinguishability`] is the criterion by which two effects are separated, [`power`] says before any
+//! measurement what a plan can see, and [`pattern_tests`] and [`dependence`] say on what the misfit depends where no candidate explains it.
 
-pub mod apart;
 pub mod basis;
 pub mod dependence;
+pub mod distinguishability;
 pub mod distributions;
-pub mod forward;
-pub mod generic;
 pub mod groups;
 pub mod held_out;
 pub mod library;
 mod moments;
 pub mod multiplicity;
+pub mod pattern_tests;
 pub mod power;
 pub mod score;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Many tests at once: Holm's family-wise level and Benjamini and Hochberg's share of false discoveries.
+//! Many tests at once: Holm's family-wise level.
 //!
 //! Candidates with a name (catalogue, user) and generic shapes are two families that share the level, so that the
 //! many shapes cost the named effects next to nothing. An adjusted p-value is stated against the whole level: Holm's
@@ -29,9 +29,6 @@ pub enum Family {
     Expected,
 }
 
-/// Share of false ones among the candidates that are worth a look.
-pub const WORTH_A_LOOK: f64 = 0.10;
-
 /// Holm's adjusted p-values (Scandinavian Journal of Statistics 6 (1979) 65).
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
@@ -41,19 +38,6 @@ pub fn holm(p: &[f64]) -> Vec<f64> {
     for (rank, &i) in ascending(p).iter().enumerate() {
         worst = worst.max(((m - rank) as f64 * p[i]).min(1.0));
         out[i] = worst;
-    }
-    out
-}
-
-/// Benjamini and Hochberg's q-values (Journal of the Royal Statistical Society B 57 (1995) 289).
-#[must_use]
-pub fn benjamini_hochberg(p: &[f64]) -> Vec<f64> {
-    let m = p.len();
-    let mut out = vec![1.0; m];
-    let mut least = 1.0f64;
-    for (rank, &i) in ascending(p).iter().enumerate().rev() {
-        least = least.min(m as f64 / (rank + 1) as f64 * p[i]);
-        out[i] = least;
     }
     out
 }
@@ -73,9 +57,8 @@ pub(super) fn adjust(scores: &mut [Score], family_of: impl Fn(&Score) -> Family)
         let members: Vec<usize> =
             (0..scores.len()).filter(|&i| scores[i].visible() && family_of(&scores[i]) == family).collect();
         let p: Vec<f64> = members.iter().map(|&i| scores[i].p).collect();
-        for ((&i, adjusted), q_value) in members.iter().zip(holm(&p)).zip(benjamini_hochberg(&p)) {
+        for (&i, adjusted) in members.iter().zip(holm(&p)) {
             scores[i].p_adjusted = (adjusted / share).min(1.0);
-            scores[i].q_value = q_value;
         }
     }
 }
@@ -93,7 +76,6 @@ mod tests {
         // p.adjust of R for these four
         let p = [0.01, 0.04, 0.03, 0.005];
         near(&holm(&p), &[0.03, 0.06, 0.06, 0.02]);
-        near(&benjamini_hochberg(&p), &[0.02, 0.04, 0.04, 0.02]);
-        assert!(holm(&[]).is_empty() && benjamini_hochberg(&[]).is_empty());
+        assert!(holm(&[]).is_empty());
     }
 }

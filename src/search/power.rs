@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-pub use super::apart::SEEN;
+pub use super::distinguishability::SEEN;
 
 /// Directions over which the median is taken.
 const DIRECTIONS: usize = 401;
@@ -24,17 +24,16 @@ pub struct Power {
     pub q: usize,
     /// Share of the candidate's norm that the base model cannot follow.
     pub kept: f64,
-    /// Smallest size that is found nearly always, as the peak of the effect over the touches, in the unit of `raw`;
+    /// Smallest size that is found nearly always, as the peak of the effect over the touches, µm;
     /// the median over random directions of the block. `None`: no size is ever seen.
     pub minimal_detectable: Option<f64>,
     /// Noncentrality at typical size, the median over the same directions.
     pub at_typical: f64,
 }
 
-/// Power of each candidate's first variant. `raw` has the library's columns before whitening (touches × columns, for
-/// instance in µm); `None` where whitening was a division by `sigma`.
+/// Power of each candidate's first variant. `raw` has its columns before whitening, in µm.
 #[must_use]
-pub fn power(base: &Basis, library: &Library, raw: Option<&DMatrix<f64>>, sigma: f64) -> Vec<Power> {
+pub fn power(base: &Basis, library: &Library, raw: &[DMatrix<f64>]) -> Vec<Power> {
     let moments = Moments::new(&DVector::zeros(base.n_rows()), base, library);
     let first = first_variants(library);
     library
@@ -50,10 +49,6 @@ pub fn power(base: &Basis, library: &Library, raw: Option<&DMatrix<f64>>, sigma:
             }
             let w = moments.qj.columns(span.start, span.len());
             let left = &moments.blocks[first[c]] - w.transpose() * w;
-            let columns = match raw {
-                Some(raw) => raw.columns(span.start, span.len()).into_owned(),
-                None => library.columns(c, 0) * sigma,
-            };
             // the same directions for every candidate and in every run
             let mut rng = ChaCha8Rng::seed_from_u64(5);
             let count = if span.len() == 1 { 1 } else { DIRECTIONS };
@@ -63,7 +58,7 @@ pub fn power(base: &Basis, library: &Library, raw: Option<&DMatrix<f64>>, sigma:
                 let theta = DVector::from_fn(span.len(), |_, _| -> f64 { StandardNormal.sample(&mut rng) });
                 let theta = if span.len() == 1 { DVector::from_element(1, 1.0) } else { theta.normalize() };
                 let lambda = theta.dot(&(&left * &theta)).max(0.0);
-                let peak = (&columns * &theta).amax();
+                let peak = (&raw[c] * &theta).amax();
                 typical.push(lambda);
                 sizes.push(if lambda > 0.0 { peak * (SEEN / lambda).sqrt() } else { f64::INFINITY });
             }

@@ -72,8 +72,6 @@ pub struct Score {
     pub p: f64,
     /// Holm's, over the family that the candidate belongs to; below [`multiplicity::FAMILY_LEVEL`]: proposed.
     pub p_adjusted: f64,
-    /// Benjamini and Hochberg's; below [`multiplicity::WORTH_A_LOOK`]: worth a look.
-    pub q_value: f64,
     /// Expected size of each parameter, in typical sizes.
     pub estimate: DVector<f64>,
     /// Its covariance.
@@ -260,7 +258,6 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
                     ln_p: if ln_best == f64::NEG_INFINITY { ln_best } else { ln_p },
                     p: ln_p.exp(),
                     p_adjusted: 1.0,
-                    q_value: 1.0,
                     estimate: -(&block.whitener * &along),
                     covariance: &block.whitener * block.whitener.transpose() * variance,
                     kept: block.kept,
@@ -281,7 +278,6 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
                     ln_p: 0.0,
                     p: 1.0,
                     p_adjusted: 1.0,
-                    q_value: 1.0,
                     estimate: DVector::zeros(m),
                     covariance: DMatrix::zeros(m, m),
                     kept: 0.0,

@@ -1,7 +1,7 @@
 //! Generic shapes on a small plan: which variable is named, how often clean data are suspected, and how long it takes.
 
-use super::dependence::{Dependence, dependences, serial};
-use super::generic::{Direction, Features, Generics, Kind, Rows, Variable, generics};
+use super::dependence::{Dependence, dependences};
+use super::pattern_tests::{Direction, Features, Generics, Kind, Rows, Variable, generics};
 use super::testing::{noise, rng};
 use super::tests::{ask, correlated_library};
 use super::*;
@@ -169,16 +169,4 @@ fn named_effects_and_shapes_share_one_level() {
     println!("clean data: any proposal in {any} of {runs}, generic in {generic}");
     // 5 % and two standard errors
     assert!(any * 1000 < 78 * runs, "{any}");
-}
-
-#[test]
-fn neighbours_that_remember_each_other_are_noticed() {
-    let mut rng = rng(22);
-    let white: Vec<f64> = noise(&mut rng, 300).iter().copied().collect();
-    let calm = serial(&white).unwrap();
-    assert!(calm.lag_1_p > 0.01 && calm.runs_p > 0.01, "{calm:?}");
-    let slow: Vec<f64> = white.iter().enumerate().map(|(i, w)| w + 2.0 * (i as f64 / 30.0).sin()).collect();
-    let drift = serial(&slow).unwrap();
-    assert!(drift.lag_1_p < 1e-6 && drift.runs_p < 1e-4, "{drift:?}");
-    assert!(serial(&[1.0; 20]).is_none());
 }

@@ -1,6 +1,6 @@
 //! The dictionary of shapes: each with its value at a touch, on a curve, and as a formula of the effects file.
 
-use super::generic::{Features, Kind};
+use super::pattern_tests::{Features, Kind};
 use std::f64::consts::TAU;
 
 /// A function of one or two variables, or of a group of touches. Variables by index in the feature table.
@@ -207,7 +207,7 @@ fn wave(x: f64, sine: bool) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::generic::Variable;
+    use super::super::pattern_tests::Variable;
     use super::*;
     use crate::model::formula::{Formula, State, VARIABLES};
 

@@ -320,7 +320,7 @@ pub(super) fn capital(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::open::Open;
+    use crate::diagnose::unresolved_pairs::Open;
 
     fn candidate(effect: &str, p_adjusted: f64, held_out: Option<f64>, same_as: &[&str]) -> Candidate {
         Candidate {

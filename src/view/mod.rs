@@ -17,7 +17,7 @@ pub use parameters::{correlation, results};
 pub use record::View;
 
 use crate::compare::Comparison;
-use crate::compare::rungs::{Kind, Ladder};
+use crate::compare::model_ladder::{Kind, Ladder};
 use crate::diagnose::Diagnosis;
 use crate::fit::Fit;
 use crate::machine::Machine;

@@ -6,6 +6,7 @@ use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::diagnose::consequence::Consequence;
+use crate::diagnose::next_step::NextStep;
 use crate::post::Postprocessor;
 use crate::tables::control;
 use crate::units::um_from_mm;
@@ -46,7 +47,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 found(m, first, &plan_next, c, &mut out);
             }
         }
-        Verdict::Unexplained if d.faint && (d.leaves_open() || d.touches_would_tell()) => {
+        Verdict::Unexplained if d.faint && d.next_step() == NextStep::MeasureMore => {
             out.push(Next::new(
                 "Measure more touches",
                 "Repeats and further poses say whether the weak pattern is there at all.",
@@ -61,8 +62,8 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
         Verdict::Unexplained if !untried(d).is_empty() => {
             which(m, &untried(d), &plan_next, controller, &mut out);
         }
-        Verdict::Unexplained if d.in_question().is_some() => {
-            let what = d.in_question().map_or_else(String::new, |c| in_question(m, c));
+        Verdict::Unexplained if d.next_step() == NextStep::MeasureMore => {
+            let what = d.in_question().map_or_else(|| "one of these effects".to_owned(), |c| in_question(m, c));
             let how = format!("Whether it is {what}, touches at further poses tell.");
             out.push(Next::new("Measure more index visits", how, plan_next.clone()));
         }
@@ -101,7 +102,7 @@ fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &m
 }
 
 fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out: &mut Vec<Next>) {
-    if m.diagnosis.mistake().is_some() {
+    if m.diagnosis.next_step() == NextStep::CorrectSetupMistake {
         out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
         return;
     }
@@ -161,12 +162,9 @@ fn unexplained(m: &Material, out: &mut Vec<Next>) {
         let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
         out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
     }
-    if !d.sketchable || d.moved_block.is_some() {
-        out.push(Next::new(
-            "Put it right at the machine",
-            capital(&crate::diagnose::words::at_the_machine(d)) + ".",
-            "",
-        ));
+    if let NextStep::CorrectAtMachine(check) = d.next_step() {
+        let how = capital(&crate::words::diagnose::machine_check(check)) + ".";
+        out.push(Next::new("Put it right at the machine", how, ""));
     }
     if !d.sketchable {
         return;

@@ -6,7 +6,7 @@ use super::Material;
 use super::headline::Headline;
 use super::next::Next;
 use crate::compare::Split;
-use crate::compare::rungs::{Curve, Kind};
+use crate::compare::model_ladder::{Curve, Kind};
 use crate::diagnose::Diagnosis;
 use crate::fit::outcome::{Combination, Status, Undetermined};
 use crate::study::tolerance::Tolerance;

@@ -2,7 +2,7 @@
 
 use super::Material;
 use super::record::{RungRecord, Touches, UnusableRecord, Variable};
-use crate::compare::rungs::{self, Curve, Kind, direction};
+use crate::compare::model_ladder::{self, Curve, Kind, direction};
 use std::collections::{BTreeMap, HashMap};
 
 /// µm, to a nanometre: a probe sees no less.
@@ -133,7 +133,7 @@ pub(super) fn curves(m: &Material, before: usize, after: usize) -> Vec<Curve> {
     if before < after && !pairs.contains(&(before, after)) {
         pairs.push((before, after));
     }
-    let each = pairs.into_iter().flat_map(|(a, b)| rungs::curves(&m.comparison.points, rungs, a, b, &ids));
+    let each = pairs.into_iter().flat_map(|(a, b)| model_ladder::curves(&m.comparison.points, rungs, a, b, &ids));
     each.map(|mut c| {
         c.x.iter_mut().chain(&mut c.y_um).for_each(|v| *v = short(*v));
         c

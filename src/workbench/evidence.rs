@@ -3,8 +3,8 @@
 
 use super::session::Snapshot;
 use crate::diag::Result;
+use crate::diagnose::candidate_effects::Named;
 use crate::diagnose::evidence::Evidence;
-use crate::diagnose::named::Named;
 use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
 use crate::search::Search;
 use serde::Serialize;

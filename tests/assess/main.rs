@@ -9,7 +9,7 @@ mod shapes;
 
 use assert_cmd::Command;
 use axiscal::design::record::{Assessment, Score, Seen};
-use axiscal::design::{Noise, Planned, Request, Task, View, assess};
+use axiscal::design::{LinearisedPlan, Noise, Planned, Request, Task, assess};
 use axiscal::fit::effects_of;
 use axiscal::machine::Machine;
 use axiscal::model::catalogue::Catalogue;
@@ -72,7 +72,7 @@ fn ranks_of_the_papers_programs() {
     let catalogue = Catalogue::built_in().unwrap();
     for (programs, rank) in [(&["head", "table"][..], 39), (&["head"], 29), (&["table"], 13)] {
         let runs: Vec<Planned> = programs.iter().map(|p| plan(&machine, p)).collect();
-        let view = View::of_model(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE).unwrap();
+        let view = LinearisedPlan::of_model(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE).unwrap();
         assert_eq!(view.base.rank(), rank, "{programs:?}");
     }
 }
@@ -102,7 +102,7 @@ fn seven_combinations_of_22_leave_no_trace() {
         "block-setup",
     ];
     let runs = vec![plan(&machine, "head"), plan(&machine, "table")];
-    let view = View::of_model(&task(&machine, &catalogue, &effects), &runs, &[], NOISE).unwrap();
+    let view = LinearisedPlan::of_model(&task(&machine, &catalogue, &effects), &runs, &[], NOISE).unwrap();
     let unknowns = &view.model.unknowns;
     let own: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].set_up.is_none()).collect();
     assert_eq!(own.len(), 22);
@@ -151,7 +151,7 @@ fn rank_does_not_depend_on_the_scaling() {
             .collect();
         for programs in programs {
             let runs: Vec<Planned> = programs.iter().map(|p| plan(&machine, p)).collect();
-            let view = View::of_model(&task(&machine, &catalogue, &effects), &runs, &[], NOISE).unwrap();
+            let view = LinearisedPlan::of_model(&task(&machine, &catalogue, &effects), &runs, &[], NOISE).unwrap();
             let stated = axiscal::fit::solve::observe(&view.jacobian);
             let unknowns = &view.model.unknowns;
             let part = |set_up: bool| -> Vec<usize> {
@@ -284,7 +284,8 @@ fn followed_by_warm_up(tau_h: f64, own_pace: bool) -> f64 {
         runs.iter_mut().flat_map(|r| &mut r.plan.touches).for_each(|t| t.time_s = None);
     }
     let effects = ["spindle-growth", "warm-up"].map(|id| (catalogue.get(id, &machine).unwrap(), Some(tau_h)));
-    let view = View::with_effects(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE, &effects).unwrap();
+    let view =
+        LinearisedPlan::with_effects(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE, &effects).unwrap();
     let columns = view.base.project_columns(&view.library.matrix().into_owned());
     let (growth, warm) = (columns.columns(0, 1).into_owned(), columns.columns(1, 3).into_owned());
     let left = axiscal::search::Basis::new(&warm).project_columns(&growth);

@@ -2,16 +2,16 @@
 
 use super::Loaded;
 use crate::design::bundle::{Bundle, Manner, as_plan, bundles, program_text, without};
-use crate::design::next::{Design, Separation, where_all_have_values};
+use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
-use crate::design::{Known, Noise, Planned, Room, Task, View};
+use crate::design::{Known, LinearisedPlan, Noise, Planned, Room, Task};
 use crate::diag::{Failure, Result, source};
 use crate::fit::{self, Fit, effects_of};
 use crate::machine::{Machine, Mounting};
 use crate::model::catalogue::Effect;
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
-use crate::search::apart::SEEN;
+use crate::search::distinguishability::SEEN;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -155,8 +155,13 @@ impl<'a> Setting<'a> {
         runs
     }
 
-    pub(super) fn view(&self, plan: &Plan, label: Option<&str>, effects: &[(&Effect, Option<f64>)]) -> Result<View> {
-        View::with_effects(&self.task, &self.with(plan.clone(), label), &self.known, self.noise, effects)
+    pub(super) fn view(
+        &self,
+        plan: &Plan,
+        label: Option<&str>,
+        effects: &[(&Effect, Option<f64>)],
+    ) -> Result<LinearisedPlan> {
+        LinearisedPlan::with_effects(&self.task, &self.with(plan.clone(), label), &self.known, self.noise, effects)
     }
 
     /// Touches that were made or planned before.

@@ -2,26 +2,26 @@
 
 mod choose;
 mod join;
-mod told;
+mod write_program;
 
 use super::load::{Loaded, load_study};
 use super::new::relative;
 use super::{Answer, Io};
 use crate::design;
 use crate::design::questions::{Pair, Questions, Suspect};
-use crate::design::{Room, View};
+use crate::design::{LinearisedPlan, Room};
 use crate::diag::{Failure, Finding, Result, source};
 use crate::diagnose::{self, Subject, Verdict, diagnose};
 use crate::fit::{Fit, Settings, effects_of};
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::post::Postprocessor;
-use crate::search::apart::SEEN;
+use crate::search::distinguishability::SEEN;
 use choose::{Chosen, SAFELY, Setting, says};
 use join::{join, plan_of};
 use nalgebra::DVector;
 use serde_json::json;
 use std::path::PathBuf;
-use told::write;
+use write_program::write;
 
 /// Other blocks are worth the trouble when they part effects so many times better.
 const WORTH_MOVING: f64 = 1.5;
@@ -129,7 +129,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if unexplained && !(found.faint && sketched.is_some()) {
         let help = match found.sketchable {
             true => format!("{} writes what is seen as a formula", super::next::sketch_effect(&loaded)),
-            false => diagnose::words::at_the_machine(&found),
+            false => crate::words::diagnose::machine_check(found.machine_check()),
         };
         return Ok(refuse(
             &format!("nothing here to part: no known effect explains what is left. {}", found.says),
@@ -150,7 +150,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             setting.noise.tau_mm = found.open.tau_mm;
             Questions::left_open(found.open.suspects, &found.open.pairs)
         } else {
-            let view = View::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
+            let view = LinearisedPlan::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
             warn(view.left_out.iter().map(|(_, says)| says).filter(|says| !found.warnings.contains(says)), io);
             let asked = Questions::of_plan(&view);
             match found.verdict {
@@ -179,7 +179,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let effect = own.or_else(|| loaded.catalogue.get(id, &loaded.machine));
         effects.extend(effect.filter(|_| !known).map(|e| (e, shape)));
     }
-    let asked_of = View::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
+    let asked_of = LinearisedPlan::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
     if let Some((_, says)) = asked_of.left_out.first() {
         return Err(Failure::new("next::no_value", says.clone())
             .help("write its formula so that it holds at every touch, or ask for other effects"));

@@ -3,18 +3,19 @@
 use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Power, Shape, Verdict, Weakened, Where};
 use super::evidence::Evidence;
 use super::first_order::FirstOrder;
-use super::verdict::{Beside, Decision};
-use super::{Examination, Subject, gross, noise_um, tell, words};
+use super::verdict::{Decision, OtherEvidence};
+use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes};
 use crate::fit::Fit;
 use crate::model::catalogue::Place;
 use crate::model::data::Origin;
 use crate::model::formula::slot;
 use crate::search::dependence::Dependence;
-use crate::search::generic::{Direction, Features, Kind};
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
-use crate::search::power;
+use crate::search::pattern_tests::{Direction, Features, Kind};
+use crate::search::{Score, power};
 use crate::units::{mm_from_um, um_from_mm};
+use crate::words::diagnose as words;
 use nalgebra::DMatrix;
 
 /// A parameter is flagged when an added effect makes it this many times less certain.
@@ -30,7 +31,7 @@ pub(super) fn put_together(
     subject: Subject,
     seen: &Examination,
     features: &Features,
-    (decision, beside): (Decision, &Beside),
+    (decision, beside): (Decision, &OtherEvidence),
     gross: Vec<Gross>,
     options: &super::Options,
 ) -> Diagnosis {
@@ -38,18 +39,18 @@ pub(super) fn put_together(
     let mut verdict = decision.verdict;
     // what passes the test and is not borne out stays a question, too
     let asked = verdict == Verdict::MissingEffect || (decision.named && !beside.shapes_win);
-    let open = if asked { super::open::open(seen) } else { super::open::Open::default() };
+    let open = if asked { super::unresolved_pairs::open(seen) } else { super::unresolved_pairs::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
-    let gross_found = gross.first().is_some_and(|g| g.rms_um < gross::RIGHT * fit.outcome.rms_um);
+    let gross_found = gross.first().is_some_and(|g| g.rms_um < setup_mistakes::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
-        && let Some(candidate) = gross::candidate(subject, first)
+        && let Some(candidate) = setup_mistakes::candidate(subject, first)
     {
         verdict = Verdict::MissingEffect;
         candidates.push(candidate);
     }
     if verdict != Verdict::TooLittleData {
         let first_order = FirstOrder::of(fit);
-        let tell_apart = tell::words(subject, seen, options);
+        let tell_apart = separating_touches::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
             tell_apart: told.says,
             never_parted: told.never,
@@ -63,7 +64,8 @@ pub(super) fn put_together(
         .filter(|g| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL))
         .collect();
     let powers = if options.power {
-        let detectable = power::power(&seen.evidence.base, &seen.named.library, Some(&used_rows(seen)), noise_um(fit));
+        let first: Vec<(usize, usize)> = (0..seen.named.effects.len()).map(|c| (c, 0)).collect();
+        let detectable = power::power(&seen.evidence.base, &seen.named.library, &seen.named.raw_um(&first));
         let not_found = detectable.iter().filter(|p| !found.iter().any(|g| g.holds(p.candidate)));
         // how far what would be found is from the usual size: noncentrality goes with the square of the size
         let mut powers: Vec<(f64, Power)> = not_found
@@ -118,7 +120,7 @@ pub(super) fn put_together(
     {
         let share = beyond_the_noise(seen.evidence, first.share, first.parameters.len() + first.not_told.len());
         depends.retain(|w| w.by != by(on));
-        own_curve = super::own_curve::curve(seen, features, on, &by(on));
+        own_curve = super::effect_curve::curve(seen, features, on, &by(on));
         depends.insert(
             0,
             Where {
@@ -141,7 +143,7 @@ pub(super) fn put_together(
     }
     beside_the_tests(&mut depends, seen, fit, (beside, verdict == Verdict::MissingEffect));
     // as the splits of `compare` and the sentences count: of what the noise does not explain
-    let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == gross::EFFECT));
+    let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
         c.share = beyond_the_noise(seen.evidence, c.share, seen.order.scores[group.first()].n_parameters);
     }
@@ -184,7 +186,7 @@ pub(super) fn put_together(
     let faces = if unexplained && first_by == "face" { faces(fit, seen, features, drawn) } else { Vec::new() };
     let blocks: Vec<String> = match drawn.filter(|d| unexplained && first_by == "block" && d.on == "block") {
         Some(d) => {
-            let found = super::standing_out::groups(seen.evidence, features, d, &features.block);
+            let found = super::outlying_groups::groups(seen.evidence, features, d, &features.block);
             found.into_iter().filter_map(|b| words::group("block", b, fit, features)).collect()
         }
         None => Vec::new(),
@@ -291,7 +293,7 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
     let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
     let columns = seen.evidence.whiten(raw_mm);
-    if super::rivals::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
+    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }
@@ -299,7 +301,7 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
 /// Faces that lie elsewhere: those on which touches were left out, or else those that stand out from the others, each with the
 /// face opposite to it.
 fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
-    let of_touches = super::gathered::faces(fit, features);
+    let of_touches = super::clustered_rejections::faces(fit, features);
     let named = |number: usize| words::group("face", number, fit, features);
     // where four of five touches of a face are not used the whole face lies elsewhere, and not a chip on it
     let whole = |face: usize| {
@@ -308,14 +310,14 @@ fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Depe
     };
     let found: Vec<(usize, bool)> = if of_touches.is_empty() {
         let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };
-        let out = super::standing_out::groups(seen.evidence, features, d, &features.face);
+        let out = super::outlying_groups::groups(seen.evidence, features, d, &features.face);
         out.into_iter().map(|face| (face, true)).collect()
     } else {
         of_touches.iter().map(|&i| (features.face[i], whole(features.face[i]))).collect()
     };
     let mut out: Vec<usize> = Vec::new();
     for (face, whole) in found {
-        let other = if whole { super::standing_out::opposite(fit, features, face) } else { None };
+        let other = if whole { super::outlying_groups::opposite(fit, features, face) } else { None };
         for one in std::iter::once(face).chain(other) {
             if !out.contains(&one) {
                 out.push(one);
@@ -326,7 +328,7 @@ fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Depe
 }
 
 /// What is no shape and no effect, but a finding: scatter of visits, and bad touches that lie together.
-fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (beside, named): (&Beside, bool)) {
+fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (beside, named): (&OtherEvidence, bool)) {
     if let Some((tau_mm, declared_mm)) = beside.scatter {
         let (sigma2, tau2) = (fit.noise.sigma_mm.powi(2), tau_mm.powi(2));
         let finding = Where {
@@ -392,15 +394,6 @@ pub(super) fn beyond_the_noise(evidence: &Evidence, share: f64, n_parameters: us
     ((taken - q * per_dof) / (total - dof).max(4.0 * (2.0 * dof).sqrt())).clamp(0.0, 1.0)
 }
 
-/// Columns in µm at the rows of the regression; rows of priors are zero.
-fn used_rows(seen: &Examination) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(seen.evidence.n_rows(), seen.named.raw_um.ncols());
-    for (row, &i) in seen.evidence.used.iter().enumerate() {
-        out.row_mut(row).copy_from(&seen.named.raw_um.row(i));
-    }
-    out
-}
-
 fn candidate(
     fit: &Fit,
     seen: &Examination,
@@ -456,11 +449,11 @@ fn candidate(
             sigma: None,
         });
     }
-    let moves = moves(seen, chosen);
+    let raw_um = seen.raw_um(chosen);
+    let moves = moves(seen, score, &raw_um);
     let question = seen.order.question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
-    let span = seen.ordered.library.candidates()[chosen].variants[score.variant].columns.clone();
-    let raw_mm = seen.ordered.raw_um.columns(span.start, span.len()).map(mm_from_um);
+    let raw_mm = raw_um.map(mm_from_um);
     Candidate {
         effect: effect.id.clone(),
         name: effect.name.clone(),
@@ -501,13 +494,10 @@ fn candidate(
 
 /// By how much an effect of the expected size moves the touch that it moves most, with its standard uncertainty, µm: told
 /// where its parameters are not told one by one.
-fn moves(seen: &Examination, chosen: usize) -> Option<(f64, f64)> {
-    let score = &seen.order.scores[chosen];
-    let span = seen.ordered.library.candidates()[chosen].variants[score.variant].columns.clone();
-    let columns = seen.ordered.raw_um.columns(span.start, span.len());
-    let at = columns * &score.estimate;
+fn moves(seen: &Examination, score: &Score, raw_um: &DMatrix<f64>) -> Option<(f64, f64)> {
+    let at = raw_um * &score.estimate;
     let most = seen.evidence.used.iter().copied().max_by(|&a, &b| at[a].abs().total_cmp(&at[b].abs()))?;
-    let row = columns.row(most).transpose();
+    let row = raw_um.row(most).transpose();
     Some((at[most].abs(), row.dot(&(&score.covariance * &row)).max(0.0).sqrt()))
 }
 

@@ -1,12 +1,11 @@
 //! A plan linearised at an errorless machine (a time constant or a pitch where its effect has its typical size): the whitened columns of a model and of every effect that it leaves out.
 
-use super::shapes::{Moments, every_slope_is_a_number};
+use super::shape_parameters::{Moments, every_slope_is_a_number};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Result};
 use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
-use crate::fit::whitening::Whitening;
 use crate::fit::{design_jacobian, every_formula_has_a_value, free_in_a_design, jumps_in_a_design, scan};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
@@ -184,7 +183,7 @@ pub struct Known {
 
 /// What planned touches see.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct LinearisedPlan {
     /// The touches as an errorless machine makes them.
     pub data: Data,
     /// The model.
@@ -199,8 +198,8 @@ pub struct View {
     pub base: Basis,
     /// The effects that it leaves out: whitened columns in units of typical sizes, one variant each.
     pub library: Library,
-    /// Their columns before whitening, µm at typical size.
-    pub raw_um: DMatrix<f64>,
+    /// Their columns before whitening, µm at typical size, effect by effect.
+    pub raw_um: Vec<DMatrix<f64>>,
     /// Value of the scanned shape at which each candidate stands; `None` where it has none.
     pub shapes: Vec<Option<f64>>,
     /// Effects whose formula has no value at some of these touches, with what is said of them: they stand in the library with
@@ -212,7 +211,7 @@ pub struct View {
     pub end_s: f64,
 }
 
-impl View {
+impl LinearisedPlan {
     /// Looks at planned runs.
     ///
     /// # Errors
@@ -284,8 +283,7 @@ impl View {
         }
         let base = Basis::new(&jacobian);
         let library = Library::new(jacobian.nrows());
-        let raw_um = DMatrix::zeros(jacobian.nrows(), 0);
-        let (shapes, left_out) = (Vec::new(), Vec::new());
+        let (raw_um, shapes, left_out) = (Vec::new(), Vec::new(), Vec::new());
         Ok(Self { data, model, theta, free, jacobian, base, library, raw_um, shapes, left_out, noise, end_s })
     }
 
@@ -295,7 +293,6 @@ impl View {
         let plain: Vec<&Effect> = effects.iter().map(|e| e.0).collect();
         let all = columns(task.machine, &plain, &self.data, &self.data.nominal, task.reference, None);
         let rows = self.jacobian.nrows();
-        let mut raw = Vec::new();
         for (effect, given) in effects {
             let bad = if effect.built_in { Vec::new() } else { without_value(effect, &self.data.nominal) };
             if let Some(bad) = bad.first() {
@@ -360,14 +357,7 @@ impl View {
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             self.library.push(effect.id.clone(), origin, &whitened);
             self.shapes.push(shape);
-            raw.push(plain);
-        }
-        let count = raw.iter().map(DMatrix::ncols).sum();
-        self.raw_um = DMatrix::zeros(rows, count);
-        let mut at = 0;
-        for part in raw {
-            self.raw_um.columns_mut(at, part.ncols()).copy_from(&part.map(um_from_mm));
-            at += part.ncols();
+            self.raw_um.push(plain.map(um_from_mm));
         }
     }
 
@@ -378,11 +368,6 @@ impl View {
         whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whiten(&mut touched));
         without_rounding(&mut touched);
         touched.resize_vertically(plain.nrows(), 0.0)
-    }
-
-    /// What whitens columns of the touches.
-    pub(super) fn whitening(&self) -> Whitening {
-        whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whitening())
     }
 
     /// Share of a block's norm that the model cannot follow.

@@ -1,7 +1,7 @@
 //! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
 
 use super::evidence::Evidence;
-use crate::fit::candidates::{Trials, Variant, with_values};
+use crate::fit::candidates::{Columns, Trials, Variant, with_values};
 use crate::fit::{Fit, around, between, scan};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -42,14 +42,16 @@ pub struct Named<'c> {
     pub effects: Vec<&'c Effect>,
     /// Their whitened columns, per typical size.
     pub library: Library,
-    /// The same before whitening, µm per typical size; touches that are not used are zero.
-    pub raw_um: DMatrix<f64>,
     /// What each column is, by candidate.
     pub columns: Vec<Vec<Column>>,
     /// The scanned shape of each candidate.
     pub scanned: Vec<Option<Scanned>>,
     /// What is said of effects that could not be tested.
     pub left_out: Vec<String>,
+    /// All effects on an errorless machine, and the touches: the columns before whitening are made when they are asked for.
+    model: Model,
+    places: Vec<Observation>,
+    weight: Vec<f64>,
 }
 
 /// Effects of catalogue and user that the model does not hold. Not the paper's sets, not whole hypotheses (gross
@@ -75,9 +77,7 @@ struct Tried {
     value: f64,
     /// Its parameters.
     columns: Vec<Column>,
-    /// What they would do, mm per typical size, one row per touch.
-    raw_mm: DMatrix<f64>,
-    /// The same as rows of the tests.
+    /// What they would do, as rows of the tests.
     white: DMatrix<f64>,
 }
 
@@ -91,25 +91,15 @@ struct Maker<'a> {
 impl Maker<'_> {
     /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at another value.
     fn make(&self, i: usize, effect: &Effect, scanned: Option<(usize, f64)>) -> Tried {
-        let mut shapes = starts(effect);
-        if let Some((which, value)) = scanned {
-            shapes[which] = value;
-        }
-        let made = self.trials.columns(&Variant { effects: vec![i], shapes });
-        let (own, shaped): (Vec<usize>, Vec<usize>) = (0..made.unknowns.len()).partition(|&c| !made.unknowns[c].shape);
-        let mut raw_mm = made.values.remove_columns_at(&shaped);
+        let made = made(&self.trials, i, effect, scanned);
         let column = |u: &Unknown| {
             let bare = u.name.split('@').next().unwrap_or(&u.name);
             let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
-            let typical = if u.typical > 0.0 { u.typical } else { 1.0 };
-            Column { name: u.name.clone(), unit: u.unit.clone(), typical, positive }
+            Column { name: u.name.clone(), unit: u.unit.clone(), typical: typical(u), positive }
         };
-        let columns: Vec<Column> = own.iter().map(|&c| column(&made.unknowns[c])).collect();
-        for (mut values, column) in raw_mm.column_iter_mut().zip(&columns) {
-            values *= column.typical;
-        }
-        let white = self.evidence.whiten(raw_mm.clone());
-        Tried { value: scanned.map_or(0.0, |(_, value)| value), columns, raw_mm, white }
+        let columns = made.unknowns.iter().map(column).collect();
+        let white = self.evidence.whiten(made.values);
+        Tried { value: scanned.map_or(0.0, |(_, value)| value), columns, white }
     }
 
     /// Which of them explains most, and how much.
@@ -162,6 +152,28 @@ impl Maker<'_> {
     }
 }
 
+/// Usual size of a parameter: 1 where it has none.
+fn typical(u: &Unknown) -> f64 {
+    if u.typical > 0.0 { u.typical } else { 1.0 }
+}
+
+/// Sizes of effect number i and what they do, mm per typical size, with one of its shapes (by its place among the shapes) at a
+/// value.
+fn made(trials: &Trials, i: usize, effect: &Effect, scanned: Option<(usize, f64)>) -> Columns {
+    let mut shapes = starts(effect);
+    if let Some((which, value)) = scanned {
+        shapes[which] = value;
+    }
+    let mut made = trials.columns(&Variant { effects: vec![i], shapes });
+    let shaped: Vec<usize> = (0..made.unknowns.len()).filter(|&c| made.unknowns[c].shape).collect();
+    made.values = made.values.remove_columns_at(&shaped);
+    made.unknowns.retain(|u| !u.shape);
+    for (mut values, u) in made.values.column_iter_mut().zip(&made.unknowns) {
+        values *= typical(u);
+    }
+    made
+}
+
 /// Where the shape parameters of an effect start.
 fn starts(effect: &Effect) -> Vec<f64> {
     effect.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect()
@@ -197,7 +209,7 @@ impl<'c> Named<'c> {
         let (effects, left_out) = with_values(effects, &places);
         let model = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
         let maker = Maker { fit, evidence, trials: Trials::of(&model, &places) };
-        let made: Vec<(Option<Scanned>, Vec<Tried>)> = effects
+        let tried: Vec<(Option<Scanned>, Vec<Tried>)> = effects
             .par_iter()
             .enumerate()
             .map(|(i, effect)| match scan_of(effect, &fit.data) {
@@ -210,17 +222,11 @@ impl<'c> Named<'c> {
             })
             .collect();
 
-        let n = fit.data.observations.len();
-        let mut raw = Vec::with_capacity(n * made.iter().flat_map(|(_, t)| t).map(|t| t.raw_mm.ncols()).sum::<usize>());
+        drop(maker);
         let mut library = Library::new(evidence.n_rows());
         let mut columns = Vec::new();
         let mut scanned = Vec::new();
-        for (effect, (shape, tried)) in effects.iter().zip(made) {
-            for t in &tried {
-                for column in t.raw_mm.column_iter() {
-                    raw.extend(column.iter().zip(&fit.weight).map(|(mm, w)| um_from_mm(*mm) * w));
-                }
-            }
+        for (effect, (shape, tried)) in effects.iter().zip(tried) {
             let own = tried.first().map_or_else(Vec::new, |t| t.columns.clone());
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             let variants = tried.into_iter().map(|t| (t.value, t.white));
@@ -229,7 +235,27 @@ impl<'c> Named<'c> {
             columns.push(own);
             scanned.push(shape);
         }
-        let raw_um = DMatrix::from_vec(n, raw.len().checked_div(n).unwrap_or(0), raw);
-        Self { effects, library, raw_um, columns, scanned, left_out }
+        let weight = fit.weight.clone();
+        Self { effects, library, columns, scanned, left_out, model, places, weight }
+    }
+
+    /// Columns of some variants of candidates (both by index) before whitening, µm per typical size; touches that are not used
+    /// are zero.
+    #[must_use]
+    pub fn raw_um(&self, wanted: &[(usize, usize)]) -> Vec<DMatrix<f64>> {
+        let trials = Trials::of(&self.model, &self.places);
+        let each = wanted.par_iter().map(|&(candidate, variant)| {
+            let effect = self.effects[candidate];
+            let value = self.library.candidates()[candidate].variants[variant].shape;
+            let which = self.scanned[candidate]
+                .as_ref()
+                .and_then(|s| effect.parameters.iter().filter(|p| p.shape.is_some()).position(|p| p.name == s.name));
+            let mut values = made(&trials, candidate, effect, which.map(|which| (which, value))).values;
+            for mut column in values.column_iter_mut() {
+                column.iter_mut().zip(&self.weight).for_each(|(mm, weight)| *mm = um_from_mm(*mm) * weight);
+            }
+            values
+        });
+        each.collect()
     }
 }

@@ -1,7 +1,7 @@
 //! Habits of good measurement as data: what else could be touched (or looked up), and what it costs.
 
+use super::linearised_plan::{Known, MOUNTING_S, Planned, STYLUS_S};
 use super::vary::{Change, Visit, again, append, faces_the_spindle, visits};
-use super::view::{Known, MOUNTING_S, Planned, STYLUS_S};
 use crate::axes::{AxisMap, AxisName};
 use crate::geometry::apply;
 use crate::machine::{Axis, Machine, Side};
@@ -36,7 +36,7 @@ const NEW_ANGLES: usize = 3;
 
 /// A variation of the planned touches.
 #[derive(Debug, Clone)]
-pub struct Habit {
+pub struct Variation {
     /// Short word, unique.
     pub id: String,
     /// What a person does.
@@ -51,7 +51,7 @@ pub struct Habit {
     pub seconds: f64,
 }
 
-impl Habit {
+impl Variation {
     /// Touches that a further program could make: of the blocks as they stand, with a stylus that the machine's file knows. A
     /// gauge is no touch, and a riser or a star is nothing that a program has.
     #[must_use]
@@ -65,9 +65,9 @@ impl Habit {
     }
 }
 
-/// All habits that this machine and these runs allow, cheapest first. `model` names the blocks' unknowns.
+/// All variations that this machine and these runs allow, cheapest first. `model` names the blocks' unknowns.
 #[must_use]
-pub fn habits(machine: &Machine, runs: &[Planned], model: &Model) -> Vec<Habit> {
+pub fn variations(machine: &Machine, runs: &[Planned], model: &Model) -> Vec<Variation> {
     let mut pool = Pool { machine, runs, model, out: Vec::new() };
     let all: Vec<Visit> = runs.iter().enumerate().flat_map(|(i, r)| visits(i, &r.plan)).collect();
     pool.at_the_best(&all);
@@ -90,7 +90,7 @@ struct Pool<'a> {
     machine: &'a Machine,
     runs: &'a [Planned],
     model: &'a Model,
-    out: Vec<Habit>,
+    out: Vec<Variation>,
 }
 
 impl Pool<'_> {
@@ -107,7 +107,7 @@ impl Pool<'_> {
             seconds += append(&mut runs[run].plan, list);
         }
         if touches > 0 {
-            self.out.push(Habit { id: id.into(), says, runs, known: Vec::new(), touches, seconds });
+            self.out.push(Variation { id: id.into(), says, runs, known: Vec::new(), touches, seconds });
         }
     }
 
@@ -362,7 +362,7 @@ impl Pool<'_> {
         let touches = added.iter().map(Vec::len).sum();
         let seconds = MOUNTING_S + append(&mut runs[run].plan, added);
         if touches > 0 {
-            self.out.push(Habit { id: id.into(), says: says.into(), runs, known: Vec::new(), touches, seconds });
+            self.out.push(Variation { id: id.into(), says: says.into(), runs, known: Vec::new(), touches, seconds });
         }
     }
 
@@ -459,7 +459,7 @@ impl Pool<'_> {
             ));
         }
         for (id, says, known) in known {
-            self.out.push(Habit {
+            self.out.push(Variation {
                 id: id.into(),
                 says,
                 runs: self.runs.to_vec(),

@@ -3,10 +3,10 @@
 
 use super::Examination;
 use super::answer::Shape;
-use super::findings::x_unit;
+use super::assemble_diagnosis::x_unit;
 use crate::model::catalogue::Place;
 use crate::model::formula::{State, VARIABLES};
-use crate::search::generic::{Features, Kind};
+use crate::search::pattern_tests::{Features, Kind};
 use crate::units::{deg_from_rad, um_from_mm};
 
 /// Points of the curve.

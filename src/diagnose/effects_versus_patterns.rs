@@ -5,7 +5,7 @@
 //! shapes come to, by what they leave and what they cost (Schwarz's criterion). Either side pays for the parameters that act
 //! and not for those that it has besides: a block that slips in X alone is a slip all the same.
 
-use crate::search::generic::{CONSTANT, Generics};
+use crate::search::pattern_tests::{CONSTANT, Generics};
 use crate::search::{Basis, KEPT, Library, Question, Search};
 use nalgebra::{DMatrix, DVector};
 

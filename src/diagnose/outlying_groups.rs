@@ -4,7 +4,7 @@
 use super::evidence::Evidence;
 use crate::fit::Fit;
 use crate::search::dependence::Dependence;
-use crate::search::generic::Features;
+use crate::search::pattern_tests::Features;
 use crate::search::{Basis, KEPT, Library, Origin, Question, Search};
 use crate::units::mm_from_um;
 use nalgebra::DMatrix;

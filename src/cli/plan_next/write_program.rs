@@ -83,8 +83,8 @@ pub(super) fn write(
             "{n} more only if the room's temperature does not go on as in the runs so far, but turns or swings while the \
              program runs (reckoned with {:.0} K up and down in {:.0} min: open a gate, switch the heating, or run it at another \
              time of day); where the room goes on as before, what goes with it and what goes with time stay one",
-            crate::design::view::SWING_K,
-            crate::design::view::SWING_S / 60.0
+            crate::design::linearised_plan::SWING_K,
+            crate::design::linearised_plan::SWING_S / 60.0
         )),
     };
     turns.iter().for_each(|says| io.say(says));

@@ -3,8 +3,8 @@
 
 use crate::fit::Fit;
 use crate::probability::hypergeometric_sf;
-use crate::search::generic::Features;
 use crate::search::multiplicity::FAMILY_LEVEL;
+use crate::search::pattern_tests::Features;
 
 /// Fewer touches than this may lie together by chance.
 const LEAST: usize = 4;

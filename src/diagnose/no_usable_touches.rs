@@ -1,8 +1,8 @@
 //! A study of which no touch is used: there is nothing to search in, and nothing to be said but that.
 
 use super::answer::{Diagnosis, FORMAT, Verdict};
-use super::open::Open;
-use super::{Options, Subject, gross, missed, noise_um, verdict};
+use super::unresolved_pairs::Open;
+use super::{Options, Subject, missed_touches, noise_um, setup_mistakes, verdict};
 
 /// The answer, before any search.
 pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
@@ -37,9 +37,9 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         depends: Vec::new(),
         shape: None,
         candidates: Vec::new(),
-        gross: match gross::of_log(subject) {
+        gross: match setup_mistakes::of_log(subject) {
             Some(supposed) => vec![supposed],
-            None => planned.map(|p| missed::hypotheses(subject, p)).unwrap_or_default(),
+            None => planned.map(|p| missed_touches::hypotheses(subject, p)).unwrap_or_default(),
         },
         outliers: Vec::new(),
         tested: 0,

@@ -1,12 +1,12 @@
 //! Which touches would tell the members of a group apart: variations of these very touches that this machine can make.
 
 use super::{Examination, Options, Subject};
-use crate::design::{Known, Noise, Planned, Task, View, habits, keep_measured};
+use crate::design::{Known, LinearisedPlan, Noise, Planned, Task, keep_measured, variations};
 use crate::diag::Result;
 use crate::fit::{Knowledge, effects_of};
 use crate::model::catalogue::Effect;
 use crate::model::formula::slot;
-use crate::search::apart::{Left, Products, chance};
+use crate::search::distinguishability::{Left, Products, chance};
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::units::deg_from_rad;
@@ -21,7 +21,7 @@ const MOST_NAMED: usize = 4;
 
 /// What tells the members of a group apart.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Told {
+pub(super) struct Separating {
     /// In words; empty where a group has one member.
     pub says: String,
     /// No touches do.
@@ -29,7 +29,7 @@ pub(super) struct Told {
 }
 
 /// One for each group.
-pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<Told> {
+pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<Separating> {
     let found = |g: &Group| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL);
     let asked: Vec<bool> = seen.groups.iter().map(|g| g.members.len() > 1 && found(g)).collect();
     let tried = match options.planned {
@@ -40,7 +40,7 @@ pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> 
         if *asked && !tried.is_empty() {
             by_variation(seen, group, &tried)
         } else {
-            Told { says: by_difference(subject, seen, group), never: false }
+            Separating { says: by_difference(subject, seen, group), never: false }
         }
     });
     each.collect()
@@ -109,11 +109,11 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
             (seen.named.effects[c], seen.named.scanned[c].as_ref().map(|_| shape))
         })
         .collect();
-    habits(machine, &planned, &fit.model)
+    variations(machine, &planned, &fit.model)
         .into_par_iter()
-        .map(|habit| {
-            let known: Vec<Known> = priors.iter().chain(&habit.known).cloned().collect();
-            let view = View::with_effects(&task, &habit.runs, &known, noise, &effects)?;
+        .map(|variation| {
+            let known: Vec<Known> = priors.iter().chain(&variation.known).cloned().collect();
+            let view = LinearisedPlan::with_effects(&task, &variation.runs, &known, noise, &effects)?;
             let spans = view.library.candidates().iter().map(|c| c.variants[0].columns.clone());
             let effects = candidates
                 .iter()
@@ -122,9 +122,9 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
                 .collect();
             let products = Products::new(&view.base, &view.library.matrix());
             Ok(Tried {
-                program: habit.is_a_program(machine),
-                says: habit.says,
-                seconds: habit.seconds,
+                program: variation.is_a_program(machine),
+                says: variation.says,
+                seconds: variation.seconds,
                 effects,
                 products,
             })
@@ -155,7 +155,7 @@ fn never_parted(group: &Group, tried: &[Tried]) -> bool {
 }
 
 /// The cheapest variation that tells the first of a group from most of the others.
-fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Told {
+fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separating {
     let chosen = group.first();
     let rivals: Vec<usize> = group.members.iter().map(|m| m.candidate).filter(|&c| c != chosen).collect();
     let told = |t: &Tried| rivals.iter().filter(|&&r| t.tells(chosen, r)).count();
@@ -174,7 +174,7 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Told {
             false => LOOKED_FOR,
         };
         // a room that turns is something that touches wait for
-        return Told { says: says.into(), never: never && !of_room };
+        return Separating { says: says.into(), never: never && !of_room };
     };
     let from: Vec<&str> = rivals.iter().filter(|&&r| best.tells(chosen, r)).map(|&r| id(r)).collect();
     let whom = match (count == rivals.len(), count) {
@@ -184,7 +184,7 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Told {
         (false, n) => format!("from {n} of the {}", rivals.len()),
     };
     let says = format!("{} (+{:.0} min): that tells {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen));
-    Told { says, never }
+    Separating { says, never }
 }
 
 /// Two effects that differ by less at every touch, um, are told apart at none of them.
@@ -194,11 +194,7 @@ const LEAST_DIFFERENCE_UM: f64 = 0.05;
 fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String {
     let chosen = group.first();
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
-    let trace = |c: usize| -> DVector<f64> {
-        let score = &seen.order.scores[c];
-        let span = seen.ordered.library.candidates()[c].variants[score.variant].columns.clone();
-        seen.ordered.raw_um.columns(span.start, span.len()) * &score.estimate
-    };
+    let trace = |c: usize| -> DVector<f64> { seen.raw_um(c) * &seen.order.scores[c].estimate };
     let difference = trace(chosen) - trace(rival);
     let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
     let Some(most) = seen.evidence.used.iter().copied().max_by(further) else { return String::new() };

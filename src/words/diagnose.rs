@@ -1,15 +1,16 @@
 //! Findings in the words of the shop floor.
 
-use super::answer::Diagnosis;
-use super::features::direction_words;
+use crate::diagnose::Subject;
+use crate::diagnose::features::direction_words;
+use crate::diagnose::next_step::MachineCheck;
 use crate::fit::{Fit, VisitSource};
 use crate::machine::Machine;
 use crate::search::dependence::Dependence;
-use crate::search::generic::{CONSTANT, Features};
+use crate::search::pattern_tests::{CONSTANT, Features};
 use crate::units::deg_from_rad;
 
 /// What a shape depends on where one block stands elsewhere from some moment on.
-pub(super) const MOVED_BLOCK: &str = "t*block";
+pub(crate) const MOVED_BLOCK: &str = "t*block";
 
 /// `a`, `a or b`, `a, b or c`.
 #[must_use]
@@ -187,47 +188,43 @@ pub fn group(on: &str, number: usize, fit: &Fit, features: &Features) -> Option<
 }
 
 /// Does an effect's own formula speak of a variable?
-pub(super) fn speaks_of(subject: super::Subject, effect: &str, variable: &str) -> bool {
+pub(crate) fn speaks_of(subject: Subject, effect: &str, variable: &str) -> bool {
     let effect = subject.catalogue.get(effect, subject.machine);
     effect.is_some_and(|e| e.terms.iter().any(|t| t.formula.variables().into_iter().any(|v| v == variable)))
 }
 
-/// What to do at the machine about a finding that no formula says.
+/// What to check at the machine.
 #[must_use]
-pub fn at_the_machine(found: &Diagnosis) -> String {
-    if !found.faces.is_empty() {
-        return format!(
-            "clean {} and touch them again; where they are clean, measure the block: it may be of another size than the plan says",
-            found.faces.join(", ")
-        );
-    }
-    if let Some(block) = found.blocks.first() {
-        return format!("clean and clamp block {block}, measure its size, and measure again");
-    }
-    if let Some(block) = &found.moved_block {
-        return format!("clamp block {block} anew and measure again");
-    }
-    match found.depends.first().map(|w| w.by.as_str()) {
-        Some("face") => "clean the faces of the blocks and touch them again",
-        Some("block") => "look whether a block is loose or dirty, clamp and clean it, and measure again",
-        Some("visit") if found.visits_come_back && !found.depends.iter().take(1).any(|w| w.id.starts_with("scatter:")) => {
-            "each pose has an error of its own and comes back with it: look for what changes from pose to pose (gear, clamping \
+pub fn machine_check(check: MachineCheck) -> String {
+    match check {
+        MachineCheck::NamedFaces(faces) => {
+            let faces = faces.join(", ");
+            return format!("clean {faces} and touch them again. If they are clean, measure the block: its size may differ from the plan");
+        }
+        MachineCheck::NamedBlock(block) => {
+            return format!("clean and clamp block {block}, measure its size, and measure again");
+        }
+        MachineCheck::MovedBlock(block) => return format!("clamp block {block} again and repeat the measurement"),
+        MachineCheck::Faces => "clean the faces of the blocks and touch them again",
+        MachineCheck::Blocks => "check whether a block is loose or dirty, clamp and clean it, and measure again",
+        MachineCheck::PosesComeBack => {
+            "each pose has an error of its own that comes back with it. Check what changes from pose to pose (gear, clamping \
              ring, cables that drag), and measure at more angles of the rotary axes"
         }
-        Some("run") => {
-            "something changed between the runs (temperature, a stylus, a block, a knock): say when each began (started, in its \
-             [[data]]), give a run whose blocks were moved a mounting of its own, and ask again"
+        MachineCheck::Runs => {
+            "something changed between the runs (temperature, stylus, block, a knock). Write when each run began (`started` in its \
+             [[data]]), give a run whose blocks were moved a `mounting` of its own, and diagnose again"
         }
-        Some("visit") => "look for play or dirt in the clamping and indexing of the rotary axes, and measure again",
-        Some(_) if found.faint => "measure again: further touches tell whether the pattern is there at all",
-        Some(_) => "look for it at the machine: no formula says it",
-        None => "measure again with more touches: what is left depends on nothing that these show",
+        MachineCheck::Clamping => "check the clamping and indexing of the rotary axes for play or dirt, and measure again",
+        MachineCheck::WeakPattern => "measure again: further touches tell whether the pattern is there at all",
+        MachineCheck::NoFormula => "look for it at the machine: no formula describes it",
+        MachineCheck::NoPattern => "measure again with more touches: the residual depends on nothing that these touches show",
     }
     .to_owned()
 }
 
 /// Revisits show that poses come back to better than a touch can tell.
-pub(super) fn visits_come_back(fit: &Fit) -> bool {
+pub(crate) fn visits_come_back(fit: &Fit) -> bool {
     fit.noise.visit_source == VisitSource::Revisits && fit.noise.tau_test_mm < fit.noise.sigma_mm
 }
 
@@ -276,4 +273,21 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
         _ => "a guideway or scale that is bent, or weight that shifts",
     };
     text.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variables_and_groups_have_names() {
+        let rotary = |name: &str| name == "C";
+        assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C stood before");
+        assert_eq!(plain(&by("C before", &rotary)), "where C stood before");
+        let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
+        assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
+        assert_eq!(one_of("backlash-x", &[]), "backlash-x");
+        assert_eq!(plain("sX*C"), "the product of the sense of X's last motion and C");
+        assert_eq!(plain("time*block"), "time and block");
+    }
 }

@@ -6,7 +6,7 @@
 
 use super::Subject;
 use super::answer::Gross;
-use super::gross::{EFFECT, in_words};
+use super::setup_mistakes::{EFFECT, in_words};
 use crate::axes::{AxisName, Position};
 use crate::design::Planned;
 use crate::geometry::apply;

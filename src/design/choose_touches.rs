@@ -5,11 +5,11 @@
 //! credit.
 
 use super::bundle::{Bundle, cost_s};
+use super::linearised_plan::LinearisedPlan;
 use super::questions::{Pair, Questions};
-use super::view::View;
 use crate::fit::candidates::without_value;
 use crate::model::catalogue::Effect;
-use crate::search::apart::{Left, Products, chance};
+use crate::search::distinguishability::{Left, Products, chance};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,11 +23,14 @@ const BEYOND: f64 = 1e-3;
 /// Prior of the model's unknowns, in typical sizes: wide, for a firm start only.
 const WIDE: f64 = 30.0;
 
-/// Passes of the exchange at most.
-const MOST_PASSES: usize = 12;
+/// Information about an effect before any touch, per square of its typical size: the choice works with the inverse.
+const FAINT: f64 = 1e-3;
 
-/// Bundles that one pass tries to bring in.
-const MOST_FRESH: usize = 60;
+/// Rounds of the exchange at most.
+const MOST_ROUNDS: usize = 12;
+
+/// Bundles that one round of the exchange tries to leave out.
+const MOST_OUT: usize = 6;
 
 /// Information about the model's unknowns and the effects in question, bundle by bundle.
 #[derive(Debug, Clone)]
@@ -39,8 +42,9 @@ pub struct Design {
     sizes: Vec<Option<DVector<f64>>>,
     /// What there is already, with the prior of the base.
     given: DMatrix<f64>,
-    /// What each bundle adds.
-    adds: Vec<DMatrix<f64>>,
+    /// Rows of the touches of all bundles, and which of them are of each.
+    rows: DMatrix<f64>,
+    ranges: Vec<Range<usize>>,
     /// The pairs, by their effects.
     asked: Vec<(usize, Option<usize>)>,
 }
@@ -78,7 +82,7 @@ impl Design {
     /// `view`: all touches so far and then those of the pool, with the columns of the effects in question.
     /// `n_given`: how many touches there are already.
     #[must_use]
-    pub fn new(view: &View, n_given: usize, pool: &[Bundle], questions: &Questions) -> Self {
+    pub fn new(view: &LinearisedPlan, n_given: usize, pool: &[Bundle], questions: &Questions) -> Self {
         let n_base = view.free.len();
         let mut spans = Vec::new();
         let mut columns = view.jacobian.clone();
@@ -105,7 +109,8 @@ impl Design {
         for i in 0..n_base {
             given[(i, i)] += 1.0 / (WIDE * WIDE);
         }
-        let mut at = n_given;
+        let rows = columns.rows(n_given, view.n_touches() - n_given).into_owned();
+        let mut at = 0;
         let ranges: Vec<Range<usize>> = pool
             .iter()
             .map(|b| {
@@ -113,7 +118,6 @@ impl Design {
                 at - b.touches.len()..at
             })
             .collect();
-        let adds = ranges.into_par_iter().map(gram).collect();
         let find = |id: &str| spans.iter().position(|(s, _)| s == id);
         let asked = questions
             .pairs
@@ -130,15 +134,7 @@ impl Design {
             questions.suspects.iter().find(|s| s.id == *id).map(|s| s.size.clone()).filter(|t| t.len() == span.len())
         };
         let sizes = spans.iter().map(size).collect();
-        Self { n_base, spans, sizes, given, adds, asked }
-    }
-
-    /// Information about the effects, what the base takes projected out.
-    fn effects(&self, information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let (p, q) = (self.n_base, information.ncols() - self.n_base);
-        let base = information.view((0, 0), (p, p)).into_owned().cholesky()?;
-        let cross = information.view((0, p), (p, q)).into_owned();
-        Some(information.view((p, p), (q, q)) - cross.tr_mul(&base.solve(&cross)))
+        Self { n_base, spans, sizes, given, rows, ranges, asked }
     }
 
     fn span(&self, effect: usize) -> Range<usize> {
@@ -146,9 +142,9 @@ impl Design {
         r.start - self.n_base..r.end - self.n_base
     }
 
-    /// Noncentralities of the pairs, the worse way of each, for the search: without the ranks that the statement has.
-    fn separations(&self, information: &DMatrix<f64>) -> Option<Vec<f64>> {
-        let s = self.effects(information)?;
+    /// Noncentralities of the pairs, the worse way of each, for the choice: without the ranks that the statement has. `s`:
+    /// information about the effects, what the base takes projected out.
+    fn separations(&self, s: &DMatrix<f64>) -> Vec<f64> {
         let part = |rows: &Range<usize>, columns: &Range<usize>| {
             s.view((rows.start, columns.start), (rows.len(), columns.len()))
         };
@@ -189,26 +185,19 @@ impl Design {
             (own[a] - taken).max(0.0)
         };
         let each = self.asked.iter().map(|&(a, b)| b.map_or(own[a].max(0.0), |b| left(a, b).min(left(b, a))));
-        Some(each.collect())
+        each.collect()
     }
 
     /// What the exchange maximises: separations, as far as they are worth anything.
-    fn worth(&self, information: &DMatrix<f64>) -> f64 {
-        let all = self.separations(information).unwrap_or_default();
-        all.iter().map(|l| l.min(ENOUGH) + BEYOND * (l - ENOUGH).max(0.0).sqrt()).sum()
-    }
-
-    /// Bayesian D_s: log det of the information about the effects, each with a prior of its typical size.
-    fn d_s(&self, information: &DMatrix<f64>) -> f64 {
-        let Some(mut s) = self.effects(information) else { return f64::NEG_INFINITY };
-        for i in 0..s.nrows() {
-            s[(i, i)] += 1.0;
-        }
-        s.cholesky().map_or(f64::NEG_INFINITY, |c| 2.0 * c.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>())
+    fn worth(&self, s: &DMatrix<f64>) -> f64 {
+        self.separations(s).iter().map(|l| l.min(ENOUGH) + BEYOND * (l - ENOUGH).max(0.0).sqrt()).sum()
     }
 
     fn information(&self, chosen: &[usize]) -> DMatrix<f64> {
-        chosen.iter().fold(self.given.clone(), |sum, &i| sum + &self.adds[i])
+        chosen.iter().fold(self.given.clone(), |sum, &i| {
+            let rows = self.rows.rows(self.ranges[i].start, self.ranges[i].len());
+            sum + rows.tr_mul(&rows)
+        })
     }
 
     /// Separations of the pairs by the touches so far and with a choice, by the criterion of the diagnosis.
@@ -241,119 +230,164 @@ impl Design {
     /// Chooses bundles within a time, s.
     #[must_use]
     pub fn choose(&self, pool: &[Bundle], budget_s: f64) -> Vec<usize> {
-        let mut best: Vec<usize> = Vec::new();
-        let mut worth = self.worth(&self.given);
-        let all: Vec<usize> = (0..pool.len()).collect();
-        // changing the stylus costs as much as many touches: what can be done without it is a start of its own
-        let own: Vec<usize> = all.iter().copied().filter(|&i| pool[i].manner.stylus.is_none()).collect();
-        let pools = if own.len() < all.len() { vec![all, own] } else { vec![all] };
-        for among in &pools {
-            // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
-            let by_d_s = self.greedy(pool, among, budget_s, |m| self.d_s(m));
-            let by_worth = self.greedy(pool, among, budget_s, |m| self.worth(m));
-            for start in [by_d_s, by_worth] {
-                let chosen = self.exchange(pool, among, budget_s, start);
-                let now = self.worth(&self.information(&chosen));
-                if now > worth {
-                    (best, worth) = (chosen, now);
-                }
-            }
-        }
-        self.thinned(pool, best)
-    }
-
-    fn greedy(
-        &self,
-        pool: &[Bundle],
-        among: &[usize],
-        budget_s: f64,
-        value: impl Fn(&DMatrix<f64>) -> f64 + Sync,
-    ) -> Vec<usize> {
-        let mut chosen: Vec<usize> = Vec::new();
-        loop {
-            let now = self.information(&chosen);
-            let (here, spent) = (value(&now), cost_s(pool, &chosen));
-            let best = among
-                .par_iter()
-                .copied()
-                .filter(|i| !chosen.contains(i))
-                .filter_map(|i| {
-                    let with: Vec<usize> = chosen.iter().copied().chain([i]).collect();
-                    let seconds = cost_s(pool, &with);
-                    (seconds <= budget_s).then(|| ((value(&(&now + &self.adds[i])) - here) / (seconds - spent), i))
-                })
-                .filter(|(gain, _)| *gain > 1e-9)
-                // ties go to the earlier bundle: the same choice in every run
-                .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-            match best {
-                Some((_, i)) => chosen.push(i),
-                None => return chosen,
-            }
-        }
-    }
-
-    /// Fedorov's exchange: one out, one in, while it pays.
-    fn exchange(&self, pool: &[Bundle], among: &[usize], budget_s: f64, mut chosen: Vec<usize>) -> Vec<usize> {
-        for _ in 0..MOST_PASSES {
-            let now = self.information(&chosen);
-            let here = self.worth(&now);
-            // what helps most beside the present choice is what is worth a place in it
-            let mut fresh: Vec<(f64, usize)> = among
-                .par_iter()
-                .copied()
-                .filter(|i| !chosen.contains(i))
-                .map(|i| (self.worth(&(&now + &self.adds[i])), i))
-                .collect();
-            fresh.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            let fresh: Vec<usize> = fresh.into_iter().take(MOST_FRESH).map(|(_, i)| i).collect();
-            let moves: Vec<Option<usize>> = (0..chosen.len()).map(Some).chain([None]).collect();
-            let best = moves
-                .into_iter()
-                .filter_map(|out| {
-                    let rest: Vec<usize> =
-                        chosen.iter().enumerate().filter(|(k, _)| Some(*k) != out).map(|(_, i)| *i).collect();
-                    let without = self.information(&rest);
-                    fresh
-                        .par_iter()
-                        .copied()
-                        .filter(|i| cost_s(pool, &rest.iter().copied().chain([*i]).collect::<Vec<_>>()) <= budget_s)
-                        .map(|i| (self.worth(&(&without + &self.adds[i])), i))
-                        .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))
-                        .map(|(value, i)| (value, rest, i))
-                })
-                .max_by(|a, b| a.0.total_cmp(&b.0));
-            match best {
-                Some((value, rest, i)) if value > here * (1.0 + 1e-6) + 1e-9 => {
-                    chosen = rest;
-                    chosen.push(i);
-                }
-                _ => break,
-            }
-        }
-        chosen
+        let Some(start) = Choice::start(self) else { return Vec::new() };
+        // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
+        let values: [&Value; 2] = [&d_s, &|s| self.worth(s)];
+        let found = values.into_par_iter().map(|value| {
+            let mut choice = start.clone();
+            choice.fill(self, pool, budget_s, None, value);
+            choice.exchange(self, pool, budget_s);
+            (self.worth(&choice.effects(self)), choice.chosen)
+        });
+        let nothing = (self.worth(&start.effects(self)), Vec::new());
+        // ties go to the first: the same choice in every run
+        let best = found.collect::<Vec<_>>().into_iter().fold(nothing, |a, b| if b.0 > a.0 { b } else { a });
+        self.thinned(pool, best.1)
     }
 
     /// Without the bundles that no pair needs.
     fn thinned(&self, pool: &[Bundle], mut chosen: Vec<usize>) -> Vec<usize> {
-        let full = self.worth(&self.information(&chosen));
+        let worth = |chosen: &[usize]| {
+            let products = Products::of_information(&self.information(chosen), self.n_base);
+            products.map_or(0.0, |p| self.worth(p.beside_the_base()))
+        };
+        let full = worth(&chosen);
         let mut order = chosen.clone();
         order.sort_by_key(|&i| std::cmp::Reverse(pool[i].touches.len()));
         for i in order {
             let rest: Vec<usize> = chosen.iter().copied().filter(|k| *k != i).collect();
-            if !rest.is_empty() && self.worth(&self.information(&rest)) > 0.99 * full {
+            if !rest.is_empty() && worth(&rest) > 0.99 * full {
                 chosen = rest;
             }
         }
         chosen
     }
 }
+
+/// How good information about the effects is.
+type Value<'a> = dyn Fn(&DMatrix<f64>) -> f64 + Sync + 'a;
+
+/// Bayesian D_s: log det of the information about the effects, each with a prior of its typical size.
+fn d_s(s: &DMatrix<f64>) -> f64 {
+    let with_prior = s + DMatrix::identity(s.nrows(), s.ncols());
+    let factor = with_prior.cholesky();
+    factor.map_or(f64::NEG_INFINITY, |c| 2.0 * c.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>())
+}
+
+/// A choice of bundles with the covariance of all unknowns: one bundle more or less changes it by a matrix of low rank.
+#[derive(Debug, Clone)]
+struct Choice {
+    chosen: Vec<usize>,
+    covariance: DMatrix<f64>,
+    /// Rows of all bundles times the covariance.
+    seen: DMatrix<f64>,
+}
+
+impl Choice {
+    /// No bundle.
+    fn start(design: &Design) -> Option<Self> {
+        let mut information = design.given.clone();
+        for i in design.n_base..information.ncols() {
+            information[(i, i)] += FAINT;
+        }
+        let covariance = information.cholesky()?.inverse();
+        Some(Self { chosen: Vec::new(), seen: &design.rows * &covariance, covariance })
+    }
+
+    /// L⁻¹AC of a bundle with rows A: the covariance C changes by what these rows are squared, less for one more bundle
+    /// (`sign` 1), more for one that goes (−1).
+    fn change(&self, design: &Design, bundle: usize, sign: f64) -> Option<DMatrix<f64>> {
+        let range = &design.ranges[bundle];
+        let seen = self.seen.rows(range.start, range.len());
+        let within = &seen * design.rows.rows(range.start, range.len()).transpose() * sign;
+        let factor = (within + DMatrix::identity(range.len(), range.len())).cholesky()?;
+        let mut out = seen.into_owned();
+        factor.l_dirty().solve_lower_triangular_mut(&mut out).then_some(out)
+    }
+
+    /// Information about the effects with this covariance of theirs.
+    fn of_covariance(effects: DMatrix<f64>) -> DMatrix<f64> {
+        let n = effects.nrows();
+        match effects.cholesky() {
+            Some(factor) => factor.inverse() - DMatrix::identity(n, n) * FAINT,
+            None => DMatrix::zeros(n, n),
+        }
+    }
+
+    fn effects(&self, design: &Design) -> DMatrix<f64> {
+        let (p, q) = (design.n_base, self.covariance.ncols() - design.n_base);
+        Self::of_covariance(self.covariance.view((p, p), (q, q)).into_owned())
+    }
+
+    /// The value with one bundle more (`sign` 1) or less (−1).
+    fn value(&self, design: &Design, bundle: usize, sign: f64, value: &Value) -> Option<f64> {
+        let (p, q) = (design.n_base, self.covariance.ncols() - design.n_base);
+        let change = self.change(design, bundle, sign)?.columns(p, q).into_owned();
+        let covariance = self.covariance.view((p, p), (q, q)) - change.tr_mul(&change) * sign;
+        Some(value(&Self::of_covariance(covariance)))
+    }
+
+    /// One bundle more (`sign` 1) or less (−1).
+    fn take(&mut self, design: &Design, bundle: usize, sign: f64) {
+        let Some(change) = self.change(design, bundle, sign) else { return };
+        self.seen -= (&design.rows * change.transpose()) * &change * sign;
+        self.covariance -= change.tr_mul(&change) * sign;
+        if sign > 0.0 {
+            self.chosen.push(bundle);
+        } else {
+            self.chosen.retain(|i| *i != bundle);
+        }
+    }
+
+    /// Takes what is worth most for its time until nothing more fits, all `but` one.
+    fn fill(&mut self, design: &Design, pool: &[Bundle], budget_s: f64, but: Option<usize>, value: &Value) {
+        loop {
+            let (here, spent) = (value(&self.effects(design)), cost_s(pool, &self.chosen));
+            let gain = |i: usize| {
+                let seconds = cost_s(pool, &[&self.chosen[..], &[i]].concat());
+                let gain = (seconds <= budget_s).then(|| self.value(design, i, 1.0, value))?? - here;
+                Some((gain / (seconds - spent), i)).filter(|g| g.0 > 1e-9)
+            };
+            let open = (0..pool.len()).into_par_iter().filter(|i| but != Some(*i) && !self.chosen.contains(i));
+            // ties go to the earlier bundle: the same choice in every run
+            match open.filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
+                Some((_, i)) => self.take(design, i, 1.0),
+                None => return,
+            }
+        }
+    }
+
+    /// Leaves out a bundle that is missed least and fills the time again, while that pays.
+    fn exchange(&mut self, design: &Design, pool: &[Bundle], budget_s: f64) {
+        let worth = |s: &DMatrix<f64>| design.worth(s);
+        self.fill(design, pool, budget_s, None, &worth);
+        for _ in 0..MOST_ROUNDS {
+            let here = worth(&self.effects(design));
+            let without = |&i: &usize| Some((self.value(design, i, -1.0, &worth)?, i));
+            let mut least: Vec<(f64, usize)> = self.chosen.iter().filter_map(without).collect();
+            least.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            let tried = least.into_par_iter().take(MOST_OUT).map(|(_, out)| {
+                let mut other = self.clone();
+                other.take(design, out, -1.0);
+                other.fill(design, pool, budget_s, Some(out), &worth);
+                (worth(&other.effects(design)), other)
+            });
+            let tried: Vec<(f64, Self)> = tried.collect();
+            match tried.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a }) {
+                Some((value, other)) if value > here * (1.0 + 1e-6) + 1e-9 => *self = other,
+                _ => return,
+            }
+        }
+    }
+}
+
 /// Bundles at which every effect of the user's own has a value, and a sentence for each effect that has none at others. Without
 /// it such an effect would stand in the design as one that leaves no trace, and nothing would ever part it from another.
 ///
 /// `view` holds `n_given` touches and then those of the pool, in its order.
 #[must_use]
 pub fn where_all_have_values(
-    view: &View,
+    view: &LinearisedPlan,
     n_given: usize,
     effects: &[(&Effect, Option<f64>)],
     pool: &[Bundle],
