@@ -1,38 +1,11 @@
 //! `effects.toml` as a person wrote it: every field as it stands, with its place in the file. Nothing is checked here.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer};
-use std::ops::Range;
+use serde::Deserialize;
 use toml::Spanned;
 
-/// A word with its place in the file. The built-in rows, which are packed when the program is built, have no places.
-#[derive(Debug, Clone)]
-pub struct Placed(Spanned<String>);
-
-impl Placed {
-    /// The word.
-    #[must_use]
-    pub fn get_ref(&self) -> &String {
-        self.0.get_ref()
-    }
-
-    /// Where it stands, bytes.
-    #[must_use]
-    pub fn span(&self) -> Range<usize> {
-        self.0.span()
-    }
-}
-
-impl<'de> Deserialize<'de> for Placed {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        // people write TOML; what is packed is for no person
-        if deserializer.is_human_readable() {
-            Spanned::deserialize(deserializer).map(Self)
-        } else {
-            String::deserialize(deserializer).map(|word| Self(Spanned::new(0..0, word)))
-        }
-    }
-}
+/// A word with its place in the file.
+pub type Placed = Spanned<String>;
 
 /// A file of effects as written.
 #[derive(Debug, Deserialize, JsonSchema)]

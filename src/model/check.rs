@@ -11,7 +11,6 @@ use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
 use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
-use std::sync::Arc;
 
 /// Name of the file's format.
 const FORMAT: &str = "axiscal-effects/1";
@@ -25,7 +24,7 @@ const ASSUMED: &str = "assumed";
 /// Reads effects as written and gathers what is wrong with them.
 pub(super) struct Check<'a> {
     source: &'a Source,
-    /// Built-in effects are checked by a test, and their formulas were compiled with the program.
+    /// Built-in effects are checked by a test, not at every start.
     built_in: bool,
     pub(super) findings: Findings,
 }
@@ -120,7 +119,7 @@ impl<'a> Check<'a> {
         for s in &w.shape {
             self.shape(s, &mut parameters);
         }
-        let names: Arc<[String]> = parameters.iter().map(|p| p.name.clone()).collect();
+        let names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
         let mut needs = self.axes(&w.needs);
         let unless = self.axes(&w.unless);
         let mut terms: Vec<Term> = Vec::with_capacity(w.terms.len());
@@ -366,7 +365,7 @@ impl<'a> Check<'a> {
     fn term(
         &mut self,
         (w, t): (&EffectAsWritten, &TermAsWritten),
-        names: &Arc<[String]>,
+        names: &[String],
         known: Option<Formula>,
         needs: &mut Vec<AxisName>,
     ) -> Option<Term> {
@@ -404,7 +403,7 @@ impl<'a> Check<'a> {
         let words = || names.iter().map(String::as_str).collect::<Vec<_>>();
         let formula = match known {
             Some(formula) => Ok(formula),
-            None if self.built_in => Ok(Formula::unchecked(text, names)),
+            None if self.built_in => Formula::compile(text, &words()),
             None => Formula::parse(text, &words()),
         };
         match formula {

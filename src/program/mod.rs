@@ -16,7 +16,6 @@ pub mod path;
 pub mod plan;
 pub mod plan_check;
 pub mod plan_digest;
-mod plan_lines;
 mod reach;
 mod route;
 pub mod scene;

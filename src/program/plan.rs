@@ -6,7 +6,6 @@ use crate::diag::{Findings, Result, Source, from_json};
 use compact_str::CompactString;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The format line of a plan.
@@ -224,9 +223,9 @@ struct ToWrite<'a> {
     fields_sha256: Fields,
 }
 
-/// A record of a plan's text, where its lines are not as usual.
-fn by_the_library<T: DeserializeOwned>(text: &str, source: &Source) -> Result<T> {
-    Ok(serde_json::from_str(text).map_err(|e| {
+/// A record of a plan's text.
+fn from_text<T: DeserializeOwned>(source: &Source) -> Result<T> {
+    Ok(serde_json::from_str(source.inner()).map_err(|e| {
         from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
     })?)
 }
@@ -273,13 +272,8 @@ impl Plan {
     /// # Errors
     /// When the text is not JSON of this form, or holds what cannot be so on any machine.
     pub(crate) fn read(source: &Source) -> Result<((Self, Fields), Findings)> {
-        let text = source.inner();
-        let (plan, frame) = match super::plan_lines::read(text) {
-            Some((plan, frame)) => (plan, Cow::Owned(frame)),
-            None => (by_the_library(text, source)?, Cow::Borrowed(text.as_str())),
-        };
-        // what is wrong there has its place in the whole text
-        let AsWritten { fields_sha256 } = serde_json::from_str(&frame).or_else(|_| by_the_library(text, source))?;
+        let plan: Self = from_text(source)?;
+        let AsWritten { fields_sha256 } = from_text(source)?;
         super::plan_check::by_itself(&plan).findings(&plan, source).finish((plan, fields_sha256))
     }
 

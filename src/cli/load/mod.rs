@@ -243,23 +243,7 @@ pub fn load_compensation(path: &Path, machine: &Machine) -> Result<Compensation>
 /// # Errors
 /// When a file is missing or unusable.
 pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
-    load(path, io, true)
-}
-
-/// The same for somebody who asks about the effects of the study alone.
-///
-/// # Errors
-/// When a file is missing or unusable.
-pub fn load_study_alone(path: &Path, io: &Io) -> Result<Loaded> {
-    load(path, io, false)
-}
-
-/// `whole`: the whole catalogue will be asked for; another thread begins to read it.
-fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let text = files::read_text(path)?;
-    if whole {
-        Catalogue::read_ahead();
-    }
     let mut hash = Sha256::new();
     let mut data = Sha256::new();
     hash.update(text.as_bytes());
