@@ -35,4 +35,5 @@ pub mod simulate;
 pub mod study;
 pub mod tables;
 pub mod view;
+mod words;
 pub mod workbench;

@@ -7,6 +7,7 @@ use super::type_b::TypeB;
 use super::{Fit, Settings, contradictions, held_out, profile, snoop, statement, uncertainty, weak};
 use crate::machine::Machine;
 use crate::model::catalogue::Effect;
+use crate::model::data::UnusableReason;
 use crate::model::predict::Unknown;
 use crate::units::{significant, um_from_mm};
 use nalgebra::DVector;
@@ -183,11 +184,12 @@ pub(super) fn outcome(
     let unusable = fit.data.unusable.iter().map(|u| Rejected {
         id: u.id,
         run: u.run + 1,
-        reason: format!("{} (line {})", u.reason, u.line),
+        reason: format!("{} (line {})", crate::words::log::unusable(&u.reason), u.line),
+        is_far: u.reason == UnusableReason::FarFromPlan,
     });
     let strangers = fit.rejected.iter().map(|(&i, reason)| {
         let o = &fit.data.observations[i];
-        Rejected { id: o.id, run: o.run + 1, reason: reason.clone() }
+        Rejected { id: o.id, run: o.run + 1, reason: reason.clone(), is_far: false }
     });
     let mut outcome = Outcome {
         format: FORMAT.into(),

@@ -412,7 +412,15 @@ mod tests {
             let by = (p.id as f64 * 12.9898).sin() * 2e-3;
             position.set(AxisName::X, position.get(AxisName::X) + by);
             position.set(AxisName::Z, position.get(AxisName::Z) - 0.7 * by);
-            Touch { id: p.id, position, status: Status::Hit, time_s: None, temperature_deg_c: None, line: 1 }
+            Touch {
+                id: p.id,
+                position,
+                status: Status::Hit,
+                time_s: None,
+                digit_mm: None,
+                temperature_deg_c: None,
+                line: 1,
+            }
         };
         plan.touches.iter().map(touch).collect()
     }

@@ -119,6 +119,7 @@ pub(super) fn match_at(
             position,
             status: if good { raw.status } else { Status::Elsewhere },
             time_s: raw.time_s,
+            digit_mm: None,
             temperature_deg_c: raw.temperature_deg_c,
             line: raw.line,
         });

@@ -5,7 +5,7 @@
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
 pub mod csv;
-mod fast;
+mod last_digit;
 mod lines;
 mod matching;
 mod parse;
@@ -21,6 +21,7 @@ mod swaps;
 pub mod touch;
 mod words;
 
+pub use last_digit::digit_mm;
 pub use matching::match_to_plan;
 pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use reader::Reader;
@@ -29,11 +30,11 @@ pub use runs::RunFound;
 pub use swaps::{Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
 
-use crate::axes::{AxisMap, AxisName, Position};
+use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
 use crate::post::{Frame, Postprocessor, log_word};
-use crate::program::plan::{Plan, PlanTouch};
+use crate::program::plan::Plan;
 use crate::program::plan_digest::{self, digest};
 use place::Places;
 
@@ -128,6 +129,8 @@ pub(crate) fn read_digested(
         }
         belongs(header, machine, plan, digest, &places, &mut findings).map_err(|f| joined(&findings, f))?;
     }
+    let finite = parsed.touches.iter().map(|t| t.position).filter(|p| p.0.iter().all(|v| v.is_finite()));
+    let digit_mm = digit_mm(finite);
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
@@ -136,9 +139,10 @@ pub(crate) fn read_digested(
         says_status: parsed.rows_say_status,
         lost: &parsed.rejected.lines,
     };
-    let (touches, more) = matching::match_at(machine, plan, parsed.touches, form, Some(&places), &parsed.rejected)
+    let (mut touches, more) = matching::match_at(machine, plan, parsed.touches, form, Some(&places), &parsed.rejected)
         .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
+    touches.iter_mut().for_each(|t| t.digit_mm = digit_mm);
     if !touches.iter().any(|t| t.status == Status::Hit) {
         findings.push(
             Finding::error("log::no_hit", format!("{name} holds no touch of the plan at which the probe triggered"))
@@ -224,13 +228,6 @@ pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Resu
         })?;
     }
     Ok(())
-}
-
-/// Where a control shows a touch: the inverse of [`to_axes`]. `planned`: the touch in the plan.
-#[must_use]
-pub fn as_logged(machine: &Machine, plan: &Plan, planned: Option<&PlanTouch>, touch: &Touch) -> Position {
-    let length = planned.and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
-    Frame::new(machine, plan.controller_frame, length).controller_from_axes(&touch.position)
 }
 
 #[cfg(test)]

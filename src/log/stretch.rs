@@ -1,9 +1,8 @@
-//! The lines of a log, read: touches at full speed, everything else as events between them.
+//! The lines of a log, read: touches, and everything else as events between them.
 //!
 //! A long log is cut at line ends into stretches that are read at the same time; the result is the same as that of one.
 //! A line that is not understood is only noted here: what is wrong with it is found out for the few that are shown.
 
-use super::fast::{self, Table};
 use super::lines::{BYTE_ORDER_MARK, HEADS, Line, blanks, first, inner_head, without_leader, without_trailer};
 use super::record::{LogHeader, Record, begin, record, row};
 use super::touch::RawTouch;
@@ -103,20 +102,11 @@ impl Reader<'_> {
     }
 
     fn stretch<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
-        let table = Table::new(self.rule);
         // lines of touches are some 60 bytes or longer
         let mut out = Stretch { touches: Vec::with_capacity(bytes.len() / 60), ..Stretch::default() };
         let mut at = 0;
         while at < bytes.len() {
             out.lines += 1;
-            if self.columns.is_none()
-                && let Some((touch, end, used)) = fast::touch(&bytes[at..], out.lines, &table)
-            {
-                out.ends[end as usize] = true;
-                out.touches.push(touch);
-                at += used;
-                continue;
-            }
             let (line, end, used) = first(&bytes[at..]);
             end.into_iter().for_each(|e| out.ends[e as usize] = true);
             let mut line = Line { number: out.lines, start: start + at, bytes: line, end };
@@ -134,7 +124,7 @@ impl Reader<'_> {
         out
     }
 
-    /// Reads a line that is not the usual one of a touch.
+    /// Reads a line.
     fn note<'a>(&self, line: Line<'a>, out: &mut Stretch<'a>) {
         let what = match self.line(&line) {
             Ok(Record::Touch(touch)) => {

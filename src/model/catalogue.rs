@@ -3,6 +3,7 @@
 pub use super::as_written::About;
 use super::as_written::File;
 use super::check::Check;
+use super::for_each_axis::expand;
 use super::formula::Formula;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source};
@@ -145,7 +146,8 @@ static BUILT_IN: LazyLock<Vec<Effect>> = LazyLock::new(|| {
     // a test reads the same text as a user's file, with every check
     let Ok(file) = toml::from_str::<File>(source.inner()) else { return Vec::new() };
     let mut check = Check::new(&source, true);
-    file.effect.iter().filter_map(|written| check.effect(written)).collect()
+    let rows = expand(file.effect, |letters| check.axes(letters));
+    rows.iter().filter_map(|written| check.effect(written)).collect()
 });
 
 /// All effects that exist.
@@ -208,7 +210,7 @@ fn read(source: &Source, taken: &dyn Fn(&Effect) -> bool) -> Result<(Vec<Effect>
     let mut check = Check::new(source, false);
     check.format(&file);
     let mut fresh: Vec<Effect> = Vec::new();
-    for written in &file.effect {
+    for written in &expand(file.effect, |letters| check.axes(letters)) {
         let Some(effect) = check.effect(written) else { continue };
         if taken(&effect) || fresh.iter().any(|e| e.id == effect.id && !e.excludes(&effect)) {
             check.twice(written);

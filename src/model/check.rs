@@ -1,7 +1,7 @@
 //! Effects as written → checked records; every finding has its place and says which words exist.
 
 use super::as_written::{
-    About, EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten,
+    About, EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten, Typical,
 };
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{CONSTANTS, FUNCTIONS, Formula, VARIABLES};
@@ -249,7 +249,11 @@ impl<'a> Check<'a> {
         let name = t.parameter.get_ref();
         let unit = t.unit.get_ref();
         let factor = unit_factor(unit);
-        let typical = t.typical.unwrap_or_else(|| default_typical(unit));
+        let typical = match &t.typical {
+            Some(Typical::All(size)) => *size,
+            Some(Typical::Each(_)) => f64::NAN,
+            None => default_typical(unit),
+        };
         if !self.built_in {
             self.name(name, &t.parameter.span());
             self.unit_fits(w, t);
@@ -262,7 +266,7 @@ impl<'a> Check<'a> {
                 &t.unit.span(),
                 "effects::typical",
                 format!("typical size of {name} is {typical}"),
-                "write a positive number",
+                "write a positive number; a list of them, one for each axis, in a row with `axes` only",
             );
         }
         match parameters.iter().find(|p| &p.name == name) {
@@ -346,7 +350,7 @@ impl<'a> Check<'a> {
     }
 
     /// Letters of axes.
-    fn axes(&mut self, written: &[Placed]) -> Vec<AxisName> {
+    pub(super) fn axes(&mut self, written: &[Placed]) -> Vec<AxisName> {
         let mut out = Vec::new();
         for word in written {
             match axis(word.get_ref()) {

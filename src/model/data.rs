@@ -33,7 +33,27 @@ pub struct Unusable {
     /// Line in the log.
     pub line: usize,
     /// Why.
-    pub reason: String,
+    pub reason: UnusableReason,
+}
+
+/// Why the model cannot use a touch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum UnusableReason {
+    /// The plan has no touch of this number.
+    NotInPlan,
+    /// The probe did not trigger.
+    NoTrigger,
+    /// The position is farther from the planned one than the probe can go.
+    FarFromPlan,
+    /// A position is infinite or not a number.
+    NotANumber,
+    /// The plan has no such block on that carrier.
+    NoSuchBlock {
+        /// `table` or the letter of a rotary axis.
+        carrier: String,
+        /// Name of the block.
+        block: String,
+    },
 }
 
 /// Where a touch comes from, in the words of its plan and log.
@@ -79,9 +99,6 @@ pub struct Data {
     pub digits_mm: Vec<Option<f64>>,
 }
 
-/// Why a touch that is far from its place is not used.
-pub const ELSEWHERE: &str = "far from its place";
-
 /// More touches than this share may not be missing.
 const MOST_MISSED: f64 = 0.2;
 
@@ -125,11 +142,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let mut before = Before::default();
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
-        // a log under the control's transformation has its digits in the coordinates of that; one of axis positions, in those
-        let shown = super::digits::digit_mm(
-            logged.clone().map(|t| crate::log::as_logged(machine, run.plan, numbered.touch(t.id), t)),
-        );
-        data.digits_mm.push(shown.or_else(|| super::digits::digit_mm(logged.map(|t| t.position))));
+        let of_log = run.touches.iter().find_map(|t| t.digit_mm);
+        data.digits_mm.push(of_log.or_else(|| crate::log::digit_mm(logged.map(|t| t.position))));
         data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run, &numbered));
         for (touch, &temperature_deg_c) in run.touches.iter().zip(&temperatures[index]) {
             let Some(planned) = numbered.touch(touch.id) else {
@@ -137,7 +151,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     run: index,
                     id: touch.id,
                     line: touch.line,
-                    reason: "not in the plan".into(),
+                    reason: UnusableReason::NotInPlan,
                 });
                 continue;
             };
@@ -149,17 +163,20 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             before.next(planned);
             previous = Some(planned);
             let reason = match touch.status {
-                Status::Miss => Some("the search ended without a trigger"),
-                Status::Elsewhere => Some(ELSEWHERE),
-                Status::Hit if touch.position.0.iter().any(|v| !v.is_finite()) => Some("a position is not a number"),
+                Status::Miss => Some(UnusableReason::NoTrigger),
+                Status::Elsewhere => Some(UnusableReason::FarFromPlan),
+                Status::Hit if touch.position.0.iter().any(|v| !v.is_finite()) => Some(UnusableReason::NotANumber),
                 Status::Hit => None,
             };
             if let Some(reason) = reason {
-                data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason: reason.into() });
+                data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason });
                 continue;
             }
             let (Some(carrier), Some(block)) = (machine.carrier(&planned.carrier), run.plan.block_of(planned)) else {
-                let reason = format!("{} carries no block {:?}", planned.carrier, planned.block);
+                let reason = UnusableReason::NoSuchBlock {
+                    carrier: planned.carrier.to_string(),
+                    block: planned.block.to_string(),
+                };
                 data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason });
                 continue;
             };

@@ -22,6 +22,7 @@ pub mod scene;
 pub mod spec;
 mod stops;
 pub mod sweep;
+mod touch_status;
 mod turns;
 mod verify;
 
@@ -32,6 +33,7 @@ pub use bare::plan_without_path;
 pub use head::{SkippedGroup, duration, pose_says, skipped_groups};
 pub use library::{built_in, choose};
 pub use spec::{ProgramSpec, load};
+pub use touch_status::Status;
 pub use verify::{Violation, verify};
 
 use crate::diag::{Failure, Finding, Findings, Result};

@@ -211,6 +211,7 @@ mod tests {
                 position: planned.nominal_position(),
                 status: log::Status::Hit,
                 time_s,
+                digit_mm: None,
                 temperature_deg_c: None,
                 line,
             };

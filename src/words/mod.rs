@@ -1,0 +1,3 @@
+//! Sentences: each fact of a room becomes one in exactly one place, for the terminal, the report, the page and the workbench.
+
+pub(crate) mod log;
