@@ -5,21 +5,21 @@
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
 pub mod csv;
+mod finding_places;
 mod last_digit;
-mod lines;
 mod matching;
+mod numbers;
+mod origin_shift;
 mod parse;
-mod place;
 pub mod points;
+mod position_rows;
+mod read_chunks;
 mod reader;
 mod record;
-mod rows;
 mod runs;
-mod shift;
-mod stretch;
-mod swaps;
+mod setup_mistakes;
+mod text_lines;
 pub mod touch;
-mod words;
 
 pub use last_digit::digit_mm;
 pub use matching::match_to_plan;
@@ -27,7 +27,7 @@ pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use reader::Reader;
 pub use record::LogHeader;
 pub use runs::RunFound;
-pub use swaps::{Supposed, suppose};
+pub use setup_mistakes::{Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
 
 use crate::axes::{AxisMap, AxisName};
@@ -36,7 +36,7 @@ use crate::machine::Machine;
 use crate::post::{Frame, Postprocessor, log_word};
 use crate::program::plan::Plan;
 use crate::program::plan_digest::{self, digest};
-use place::Places;
+use finding_places::Places;
 
 /// Who wrote a log.
 #[derive(Debug, Clone, Copy)]
@@ -134,7 +134,7 @@ pub(crate) fn read_digested(
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
-    let form = rows::RowForm {
+    let form = position_rows::RowForm {
         per_touch: &parsed.per_touch,
         says_status: parsed.rows_say_status,
         lost: &parsed.rejected.lines,
@@ -206,7 +206,7 @@ fn belongs(
 /// # Errors
 /// When the machine's linear axes do not span space.
 pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Result<()> {
-    if !Frame::of(machine, plan).is_tcp() {
+    if !Frame::of_plan(machine, plan).is_tcp() {
         return Ok(());
     }
     let numbered = plan.numbered();

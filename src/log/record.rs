@@ -1,8 +1,8 @@
 //! One line of a log → header, touch or end; or a row of columns. Driven by the postprocessor's data.
 
-use super::lines::{blanks, without_leader};
+use super::numbers::{Fault, Number, number, whole};
+use super::text_lines::{blanks, without_leader};
 use super::touch::{RawTouch, Status};
-use super::words::{Fault, Number, number, whole};
 use crate::axes::{AxisName, Position};
 use crate::post::as_written::LengthUnit;
 use crate::post::{ColumnRule, LogRule};

@@ -5,8 +5,8 @@ use super::as_written::{
 };
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{CONSTANTS, FUNCTIONS, Formula, VARIABLES};
-use super::mistake::MOST_SHAPES;
-use super::{degrees, mistake};
+use super::formula_errors::MOST_SHAPES;
+use super::{degrees_in_formula, formula_errors};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
@@ -429,7 +429,7 @@ impl<'a> Check<'a> {
                 Some(Term { parameter, place, component, formula })
             }
             Err(message) => {
-                let found = mistake::find(text, &words());
+                let found = formula_errors::find(text, &words());
                 let help = found.as_ref().and_then(|m| m.help).unwrap_or("angles A B C are radians inside a formula");
                 let place = found.and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
@@ -445,7 +445,7 @@ impl<'a> Check<'a> {
 
     /// A number of degrees where radians are meant.
     fn in_degrees(&mut self, w: &EffectAsWritten, t: &TermAsWritten, shapes: &[&str]) {
-        if let Some(found) = degrees::find(t.formula.get_ref(), shapes) {
+        if let Some(found) = degrees_in_formula::find(t.formula.get_ref(), shapes) {
             let says = format!("formula {:?} of {:?}: {found}", t.formula.get_ref(), w.id.get_ref());
             let finding = Finding::warning("effects::in_degrees", says).help(found.remedy());
             self.findings.push(finding.at(self.source, t.formula.span()));

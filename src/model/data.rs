@@ -1,7 +1,6 @@
 //! From plans and touches to observations: what the model needs to know of each touch, and which touches it cannot use.
 
 use super::formula::{State, VARIABLES, slot};
-use super::poses::LastPose;
 use super::predict::{Observation, SetUp};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
@@ -129,8 +128,6 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut first_touch_s: Option<f64> = None;
     let mut earliest_h = 0.0;
     let mut visits = Visits::default();
-    // as made and as planned: an axis that came to a little beside its pose would else push the other out at every touch
-    let (mut made, mut planned_at) = (LastPose::default(), LastPose::default());
     let (temperatures, temperature_says) = super::temperatures::of_runs(runs);
     data.temperature_says = temperature_says;
     for (index, run) in runs.iter().enumerate() {
@@ -197,11 +194,10 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
             let ball_radius = planned.ball_radius_mm.unwrap_or(run.plan.ball_radius_mm);
             let ball = point + normal * ball_radius;
-            let ideal = planned_at
-                .linear_for_ball(machine, carrier, &planned.pose.position(), &ball, length_mm)
-                .unwrap_or(touch.position);
+            let ideal =
+                machine.linear_for_ball(carrier, &planned.pose.position(), &ball, length_mm).unwrap_or(touch.position);
             // the rotary axes stand where the control says they stand; a log without them means the plan's pose
-            let at = |position: Position, poses: &mut LastPose| Observation {
+            let at = |position: Position| Observation {
                 run: index,
                 id: touch.id,
                 set_up,
@@ -223,9 +219,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     before: &before.earlier,
                     length_mm,
                 }
-                .state(poses),
+                .state(),
             };
-            let observation = at(touch.position, &mut made);
+            let observation = at(touch.position);
             data.origins.push(Origin {
                 line: touch.line,
                 stage: planned.stage.to_string(),
@@ -233,9 +229,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 face: planned.face.to_string(),
             });
             // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
-            data.nominal.push(at(ideal, &mut planned_at));
+            data.nominal.push(at(ideal));
             data.repeats.push(repeat_group(&data, &numbered, planned, index));
-            let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));
+            let visit = visits.number_of(&mut data, index, planned, mounting_key(&label, mounting));
             data.visits.push(visit);
             data.observations.push(observation);
         }
@@ -275,7 +271,7 @@ struct Visits {
 impl Visits {
     /// The visit that a touch belongs to: a new one where the run, the plan's visit number or the pose changes. The axes stand
     /// where they stood while the spindle turns or the stylus is changed: their scatter is drawn once for all of it.
-    fn of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
+    fn number_of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
         let at = Indexed { mounting, pose: touch.pose, from: touch.from };
         let now = (run, touch.visit, at);
         if self.last.as_ref() != Some(&now) {
@@ -363,7 +359,7 @@ struct Circumstances<'a> {
 }
 
 impl Circumstances<'_> {
-    fn state(&self, poses: &mut LastPose) -> State {
+    fn state(&self) -> State {
         let c = self;
         let mut state = [0.0; VARIABLES.len()];
         for name in AxisName::ALL {
@@ -383,12 +379,12 @@ impl Circumstances<'_> {
         const ROUNDING: f64 = 1e-12;
         let plain = |v: Vector3<f64>| v.map(|x| if x.abs() <= ROUNDING { 0.0 } else { x });
         let normal = Vector3::from(c.planned.normal).normalize();
-        let turned = poses.turned(c.machine, c.carrier, c.at);
-        let in_r = turned.to_r * normal;
+        let into_tool = c.machine.tool_frame(c.at).rotation.inverse();
+        let in_r = c.machine.carrier_frame(c.carrier, c.at).rotation * normal;
         let into_probe = nalgebra::Rotation3::from_axis_angle(&c.machine.tool.direction, -spindle);
         put(slot::NORMAL_IN_R, plain(in_r));
-        put(slot::NORMAL_IN_PROBE, plain(into_probe * (turned.into_tool * in_r)));
-        put(slot::GRAVITY, plain(turned.into_tool * -Vector3::z()));
+        put(slot::NORMAL_IN_PROBE, plain(into_probe * (into_tool * in_r)));
+        put(slot::GRAVITY, plain(into_tool * -Vector3::z()));
         put(slot::NORMAL_OF_BLOCK, normal);
         put(slot::POINT, c.planned.point.into());
         put(slot::OUTWARD, plain(outward(c.machine, c.carrier, &c.block.centre.into())));

@@ -2,9 +2,9 @@
 //!
 //! Nothing here calls itself, so that no formula can exhaust the stack.
 
-use super::dual::Dual;
-use super::spelling::{Steps, fold};
-use super::words::{One, Two, Value, constant};
+use super::dual_number::Dual;
+use super::formula_parser::{Steps, fold};
+use super::operators::{One, Two, Value, constant};
 
 /// Variables of a formula at most: their values fit on the stack.
 pub(super) const MOST_VARIABLES: usize = 32;

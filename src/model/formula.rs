@@ -4,7 +4,7 @@
 //! turns a mistake into a sentence that names it.
 
 use super::expression::{Expression, MOST_VARIABLES};
-use super::spelling::bare_number;
+use super::formula_parser::bare_number;
 use std::sync::Arc;
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
@@ -85,7 +85,7 @@ enum Parts {
 }
 
 impl Parts {
-    fn of(expression: Expression, shapes: &[&str]) -> Result<Self, String> {
+    fn from_expression(expression: Expression, shapes: &[&str]) -> Result<Self, String> {
         let origins = origins(&expression.variables(), shapes)?;
         Ok(if origins.is_empty() {
             Self::Constant(expression.value(&[]))
@@ -111,7 +111,7 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
-        match super::mistake::find(text, shapes) {
+        match super::formula_errors::find(text, shapes) {
             Some(wrong) => Err(wrong.says),
             None => Self::compile(text, shapes),
         }
@@ -230,7 +230,7 @@ impl Formula {
 fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     let cannot = || format!("it cannot be read (functions: {})", FUNCTIONS.join(" "));
     let expression = Expression::read(text).ok_or_else(cannot)?;
-    Parts::of(expression, shapes)
+    Parts::from_expression(expression, shapes)
 }
 
 /// Hands on the values of an expression's variables.

@@ -3,7 +3,6 @@
 use super::plan_digest::{self, Fields};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Findings, Result, Source, from_json};
-use compact_str::CompactString;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -116,19 +115,19 @@ pub struct PlanTouch {
     /// Its number, unique in the plan.
     pub id: u64,
     /// Stage of the procedure, e.g. `head`.
-    pub stage: CompactString,
+    pub stage: String,
     /// Which repeat of the same point, from 1.
     #[serde(default = "one")]
     pub repeat: u32,
     /// `table` or the letter of a rotary axis.
-    pub carrier: CompactString,
+    pub carrier: String,
     /// The block's mounting, where it differs from the plan's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mounting: Option<String>,
     /// The block's name.
-    pub block: CompactString,
+    pub block: String,
     /// The block's own face at all axes 0.
-    pub face: CompactString,
+    pub face: String,
     /// Nominal contact in the carrier's frame, mm.
     pub point: [f64; 3],
     /// Outward unit normal in the carrier's frame.

@@ -12,7 +12,7 @@ use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
 use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
-use crate::study::{DataEntry, Study};
+use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
 use rayon::prelude::*;
@@ -255,7 +255,7 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     // the machine beside the plans; what is to be said of each is said in its turn
     let (machine, plans) = rayon::join(
         || load_machine(&study.machine, machines.as_deref(), io),
-        || study.data.par_iter().map(|entry| ReadPlan::of(&folder.join(&entry.plan))).collect::<Vec<_>>(),
+        || study.data.par_iter().map(|entry| ReadPlan::read(&folder.join(&entry.plan))).collect::<Vec<_>>(),
     );
     let machine = located(machine, &src)?;
     hash.update(machine.sha256.as_bytes());
@@ -267,17 +267,10 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
-    let read = |(entry, plan): (&DataEntry, Result<ReadPlan>)| ReadRun::of(entry, plan?, &folder, &machine);
-    // small logs at once; of large ones, which all threads read together, one after the other: each lies in memory, and with it what is
-    // to be said of it
-    let each: Box<dyn Iterator<Item = Result<ReadRun>>> = if are_small(&study.data, &folder) {
-        Box::new(study.data.par_iter().zip(plans).map(read).collect::<Vec<_>>().into_iter())
-    } else {
-        Box::new(study.data.iter().zip(plans).map(read))
-    };
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for (entry, read) in study.data.iter().zip(each) {
+    for (entry, plan) in study.data.iter().zip(plans) {
+        let read = plan.and_then(|plan| ReadRun::read(entry, plan, &folder, &machine));
         let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest, .. }, log } =
             at_the_name(read, &entry.plan, &src)?;
         io.report(&findings);
@@ -314,14 +307,6 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     let hexadecimal = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
     let (sha256, data_sha256) = (hexadecimal(hash), hexadecimal(data));
     Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256, data_sha256 })
-}
-
-/// Are the logs of a study so small together that they are read at once?
-fn are_small(data: &[DataEntry], folder: &Path) -> bool {
-    const SMALL: u64 = 4 << 20;
-    // what cannot be read is said in its turn
-    let size = |entry: &DataEntry| std::fs::metadata(folder.join(&entry.log)).map_or(0, |found| found.len());
-    data.iter().map(size).sum::<u64>() <= SMALL
 }
 
 /// What is wrong with a file that the study names gets the place of its name, where it has none of its own.

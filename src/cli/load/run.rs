@@ -17,7 +17,7 @@ use std::path::Path;
 /// # Errors
 /// When it is unusable or for another machine.
 pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
-    let mut read = ReadPlan::of(path)?;
+    let mut read = ReadPlan::read(path)?;
     read.check_belongs(path, machine)?;
     io.report(&read.findings);
     Ok(read.plan)
@@ -28,7 +28,7 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
 /// # Errors
 /// When one of them is unusable.
 pub fn load_plan_and_machine(path: &Path, machines: Option<&Path>, io: &Io) -> Result<(Plan, Machine)> {
-    let mut read = ReadPlan::of(path)?;
+    let mut read = ReadPlan::read(path)?;
     let machine = load_machine(&read.plan.machine, machines, io)?;
     read.check_belongs(path, &machine)?;
     io.report(&read.findings);
@@ -54,7 +54,7 @@ impl ReadPlan {
     ///
     /// # Errors
     /// When it is unusable.
-    pub fn of(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> Result<Self> {
         let src = source(path.display().to_string(), files::read_text(path)?);
         let ((plan, written), Findings(findings)) = Plan::read(&src)?;
         let fields = plan_digest::of_fields(&plan);
@@ -118,7 +118,7 @@ impl ReadRun {
     ///
     /// # Errors
     /// When the plan is for another machine.
-    pub fn of(entry: &DataEntry, mut plan: ReadPlan, folder: &Path, machine: &Machine) -> Result<Self> {
+    pub fn read(entry: &DataEntry, mut plan: ReadPlan, folder: &Path, machine: &Machine) -> Result<Self> {
         plan.check_belongs(&folder.join(&entry.plan), machine)?;
         let path = folder.join(&entry.log);
         let log = files::read_bytes(&path).map(|bytes| {

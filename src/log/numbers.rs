@@ -4,7 +4,7 @@
 //! them, a number that begins or ends with its decimal mark, `+`, `1.5EX+02`. What is not: anything else. A line either
 //! is understood as a whole or is a [`Fault`] with its place.
 
-use super::lines::blanks;
+use super::text_lines::blanks;
 use nom::bytes::complete::take_while_m_n;
 use nom::character::complete::one_of;
 use nom::combinator::opt;

@@ -1,12 +1,12 @@
 //! The lines of a log, read: touches, and everything else as events between them.
 //!
-//! A long log is cut at line ends into stretches that are read at the same time; the result is the same as that of one.
+//! A long log is cut at line ends into chunks that are read at the same time; the result is the same as that of one.
 //! A line that is not understood is only noted here: what is wrong with it is found out for the few that are shown.
 
-use super::lines::{BYTE_ORDER_MARK, HEADS, Line, blanks, first, inner_head, without_leader, without_trailer};
+use super::numbers::Fault;
 use super::record::{LogHeader, Record, begin, record, row};
+use super::text_lines::{BYTE_ORDER_MARK, HEADS, Line, blanks, first, inner_head, without_leader, without_trailer};
 use super::touch::RawTouch;
-use super::words::Fault;
 use crate::post::as_written::EndOfLine;
 use crate::post::{ColumnRule, LogRule};
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ const SHORT: usize = 1 << 20;
 
 /// What is read of a log, or of a part of it that begins and ends with a line.
 #[derive(Debug, Default)]
-pub struct Stretch<'a> {
+pub struct Chunk<'a> {
     /// In the order of the log.
     pub touches: Vec<RawTouch>,
     /// Everything else, in the order of the log.
@@ -34,13 +34,13 @@ pub struct Event<'a> {
     pub at: usize,
     /// Where.
     pub line: Line<'a>,
-    /// What.
-    pub what: What,
+    /// What kind of line.
+    pub kind: LineKind,
 }
 
-/// What such a line is.
+/// What kind of line it is, where it is no touch.
 #[derive(Debug)]
-pub enum What {
+pub enum LineKind {
     /// A run begins.
     Head(Box<LogHeader>),
     /// A run has come to its end; number of touches of the plan.
@@ -87,23 +87,22 @@ impl Reader<'_> {
     }
 
     /// Reads lines, the first of which begins at `start` of the log.
-    pub fn read<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
+    pub fn read<'a>(&self, bytes: &'a [u8], start: usize) -> Chunk<'a> {
         let n_parts = if bytes.len() < SHORT { 1 } else { rayon::current_num_threads().max(1) };
         if n_parts == 1 {
-            return self.stretch(bytes, start);
+            return self.chunk(bytes, start);
         }
         let mut cuts: Vec<usize> = (0..=n_parts).map(|i| line_start(bytes, bytes.len() / n_parts * i)).collect();
         if let Some(last) = cuts.last_mut() {
             *last = bytes.len();
         }
-        let parts: Vec<Stretch<'a>> =
-            cuts.par_windows(2).map(|c| self.stretch(&bytes[c[0]..c[1]], start + c[0])).collect();
+        let parts: Vec<Chunk<'a>> = cuts.par_windows(2).map(|c| self.chunk(&bytes[c[0]..c[1]], start + c[0])).collect();
         parts.into_iter().reduce(join).unwrap_or_default()
     }
 
-    fn stretch<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
+    fn chunk<'a>(&self, bytes: &'a [u8], start: usize) -> Chunk<'a> {
         // lines of touches are some 60 bytes or longer
-        let mut out = Stretch { touches: Vec::with_capacity(bytes.len() / 60), ..Stretch::default() };
+        let mut out = Chunk { touches: Vec::with_capacity(bytes.len() / 60), ..Chunk::default() };
         let mut at = 0;
         while at < bytes.len() {
             out.lines += 1;
@@ -125,19 +124,19 @@ impl Reader<'_> {
     }
 
     /// Reads a line.
-    fn note<'a>(&self, line: Line<'a>, out: &mut Stretch<'a>) {
-        let what = match self.line(&line) {
+    fn note<'a>(&self, line: Line<'a>, out: &mut Chunk<'a>) {
+        let kind = match self.line(&line) {
             Ok(Record::Touch(touch)) => {
                 out.touches.push(touch);
                 None
             }
-            Ok(Record::Head(head)) => Some(What::Head(Box::new(head))),
-            Ok(Record::End(count)) => Some(What::End(count)),
+            Ok(Record::Head(head)) => Some(LineKind::Head(Box::new(head))),
+            Ok(Record::End(count)) => Some(LineKind::End(count)),
             Ok(Record::Blank) => None,
-            Err(_) => Some(What::Fault),
+            Err(_) => Some(LineKind::Fault),
         };
         let n_touches = out.touches.len();
-        out.events.extend(what.map(|what| Event { at: n_touches, line, what }));
+        out.events.extend(kind.map(|kind| Event { at: n_touches, line, kind }));
     }
 
     /// What stands before a head in its line, without what belongs to the head.
@@ -160,7 +159,7 @@ pub fn looks_like_columns(bytes: &[u8], columns: &ColumnRule) -> bool {
         let holds = |what: &[u8]| memchr::memmem::find(bytes, what).is_some();
         return holds(columns.prefix.as_bytes()) && !HEADS.iter().any(|head| holds(head));
     }
-    let firsts = super::lines::Lines::new(bytes, 0).filter_map(|l| blanks(l.bytes).first().copied()).take(64);
+    let firsts = super::text_lines::Lines::new(bytes, 0).filter_map(|l| blanks(l.bytes).first().copied()).take(64);
     let mut numbers = 0;
     for first in firsts {
         match first {
@@ -190,17 +189,17 @@ fn line_start(bytes: &[u8], at: usize) -> usize {
     at - 1 + first(&bytes[at - 1..]).2
 }
 
-/// One stretch after the other.
-fn join<'a>(mut before: Stretch<'a>, after: Stretch<'a>) -> Stretch<'a> {
+/// One chunk after the other.
+fn join<'a>(mut before: Chunk<'a>, after: Chunk<'a>) -> Chunk<'a> {
     let (n_touches, n_lines) = (before.touches.len(), before.lines);
     before.touches.extend(after.touches.into_iter().map(|t| RawTouch { line: t.line + n_lines, ..t }));
     before.events.extend(after.events.into_iter().map(|e| {
         let line = Line { number: e.line.number + n_lines, ..e.line };
-        let what = match e.what {
-            What::Head(head) => What::Head(Box::new(LogHeader { line: line.number, ..*head })),
-            what => what,
+        let kind = match e.kind {
+            LineKind::Head(head) => LineKind::Head(Box::new(LogHeader { line: line.number, ..*head })),
+            kind => kind,
         };
-        Event { at: e.at + n_touches, line, what }
+        Event { at: e.at + n_touches, line, kind }
     }));
     before.lines += after.lines;
     before.ends.iter_mut().zip(after.ends).for_each(|(b, a)| *b |= a);
