@@ -13,7 +13,7 @@ mod origin_shift;
 mod parse;
 pub mod points;
 mod position_rows;
-mod read_chunks;
+mod read_lines;
 mod reader;
 mod record;
 mod runs;
@@ -88,19 +88,6 @@ pub fn read_run(
     plan: &Plan,
     run: Option<usize>,
 ) -> Result<(MatchedLog, Findings)> {
-    read_digested(bytes, name, writer, machine, plan, run, || digest(plan))
-}
-
-/// The same where the plan's digest is known to who reads many logs of one plan.
-pub(crate) fn read_digested(
-    bytes: &[u8],
-    name: &str,
-    writer: Writer<'_>,
-    machine: &Machine,
-    plan: &Plan,
-    run: Option<usize>,
-    digest: impl FnOnce() -> String,
-) -> Result<(MatchedLog, Findings)> {
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
         Writer::Controller(post) => parse_run(bytes, name, post, run)?,
@@ -127,7 +114,7 @@ pub(crate) fn read_digested(
         {
             parse::other_controller(header, post, &places, &mut findings);
         }
-        belongs(header, machine, plan, digest, &places, &mut findings).map_err(|f| joined(&findings, f))?;
+        belongs(header, machine, plan, &places, &mut findings).map_err(|f| joined(&findings, f))?;
     }
     let finite = parsed.touches.iter().map(|t| t.position).filter(|p| p.0.iter().all(|v| v.is_finite()));
     let digit_mm = digit_mm(finite);
@@ -169,7 +156,6 @@ fn belongs(
     header: &LogHeader,
     machine: &Machine,
     plan: &Plan,
-    digest: impl FnOnce() -> String,
     places: &Places<'_>,
     findings: &mut Findings,
 ) -> Result<()> {
@@ -181,7 +167,7 @@ fn belongs(
             .help("use the plan that `axiscal generate` wrote together with the program");
         return Err(places.at_line(finding, header.line).into());
     }
-    if header.digest == digest() {
+    if header.digest == digest(plan) {
         return Ok(());
     }
     if header.digest == plan_digest::older(plan) {

@@ -2,7 +2,7 @@
 
 use super::finding_places::{Capped, Places};
 use super::numbers::Fault;
-use super::read_chunks::{Event, LineKind, Reader, looks_like_columns};
+use super::read_lines::{Event, LineKind, Reader, looks_like_columns};
 use super::record::{LogHeader, begin, named};
 use super::runs::{self, RunFound};
 use super::text_lines::{Line, Lines, is_tape};

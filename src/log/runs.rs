@@ -1,7 +1,7 @@
 //! Where the runs of a log begin and end, and which of them counts.
 
 use super::finding_places::Places;
-use super::read_chunks::{Event, LineKind};
+use super::read_lines::{Event, LineKind};
 use super::record::LogHeader;
 use super::text_lines::Line;
 use super::touch::RawTouch;

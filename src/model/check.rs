@@ -126,7 +126,7 @@ impl<'a> Check<'a> {
         for t in &w.terms {
             // the components of an effect mostly go by one formula
             let known = terms.iter().find(|k| k.formula.text() == t.formula.get_ref()).map(|k| k.formula.clone());
-            terms.extend(self.term((w, t), &names, known, &mut needs));
+            terms.extend(self.term(w, t, &names, known, &mut needs));
         }
         if !self.built_in {
             self.usable(w);
@@ -368,7 +368,8 @@ impl<'a> Check<'a> {
 
     fn term(
         &mut self,
-        (w, t): (&EffectAsWritten, &TermAsWritten),
+        w: &EffectAsWritten,
+        t: &TermAsWritten,
         names: &[String],
         known: Option<Formula>,
         needs: &mut Vec<AxisName>,

@@ -262,7 +262,7 @@ impl Plan {
     /// When the text is not JSON of this form, holds what cannot be so on any machine, or was changed since it was written.
     pub fn parse(source: &Source) -> Result<(Self, Findings)> {
         let ((plan, written), mut findings) = Self::read(source)?;
-        findings.0.extend(plan_digest::changed(&written, &plan_digest::of_fields(&plan), source));
+        findings.0.extend(plan_digest::changed(&written, &plan_digest::field_digests(&plan), source));
         findings.finish(plan)
     }
 
@@ -282,7 +282,7 @@ impl Plan {
         // a plan holds only strings and finite numbers: serialisation cannot fail
         const EMPTY: &str = "\"touches\": []";
         let plan = &Self { touches: Vec::new(), ..self.clone() };
-        let frame = ToWrite { plan, fields_sha256: plan_digest::of_fields(self) };
+        let frame = ToWrite { plan, fields_sha256: plan_digest::field_digests(self) };
         let mut text = serde_json::to_string_pretty(&frame).unwrap_or_default();
         text.push('\n');
         let lines: Vec<String> =

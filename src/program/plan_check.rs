@@ -216,7 +216,7 @@ pub fn on_machine(plan: &Plan, machine: &Machine) -> Faults {
         let length_mm = touch.tool_length_mm.unwrap_or(plan.tool_length_mm);
         let Some(places) = machine.ball_places(carrier, &touch.pose.position(), length_mm) else { continue };
         let ball_radius_mm = touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm);
-        at_the_ball(&mut faults, part, touch, &places, (ball_radius_mm, agrees_mm));
+        at_the_ball(&mut faults, part, touch, &places, ball_radius_mm, agrees_mm);
     }
     faults
 }
@@ -275,7 +275,8 @@ fn at_the_ball(
     part: Part,
     touch: &PlanTouch,
     places: &BallPlaces,
-    (ball_radius_mm, agrees_mm): (f64, f64),
+    ball_radius_mm: f64,
+    agrees_mm: f64,
 ) {
     let (point, normal) = (Vector3::from(touch.point), Vector3::from(touch.normal));
     let linear = |ball: Vector3<f64>| places.linear_for(&ball);

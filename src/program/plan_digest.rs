@@ -122,7 +122,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 
 /// The digest of each field of a plan that a fit reads.
 #[must_use]
-pub fn of_fields(plan: &Plan) -> Fields {
+pub fn field_digests(plan: &Plan) -> Fields {
     let of_touches = |(name, write): &(&str, OfTouch)| ((*name).to_owned(), Canonical::of(&plan.touches, *write));
     let mut fields: Fields = OF_TOUCHES.iter().map(of_touches).collect();
     fields.extend(OF_BLOCKS.iter().map(|(name, write)| ((*name).to_owned(), Canonical::of(&plan.blocks, *write))));
@@ -131,20 +131,14 @@ pub fn of_fields(plan: &Plan) -> Fields {
     fields
 }
 
-/// Twelve hexadecimal digits of all fields together: what the log carries.
+/// The digest that the log of a plan carries: twelve hexadecimal digits of all fields together.
 #[must_use]
-pub fn of_all(fields: &Fields) -> String {
-    let text = fields.iter().fold(String::new(), |mut text, (name, digest)| {
+pub fn digest(plan: &Plan) -> String {
+    let text = field_digests(plan).iter().fold(String::new(), |mut text, (name, digest)| {
         let _ = writeln!(text, "{name}={digest}");
         text
     });
     hexadecimal(&Sha256::digest(text.as_bytes())[..6])
-}
-
-/// The digest that the log of a plan carries.
-#[must_use]
-pub fn digest(plan: &Plan) -> String {
-    of_all(&of_fields(plan))
 }
 
 /// Refuses a plan whose fields are not those with which it was written. Plans of earlier versions hold no digests: of them only the
@@ -212,7 +206,7 @@ mod tests {
         let unread = ["format", "machine_sha256", FIELD, "blocks", "touches"];
         expected.retain(|name| !unread.contains(&name.as_str()));
         expected.sort();
-        assert_eq!(of_fields(&whole).into_keys().collect::<Vec<_>>(), expected);
+        assert_eq!(field_digests(&whole).into_keys().collect::<Vec<_>>(), expected);
     }
 
     #[test]

@@ -15,7 +15,6 @@ use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
 use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
-use rayon::prelude::*;
 use run::{ReadLog, ReadPlan, ReadRun};
 pub use run::{load_plan, load_plan_and_machine, read_log};
 use sha2::{Digest, Sha256};
@@ -252,12 +251,7 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     io.report(&findings.0);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let machines = study.machines.as_ref().map(|m| folder.join(m));
-    // the machine beside the plans; what is to be said of each is said in its turn
-    let (machine, plans) = rayon::join(
-        || load_machine(&study.machine, machines.as_deref(), io),
-        || study.data.par_iter().map(|entry| ReadPlan::read(&folder.join(&entry.plan))).collect::<Vec<_>>(),
-    );
-    let machine = located(machine, &src)?;
+    let machine = located(load_machine(&study.machine, machines.as_deref(), io), &src)?;
     hash.update(machine.sha256.as_bytes());
     let mut catalogue = Catalogue::built_in()?;
     for name in &study.effects_files {
@@ -269,8 +263,8 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for (entry, plan) in study.data.iter().zip(plans) {
-        let read = plan.and_then(|plan| ReadRun::read(entry, plan, &folder, &machine));
+    for entry in &study.data {
+        let read = ReadRun::read(entry, &folder, &machine);
         let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest, .. }, log } =
             at_the_name(read, &entry.plan, &src)?;
         io.report(&findings);

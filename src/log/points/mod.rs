@@ -186,7 +186,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
         };
         match found {
             Err(fault) => {
-                let fault = super::read_chunks::no_text(text, line.start).unwrap_or(fault);
+                let fault = super::read_lines::no_text(text, line.start).unwrap_or(fault);
                 error(fault.at, fault.length, fault.code, fault.message);
             }
             Ok(Record::Blank) => {}
