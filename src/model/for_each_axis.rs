@@ -52,7 +52,7 @@ mod tests {
     fn a_row_stands_for_each_of_its_axes() {
         let row = |id: &str, more: &str| {
             format!(
-                "[[effect]]\nid = \"{id}-{{a}}\"\n{more}\nname = \"Lean of {{A}}\"\nat = \"{{A}}\"\nterms = [{{ parameter = \
+                "[[effect]]\nid = \"{id}-{{a}}\"\n{more}\nname = \"Tilt of {{A}}\"\nat = \"{{A}}\"\nterms = [{{ parameter = \
                  \"q{id}_{{B}}{{A}}\", unit = \"urad\", dof = \"r{{y}}\", formula = \"sin({{A}})\", typical = [3.0, 5.0] }}]\n"
             )
         };
@@ -68,10 +68,10 @@ mod tests {
             .collect();
         // about A the other two are Y and Z, about C they are X and Y
         let expected = [
-            ("p-a", "Lean of A", "qp_BA", 3.0, 4, "sin(A)"),
-            ("q-a", "Lean of A", "qq_BA", 3.0, 4, "sin(A)"),
-            ("p-c", "Lean of C", "qp_AC", 5.0, 3, "sin(C)"),
-            ("q-c", "Lean of C", "qq_AC", 5.0, 3, "sin(C)"),
+            ("p-a", "Tilt of A", "qp_BA", 3.0, 4, "sin(A)"),
+            ("q-a", "Tilt of A", "qq_BA", 3.0, 4, "sin(A)"),
+            ("p-c", "Tilt of C", "qp_AC", 5.0, 3, "sin(C)"),
+            ("q-c", "Tilt of C", "qq_AC", 5.0, 3, "sin(C)"),
         ];
         assert_eq!(found, expected);
         let wrong = Catalogue::default().add_file(&source("my.toml", text.replace("\"C\"]", "\"Q\"]"))).unwrap_err();

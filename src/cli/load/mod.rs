@@ -326,7 +326,7 @@ fn located<T>(result: Result<T>, study: &Source) -> Result<T> {
 fn placed(Failure(findings): Failure, study: &Source) -> Failure {
     let text = study.inner();
     let place = |f: &Finding| {
-        let word = f.message.split('"').nth(1)?;
+        let word = f.about.as_deref()?;
         let as_value = text.rfind(&format!("\"{word}\"")).map(|at| at..at + word.len() + 2);
         // or as a key
         as_value.or_else(|| {
