@@ -47,6 +47,24 @@ impl AxisName {
     pub fn from_letter(letter: char) -> Option<Self> {
         Self::ALL.into_iter().find(|name| name.letter() == letter.to_ascii_uppercase())
     }
+
+    /// A text that is written for X or A, with its letters in braces replaced by those of this axis: `{X}` is the direction
+    /// in which the axis lies and `{A}` the rotation about it, `{Y}` `{Z}` and `{B}` `{C}` are the other two in the order of
+    /// the alphabet. Small letters in braces become small letters.
+    #[must_use]
+    pub fn fill_in(self, text: &str) -> String {
+        let own = self.index() % 3;
+        let order: Vec<usize> = [own].into_iter().chain((0..3).filter(|i| *i != own)).collect();
+        let mut out = text.to_owned();
+        for (written, meant) in order.into_iter().enumerate() {
+            for kind in [0, 3] {
+                let (from, to) = (Self::ALL[written + kind].letter(), Self::ALL[meant + kind].letter());
+                out = out.replace(&format!("{{{from}}}"), &to.to_string());
+                out = out.replace(&format!("{{{}}}", from.to_ascii_lowercase()), &to.to_ascii_lowercase().to_string());
+            }
+        }
+        out
+    }
 }
 
 impl fmt::Display for AxisName {

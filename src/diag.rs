@@ -37,6 +37,8 @@ pub struct Finding {
     pub message: String,
     /// What to do.
     pub help: Option<String>,
+    /// The word of a file that it is about: its place is there, where it has none of its own.
+    pub about: Option<String>,
     /// Byte range in the source.
     pub span: Option<Range<usize>>,
     /// The text that `span` points into.
@@ -47,7 +49,8 @@ impl Finding {
     /// An error.
     #[must_use]
     pub fn error(code: &'static str, message: impl Into<String>) -> Self {
-        Self { severity: Severity::Error, code, message: message.into(), help: None, span: None, source: None }
+        let message = message.into();
+        Self { severity: Severity::Error, code, message, help: None, about: None, span: None, source: None }
     }
 
     /// A warning.
@@ -66,6 +69,13 @@ impl Finding {
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
+        self
+    }
+
+    /// With the word of a file that it is about.
+    #[must_use]
+    pub fn about(mut self, word: impl Into<String>) -> Self {
+        self.about = Some(word.into());
         self
     }
 

@@ -28,6 +28,7 @@ fn diagnosis_with(machine: &Machine, plans: &[Plan], scenario: &Scenario, refit:
                 position: r.position,
                 status: r.status,
                 time_s: r.time_s,
+                digit_mm: None,
                 temperature_deg_c: r.temperature_deg_c,
                 line: r.line,
             });

@@ -174,6 +174,7 @@ fn set_ups_come_back_and_visits_are_counted() {
                 position: t.nominal_position(),
                 status: axiscal::log::Status::Hit,
                 time_s: None,
+                digit_mm: None,
                 temperature_deg_c: None,
                 line: 0,
             })
@@ -321,6 +322,7 @@ fn blocks_that_are_put_up_anew_are_other_blocks() {
             position: t.nominal_position(),
             status: axiscal::log::Status::Hit,
             time_s: None,
+            digit_mm: None,
             temperature_deg_c: None,
             line: 0,
         })

@@ -5,7 +5,7 @@
 mod common;
 
 use axiscal::cli::Io;
-use axiscal::cli::load::{load_plan, load_study_alone};
+use axiscal::cli::load::{load_plan, load_study};
 use axiscal::diag::{Failure, Finding};
 use axiscal::log::Status;
 use axiscal::machine::Machine;
@@ -72,7 +72,7 @@ impl Job {
 
     /// As `identify --quick --json` does it.
     fn identify(&self) -> Result<String, Failure> {
-        let loaded = load_study_alone(&self.folder.path().join("study.toml"), &silent())?;
+        let loaded = load_study(&self.folder.path().join("study.toml"), &silent())?;
         let fit = loaded.fit(&axiscal::fit::Settings { bare: true, ..loaded.settings() })?;
         Ok(serde_json::to_string(&fit.outcome).unwrap())
     }

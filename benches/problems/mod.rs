@@ -131,7 +131,7 @@ pub fn swivel_head() -> Machine {
 pub fn matched(raw: &RawTouch) -> Touch {
     assert_eq!(raw.status, Status::Hit, "touch {:?} missed", raw.id);
     let RawTouch { position, status, time_s, temperature_deg_c, line, .. } = *raw;
-    Touch { id: raw.id.unwrap(), position, status, time_s, temperature_deg_c, line }
+    Touch { id: raw.id.unwrap(), position, status, time_s, digit_mm: None, temperature_deg_c, line }
 }
 
 /// Blocks on the turntable and on the linear axes' table by turns.

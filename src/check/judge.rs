@@ -27,7 +27,6 @@ use proofs::{How, Key, Proof};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::OnceLock;
 
 /// What is judged, and against what.
 pub struct Case<'a> {
@@ -37,8 +36,6 @@ pub struct Case<'a> {
     pub post: &'a Postprocessor,
     /// The plan, where there is one.
     pub plan: Option<&'a Plan>,
-    /// The plan's digest, once a log was read.
-    pub digest: OnceLock<String>,
     /// Shapes of each part.
     pub scenes: &'a [Scene<'a>],
     /// Blocks and coordinates.

@@ -44,7 +44,7 @@ use proof::Proving;
 use run::Event;
 use runs::Kind;
 use std::ops::Range;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use world::World;
 
 /// What a program is checked against.
@@ -358,7 +358,6 @@ fn with_parts(
         machine,
         post,
         plan: against.plan,
-        digest: OnceLock::new(),
         scenes: &scenes,
         mountings: &parts.iter().map(|p| &p.mounting).collect::<Vec<_>>(),
         world: &world,

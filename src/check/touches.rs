@@ -6,7 +6,6 @@ use super::run::{Event, Probe};
 use crate::axes::{AxisMap, Position};
 use crate::log;
 use crate::program::plan::{ControllerFrame, PlanTouch};
-use crate::program::plan_digest::digest;
 use crate::units::Plain;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -201,16 +200,7 @@ fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut Said) {
     let mut complain = |message: &str| {
         said.say(case, "check::log", end, format!("the log that it writes: {message}"), "");
     };
-    let known = || case.digest.get_or_init(|| digest(plan)).clone();
-    match log::read_digested(
-        text.as_bytes(),
-        "the log that the program writes",
-        writer,
-        case.machine,
-        plan,
-        None,
-        known,
-    ) {
+    match log::read(text.as_bytes(), "the log that the program writes", writer, case.machine, plan) {
         Ok((log, findings)) => {
             // a program that an earlier version wrote is as good as it was
             findings.0.iter().filter(|f| f.code != "log::older").for_each(|f| complain(&f.message));

@@ -238,8 +238,10 @@ pub fn load_machine(name: &str, path: Option<&Path>, io: &Io) -> Result<Machine>
     let machines = load_machines(path, io)?;
     let names: Vec<String> = machines.iter().map(|m| m.name.clone()).collect();
     machines.into_iter().find(|m| m.name == name).ok_or_else(|| {
-        Failure::new("machine::unknown", format!("no machine is called {name:?}"))
+        Finding::error("machine::unknown", format!("no machine is called {name:?}"))
+            .about(name)
             .help(format!("there are: {}; a file of your own goes with --machines FILE", names.join(", ")))
+            .into()
     })
 }
 

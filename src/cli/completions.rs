@@ -1,6 +1,6 @@
 //! `axiscal completions SHELL` and `axiscal man`: what shells and `man` want to know of the verbs.
 
-use super::{Answer, Cli, Io, Verb};
+use super::{Answer, Cli, Io};
 use crate::diag::Result;
 use crate::files;
 use clap::CommandFactory;
@@ -29,7 +29,7 @@ pub struct ManArgs {
 /// Never: the script is made in memory.
 pub fn completions(args: &CompletionArgs, io: &Io) -> Result<Answer> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::<Verb>::command(), "axiscal", &mut script);
+    clap_complete::generate(args.shell, &mut Cli::command(), "axiscal", &mut script);
     let text = String::from_utf8_lossy(&script).into_owned();
     io.say_as_it_is(text.trim_end());
     io.answer(&json!({ "shell": args.shell.to_string(), "script": text }));
@@ -41,7 +41,7 @@ pub fn completions(args: &CompletionArgs, io: &Io) -> Result<Answer> {
 /// # Errors
 /// When the folder cannot be written.
 pub fn man(args: &ManArgs, io: &Io) -> Result<Answer> {
-    let mut program = Cli::<Verb>::command();
+    let mut program = Cli::command();
     // every verb gets what all verbs share: --json, --help, --version
     program.build();
     let mut pages = vec![("axiscal.1".to_owned(), page(program.clone())?)];

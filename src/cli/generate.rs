@@ -169,6 +169,7 @@ fn lost_parameters(machine: &Machine, spec: &ProgramSpec, plan: &Plan) -> Result
                 position: t.nominal_position(),
                 status: Status::Hit,
                 time_s: None,
+                digit_mm: None,
                 temperature_deg_c: None,
                 line: 0,
             })

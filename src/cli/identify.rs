@@ -1,7 +1,7 @@
 //! `axiscal identify`: the fit of a study.
 
 use super::common::of_fit;
-use super::load::{load_study, load_study_alone};
+use super::load::load_study;
 use super::{Answer, Io};
 use crate::design;
 use crate::diag::{Failure, Result};
@@ -34,7 +34,7 @@ pub struct Args {
 /// # Errors
 /// When the study or a file that it names is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let loaded = if args.quick { load_study_alone(&args.study, io)? } else { load_study(&args.study, io)? };
+    let loaded = load_study(&args.study, io)?;
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
     settings.bare = args.quick;
@@ -67,12 +67,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     if io.json {
         io.answer(&outcome);
-        let answer = of_fit(&outcome, Answer::Done, io);
-        // the process ends with its answer: to give back piece by piece what a study holds would take longer than to write it
-        if !io.within {
-            std::mem::forget((loaded, fit, outcome));
-        }
-        return Ok(answer);
+        return Ok(of_fit(&outcome, Answer::Done, io));
     }
     io.say(crate::report::fit::outcome(&outcome, io.paper(false)));
     if let Some(residuals) = &outcome.residuals {

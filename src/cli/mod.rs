@@ -4,7 +4,6 @@
 //! "no", 2 the input or the call was unusable.
 
 mod add;
-mod ahead;
 mod assess;
 mod check;
 mod common;
@@ -43,7 +42,7 @@ use std::process::ExitCode;
 /// A five-axis machine measures itself with its own touch probe, learns what is wrong with it, and is put right.
 #[derive(Debug, Parser)]
 #[command(name = "axiscal", version, about, propagate_version = true, arg_required_else_help = true)]
-struct Cli<V: Subcommand = Verb> {
+struct Cli {
     /// One JSON object on stdout, messages on stderr
     #[arg(long, global = true)]
     json: bool,
@@ -51,13 +50,7 @@ struct Cli<V: Subcommand = Verb> {
     #[arg(long, global = true, value_name = "BYTES", default_value = "2G", value_parser = crate::files::read_size)]
     max_input: u64,
     #[command(subcommand)]
-    verb: V,
-}
-
-/// The verb that scripts call for every machine and every night.
-#[derive(Debug, Subcommand)]
-enum Often {
-    Identify(identify::Args),
+    verb: Verb,
 }
 
 #[derive(Debug, Subcommand)]
@@ -124,16 +117,7 @@ enum Verb {
 #[must_use]
 pub fn main() -> ExitCode {
     guard::listen();
-    // a good call of this verb needs none of the options of the others, whose making takes a third of the time of the fit; what is wrong
-    // with a bad one, all of them together say
-    if ahead::of_identify()
-        && let Ok(Cli { json, max_input, verb: Often::Identify(args) }) = Cli::try_parse()
-    {
-        crate::files::set_max_input(max_input);
-        let io = Io::new(json);
-        return io.finish(guard::guarded(|| identify::run(&args, &io)));
-    }
-    let cli = match Cli::<Verb>::try_parse() {
+    let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         // clap exits with 2 for a bad call and 0 for --help and --version, which is what scripts rely on
         Err(e) => e.exit(),

@@ -68,7 +68,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for (i, (plan, log)) in args.plan.iter().zip(&args.log).enumerate() {
         let controller = pick(&args.controller, i, "--controller")?;
         let read = load_plan(plan, &machine, io)?;
-        read_log(&files::read_bytes(log)?, log, (&controller, None), &machine, &read, io)?;
+        read_log(&files::read_bytes(log)?, log, &controller, &machine, &read, io)?;
         let controller =
             if controller.ends_with(".toml") { relative(Path::new(&controller), &folder) } else { controller };
         if let Some(active) = args.compensation.get(if args.compensation.len() == 1 { 0 } else { i }) {

@@ -148,7 +148,7 @@ fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Fi
 fn numbered(touches: &[RawTouch]) -> Vec<Touch> {
     let touch = |t: &RawTouch| {
         let RawTouch { position, status, time_s, temperature_deg_c, line, .. } = *t;
-        Some(Touch { id: t.id?, position, status, time_s, temperature_deg_c, line })
+        Some(Touch { id: t.id?, position, status, time_s, digit_mm: None, temperature_deg_c, line })
     };
     touches.iter().filter_map(touch).collect()
 }

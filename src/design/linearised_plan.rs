@@ -441,6 +441,7 @@ fn nominal(task: &Task, runs: &[Planned]) -> (Data, f64) {
                     position: t.nominal_position(),
                     status: Status::Hit,
                     time_s: Some(time_s),
+                    digit_mm: None,
                     temperature_deg_c: task.temperature.then_some(deg_c),
                     line: 0,
                 }

@@ -4,6 +4,7 @@ use super::Examination;
 use super::answer::{Candidate, Diagnosis, Verdict};
 use super::clustered_rejections::Gathered;
 use crate::fit::Fit;
+use crate::model::data::UnusableReason;
 use crate::search::held_out::HeldOut;
 use crate::search::multiplicity::FAMILY_LEVEL;
 
@@ -237,7 +238,7 @@ pub(super) fn not_when_touches_are_missing(out: &mut Diagnosis, subject: super::
         );
         return;
     }
-    let far = fit.data.unusable.iter().filter(|u| u.reason == crate::model::data::ELSEWHERE).count();
+    let far = fit.data.unusable.iter().filter(|u| u.reason == UnusableReason::FarFromPlan).count();
     let why = if 2 * far > missed { "they are far from their places" } else { "the search found nothing" };
     out.says = format!(
         "{missed} of {made} touches cannot be used, most of them because {why}: nothing can be said about small effects. Does an axis count the other way round, are two exchanged, do the blocks stand where the plan says, does the \

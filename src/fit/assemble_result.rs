@@ -9,6 +9,7 @@ use super::solve::{Problem as _, Solution};
 use super::type_b::TypeB;
 use super::uncertainty::{LeftOut, Unmodelled};
 use super::{Fit, contradictions, held_out, null_space, outliers, poorly_determined, profile, uncertainty};
+use crate::model::data::UnusableReason;
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use crate::words::fit as words;
@@ -70,11 +71,12 @@ pub(super) fn assemble_result(
     let unusable = fit.data.unusable.iter().map(|u| Rejected {
         id: u.id,
         run: u.run + 1,
-        reason: format!("{} (line {})", u.reason, u.line),
+        reason: format!("{} (line {})", crate::words::log::unusable(&u.reason), u.line),
+        is_far: u.reason == UnusableReason::FarFromPlan,
     });
     let excluded = fit.rejected.iter().map(|(&i, reason)| {
         let o = &fit.data.observations[i];
-        Rejected { id: o.id, run: o.run + 1, reason: words::reason(reason) }
+        Rejected { id: o.id, run: o.run + 1, reason: words::reason(reason), is_far: false }
     });
     let mut undetermined =
         null_space::undetermined(&free_unknowns, effects, &fit.observability.unseen, &fit.observability);

@@ -4,7 +4,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::{Effect, Term};
 use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
-use crate::model::traces::Traces;
+use crate::model::sensitivities::Sensitivities;
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
@@ -36,7 +36,7 @@ pub fn columns(
 /// Columns of all unknowns of a model at some touches, in the order of its θ, at the start of its shape parameters.
 #[must_use]
 pub(super) fn columns_of(model: &Model, observations: &[Observation]) -> DMatrix<f64> {
-    let traces = Traces::of(model, observations);
+    let traces = Sensitivities::new(model, observations);
     let start = model.start();
     let mut values = DMatrix::zeros(observations.len(), model.n_unknowns());
     let mut left = values.as_mut_slice();
@@ -69,7 +69,7 @@ pub struct Variant {
 #[derive(Debug)]
 pub struct Trials<'a> {
     model: &'a Model,
-    traces: Traces<'a>,
+    traces: Sensitivities<'a>,
     start: Vec<f64>,
 }
 
@@ -77,7 +77,7 @@ impl<'a> Trials<'a> {
     /// Of the effects of a model, at touches.
     #[must_use]
     pub fn of(model: &'a Model, observations: &'a [Observation]) -> Self {
-        Self { model, traces: Traces::of(model, observations), start: model.start() }
+        Self { model, traces: Sensitivities::new(model, observations), start: model.start() }
     }
 
     /// The columns of one choice.

@@ -18,15 +18,16 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
     for id in ids {
         match catalogue.get(id, machine) {
             Some(effect) if effects.iter().any(|e| e.id == effect.id) => {
-                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} stands twice in the model")).help("name each effect once"));
+                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} stands twice in the model")).about(id).help("name each effect once"));
             }
             Some(effect) => effects.push(effect),
             None if catalogue.knows(id) => findings.push(
                 Finding::error("model::effect_not_here", format!("effect {id:?} does not apply to machine {:?}", machine.name))
+                    .about(id)
                     .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` tells which"),
             ),
             None => {
-                let mut finding = Finding::error("model::unknown_effect", format!("no effect is called {id:?}"));
+                let mut finding = Finding::error("model::unknown_effect", format!("no effect is called {id:?}")).about(id);
                 if !enough(findings.iter().map(|f: &Finding| f.code), finding.code) {
                     let known: Vec<&str> = catalogue.iter().filter(|e| e.applies_to(machine)).map(|e| e.id.as_str()).collect();
                     finding = finding.help(format!("for this machine there are: {}", known.join(", ")));
@@ -44,6 +45,7 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
                         "model::parameter_twice",
                         format!("effects {:?} and {:?} both bring the parameter {}", b.id, a.id, p.name),
                     )
+                    .about(&b.id)
                     .help("take one of the two out of the model"),
                 );
             }
@@ -62,7 +64,7 @@ pub fn every_formula_has_a_value<'e>(
 ) -> Result<()> {
     let mut findings = Vec::new();
     for bad in effects.into_iter().flat_map(|e| without_value(e, observations)) {
-        findings.push(Finding::error("model::no_value", bad.says()).help(
+        findings.push(Finding::error("model::no_value", bad.says()).about(&bad.effect.id).help(
             "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
         ));
     }
@@ -91,7 +93,7 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
             [i] => out[i] = Some(*known),
             _ => {
                 let message = format!("no parameter of the model is called {word:?}");
-                let mut finding = Finding::error("model::unknown_parameter", message);
+                let mut finding = Finding::error("model::unknown_parameter", message).about(word);
                 if !enough(findings.iter().map(|f: &Finding| f.code), finding.code) {
                     let names: Vec<&str> = unknowns.iter().map(|u| u.name.as_str()).collect();
                     finding = finding.help(format!("there are: {}", names.join(", ")));
@@ -108,6 +110,7 @@ pub(super) fn resolve(unknowns: &[Unknown], words: &BTreeMap<String, Knowledge>)
         if bad {
             findings.push(
                 Finding::error("model::knowledge", format!("what is said of {word:?} is not usable"))
+                    .about(word)
                     .help("write numbers below 1e6 in size, in the parameter's unit, and a sigma greater than 0"),
             );
         }

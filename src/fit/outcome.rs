@@ -103,6 +103,9 @@ pub struct Rejected {
     pub run: usize,
     /// Why.
     pub reason: String,
+    /// It is far from the planned position.
+    #[serde(default, skip_serializing)]
+    pub is_far: bool,
 }
 
 /// A combination that the data cannot tell.

@@ -102,6 +102,7 @@ pub(super) fn type_b(
         if (owner.is_some() || is_thermometer) && !is_size {
             findings.push(
                 Finding::error("model::type_b", format!("uncertainty of {word:?} is {sigma}"))
+                    .about(word)
                     .help("write a positive number in the parameter's unit"),
             );
             continue;
@@ -109,6 +110,7 @@ pub(super) fn type_b(
         let Some((effect, which)) = owner else {
             findings.push(
                 Finding::error("model::unknown_type_b", format!("no effect for this machine has a parameter {word:?}"))
+                    .about(word)
                     .help("`axiscal effects` lists them, for instance size_X (block-size), dL (tool-length), expansion (ambient-scale); and temperature, K, for the thermometer"),
             );
             continue;
@@ -116,6 +118,7 @@ pub(super) fn type_b(
         if let Some(bad) = without_value(effect, &fit.data.observations).first() {
             findings.push(
                 Finding::error("model::no_value", format!("{word:?} cannot be a type B row: {}", bad.says()))
+                    .about(word)
                     .help("write the formula so that it holds at every touch"),
             );
             continue;

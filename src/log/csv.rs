@@ -4,10 +4,10 @@
 //! Positions are axis positions relative to R, mm and deg. Fields separated by semicolons or tabs, with a decimal comma
 //! where commas do not separate, are read too: spreadsheets write them.
 
-use super::lines::Lines;
-use super::place::{Capped, Places};
+use super::finding_places::{Capped, Places};
+use super::numbers::{number, whole};
+use super::text_lines::Lines;
 use super::touch::{RawTouch, Status, Touch};
-use super::words::{number, whole};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
@@ -24,7 +24,7 @@ enum Column {
 }
 
 impl Column {
-    fn of(name: &str) -> Option<Self> {
+    fn named(name: &str) -> Option<Self> {
         match name {
             "id" => Some(Self::Id),
             "time_s" => Some(Self::Time),
@@ -80,7 +80,7 @@ fn header(line: &[u8], start: usize, separator: u8, places: &Places<'_>) -> Resu
         let name = String::from_utf8_lossy(field).trim().trim_matches('"').to_owned();
         let range = start + at..start + at + field.len().max(1);
         at += field.len() + 1;
-        match Column::of(&name) {
+        match Column::named(&name) {
             Some(column) if columns.contains(&column) => findings.push(
                 places.at(Finding::error("log::column_twice", format!("column {name} stands twice")).help(FORM), range),
             ),

@@ -1,9 +1,9 @@
 //! Raw touches → touches of the plan: by number where there is one, otherwise by place. What does not match is said.
 
+use super::finding_places::{Capped, Places};
 use super::parse::Rejected;
-use super::place::{Capped, Places};
-use super::rows::{self, RowForm};
-use super::swaps;
+use super::position_rows::{self, RowForm};
+use super::setup_mistakes;
 use super::touch::{RawTouch, Status, Touch};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -40,7 +40,7 @@ pub(super) fn match_at(
     };
     let mut rejected = rejected.clone();
     let raw = if raw.iter().any(|t| t.id.is_none()) {
-        let numbered = rows::number(machine, plan, raw, form, &at);
+        let numbered = position_rows::number(machine, plan, raw, form, &at);
         findings.0.extend(numbered.findings);
         if findings.has_errors() {
             return Err(Failure(findings.0));
@@ -90,10 +90,10 @@ pub(super) fn match_at(
     let bad = good.iter().filter(|g| !**g).count();
     if bad > 1 && bad * 2 > pairs.len() {
         let line = pairs.first().map_or(1, |(_, raw)| raw.line);
-        findings.push(at(swaps::explain(machine, &pairs, bad), line));
+        findings.push(at(setup_mistakes::explain(machine, &pairs, bad), line));
         return findings.finish(Vec::new());
     }
-    if let Some(finding) = swaps::hint(machine, &pairs) {
+    if let Some(finding) = setup_mistakes::hint(machine, &pairs) {
         findings.push(finding);
     }
     let mut implausible = Capped::few();
@@ -119,6 +119,7 @@ pub(super) fn match_at(
             position,
             status: if good { raw.status } else { Status::Elsewhere },
             time_s: raw.time_s,
+            digit_mm: None,
             temperature_deg_c: raw.temperature_deg_c,
             line: raw.line,
         });

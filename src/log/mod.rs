@@ -5,37 +5,38 @@
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
 pub mod csv;
-mod fast;
-mod lines;
+mod finding_places;
+mod last_digit;
 mod matching;
+mod numbers;
+mod origin_shift;
 mod parse;
-mod place;
 pub mod points;
+mod position_rows;
+mod read_lines;
 mod reader;
 mod record;
-mod rows;
 mod runs;
-mod shift;
-mod stretch;
-mod swaps;
+mod setup_mistakes;
+mod text_lines;
 pub mod touch;
-mod words;
 
+pub use last_digit::digit_mm;
 pub use matching::match_to_plan;
 pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use reader::Reader;
 pub use record::LogHeader;
 pub use runs::RunFound;
-pub use swaps::{Supposed, suppose};
+pub use setup_mistakes::{Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
 
-use crate::axes::{AxisMap, AxisName, Position};
+use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::Machine;
 use crate::post::{Frame, Postprocessor, log_word};
-use crate::program::plan::{Plan, PlanTouch};
+use crate::program::plan::Plan;
 use crate::program::plan_digest::{self, digest};
-use place::Places;
+use finding_places::Places;
 
 /// Who wrote a log.
 #[derive(Debug, Clone, Copy)]
@@ -87,19 +88,6 @@ pub fn read_run(
     plan: &Plan,
     run: Option<usize>,
 ) -> Result<(MatchedLog, Findings)> {
-    read_digested(bytes, name, writer, machine, plan, run, || digest(plan))
-}
-
-/// The same where the plan's digest is known to who reads many logs of one plan.
-pub(crate) fn read_digested(
-    bytes: &[u8],
-    name: &str,
-    writer: Writer<'_>,
-    machine: &Machine,
-    plan: &Plan,
-    run: Option<usize>,
-    digest: impl FnOnce() -> String,
-) -> Result<(MatchedLog, Findings)> {
     let places = Places::new(bytes, name);
     let (mut parsed, mut findings) = match writer {
         Writer::Controller(post) => parse_run(bytes, name, post, run)?,
@@ -126,19 +114,22 @@ pub(crate) fn read_digested(
         {
             parse::other_controller(header, post, &places, &mut findings);
         }
-        belongs(header, machine, plan, digest, &places, &mut findings).map_err(|f| joined(&findings, f))?;
+        belongs(header, machine, plan, &places, &mut findings).map_err(|f| joined(&findings, f))?;
     }
+    let finite = parsed.touches.iter().map(|t| t.position).filter(|p| p.0.iter().all(|v| v.is_finite()));
+    let digit_mm = digit_mm(finite);
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
-    let form = rows::RowForm {
+    let form = position_rows::RowForm {
         per_touch: &parsed.per_touch,
         says_status: parsed.rows_say_status,
         lost: &parsed.rejected.lines,
     };
-    let (touches, more) = matching::match_at(machine, plan, parsed.touches, form, Some(&places), &parsed.rejected)
+    let (mut touches, more) = matching::match_at(machine, plan, parsed.touches, form, Some(&places), &parsed.rejected)
         .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
+    touches.iter_mut().for_each(|t| t.digit_mm = digit_mm);
     if !touches.iter().any(|t| t.status == Status::Hit) {
         findings.push(
             Finding::error("log::no_hit", format!("{name} holds no touch of the plan at which the probe triggered"))
@@ -165,7 +156,6 @@ fn belongs(
     header: &LogHeader,
     machine: &Machine,
     plan: &Plan,
-    digest: impl FnOnce() -> String,
     places: &Places<'_>,
     findings: &mut Findings,
 ) -> Result<()> {
@@ -177,7 +167,7 @@ fn belongs(
             .help("use the plan that `axiscal generate` wrote together with the program");
         return Err(places.at_line(finding, header.line).into());
     }
-    if header.digest == digest() {
+    if header.digest == digest(plan) {
         return Ok(());
     }
     if header.digest == plan_digest::older(plan) {
@@ -202,7 +192,7 @@ fn belongs(
 /// # Errors
 /// When the machine's linear axes do not span space.
 pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Result<()> {
-    if !Frame::of(machine, plan).is_tcp() {
+    if !Frame::of_plan(machine, plan).is_tcp() {
         return Ok(());
     }
     let numbered = plan.numbered();
@@ -224,13 +214,6 @@ pub fn to_axes(machine: &Machine, plan: &Plan, touches: &mut [RawTouch]) -> Resu
         })?;
     }
     Ok(())
-}
-
-/// Where a control shows a touch: the inverse of [`to_axes`]. `planned`: the touch in the plan.
-#[must_use]
-pub fn as_logged(machine: &Machine, plan: &Plan, planned: Option<&PlanTouch>, touch: &Touch) -> Position {
-    let length = planned.and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
-    Frame::new(machine, plan.controller_frame, length).controller_from_axes(&touch.position)
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! A whole log: which form it has, where its runs begin and end, which of them counts.
 
-use super::lines::{Line, Lines, is_tape};
-use super::place::{Capped, Places};
+use super::finding_places::{Capped, Places};
+use super::numbers::Fault;
+use super::read_lines::{Event, LineKind, Reader, looks_like_columns};
 use super::record::{LogHeader, begin, named};
 use super::runs::{self, RunFound};
-use super::stretch::{Event, Reader, What, looks_like_columns};
+use super::text_lines::{Line, Lines, is_tape};
 use super::touch::RawTouch;
-use super::words::Fault;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::post::as_written::{EndOfLine, LengthUnit, Role};
 use crate::post::{LogRule, Postprocessor, log_word};
@@ -97,7 +97,7 @@ pub fn parse_run(
     let read = reader.read(&bytes[start..], start);
     line_ends(bytes, start, read.ends, post, &places, &mut findings);
     let mut faults = Capped::default();
-    for event in read.events.iter().filter(|e| matches!(e.what, What::Fault)) {
+    for event in read.events.iter().filter(|e| matches!(e.kind, LineKind::Fault)) {
         faults.push(|| match reader.line(&event.line) {
             Err(fault) if event.line.ended() => {
                 let at = event.line.start + fault.at;
@@ -113,7 +113,8 @@ pub fn parse_run(
     // one mistake of a form that a user wrote, not one of each row
     if is_columns && read.touches.is_empty() && n_faults > 0 {
         let of_line = |e: &Event| reader.line(&e.line).err().map(|fault| (e.line.start, fault));
-        let each: Vec<_> = read.events.iter().filter(|e| matches!(e.what, What::Fault)).filter_map(of_line).collect();
+        let each: Vec<_> =
+            read.events.iter().filter(|e| matches!(e.kind, LineKind::Fault)).filter_map(of_line).collect();
         if let Some((start, first)) = each.first().filter(|_| each.iter().all(|(_, f)| f.code == "log::decimals")) {
             let at = start + first.at;
             return Err(places
@@ -158,7 +159,8 @@ pub fn parse_run(
     };
     let first = run.header.as_ref().map_or(0, |h| h.line);
     let last = run.end.map_or(usize::MAX, |(_, line)| line);
-    let lost = read.events.iter().filter(|e| matches!(e.what, What::Fault) && (first..=last).contains(&e.line.number));
+    let lost =
+        read.events.iter().filter(|e| matches!(e.kind, LineKind::Fault) && (first..=last).contains(&e.line.number));
     let lost: Vec<(usize, Option<u64>)> =
         lost.filter(|e| reader.may_be_touch(&e.line)).map(|e| (e.line.number, named(e.line.bytes, &rule))).collect();
     let unnamed = lost.iter().any(|(_, id)| id.is_none());
@@ -206,7 +208,7 @@ fn glued(bytes: &[u8], start: usize, events: &[Event<'_>], places: &Places<'_>, 
         !matches!(before, None | Some(b'\n' | b'\r'))
     };
     let mut found = Capped::few();
-    for event in events.iter().filter(|e| !matches!(e.what, What::End(_))).filter(in_line) {
+    for event in events.iter().filter(|e| !matches!(e.kind, LineKind::End(_))).filter(in_line) {
         found.push(|| {
             let finding = Finding::warning("log::line_end_lost", "a run begins in the middle of a line")
                 .help("were two logs put together? the line end between them is lost; they are read as two runs");
@@ -276,7 +278,7 @@ pub(super) fn sniff(bytes: &[u8], places: &Places<'_>, findings: &mut Findings) 
     // what a punch writes around lines is no sign of a binary file
     let odd = |b: &u8| *b == 0 || *b >= 0x80 || (*b < b' ' && !matches!(*b, b'\n' | b'\r' | b'\t'));
     let line = |l: Line<'_>| -> usize {
-        super::lines::without_leader(super::lines::without_trailer(l.bytes)).iter().filter(|b| odd(b)).count()
+        super::text_lines::without_leader(super::text_lines::without_trailer(l.bytes)).iter().filter(|b| odd(b)).count()
     };
     let count: usize = Lines::new(head, 0).map(line).sum();
     if count * 10 > head.len() {

@@ -1,8 +1,8 @@
 //! One line of a log → header, touch or end; or a row of columns. Driven by the postprocessor's data.
 
-use super::lines::{blanks, without_leader};
+use super::numbers::{Fault, Number, number, whole};
+use super::text_lines::{blanks, without_leader};
 use super::touch::{RawTouch, Status};
-use super::words::{Fault, Number, number, whole};
 use crate::axes::{AxisName, Position};
 use crate::post::as_written::LengthUnit;
 use crate::post::{ColumnRule, LogRule};
@@ -191,15 +191,14 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
 }
 
 /// How far a sum is off the one that it should be; whole multiples of the modulo do not count.
-#[inline]
-pub fn off_sum(difference: f64, modulo: Option<f64>) -> f64 {
+fn off_sum(difference: f64, modulo: Option<f64>) -> f64 {
     modulo.map_or(difference, |m| difference - (difference / m).round() * m).abs()
 }
 
 /// How far the sum that a line gives may be from the sum of its numbers.
 ///
 /// Every position, a time and the sum itself are rounded by at most half a digit; with a little room for the doubles.
-pub fn sum_room(rule: &LogRule, n_axes: usize) -> f64 {
+fn sum_room(rule: &LogRule, n_axes: usize) -> f64 {
     let half = |decimals: usize| 0.505 * 10f64.powi(-i32::try_from(decimals).unwrap_or(0));
     // a control that counts whole ticks adds those that it writes: only digits behind the positions' own are rounded
     let time = if rule.time_word.is_some() { half(rule.decimals) } else { 0.0 };

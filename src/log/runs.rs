@@ -1,9 +1,9 @@
 //! Where the runs of a log begin and end, and which of them counts.
 
-use super::lines::Line;
-use super::place::Places;
+use super::finding_places::Places;
+use super::read_lines::{Event, LineKind};
 use super::record::LogHeader;
-use super::stretch::{Event, What};
+use super::text_lines::Line;
 use super::touch::RawTouch;
 use crate::diag::{Failure, Finding, Findings};
 use crate::post::LogRule;
@@ -158,8 +158,8 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
         done = event.at;
         let Some(run) = runs.last_mut() else { continue };
         let number = event.line.number;
-        match &event.what {
-            What::Fault
+        match &event.kind {
+            LineKind::Fault
                 if run.count() > 0
                     && run.end.is_none()
                     && may_be_head(&event.line)
@@ -167,8 +167,8 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
             {
                 run.resumed.push((None, number));
             }
-            What::Fault => {}
-            What::Head(header) => {
+            LineKind::Fault => {}
+            LineKind::Head(header) => {
                 let goes_on = header.setup > 1
                     && run.end.is_none()
                     && run.header.as_ref().is_none_or(|h| {
@@ -182,7 +182,7 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
                     runs.push(Run { header: Some((**header).clone()), last_line: number, ..Run::default() });
                 }
             }
-            What::End(count) => {
+            LineKind::End(count) => {
                 if run.end.is_none() {
                     run.end = Some((*count, number));
                     run.last_line = number;
@@ -216,9 +216,9 @@ fn beginnings(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&
     let mut out = Vec::new();
     let (mut from, mut unread) = (0, Vec::new());
     for event in events {
-        match event.what {
-            What::Fault => unread.extend(may_be_head(&event.line).then_some(event.at)),
-            What::Head(_) | What::End(_) => {
+        match event.kind {
+            LineKind::Fault => unread.extend(may_be_head(&event.line).then_some(event.at)),
+            LineKind::Head(_) | LineKind::End(_) => {
                 again(touches, from..event.at, &unread, &mut out);
                 from = event.at;
                 unread.clear();

@@ -1,17 +1,7 @@
 //! Records of measured touches: raw as a log gave them, and matched to the plan.
 
 use crate::axes::Position;
-
-/// Did the probe trigger?
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
-    /// It did: the position is that of the trigger.
-    Hit,
-    /// It did not: the position is where the search ended.
-    Miss,
-    /// The position is far from where this touch can be: it is kept as the log has it, and not used.
-    Elsewhere,
-}
+pub use crate::program::Status;
 
 /// One touch as the log gives it. Positions are NC coordinates in R (mm, deg), not corrected for the ball.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +44,8 @@ pub struct Touch {
     pub time_s: Option<f64>,
     /// Temperature, °C.
     pub temperature_deg_c: Option<f64>,
+    /// The last digit of its log, where all lengths in it are multiples of one, mm.
+    pub digit_mm: Option<f64>,
     /// Line in the log, from 1.
     pub line: usize,
 }

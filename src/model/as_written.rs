@@ -1,38 +1,11 @@
 //! `effects.toml` as a person wrote it: every field as it stands, with its place in the file. Nothing is checked here.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer};
-use std::ops::Range;
+use serde::Deserialize;
 use toml::Spanned;
 
-/// A word with its place in the file. The built-in rows, which are packed when the program is built, have no places.
-#[derive(Debug, Clone)]
-pub struct Placed(Spanned<String>);
-
-impl Placed {
-    /// The word.
-    #[must_use]
-    pub fn get_ref(&self) -> &String {
-        self.0.get_ref()
-    }
-
-    /// Where it stands, bytes.
-    #[must_use]
-    pub fn span(&self) -> Range<usize> {
-        self.0.span()
-    }
-}
-
-impl<'de> Deserialize<'de> for Placed {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        // people write TOML; what is packed is for no person
-        if deserializer.is_human_readable() {
-            Spanned::deserialize(deserializer).map(Self)
-        } else {
-            String::deserialize(deserializer).map(|word| Self(Spanned::new(0..0, word)))
-        }
-    }
-}
+/// A word with its place in the file.
+pub type Placed = Spanned<String>;
 
 /// A file of effects as written.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -46,12 +19,20 @@ pub struct File {
 }
 
 /// An effect as written.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EffectAsWritten {
     /// Short name, used in studies.
     #[schemars(with = "String")]
     pub id: Placed,
+    /// Letters of axes, all linear or all rotary: the row stands for one row of each. It is written for X or A, with `{X}`,
+    /// `{Y}`, `{Z}`, `{A}`, `{B}`, `{C}` (or small letters) where another axis has another letter.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub axes: Vec<Placed>,
+    /// The row has the axes of the row before: both are repeated together, axis by axis.
+    #[serde(default)]
+    pub with_previous: bool,
     /// Name for people.
     #[serde(default)]
     pub name: String,
@@ -148,7 +129,7 @@ pub enum Frame {
 }
 
 /// A displacement as written.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermAsWritten {
     /// Name of its factor, unique among the effects of a model.
@@ -170,7 +151,7 @@ pub struct TermAsWritten {
     #[schemars(with = "String")]
     pub formula: Placed,
     /// Usual size, in the unit.
-    pub typical: Option<f64>,
+    pub typical: Option<Typical>,
     /// Where that size comes from.
     pub source: Option<String>,
     /// Where it differs from the effect's.
@@ -180,8 +161,18 @@ pub struct TermAsWritten {
     pub frame: Option<Frame>,
 }
 
+/// The usual size of a parameter.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Typical {
+    /// One for all axes of the row.
+    All(f64),
+    /// One for each axis of the row.
+    Each(Vec<f64>),
+}
+
 /// A shape parameter as written.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeAsWritten {
     /// Its name in the formulas.

@@ -7,8 +7,8 @@
 
 use super::catalogue::Place;
 use super::formula::slot;
-use super::placed::{Centre, Placed, Rigid};
 use super::predict::{Active, Changes, Model, Observation};
+use super::rigid_motions::{Centre, Placed, Rigid};
 use crate::axes::AxisName;
 use crate::geometry::Displacement;
 use crate::machine::{Axis, Side};

@@ -1,19 +1,18 @@
 //! Effects as data: `effects.toml`, built in and of the user's own, as written and checked.
 
 pub use super::as_written::About;
-use super::as_written::{EffectAsWritten, File};
+use super::as_written::File;
 use super::check::Check;
+use super::for_each_axis::expand;
 use super::formula::Formula;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source};
 use crate::keys::not_of_form;
 use crate::machine::{Machine, Side};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock, OnceLock};
+use std::sync::LazyLock;
 
 /// The effects that are built in, as they are written.
-#[cfg(test)]
-const BUILT_IN: &str = include_str!("../../effects.toml");
+const BUILT_IN_TEXT: &str = include_str!("../../effects.toml");
 
 /// Place of a displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -141,56 +140,20 @@ impl Effect {
     }
 }
 
-/// A row of the built-in file: read when it is asked for, because a study takes a few of the many.
-#[derive(Debug, Clone)]
-struct Row {
-    id: &'static str,
-    /// The row as `build.rs` packs it.
-    packed: &'static [u8],
-    effect: OnceLock<Option<Effect>>,
-}
-
-impl Row {
-    fn effect(&self) -> Option<&Effect> {
-        self.effect.get_or_init(|| self.read()).as_ref()
-    }
-
-    fn read(&self) -> Option<Effect> {
-        let written: EffectAsWritten = rmp_serde::from_slice(self.packed).ok()?;
-        let nowhere = crate::diag::source("effects.toml (built in)", String::new());
-        Check::new(&nowhere, true).effect(&written)
-    }
-
-    /// The effect, where it may act on a machine beside any model.
-    fn acting_on(&self, machine: &Machine) -> Option<&Effect> {
-        self.effect().filter(|e| e.acts_on(machine))
-    }
-}
-
-/// All rows, one after the other.
-static PACKED: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/effects.msgpack"));
-
-/// Id of each row, and where it ends.
-static ENDS: &[(&str, usize)] = include!(concat!(env!("OUT_DIR"), "/effects_ends.rs"));
-
-/// The rows of the built-in file, each read at most once in a process.
-static ROWS: LazyLock<Arc<[Row]>> = LazyLock::new(|| {
-    let starts = std::iter::once(0).chain(ENDS.iter().map(|(_, end)| *end));
-    let row = |(from, (id, end)): (usize, &(&'static str, usize))| Row {
-        id,
-        packed: &PACKED[from..*end],
-        effect: OnceLock::new(),
-    };
-    starts.zip(ENDS).map(row).collect()
+/// The built-in effects, read once in a process.
+static BUILT_IN: LazyLock<Vec<Effect>> = LazyLock::new(|| {
+    let source = crate::diag::source("effects.toml (built in)", BUILT_IN_TEXT);
+    // a test reads the same text as a user's file, with every check
+    let Ok(file) = toml::from_str::<File>(source.inner()) else { return Vec::new() };
+    let mut check = Check::new(&source, true);
+    let rows = expand(file.effect, |letters| check.axes(letters));
+    rows.iter().filter_map(|written| check.effect(written)).collect()
 });
-
-/// Does some thread read all rows, or has it done so?
-static BEGUN: AtomicBool = AtomicBool::new(false);
 
 /// All effects that exist.
 #[derive(Debug, Clone, Default)]
 pub struct Catalogue {
-    rows: Arc<[Row]>,
+    built_in: &'static [Effect],
     own: Vec<Effect>,
 }
 
@@ -200,25 +163,7 @@ impl Catalogue {
     /// # Errors
     /// Never for a released program: a test reads the built-in file as a user's is read.
     pub fn built_in() -> Result<Self> {
-        Ok(Self { rows: Arc::clone(&ROWS), own: Vec::new() })
-    }
-
-    /// Begins to read, on another thread, all built-in rows, for who will need them; unless somebody has begun.
-    pub fn read_ahead() {
-        if !BEGUN.swap(true, Ordering::Relaxed) {
-            // a fault would end the process here; who needs the rows meets it again, and says so
-            rayon::spawn(|| drop(std::panic::catch_unwind(|| Self::read_rows(|| ()))));
-        }
-    }
-
-    /// Reads all built-in rows; between them the thread may do something else.
-    pub fn read_rows(between: impl Fn()) {
-        BEGUN.store(true, Ordering::Relaxed);
-        // from the end: who cannot wait begins at the start, and two that go the same way wait for each other at each step
-        for row in ROWS.iter().rev() {
-            row.effect();
-            between();
-        }
+        Ok(Self { built_in: &BUILT_IN, own: Vec::new() })
     }
 
     /// Adds a user's effects.
@@ -227,35 +172,33 @@ impl Catalogue {
     /// When the file is unusable; every finding has its place, and says which words exist.
     pub fn add_file(&mut self, source: &Source) -> Result<Findings> {
         let (fresh, findings) = read(source, &|effect| {
-            self.rows.iter().any(|row| row.id == effect.id)
+            self.built_in.iter().any(|row| row.id == effect.id)
                 || self.own.iter().any(|own| own.id == effect.id && !own.excludes(effect))
         })?;
         self.own.extend(fresh);
         Ok(findings)
     }
 
-    /// The effects that may act on a machine beside any model, built-in ones first: those that apply to it but the paper's sets
-    /// and hypotheses.
+    /// The effects that may act on a machine, built-in ones first, without the paper's sets and without hypotheses.
     pub fn acting_on(&self, machine: &Machine) -> impl Iterator<Item = &Effect> {
-        self.rows.iter().filter_map(|row| row.acting_on(machine)).chain(self.own.iter().filter(|e| e.acts_on(machine)))
+        self.iter().filter(|e| e.acts_on(machine))
     }
 
     /// All effects, built-in ones first.
     pub fn iter(&self) -> impl Iterator<Item = &Effect> {
-        self.rows.iter().filter_map(Row::effect).chain(&self.own)
+        self.built_in.iter().chain(&self.own)
     }
 
     /// The effect of that id that applies to a machine.
     #[must_use]
     pub fn get(&self, id: &str, machine: &Machine) -> Option<&Effect> {
-        let rows = self.rows.iter().filter(|row| row.id == id).filter_map(Row::effect);
-        rows.chain(self.own.iter().filter(|e| e.id == id)).find(|e| e.applies_to(machine))
+        self.iter().find(|e| e.id == id && e.applies_to(machine))
     }
 
     /// True when an effect of that id exists for some machine.
     #[must_use]
     pub fn knows(&self, id: &str) -> bool {
-        self.rows.iter().any(|row| row.id == id) || self.own.iter().any(|e| e.id == id)
+        self.iter().any(|e| e.id == id)
     }
 }
 
@@ -267,7 +210,7 @@ fn read(source: &Source, taken: &dyn Fn(&Effect) -> bool) -> Result<(Vec<Effect>
     let mut check = Check::new(source, false);
     check.format(&file);
     let mut fresh: Vec<Effect> = Vec::new();
-    for written in &file.effect {
+    for written in &expand(file.effect, |letters| check.axes(letters)) {
         let Some(effect) = check.effect(written) else { continue };
         if taken(&effect) || fresh.iter().any(|e| e.id == effect.id && !e.excludes(&effect)) {
             check.twice(written);
@@ -287,17 +230,10 @@ mod tests {
     fn the_built_in_catalogue_is_good() {
         // read as a user's file is: every formula is compiled and every unit checked
         let mut catalogue = Catalogue::default();
-        catalogue.add_file(&source("effects.toml", BUILT_IN)).unwrap();
+        catalogue.add_file(&source("effects.toml", BUILT_IN_TEXT)).unwrap();
         assert!(
             catalogue.knows("location-b") && catalogue.knows("paper-double-head") && catalogue.knows("block-setup")
         );
-        // what was packed when the program was built is the same, to the last digit and word
-        let source = source("effects.toml", BUILT_IN);
-        let file: File = toml::from_str(BUILT_IN).unwrap();
-        let mut check = Check::new(&source, true);
-        let written: Vec<String> = file.effect.iter().map(|w| format!("{:?}", check.effect(w).unwrap())).collect();
-        let packed: Vec<String> = ROWS.iter().map(|row| format!("{:?}", row.read().unwrap())).collect();
-        assert_eq!(packed, written);
         let ids = |c: &Catalogue| c.iter().map(|e| e.id.clone()).collect::<Vec<_>>();
         assert_eq!(ids(&Catalogue::built_in().unwrap()), ids(&catalogue));
         for e in catalogue.iter() {
@@ -307,23 +243,6 @@ mod tests {
             let shapes: Vec<f64> = e.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
             for t in &e.terms {
                 assert!(t.formula.eval(&[0.5; VARIABLES.len()], &shapes).is_finite(), "{} {}", e.id, t.formula.text());
-            }
-        }
-        // what was made of a built-in formula when the program was built is what the formula says
-        let state: [f64; VARIABLES.len()] = std::array::from_fn(|i| 0.31 + 0.017 * i as f64);
-        for (written, row) in catalogue.iter().zip(ROWS.iter()) {
-            let packed = row.read().unwrap();
-            let shapes: Vec<f64> = packed.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
-            for (w, p) in written.terms.iter().zip(&packed.terms) {
-                let (w, p) = (&w.formula, &p.formula);
-                let (own, made) = (w.eval(&state, &shapes), p.eval(&state, &shapes));
-                assert!((own - made).abs() <= 1e-15 * own.abs(), "{}: {own} {made}", w.text());
-                assert_eq!((w.constant(), w.variables(), w.has_shape()), (p.constant(), p.variables(), p.has_shape()));
-                let slopes = |f: &crate::model::formula::Formula| f.partials(&state, &shapes).collect::<Vec<_>>();
-                assert_eq!(slopes(w).len(), slopes(p).len());
-                for ((i, own), (k, made)) in slopes(w).into_iter().zip(slopes(p)) {
-                    assert!(i == k && (own - made).abs() <= 1e-15 * own.abs(), "{}: {own} {made}", w.text());
-                }
             }
         }
     }

@@ -1,17 +1,16 @@
 //! Effects as written → checked records; every finding has its place and says which words exist.
 
 use super::as_written::{
-    About, EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten,
+    About, EffectAsWritten, File, Frame, Per, Placed, Scan, ShapeAsWritten, SideAsWritten, TermAsWritten, Typical,
 };
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{CONSTANTS, FUNCTIONS, Formula, VARIABLES};
-use super::mistake::MOST_SHAPES;
-use super::{degrees, mistake};
+use super::formula_errors::MOST_SHAPES;
+use super::{degrees_in_formula, formula_errors};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
 use crate::machine::Side;
 use crate::units::{mm_from_um, rad_from_deg, ratio_from_ppm};
-use std::sync::Arc;
 
 /// Name of the file's format.
 const FORMAT: &str = "axiscal-effects/1";
@@ -25,7 +24,7 @@ const ASSUMED: &str = "assumed";
 /// Reads effects as written and gathers what is wrong with them.
 pub(super) struct Check<'a> {
     source: &'a Source,
-    /// Built-in effects are checked by a test, and their formulas were compiled with the program.
+    /// Built-in effects are checked by a test, not at every start.
     built_in: bool,
     pub(super) findings: Findings,
 }
@@ -120,14 +119,14 @@ impl<'a> Check<'a> {
         for s in &w.shape {
             self.shape(s, &mut parameters);
         }
-        let names: Arc<[String]> = parameters.iter().map(|p| p.name.clone()).collect();
+        let names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
         let mut needs = self.axes(&w.needs);
         let unless = self.axes(&w.unless);
         let mut terms: Vec<Term> = Vec::with_capacity(w.terms.len());
         for t in &w.terms {
             // the components of an effect mostly go by one formula
             let known = terms.iter().find(|k| k.formula.text() == t.formula.get_ref()).map(|k| k.formula.clone());
-            terms.extend(self.term((w, t), &names, known, &mut needs));
+            terms.extend(self.term(w, t, &names, known, &mut needs));
         }
         if !self.built_in {
             self.usable(w);
@@ -250,7 +249,11 @@ impl<'a> Check<'a> {
         let name = t.parameter.get_ref();
         let unit = t.unit.get_ref();
         let factor = unit_factor(unit);
-        let typical = t.typical.unwrap_or_else(|| default_typical(unit));
+        let typical = match &t.typical {
+            Some(Typical::All(size)) => *size,
+            Some(Typical::Each(_)) => f64::NAN,
+            None => default_typical(unit),
+        };
         if !self.built_in {
             self.name(name, &t.parameter.span());
             self.unit_fits(w, t);
@@ -263,7 +266,7 @@ impl<'a> Check<'a> {
                 &t.unit.span(),
                 "effects::typical",
                 format!("typical size of {name} is {typical}"),
-                "write a positive number",
+                "write a positive number; a list of them, one for each axis, in a row with `axes` only",
             );
         }
         match parameters.iter().find(|p| &p.name == name) {
@@ -347,7 +350,7 @@ impl<'a> Check<'a> {
     }
 
     /// Letters of axes.
-    fn axes(&mut self, written: &[Placed]) -> Vec<AxisName> {
+    pub(super) fn axes(&mut self, written: &[Placed]) -> Vec<AxisName> {
         let mut out = Vec::new();
         for word in written {
             match axis(word.get_ref()) {
@@ -365,8 +368,9 @@ impl<'a> Check<'a> {
 
     fn term(
         &mut self,
-        (w, t): (&EffectAsWritten, &TermAsWritten),
-        names: &Arc<[String]>,
+        w: &EffectAsWritten,
+        t: &TermAsWritten,
+        names: &[String],
         known: Option<Formula>,
         needs: &mut Vec<AxisName>,
     ) -> Option<Term> {
@@ -404,7 +408,7 @@ impl<'a> Check<'a> {
         let words = || names.iter().map(String::as_str).collect::<Vec<_>>();
         let formula = match known {
             Some(formula) => Ok(formula),
-            None if self.built_in => Ok(Formula::unchecked(text, names)),
+            None if self.built_in => Formula::compile(text, &words()),
             None => Formula::parse(text, &words()),
         };
         match formula {
@@ -426,7 +430,7 @@ impl<'a> Check<'a> {
                 Some(Term { parameter, place, component, formula })
             }
             Err(message) => {
-                let found = mistake::find(text, &words());
+                let found = formula_errors::find(text, &words());
                 let help = found.as_ref().and_then(|m| m.help).unwrap_or("angles A B C are radians inside a formula");
                 let place = found.and_then(|m| self.inside(&t.formula, m.at));
                 self.error(
@@ -442,7 +446,7 @@ impl<'a> Check<'a> {
 
     /// A number of degrees where radians are meant.
     fn in_degrees(&mut self, w: &EffectAsWritten, t: &TermAsWritten, shapes: &[&str]) {
-        if let Some(found) = degrees::find(t.formula.get_ref(), shapes) {
+        if let Some(found) = degrees_in_formula::find(t.formula.get_ref(), shapes) {
             let says = format!("formula {:?} of {:?}: {found}", t.formula.get_ref(), w.id.get_ref());
             let finding = Finding::warning("effects::in_degrees", says).help(found.remedy());
             self.findings.push(finding.at(self.source, t.formula.span()));

@@ -1,7 +1,6 @@
 //! From plans and touches to observations: what the model needs to know of each touch, and which touches it cannot use.
 
 use super::formula::{State, VARIABLES, slot};
-use super::poses::LastPose;
 use super::predict::{Observation, SetUp};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
@@ -33,7 +32,27 @@ pub struct Unusable {
     /// Line in the log.
     pub line: usize,
     /// Why.
-    pub reason: String,
+    pub reason: UnusableReason,
+}
+
+/// Why the model cannot use a touch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum UnusableReason {
+    /// The plan has no touch of this number.
+    NotInPlan,
+    /// The probe did not trigger.
+    NoTrigger,
+    /// The position is farther from the planned one than the probe can go.
+    FarFromPlan,
+    /// A position is infinite or not a number.
+    NotANumber,
+    /// The plan has no such block on that carrier.
+    NoSuchBlock {
+        /// `table` or the letter of a rotary axis.
+        carrier: String,
+        /// Name of the block.
+        block: String,
+    },
 }
 
 /// Where a touch comes from, in the words of its plan and log.
@@ -79,9 +98,6 @@ pub struct Data {
     pub digits_mm: Vec<Option<f64>>,
 }
 
-/// Why a touch that is far from its place is not used.
-pub const ELSEWHERE: &str = "far from its place";
-
 /// More touches than this share may not be missing.
 const MOST_MISSED: f64 = 0.2;
 
@@ -112,8 +128,6 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut first_touch_s: Option<f64> = None;
     let mut earliest_h = 0.0;
     let mut visits = Visits::default();
-    // as made and as planned: an axis that came to a little beside its pose would else push the other out at every touch
-    let (mut made, mut planned_at) = (LastPose::default(), LastPose::default());
     let (temperatures, temperature_says) = super::temperatures::of_runs(runs);
     data.temperature_says = temperature_says;
     for (index, run) in runs.iter().enumerate() {
@@ -125,11 +139,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let mut before = Before::default();
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
-        // a log under the control's transformation has its digits in the coordinates of that; one of axis positions, in those
-        let shown = super::digits::digit_mm(
-            logged.clone().map(|t| crate::log::as_logged(machine, run.plan, numbered.touch(t.id), t)),
-        );
-        data.digits_mm.push(shown.or_else(|| super::digits::digit_mm(logged.map(|t| t.position))));
+        let of_log = run.touches.iter().find_map(|t| t.digit_mm);
+        data.digits_mm.push(of_log.or_else(|| crate::log::digit_mm(logged.map(|t| t.position))));
         data.supposed = data.supposed.take().or_else(|| elsewhere(machine, run, &numbered));
         for (touch, &temperature_deg_c) in run.touches.iter().zip(&temperatures[index]) {
             let Some(planned) = numbered.touch(touch.id) else {
@@ -137,7 +148,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     run: index,
                     id: touch.id,
                     line: touch.line,
-                    reason: "not in the plan".into(),
+                    reason: UnusableReason::NotInPlan,
                 });
                 continue;
             };
@@ -149,17 +160,20 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             before.next(planned);
             previous = Some(planned);
             let reason = match touch.status {
-                Status::Miss => Some("the search ended without a trigger"),
-                Status::Elsewhere => Some(ELSEWHERE),
-                Status::Hit if touch.position.0.iter().any(|v| !v.is_finite()) => Some("a position is not a number"),
+                Status::Miss => Some(UnusableReason::NoTrigger),
+                Status::Elsewhere => Some(UnusableReason::FarFromPlan),
+                Status::Hit if touch.position.0.iter().any(|v| !v.is_finite()) => Some(UnusableReason::NotANumber),
                 Status::Hit => None,
             };
             if let Some(reason) = reason {
-                data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason: reason.into() });
+                data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason });
                 continue;
             }
             let (Some(carrier), Some(block)) = (machine.carrier(&planned.carrier), run.plan.block_of(planned)) else {
-                let reason = format!("{} carries no block {:?}", planned.carrier, planned.block);
+                let reason = UnusableReason::NoSuchBlock {
+                    carrier: planned.carrier.to_string(),
+                    block: planned.block.to_string(),
+                };
                 data.unusable.push(Unusable { run: index, id: touch.id, line: touch.line, reason });
                 continue;
             };
@@ -180,11 +194,10 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
             let ball_radius = planned.ball_radius_mm.unwrap_or(run.plan.ball_radius_mm);
             let ball = point + normal * ball_radius;
-            let ideal = planned_at
-                .linear_for_ball(machine, carrier, &planned.pose.position(), &ball, length_mm)
-                .unwrap_or(touch.position);
+            let ideal =
+                machine.linear_for_ball(carrier, &planned.pose.position(), &ball, length_mm).unwrap_or(touch.position);
             // the rotary axes stand where the control says they stand; a log without them means the plan's pose
-            let at = |position: Position, poses: &mut LastPose| Observation {
+            let at = |position: Position| Observation {
                 run: index,
                 id: touch.id,
                 set_up,
@@ -206,9 +219,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     before: &before.earlier,
                     length_mm,
                 }
-                .state(poses),
+                .state(),
             };
-            let observation = at(touch.position, &mut made);
+            let observation = at(touch.position);
             data.origins.push(Origin {
                 line: touch.line,
                 stage: planned.stage.to_string(),
@@ -216,9 +229,9 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 face: planned.face.to_string(),
             });
             // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
-            data.nominal.push(at(ideal, &mut planned_at));
+            data.nominal.push(at(ideal));
             data.repeats.push(repeat_group(&data, &numbered, planned, index));
-            let visit = visits.of(&mut data, index, planned, mounting_key(&label, mounting));
+            let visit = visits.number_of(&mut data, index, planned, mounting_key(&label, mounting));
             data.visits.push(visit);
             data.observations.push(observation);
         }
@@ -258,7 +271,7 @@ struct Visits {
 impl Visits {
     /// The visit that a touch belongs to: a new one where the run, the plan's visit number or the pose changes. The axes stand
     /// where they stood while the spindle turns or the stylus is changed: their scatter is drawn once for all of it.
-    fn of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
+    fn number_of(&mut self, data: &mut Data, run: usize, touch: &PlanTouch, mounting: String) -> usize {
         let at = Indexed { mounting, pose: touch.pose, from: touch.from };
         let now = (run, touch.visit, at);
         if self.last.as_ref() != Some(&now) {
@@ -346,7 +359,7 @@ struct Circumstances<'a> {
 }
 
 impl Circumstances<'_> {
-    fn state(&self, poses: &mut LastPose) -> State {
+    fn state(&self) -> State {
         let c = self;
         let mut state = [0.0; VARIABLES.len()];
         for name in AxisName::ALL {
@@ -366,12 +379,12 @@ impl Circumstances<'_> {
         const ROUNDING: f64 = 1e-12;
         let plain = |v: Vector3<f64>| v.map(|x| if x.abs() <= ROUNDING { 0.0 } else { x });
         let normal = Vector3::from(c.planned.normal).normalize();
-        let turned = poses.turned(c.machine, c.carrier, c.at);
-        let in_r = turned.to_r * normal;
+        let into_tool = c.machine.tool_frame(c.at).rotation.inverse();
+        let in_r = c.machine.carrier_frame(c.carrier, c.at).rotation * normal;
         let into_probe = nalgebra::Rotation3::from_axis_angle(&c.machine.tool.direction, -spindle);
         put(slot::NORMAL_IN_R, plain(in_r));
-        put(slot::NORMAL_IN_PROBE, plain(into_probe * (turned.into_tool * in_r)));
-        put(slot::GRAVITY, plain(turned.into_tool * -Vector3::z()));
+        put(slot::NORMAL_IN_PROBE, plain(into_probe * (into_tool * in_r)));
+        put(slot::GRAVITY, plain(into_tool * -Vector3::z()));
         put(slot::NORMAL_OF_BLOCK, normal);
         put(slot::POINT, c.planned.point.into());
         put(slot::OUTWARD, plain(outward(c.machine, c.carrier, &c.block.centre.into())));

@@ -1,36 +1,17 @@
-//! What a formula computes: a built-in one as machine code that was made of it when the program was built (`build.rs`), any other as a
-//! flat list of steps.
+//! What a formula computes: its text as a flat list of steps (postfix notation).
 //!
-//! Both are taken from the text by the same reader (`spelling`), step by step in the same order, and call the same functions (`words`). A
-//! test compares their values. Nothing here calls itself, so that no formula can exhaust the stack.
+//! Nothing here calls itself, so that no formula can exhaust the stack.
 
-use super::dual::Dual;
-use super::spelling::{Steps, fold};
-use super::words::{One, Two, Value, constant};
-
-mod built_in {
-    //! Made by `build.rs`.
-    #![allow(clippy::all, unused_parens, non_snake_case)]
-    use super::{BuiltIn, Dual, One, Two, Value};
-    include!(concat!(env!("OUT_DIR"), "/formulas.rs"));
-}
-
-/// A built-in formula.
-#[derive(Debug)]
-pub(super) struct BuiltIn {
-    text: &'static str,
-    variables: &'static [&'static str],
-    value: fn(&[f64]) -> f64,
-    /// The same with a derivative, where a parameter of the effect is inside.
-    dual: Option<fn(&[Dual]) -> Dual>,
-}
+use super::dual_number::Dual;
+use super::formula_parser::{Steps, fold};
+use super::operators::{One, Two, Value, constant};
 
 /// Variables of a formula at most: their values fit on the stack.
 pub(super) const MOST_VARIABLES: usize = 32;
 
-/// A formula of a user's file.
+/// A function of named variables.
 #[derive(Debug)]
-pub(super) struct Read {
+pub(super) struct Expression {
     steps: Vec<Step>,
     /// Names of the variables, sorted.
     variables: Vec<String>,
@@ -47,9 +28,9 @@ enum Step {
     Two(Two),
 }
 
-impl Read {
-    /// `None` where the text is no formula, or has more than [`MOST_VARIABLES`].
-    fn of(text: &str) -> Option<Self> {
+impl Expression {
+    /// Reads a text; `None` where it is no formula.
+    pub(super) fn read(text: &str) -> Option<Self> {
         let written = fold::<Written>(text).ok()?.0;
         let names = written.iter().filter_map(|step| if let Word::Name(name) = step { Some(name) } else { None });
         let mut variables: Vec<String> = names.cloned().collect();
@@ -67,7 +48,23 @@ impl Read {
         Some(Self { steps, variables, most_waiting })
     }
 
-    fn value<V: Value>(&self, variables: &[V]) -> V {
+    /// Names of its variables, in the order in which it takes their values.
+    pub(super) fn variables(&self) -> Vec<&str> {
+        self.variables.iter().map(String::as_str).collect()
+    }
+
+    /// Its derivative by one of its variables, a parameter of the effect.
+    pub(super) fn derivative(&self, at: usize, variables: &[f64]) -> f64 {
+        let mut duals = [Dual::number(0.0); MOST_VARIABLES];
+        let duals = &mut duals[..variables.len()];
+        for (i, (dual, value)) in duals.iter_mut().zip(variables).enumerate() {
+            *dual = if i == at { Dual::variable(*value) } else { Dual::number(*value) };
+        }
+        self.value(duals).slope
+    }
+
+    /// Its value, not a number where it has none.
+    pub(super) fn value<V: Value>(&self, variables: &[V]) -> V {
         /// Values that wait in usual formulas.
         const USUAL: usize = 16;
         let zero = V::number(0.0);
@@ -163,57 +160,5 @@ impl Steps for Written {
 
     fn in_brackets(self) -> Self {
         self
-    }
-}
-
-/// A function of named variables.
-#[derive(Debug)]
-pub(super) enum Expression {
-    /// Of the catalogue.
-    BuiltIn(&'static BuiltIn),
-    /// Of a user's file.
-    Read(Read),
-}
-
-impl Expression {
-    /// A built-in one by its text.
-    pub(super) fn built_in(text: &str) -> Option<Self> {
-        let all = built_in::ALL;
-        let found = all.binary_search_by(|formula| formula.text.cmp(text)).ok()?;
-        Some(Self::BuiltIn(&all[found]))
-    }
-
-    /// Reads a text; `None` where it is no formula.
-    pub(super) fn read(text: &str) -> Option<Self> {
-        Read::of(text).map(Self::Read)
-    }
-
-    /// Names of its variables, in the order in which it takes their values.
-    pub(super) fn variables(&self) -> Vec<&str> {
-        match self {
-            Self::BuiltIn(formula) => formula.variables.to_vec(),
-            Self::Read(read) => read.variables.iter().map(String::as_str).collect(),
-        }
-    }
-
-    /// Its value, not a number where it has none.
-    pub(super) fn value(&self, variables: &[f64]) -> f64 {
-        match self {
-            Self::BuiltIn(formula) => (formula.value)(variables),
-            Self::Read(read) => read.value(variables),
-        }
-    }
-
-    /// Its derivative by one of its variables, a parameter of the effect.
-    pub(super) fn derivative(&self, at: usize, variables: &[f64]) -> f64 {
-        let mut duals = [Dual::number(0.0); MOST_VARIABLES];
-        let duals = &mut duals[..variables.len()];
-        for (i, (dual, value)) in duals.iter_mut().zip(variables).enumerate() {
-            *dual = if i == at { Dual::variable(*value) } else { Dual::number(*value) };
-        }
-        match self {
-            Self::BuiltIn(formula) => formula.dual.map_or(f64::NAN, |of| of(duals).slope),
-            Self::Read(read) => read.value(duals).slope,
-        }
     }
 }

@@ -4,8 +4,8 @@
 //! turns a mistake into a sentence that names it.
 
 use super::expression::{Expression, MOST_VARIABLES};
-use super::spelling::bare_number;
-use std::sync::{Arc, OnceLock};
+use super::formula_parser::bare_number;
+use std::sync::Arc;
 
 /// The variables of a touch that a formula may use, in the order of [`State`].
 pub const VARIABLES: [&str; 40] = [
@@ -85,7 +85,7 @@ enum Parts {
 }
 
 impl Parts {
-    fn of(expression: Expression, shapes: &[impl AsRef<str>]) -> Result<Self, String> {
+    fn from_expression(expression: Expression, shapes: &[&str]) -> Result<Self, String> {
         let origins = origins(&expression.variables(), shapes)?;
         Ok(if origins.is_empty() {
             Self::Constant(expression.value(&[]))
@@ -95,17 +95,14 @@ impl Parts {
     }
 }
 
-/// A formula. What a built-in one consists of is looked up when it is first used: a study takes a few of the many. Copies are one and
-/// the same.
+/// A formula. Copies share one record.
 #[derive(Debug, Clone)]
-pub struct Formula(Arc<Written>);
+pub struct Formula(Arc<Compiled>);
 
 #[derive(Debug)]
-struct Written {
+struct Compiled {
     text: String,
-    /// Names of the effect's parameters that may stand inside.
-    shapes: Arc<[String]>,
-    parts: OnceLock<Option<Parts>>,
+    parts: Parts,
 }
 
 impl Formula {
@@ -114,29 +111,26 @@ impl Formula {
     /// # Errors
     /// A sentence that says what is wrong and which words exist.
     pub fn parse(text: &str, shapes: &[&str]) -> Result<Self, String> {
-        if let Some(wrong) = super::mistake::find(text, shapes) {
-            return Err(wrong.says);
+        match super::formula_errors::find(text, shapes) {
+            Some(wrong) => Err(wrong.says),
+            None => Self::compile(text, shapes),
         }
-        let parts = OnceLock::from(Some(compile(text, shapes)?));
-        let shapes = shapes.iter().map(|s| (*s).to_owned()).collect();
-        Ok(Self(Arc::new(Written { text: text.to_owned(), shapes, parts })))
     }
 
-    /// A built-in formula, known to be good: looked up when it is first used. One that is not among them has no value anywhere.
-    pub(super) fn unchecked(text: &str, shapes: &Arc<[String]>) -> Self {
-        Self(Arc::new(Written { text: text.to_owned(), shapes: Arc::clone(shapes), parts: OnceLock::new() }))
+    /// The same without the search for mistakes.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong and which words exist.
+    pub(super) fn compile(text: &str, shapes: &[&str]) -> Result<Self, String> {
+        let parts = match bare_number(text) {
+            Some(constant) => Parts::Constant(constant),
+            None => compile(text, shapes)?,
+        };
+        Ok(Self(Arc::new(Compiled { text: text.to_owned(), parts })))
     }
 
-    fn parts(&self) -> Option<&Parts> {
-        self.0.parts.get_or_init(|| self.found()).as_ref()
-    }
-
-    /// What was made of a built-in formula.
-    fn found(&self) -> Option<Parts> {
-        if let Some(constant) = bare_number(&self.0.text) {
-            return Some(Parts::Constant(constant));
-        }
-        Parts::of(Expression::built_in(&self.0.text)?, &self.0.shapes).ok()
+    fn parts(&self) -> &Parts {
+        &self.0.parts
     }
 
     /// The formula as it was written.
@@ -148,12 +142,12 @@ impl Formula {
     /// Its value where it uses no variable.
     #[must_use]
     pub fn constant(&self) -> Option<f64> {
-        if let Some(Parts::Constant(constant)) = self.parts() { Some(*constant) } else { None }
+        if let Parts::Constant(constant) = self.parts() { Some(*constant) } else { None }
     }
 
-    /// Where its variables come from; none for a number, or where it is no formula.
+    /// Where its variables come from; none for a number.
     fn origins(&self) -> &[Origin] {
-        if let Some(Parts::Expression(_, origins)) = self.parts() { origins } else { &[] }
+        if let Parts::Expression(_, origins) = self.parts() { origins } else { &[] }
     }
 
     /// True when a parameter of the effect stands inside.
@@ -179,18 +173,17 @@ impl Formula {
     #[must_use]
     pub fn eval(&self, state: &State, shapes: &[f64]) -> f64 {
         match self.parts() {
-            Some(Parts::Constant(constant)) => *constant,
-            Some(Parts::Expression(expression, origins)) => {
+            Parts::Constant(constant) => *constant,
+            Parts::Expression(expression, origins) => {
                 with_values(origins, state, shapes, |values| expression.value(values))
             }
-            None => f64::NAN,
         }
     }
 
     /// Values at many states. Touches of one pose mostly follow one another: where the variables are those of the state before,
     /// so is the value.
     pub fn eval_each<'s>(&self, states: impl Iterator<Item = &'s State>, shapes: &[f64]) -> Vec<f64> {
-        let Some(Parts::Expression(expression, origins)) = self.parts() else {
+        let Parts::Expression(expression, origins) = self.parts() else {
             return states.map(|state| self.eval(state, shapes)).collect();
         };
         let mut before = [0.0_f64; MOST_VARIABLES];
@@ -220,7 +213,7 @@ impl Formula {
     }
 
     fn derivative(&self, at: usize, state: &State, shapes: &[f64]) -> f64 {
-        let Some(Parts::Expression(expression, origins)) = self.parts() else { return f64::NAN };
+        let Parts::Expression(expression, origins) = self.parts() else { return f64::NAN };
         with_values(origins, state, shapes, |values| expression.derivative(at, values))
     }
 
@@ -237,7 +230,7 @@ impl Formula {
 fn compile(text: &str, shapes: &[&str]) -> Result<Parts, String> {
     let cannot = || format!("it cannot be read (functions: {})", FUNCTIONS.join(" "));
     let expression = Expression::read(text).ok_or_else(cannot)?;
-    Parts::of(expression, shapes)
+    Parts::from_expression(expression, shapes)
 }
 
 /// Hands on the values of an expression's variables.
@@ -250,11 +243,10 @@ fn with_values<T>(origins: &[Origin], state: &State, shapes: &[f64], of: impl Fn
     of(values)
 }
 
-fn origins(names: &[&str], shapes: &[impl AsRef<str>]) -> Result<Vec<Origin>, String> {
+fn origins(names: &[&str], shapes: &[&str]) -> Result<Vec<Origin>, String> {
     if names.len() > MOST_VARIABLES {
         return Err(format!("a formula has more than {MOST_VARIABLES} variables"));
     }
-    let shapes: Vec<&str> = shapes.iter().map(AsRef::as_ref).collect();
     names
         .iter()
         .map(|name| {
@@ -405,25 +397,16 @@ mod tests {
         assert!(wrong.is_empty(), "{wrong:#?}");
     }
 
-    /// What the program was built with, and not what is read from a file.
     #[test]
     fn built_in_formulas_have_the_values_that_python_computes() {
         let (table, rows) = table(include_str!("../../tests/formulas/built_in.json"));
         let state = state_of(&table["variables"]);
         let shapes = table["shapes"].as_object().unwrap();
-        let names: Arc<[String]> = shapes.keys().cloned().collect();
+        let names: Vec<&str> = shapes.keys().map(String::as_str).collect();
         let values: Vec<f64> = shapes.values().map(|v| v.as_f64().unwrap()).collect();
-        let mut compared = 0;
         for (text, expected) in &rows {
-            let bare = bare_number(text).is_some();
-            if !bare && Expression::built_in(text).is_none() {
-                // the catalogue has it no longer
-                continue;
-            }
-            let value = Formula::unchecked(text, &names).eval(&state, &values);
+            let value = Formula::parse(text, &names).unwrap().eval(&state, &values);
             assert!((value - expected).abs() <= 1e-9 * expected.abs().max(1.0), "{text}: {value} {expected}");
-            compared += usize::from(!bare);
         }
-        assert!(compared > rows.len() / 2, "{compared} of {}", rows.len());
     }
 }

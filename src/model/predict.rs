@@ -14,7 +14,7 @@
 
 use super::catalogue::{About, Effect, Place, Term};
 use super::formula::State;
-use super::stated::{Stated, own_frame, own_point, stated};
+use super::reference_points::{Stated, own_frame, own_point, stated};
 use crate::axes::Position;
 use crate::machine::{Axis, Carrier, Machine, Side};
 use nalgebra::{Matrix3, Vector3};

@@ -167,6 +167,7 @@ fn matched(raw: &RawTouch) -> Result<Touch> {
             position: raw.position,
             status: raw.status,
             time_s: raw.time_s,
+            digit_mm: None,
             temperature_deg_c: None,
             line: raw.line,
         }),

@@ -14,6 +14,9 @@ pub struct File {
     /// `unverified` of its own takes a new one when any line of it is changed.
     #[serde(default)]
     pub based_on: Option<String>,
+    /// Tables and keys of the base that do not apply, such as `tables` or `check.waits`.
+    #[serde(default)]
+    pub without: Vec<String>,
     /// `axiscal-postprocessor/1`
     #[schemars(with = "String")]
     pub format: Spanned<String>,

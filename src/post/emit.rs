@@ -30,7 +30,7 @@ impl Postprocessor {
     pub fn program(&self, machine: &Machine, plan: &Plan, path: &Path) -> Result<NcProgram> {
         let mut writer = Writer::new(self, machine, plan, path)?;
         writer.start()?;
-        let opening = Opening::of(path, machine, writer.frame.is_tcp());
+        let opening = Opening::from_path(path, machine, writer.frame.is_tcp());
         let (first, rest) = (opening.steps.clone(), opening.rest.clone());
         writer.opening = opening;
         writer.open(&first)?;
@@ -151,7 +151,7 @@ fn refuse_roll_over(post: &Postprocessor, machine: &Machine) -> Result<()> {
 impl<'a> Writer<'a> {
     fn new(post: &'a Postprocessor, machine: &'a Machine, plan: &'a Plan, path: &'a Path) -> Result<Self> {
         refuse_origin_between_steps(post, machine)?;
-        let frame = Frame::of(machine, plan);
+        let frame = Frame::of_plan(machine, plan);
         let mut at = AxisMap::default();
         if frame.is_tcp() {
             if post.tcp.is_none() {

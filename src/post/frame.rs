@@ -22,7 +22,7 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// The frame of a plan's program up to its first stop: a touch with another stylus has a frame of its own.
     #[must_use]
-    pub fn of(machine: &'a Machine, plan: &Plan) -> Self {
+    pub fn of_plan(machine: &'a Machine, plan: &Plan) -> Self {
         Self::new(machine, plan.controller_frame, plan.tool_length_mm)
     }
 

@@ -124,12 +124,26 @@ fn completed(text: &Source, read: &dyn Fn(&Path) -> Result<String>, depth: usize
     let mut whole: Table = toml::from_str(base.inner())
         .map_err(|e| from_toml(&e, &base, "post::not_toml").help("the base is unusable"))?;
     let of_base = settings(&whole);
+    for path in own.get("without").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str) {
+        if remove(&mut whole, path).is_none() {
+            return Err(Failure::new("post::base", format!("{}: {word:?} has no {path:?}", text.name()))
+                .help("`without` lists the tables and keys of the base that do not apply, such as \"tables\" or \"check.waits\""));
+        }
+    }
     merge(&mut whole, own);
     let written = toml::to_string_pretty(&whole).map_err(|e| {
         Failure::new("post::base", format!("{} cannot be completed from {word:?}: {e}", text.name()))
             .help("copy the base and change the copy")
     })?;
     Ok(Some((source(format!("{} completed from {word}", text.name()), written), of_base)))
+}
+
+/// Removes what stands at a path such as `check.waits`.
+fn remove(table: &mut Table, path: &str) -> Option<Value> {
+    match path.split_once('.') {
+        Some((first, rest)) => remove(table.get_mut(first)?.as_table_mut()?, rest),
+        None => table.remove(path),
+    }
 }
 
 fn merge(base: &mut Table, own: Table) {
@@ -171,6 +185,15 @@ unverified = "the builder's sheet"
         assert_eq!((post.settings["orient"].clone(), &post.log), (base.settings["orient"].clone(), &base.log));
         assert_eq!(post.unverified, [("write.rapid".to_owned(), "the builder's sheet".to_owned())]);
         assert_eq!(post.text, VARIANT);
+    }
+
+    #[test]
+    fn parts_of_the_base_are_left_out() {
+        let without = |what: &str| VARIANT.replace("name = ", &format!("without = [{what:?}]\nname = "));
+        let (post, _) = parse_alone(&source("mine.toml", without("tables"))).unwrap();
+        assert!(post.tables.is_none());
+        let failure = parse_alone(&source("mine.toml", without("tabels"))).unwrap_err();
+        assert!(failure.to_string().contains("tabels"), "{failure}");
     }
 
     #[test]

@@ -242,12 +242,11 @@ impl Postprocessor {
     /// # Errors
     /// Never for the files that are shipped: a test reads them all.
     pub fn built_in() -> Result<Vec<Self>> {
-        BUILT_IN
-            .iter()
-            .map(|(file, text)| {
-                parse(&source(format!("postprocessors/{file} (built in)"), *text)).map(|(post, _)| post)
-            })
-            .collect()
+        BUILT_IN.iter().map(|(file, text)| Self::built_in_file(file, text)).collect()
+    }
+
+    fn built_in_file(file: &str, text: &str) -> Result<Self> {
+        parse(&source(format!("postprocessors/{file} (built in)"), text)).map(|(post, _)| post)
     }
 
     /// The tables of a built-in one; none where it has none, or there is none of that name.
@@ -269,12 +268,12 @@ impl Postprocessor {
             let text = read(Path::new(word))?;
             return inherit::parse(&source(word, text), &read).map(|(post, findings)| (post, findings.0));
         }
-        let all = Self::built_in()?;
-        let names: Vec<String> = all.iter().map(|p| p.name.clone()).collect();
-        all.into_iter().find(|p| p.name == word).map(|post| (post, Vec::new())).ok_or_else(|| {
-            Failure::new("post::unknown", format!("no controller is called {word:?}"))
-                .help(format!("there are: {}; a file of your own goes with --controller FILE.toml", names.join(", ")))
-        })
+        if let Some((file, text)) = BUILT_IN.iter().find(|(file, _)| file.strip_suffix(".toml") == Some(word)) {
+            return Ok((Self::built_in_file(file, text)?, Vec::new()));
+        }
+        let names: Vec<&str> = BUILT_IN.iter().filter_map(|(file, _)| file.strip_suffix(".toml")).collect();
+        Err(Failure::new("post::unknown", format!("no controller is called {word:?}"))
+            .help(format!("there are: {}; a file of your own goes with --controller FILE.toml", names.join(", "))))
     }
 
     /// A name of the built-in ones, or the path of a file of the user's own, which is read.

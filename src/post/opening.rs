@@ -29,7 +29,7 @@ pub(super) struct Opening {
 impl Opening {
     /// Takes the first moves out of the first set-up. Under a transformation linear axes go first: a turn needs to know
     /// where they stand.
-    pub(super) fn of(path: &Path, machine: &Machine, tcp: bool) -> Self {
+    pub(super) fn from_path(path: &Path, machine: &Machine, tcp: bool) -> Self {
         let mut known = AxisMap::default();
         let whole = |known: &AxisMap| machine.axes.iter().all(|a| known.get(a.name).is_some());
         let mut setup = None;

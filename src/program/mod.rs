@@ -5,34 +5,35 @@
 //! in [`sweep`].
 
 pub mod as_written;
-mod bare;
 mod clock;
-mod head;
 pub mod heights;
 pub mod layout;
 mod library;
+mod operator_notes;
 pub mod parts;
 pub mod path;
 pub mod plan;
 pub mod plan_check;
 pub mod plan_digest;
-mod plan_lines;
+mod plan_without_path;
 mod reach;
+mod rotary_turns;
 mod route;
 pub mod scene;
 pub mod spec;
 mod stops;
 pub mod sweep;
-mod turns;
+mod touch_status;
 mod verify;
 
 #[cfg(test)]
 mod tests;
 
-pub use bare::plan_without_path;
-pub use head::{SkippedGroup, duration, pose_says, skipped_groups};
 pub use library::{built_in, choose};
+pub use operator_notes::{SkippedGroup, duration, pose_says, skipped_groups};
+pub use plan_without_path::plan_without_path;
 pub use spec::{ProgramSpec, load};
+pub use touch_status::Status;
 pub use verify::{Violation, verify};
 
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -115,11 +116,11 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
     if findings.has_errors() {
         return Err(Failure(findings.0));
     }
-    let notes = head::losses(&layout, &routed.touches, &routed.skipped);
+    let notes = operator_notes::losses(&layout, &routed.touches, &routed.skipped);
     for note in &notes {
         findings.push(Finding::warning("program::lost", note.clone()));
     }
-    let head = head::head(machine, spec, &layout, &routed);
+    let head = operator_notes::head(machine, spec, &layout, &routed);
     routed.path.head = head;
     let first = layout.parts.first();
     let own = first.map_or(machine, |p| &p.machine);

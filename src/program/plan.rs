@@ -3,10 +3,8 @@
 use super::plan_digest::{self, Fields};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Findings, Result, Source, from_json};
-use compact_str::CompactString;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The format line of a plan.
@@ -117,19 +115,19 @@ pub struct PlanTouch {
     /// Its number, unique in the plan.
     pub id: u64,
     /// Stage of the procedure, e.g. `head`.
-    pub stage: CompactString,
+    pub stage: String,
     /// Which repeat of the same point, from 1.
     #[serde(default = "one")]
     pub repeat: u32,
     /// `table` or the letter of a rotary axis.
-    pub carrier: CompactString,
+    pub carrier: String,
     /// The block's mounting, where it differs from the plan's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mounting: Option<String>,
     /// The block's name.
-    pub block: CompactString,
+    pub block: String,
     /// The block's own face at all axes 0.
-    pub face: CompactString,
+    pub face: String,
     /// Nominal contact in the carrier's frame, mm.
     pub point: [f64; 3],
     /// Outward unit normal in the carrier's frame.
@@ -224,9 +222,9 @@ struct ToWrite<'a> {
     fields_sha256: Fields,
 }
 
-/// A record of a plan's text, where its lines are not as usual.
-fn by_the_library<T: DeserializeOwned>(text: &str, source: &Source) -> Result<T> {
-    Ok(serde_json::from_str(text).map_err(|e| {
+/// A record of a plan's text.
+fn from_text<T: DeserializeOwned>(source: &Source) -> Result<T> {
+    Ok(serde_json::from_str(source.inner()).map_err(|e| {
         from_json(&e, source, "plan::not_json").help("a plan is written by `axiscal generate` (axiscal-plan/1)")
     })?)
 }
@@ -264,7 +262,7 @@ impl Plan {
     /// When the text is not JSON of this form, holds what cannot be so on any machine, or was changed since it was written.
     pub fn parse(source: &Source) -> Result<(Self, Findings)> {
         let ((plan, written), mut findings) = Self::read(source)?;
-        findings.0.extend(plan_digest::changed(&written, &plan_digest::of_fields(&plan), source));
+        findings.0.extend(plan_digest::changed(&written, &plan_digest::field_digests(&plan), source));
         findings.finish(plan)
     }
 
@@ -273,13 +271,8 @@ impl Plan {
     /// # Errors
     /// When the text is not JSON of this form, or holds what cannot be so on any machine.
     pub(crate) fn read(source: &Source) -> Result<((Self, Fields), Findings)> {
-        let text = source.inner();
-        let (plan, frame) = match super::plan_lines::read(text) {
-            Some((plan, frame)) => (plan, Cow::Owned(frame)),
-            None => (by_the_library(text, source)?, Cow::Borrowed(text.as_str())),
-        };
-        // what is wrong there has its place in the whole text
-        let AsWritten { fields_sha256 } = serde_json::from_str(&frame).or_else(|_| by_the_library(text, source))?;
+        let plan: Self = from_text(source)?;
+        let AsWritten { fields_sha256 } = from_text(source)?;
         super::plan_check::by_itself(&plan).findings(&plan, source).finish((plan, fields_sha256))
     }
 
@@ -289,7 +282,7 @@ impl Plan {
         // a plan holds only strings and finite numbers: serialisation cannot fail
         const EMPTY: &str = "\"touches\": []";
         let plan = &Self { touches: Vec::new(), ..self.clone() };
-        let frame = ToWrite { plan, fields_sha256: plan_digest::of_fields(self) };
+        let frame = ToWrite { plan, fields_sha256: plan_digest::field_digests(self) };
         let mut text = serde_json::to_string_pretty(&frame).unwrap_or_default();
         text.push('\n');
         let lines: Vec<String> =

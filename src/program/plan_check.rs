@@ -3,7 +3,7 @@
 use super::plan::{FORMAT, Plan, PlanBlock, PlanTouch};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Finding, Findings, Source, in_json};
-use crate::machine::{BallPlaces, Carrier, Machine};
+use crate::machine::{BallPlaces, Machine};
 use crate::units::Plain;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -200,7 +200,6 @@ pub fn on_machine(plan: &Plan, machine: &Machine) -> Faults {
         // a description that has changed since moves the nominal positions: by less than the search allows
         _ => AGREES_MM + placement_mm,
     };
-    let mut last: Option<Places> = None;
     for (i, touch) in plan.touches.iter().enumerate() {
         let part = Part::Touch(i);
         let Some(carrier) = machine.carrier(&touch.carrier) else {
@@ -215,12 +214,9 @@ pub fn on_machine(plan: &Plan, machine: &Machine) -> Faults {
             on_block(&mut faults, part, touch, block, placement_mm + AGREES_MM);
         }
         let length_mm = touch.tool_length_mm.unwrap_or(plan.tool_length_mm);
-        let Some(places) = Places::of(machine, carrier, &touch.pose.position(), length_mm, last.take()) else {
-            continue;
-        };
+        let Some(places) = machine.ball_places(carrier, &touch.pose.position(), length_mm) else { continue };
         let ball_radius_mm = touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm);
-        at_the_ball(&mut faults, part, touch, &places, (ball_radius_mm, agrees_mm));
-        last = Some(places);
+        at_the_ball(&mut faults, part, touch, &places, ball_radius_mm, agrees_mm);
     }
     faults
 }
@@ -273,32 +269,17 @@ fn on_block(faults: &mut Faults, part: Part, touch: &PlanTouch, block: &PlanBloc
     }
 }
 
-/// Where the linear axes stand for each place of the ball: touches of one pose follow one another.
-struct Places {
-    of: (Carrier, Position, f64),
-    places: BallPlaces,
-}
-
-impl Places {
-    fn of(machine: &Machine, carrier: Carrier, pose: &Position, length_mm: f64, last: Option<Self>) -> Option<Self> {
-        let of = (carrier, *pose, length_mm);
-        match last.filter(|l| l.of == of) {
-            Some(same) => Some(same),
-            None => Some(Self { of, places: machine.ball_places(carrier, pose, length_mm)? }),
-        }
-    }
-}
-
 /// The ball is on the point where the plan says that it triggers, outside of the face before and inside behind.
 fn at_the_ball(
     faults: &mut Faults,
     part: Part,
     touch: &PlanTouch,
-    places: &Places,
-    (ball_radius_mm, agrees_mm): (f64, f64),
+    places: &BallPlaces,
+    ball_radius_mm: f64,
+    agrees_mm: f64,
 ) {
     let (point, normal) = (Vector3::from(touch.point), Vector3::from(touch.normal));
-    let linear = |ball: Vector3<f64>| places.places.linear_for(&ball);
+    let linear = |ball: Vector3<f64>| places.linear_for(&ball);
     let expected = linear(point + normal * ball_radius_mm);
     // what the linear axes do per mm away from the face
     let outward = linear(point + normal * (ball_radius_mm + 1.0)) - expected;

@@ -10,11 +10,11 @@ use super::parts::where_it_differs;
 use super::path::{Path, StartNear, Step, TouchStep};
 use super::plan::{PlanTouch, Skipped};
 use super::reach::Reached;
+use super::rotary_turns::{Turn, turn_step, turns};
 use super::scene::Scene;
 use super::spec::ProgramSpec;
 use super::stops::mounted;
 use super::sweep::Manner;
-use super::turns::{Turn, turn_step, turns};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
 use crate::machine::{Axis, Carrier};
@@ -442,10 +442,10 @@ impl Router<'_, '_> {
             id,
             stage: setup.spec.stage.as_str().into(),
             repeat,
-            carrier: planned.carrier.to_string().into(),
+            carrier: planned.carrier.to_string(),
             mounting: (part.label != one.label).then(|| part.label.clone()),
             block: block.into(),
-            face: target.face.to_string().into(),
+            face: target.face.to_string(),
             point: target.point.into(),
             normal: target.normal.into(),
             pose: setup.pose,

@@ -2,9 +2,9 @@
 
 use super::parts::Part;
 use super::path::{Step, Stop};
+use super::rotary_turns::{Turn, turn_step};
 use super::route::{Router, SAME};
 use super::sweep::Manner;
-use super::turns::{Turn, turn_step};
 use crate::axes::{AxisMap, Position};
 
 impl Router<'_, '_> {

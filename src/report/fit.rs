@@ -3,7 +3,6 @@
 use super::lay::lay;
 use super::plot::Paper;
 use crate::fit::outcome::{Outcome, Parameter, Rejected, Status};
-use crate::model::data::ELSEWHERE;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Up to so many touches that are far from their places have a line each.
@@ -173,7 +172,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         out += &together(&o.parted_together);
     }
     // a column of the other sign puts hundreds of them elsewhere: one line says so
-    let far = |r: &&Rejected| r.reason.starts_with(ELSEWHERE);
+    let far = |r: &&Rejected| r.is_far;
     let all_far: Vec<&Rejected> = o.rejected.iter().filter(far).collect();
     let many = all_far.len() > MOST_FAR;
     if let Some(first) = all_far.first().filter(|_| many) {

@@ -5,7 +5,7 @@
 use crate::axes::AxisName;
 use crate::machine::{Axis, Machine, Side};
 use crate::model::catalogue::{Effect, Place as At, Term};
-use crate::model::stated::{Stated, direction_sign, own_turn, stated};
+use crate::model::reference_points::{Stated, direction_sign, own_turn, stated};
 use crate::units::deg_from_rad;
 use serde::{Deserialize, Serialize};
 use std::fmt;

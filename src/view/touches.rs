@@ -63,7 +63,13 @@ pub(super) fn touches(m: &Material) -> Touches {
 
 pub(super) fn unusable(m: &Material) -> Vec<UnusableRecord> {
     let each = m.fit.data.unusable.iter();
-    each.map(|u| UnusableRecord { run: u.run + 1, id: u.id, line: u.line, reason: u.reason.clone() }).collect()
+    each.map(|u| UnusableRecord {
+        run: u.run + 1,
+        id: u.id,
+        line: u.line,
+        reason: crate::words::log::unusable(&u.reason),
+    })
+    .collect()
 }
 
 pub(super) fn rungs(m: &Material) -> Vec<RungRecord> {

@@ -2,3 +2,4 @@
 
 pub(crate) mod fit;
 pub(crate) mod diagnose;
+pub(crate) mod log;

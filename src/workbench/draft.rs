@@ -4,7 +4,7 @@ use super::session::Refused;
 use crate::diag::{Failure, Finding, source};
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::{Formula, VARIABLES};
-use crate::model::{degrees, mistake};
+use crate::model::{degrees_in_formula, formula_errors};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
@@ -221,7 +221,7 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
     for (i, t) in draft.terms.iter().enumerate() {
         if let Err(message) = Formula::parse(t.formula.trim(), &shapes) {
             let lead = t.formula.len() - t.formula.trim_start().len();
-            let found = mistake::find(t.formula.trim(), &shapes);
+            let found = formula_errors::find(t.formula.trim(), &shapes);
             let help = found.as_ref().and_then(|m| m.help).map(str::to_owned);
             let at = found.map_or_else(|| place(t.formula.trim(), &message), |m| m.at);
             let signs = |byte: usize| t.formula.get(..lead + byte).map_or(0, |text| text.chars().count());
@@ -252,7 +252,7 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
 
 fn hints(draft: &Draft, shapes: &[&str]) -> Vec<Mistake> {
     let of = |(i, t): (usize, &DraftTerm)| {
-        let found = degrees::find(t.formula.trim(), shapes)?;
+        let found = degrees_in_formula::find(t.formula.trim(), shapes)?;
         Some(Mistake::of(format!("terms.{i}.formula"), found.to_string(), &found.remedy()))
     };
     draft.terms.iter().enumerate().filter_map(of).collect()

@@ -43,6 +43,7 @@ pub fn matched(raw: &RawTouch) -> Touch {
         position: raw.position,
         status: raw.status,
         time_s: raw.time_s,
+        digit_mm: None,
         temperature_deg_c: raw.temperature_deg_c,
         line: raw.line,
     }

@@ -75,6 +75,22 @@ def expression(dice, depth):
     return f"{dice.choice(ONE)}({expression(dice, depth - 1)})"
 
 
+def each_axis(rows):
+    """Rows with `axes` (docs/guide/effects.md) → one row for each axis."""
+    out, axes = [], []
+    for row in rows:
+        axes = row.get("axes", axes if row.get("with_previous") else [])
+        for axis in axes:
+            own = "XYZABC".index(axis) % 3
+            text = json.dumps(row)
+            for i, meant in enumerate([own] + [k for k in range(3) if k != own]):
+                for letters in ("XYZ", "ABC", "xyz", "abc"):
+                    text = text.replace("{" + letters[i] + "}", letters[meant])
+            out.append(json.loads(text))
+        out += [] if axes else [row]
+    return out
+
+
 def main():
     dice = random.Random(SEED)
     rows = [(text, steady(text, VALUES)) for text in ["-(X)^2", "exp(-(X - Y)^2)", "2^-X^2", "2^3^2", "-X^2^0.5", "--X", "X - -Y"]]
@@ -90,7 +106,7 @@ def main():
     table = {"variables": VALUES, "rows": [{"formula": text, "value": found} for text, found in rows]}
     (here / "expressions.json").write_text(json.dumps(table, indent=0) + "\n")
 
-    effects = tomllib.loads((here / "../../effects.toml").read_text())["effect"]
+    effects = each_axis(tomllib.loads((here / "../../effects.toml").read_text())["effect"])
     texts = sorted({term["formula"] for effect in effects for term in effect.get("terms", [])})
     shapes = {shape["parameter"]: shape["start"] for effect in effects for shape in effect.get("shape", [])}
     names = ("X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB sC feed S gx gy gz L L0 bx by bz px py pz ox oy oz "

@@ -13,10 +13,9 @@ use crate::machine::{Machine, Side};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
 use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
-use crate::study::{DataEntry, Study};
+use crate::study::Study;
 use crate::tables::compensation::Compensation;
 use crate::tables::correction::During;
-use rayon::prelude::*;
 use run::{ReadLog, ReadPlan, ReadRun};
 pub use run::{load_plan, load_plan_and_machine, read_log};
 use sha2::{Digest, Sha256};
@@ -244,24 +243,8 @@ pub fn load_compensation(path: &Path, machine: &Machine) -> Result<Compensation>
 /// # Errors
 /// When a file is missing or unusable.
 pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
-    load(path, io, true)
-}
-
-/// The same for somebody who asks about the effects of the study alone.
-///
-/// # Errors
-/// When a file is missing or unusable.
-pub fn load_study_alone(path: &Path, io: &Io) -> Result<Loaded> {
-    load(path, io, false)
-}
-
-/// `whole`: the whole catalogue will be asked for; another thread begins to read it.
-fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     let text = files::read_text(path)?;
     files::protect(&history_path(path));
-    if whole {
-        Catalogue::read_ahead();
-    }
     let mut hash = Sha256::new();
     let mut data = Sha256::new();
     hash.update(text.as_bytes());
@@ -270,12 +253,7 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     io.report(&findings.0);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let machines = study.machines.as_ref().map(|m| folder.join(m));
-    // the machine beside the plans; what is to be said of each is said in its turn
-    let (machine, plans) = rayon::join(
-        || load_machine(&study.machine, machines.as_deref(), io),
-        || study.data.par_iter().map(|entry| ReadPlan::of(&folder.join(&entry.plan))).collect::<Vec<_>>(),
-    );
-    let machine = located(machine, &src)?;
+    let machine = located(load_machine(&study.machine, machines.as_deref(), io), &src)?;
     hash.update(machine.sha256.as_bytes());
     let mut catalogue = Catalogue::built_in()?;
     for name in &study.effects_files {
@@ -285,17 +263,10 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
         io.report(&catalogue.add_file(&source(file.display().to_string(), text))?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
-    let read = |(entry, plan): (&DataEntry, Result<ReadPlan>)| ReadRun::of(entry, plan?, &folder, &machine);
-    // small logs at once; of large ones, which all threads read together, one after the other: each lies in memory, and with it what is
-    // to be said of it
-    let each: Box<dyn Iterator<Item = Result<ReadRun>>> = if are_small(&study.data, &folder) {
-        Box::new(study.data.par_iter().zip(plans).map(read).collect::<Vec<_>>().into_iter())
-    } else {
-        Box::new(study.data.iter().zip(plans).map(read))
-    };
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for (entry, read) in study.data.iter().zip(each) {
+    for entry in &study.data {
+        let read = ReadRun::read(entry, &folder, &machine);
         let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest, .. }, log } =
             at_the_name(read, &entry.plan, &src)?;
         io.report(&findings);
@@ -334,14 +305,6 @@ fn load(path: &Path, io: &Io, whole: bool) -> Result<Loaded> {
     Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256, data_sha256 })
 }
 
-/// Are the logs of a study so small together that they are read at once?
-fn are_small(data: &[DataEntry], folder: &Path) -> bool {
-    const SMALL: u64 = 4 << 20;
-    // what cannot be read is said in its turn
-    let size = |entry: &DataEntry| std::fs::metadata(folder.join(&entry.log)).map_or(0, |found| found.len());
-    data.iter().map(size).sum::<u64>() <= SMALL
-}
-
 /// What is wrong with a file that the study names gets the place of its name, where it has none of its own.
 fn at_the_name<T>(result: Result<T>, name: &str, study: &Source) -> Result<T> {
     let place = ["\"", "'"].iter().find_map(|quote| {
@@ -365,7 +328,7 @@ fn located<T>(result: Result<T>, study: &Source) -> Result<T> {
 fn placed(Failure(findings): Failure, study: &Source) -> Failure {
     let text = study.inner();
     let place = |f: &Finding| {
-        let word = f.message.split('"').nth(1)?;
+        let word = f.about.as_deref()?;
         let as_value = text.rfind(&format!("\"{word}\"")).map(|at| at..at + word.len() + 2);
         // or as a key
         as_value.or_else(|| {

@@ -17,7 +17,7 @@ use std::path::Path;
 /// # Errors
 /// When it is unusable or for another machine.
 pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
-    let mut read = ReadPlan::of(path)?;
+    let mut read = ReadPlan::read(path)?;
     read.check_belongs(path, machine)?;
     io.report(&read.findings);
     Ok(read.plan)
@@ -28,7 +28,7 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
 /// # Errors
 /// When one of them is unusable.
 pub fn load_plan_and_machine(path: &Path, machines: Option<&Path>, io: &Io) -> Result<(Plan, Machine)> {
-    let mut read = ReadPlan::of(path)?;
+    let mut read = ReadPlan::read(path)?;
     let machine = load_machine(&read.plan.machine, machines, io)?;
     read.check_belongs(path, &machine)?;
     io.report(&read.findings);
@@ -43,8 +43,6 @@ pub(super) struct ReadPlan {
     pub findings: Vec<Finding>,
     /// The error where it is not as it was written.
     changed: Option<Finding>,
-    /// What the log of its program carries.
-    log_digest: String,
     /// SHA-256 of the file.
     pub digest: Vec<u8>,
 }
@@ -54,13 +52,13 @@ impl ReadPlan {
     ///
     /// # Errors
     /// When it is unusable.
-    pub fn of(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path) -> Result<Self> {
         let src = source(path.display().to_string(), files::read_text(path)?);
         let ((plan, written), Findings(findings)) = Plan::read(&src)?;
-        let fields = plan_digest::of_fields(&plan);
+        let fields = plan_digest::field_digests(&plan);
         let changed = plan_digest::changed(&written, &fields, &src);
         let digest = Sha256::digest(src.inner().as_bytes()).to_vec();
-        Ok(Self { plan, findings, changed, log_digest: plan_digest::of_all(&fields), digest })
+        Ok(Self { plan, findings, changed, digest })
     }
 
     fn check_belongs(&mut self, path: &Path, machine: &Machine) -> Result<()> {
@@ -114,17 +112,18 @@ pub(super) struct ReadRun {
 }
 
 impl ReadRun {
-    /// The log of an entry of a study, beside its plan.
+    /// Plan and log of an entry of a study.
     ///
     /// # Errors
-    /// When the plan is for another machine.
-    pub fn of(entry: &DataEntry, mut plan: ReadPlan, folder: &Path, machine: &Machine) -> Result<Self> {
-        plan.check_belongs(&folder.join(&entry.plan), machine)?;
+    /// When the plan is unusable or for another machine.
+    pub fn read(entry: &DataEntry, folder: &Path, machine: &Machine) -> Result<Self> {
+        let plan_path = folder.join(&entry.plan);
+        let mut plan = ReadPlan::read(&plan_path)?;
+        plan.check_belongs(&plan_path, machine)?;
         let path = folder.join(&entry.log);
         let log = files::read_bytes(&path).map(|bytes| {
             let controller = controller_path(&entry.controller, folder);
-            let belongs = (&plan.plan, Some(plan.log_digest.as_str()));
-            let (findings, mut touches) = matched(&bytes, &path, (&controller, entry.run), machine, belongs);
+            let (findings, mut touches) = matched(&bytes, &path, &controller, entry.run, machine, &plan.plan);
             if let Ok(touches) = &mut touches
                 && controller != "csv"
             {
@@ -157,38 +156,38 @@ fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>
     }
 }
 
-/// Reads a log (or touches CSV), the run of this number or the last complete one, and matches it to its plan.
+/// Reads a log (or touches CSV), of several runs the last complete one, and matches it to its plan.
 ///
 /// # Errors
 /// When nothing in it can be used.
 pub fn read_log(
     bytes: &[u8],
     path: &Path,
-    (controller, run): (&str, Option<usize>),
+    controller: &str,
     machine: &Machine,
     plan: &Plan,
     io: &Io,
 ) -> Result<Vec<Touch>> {
-    let (findings, touches) = matched(bytes, path, (controller, run), machine, (plan, None));
+    let (findings, touches) = matched(bytes, path, controller, None, machine, plan);
     io.report(&findings);
     touches
 }
 
-/// What is to be said of a log, and its touches. With the plan the digest of its log, where it is known.
+/// What is to be said of a log, and its touches: of the run of this number, or of the last complete one.
 fn matched(
     bytes: &[u8],
     path: &Path,
-    (controller, run): (&str, Option<usize>),
+    controller: &str,
+    run: Option<usize>,
     machine: &Machine,
-    (plan, digest): (&Plan, Option<&str>),
+    plan: &Plan,
 ) -> (Vec<Finding>, Result<Vec<Touch>>) {
     let mut findings = Vec::new();
     let mut read = || {
         let (reader, said) = log::Reader::load(controller, files::read_text)?;
         findings.extend(said);
         let name = path.display().to_string();
-        let digest = || digest.map_or_else(|| plan_digest::digest(plan), str::to_owned);
-        let (read, said) = log::read_digested(bytes, &name, reader.writer(), machine, plan, run, digest)?;
+        let (read, said) = log::read_run(bytes, &name, reader.writer(), machine, plan, run)?;
         findings.extend(said.0);
         Ok(read.touches)
     };
@@ -211,6 +210,7 @@ mod tests {
                 position: planned.nominal_position(),
                 status: log::Status::Hit,
                 time_s,
+                digit_mm: None,
                 temperature_deg_c: None,
                 line,
             };

@@ -28,7 +28,7 @@ pub(super) fn join(args: &Args, loaded: &Loaded, plan_file: &Path, log: &Path, i
             .help("a log counts once: name the log of a further run"));
     }
     let plan = load_plan(plan_file, &loaded.machine, io)?;
-    let touches = read_log(&files::read_bytes(log)?, log, (&args.controller, None), &loaded.machine, &plan, io)?;
+    let touches = read_log(&files::read_bytes(log)?, log, &args.controller, &loaded.machine, &plan, io)?;
     let runs = loaded.planned();
     // whoever made the program for blocks put up anew has put them up anew
     let moved = args.moved || plan.blocks_anew;

@@ -4,10 +4,10 @@
 use super::{Point, Points, PointsForm};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
+use crate::log::finding_places::{Capped, Places};
 use crate::log::matching::ranges;
-use crate::log::place::{Capped, Places};
-use crate::log::shift::common_shift;
-use crate::log::swaps::shift_says;
+use crate::log::origin_shift::common_shift;
+use crate::log::setup_mistakes::shift_says;
 use crate::log::touch::{RawTouch, Status};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Plan, PlanTouch};

@@ -11,9 +11,9 @@ mod record;
 pub use form::PointsForm;
 pub use matching::touches;
 
-use super::lines::Lines;
-use super::place::{Capped, Places};
+use super::finding_places::{Capped, Places};
 use super::runs::RunFound;
+use super::text_lines::Lines;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::geometry::Displacement;
 use crate::post::as_written::LengthUnit;
@@ -165,7 +165,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
         places.at_line(Finding::error("log::order", message).help(WHOLE), line)
     };
     for line in Lines::new(bytes, start) {
-        let text = super::lines::without_trailer(line.bytes);
+        let text = super::text_lines::without_trailer(line.bytes);
         let found = record(text, form);
         if blocks.is_empty()
             && matches!(found, Ok(Record::Orientation(_) | Record::Nominal { .. } | Record::Centre { .. }))
@@ -186,7 +186,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
         };
         match found {
             Err(fault) => {
-                let fault = super::stretch::no_text(text, line.start).unwrap_or(fault);
+                let fault = super::read_lines::no_text(text, line.start).unwrap_or(fault);
                 error(fault.at, fault.length, fault.code, fault.message);
             }
             Ok(Record::Blank) => {}

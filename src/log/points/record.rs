@@ -1,8 +1,8 @@
 //! One line of inspection results.
 
 use super::PointsForm;
-use crate::log::lines::{blanks, without_leader};
-use crate::log::words::{Fault, number, whole};
+use crate::log::numbers::{Fault, number, whole};
+use crate::log::text_lines::{blanks, without_leader};
 use nalgebra::Vector3;
 
 /// What a line says.
@@ -103,7 +103,7 @@ impl Words {
 
     fn number(&self, line: &[u8]) -> Result<u64, Fault> {
         let [value] = self.all(line, b"N")?;
-        let number = crate::log::words::Number { value, decimals: None };
+        let number = crate::log::numbers::Number { value, decimals: None };
         whole(number).ok_or_else(|| {
             Fault::at(line, line, line.len(), "log::id", "the number of a point is whole and not negative")
         })

@@ -25,10 +25,14 @@ struct OwnFile {
 }
 
 /// An effect as it stands in the file; what only people read is passed over.
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OwnEffect {
     id: Spanned<String>,
+    #[serde(default)]
+    axes: Vec<Spanned<String>>,
+    #[serde(default)]
+    with_previous: bool,
     at: Spanned<String>,
     side: Option<OwnSide>,
     about: Option<OwnAbout>,
@@ -83,7 +87,7 @@ enum OwnFrame {
     Moving,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 struct OwnTerm {
     parameter: Spanned<String>,
     unit: Spanned<String>,
@@ -93,7 +97,7 @@ struct OwnTerm {
     frame: Option<OwnFrame>,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 struct OwnShape {
     parameter: Spanned<String>,
     unit: Spanned<String>,
@@ -157,6 +161,21 @@ fn inside(unit: Unit) -> f64 {
     }
 }
 
+impl OwnEffect {
+    /// The row for one of its axes.
+    fn for_axis(&self, axis: AxisName) -> Self {
+        let mut row = self.clone();
+        let fill = |word: &mut Spanned<String>| *word.get_mut() = axis.fill_in(word.get_ref());
+        [&mut row.id, &mut row.at].into_iter().chain(&mut row.needs).chain(&mut row.unless).for_each(fill);
+        for term in &mut row.terms {
+            let always = [&mut term.parameter, &mut term.dof, &mut term.formula];
+            always.into_iter().chain(&mut term.at).for_each(fill);
+        }
+        row.shape.iter_mut().for_each(|shape| fill(&mut shape.parameter));
+        row
+    }
+}
+
 /// A value that was given in `from`, in `to`. `None` when they measure different things.
 pub fn converted(value: f64, from: Unit, to: Unit) -> Option<f64> {
     if from == to {
@@ -175,7 +194,15 @@ pub fn read(source: &Source, machine: &Machine) -> Result<Vec<Own>> {
     })?;
     let mut reader = Reader { source, machine, findings: Findings::default() };
     let mut out: Vec<Own> = Vec::new();
-    for row in &file.effect {
+    let mut rows = Vec::new();
+    for together in file.effect.chunk_by(|_, next| next.with_previous) {
+        let letters = together.first().map(|row| reader.axes(&row.axes)).unwrap_or_default();
+        if letters.is_empty() {
+            rows.extend_from_slice(together);
+        }
+        letters.into_iter().for_each(|axis| rows.extend(together.iter().map(|row| row.for_axis(axis))));
+    }
+    for row in &rows {
         if super::catalogue::is_known(row.id.get_ref(), machine) {
             let message = format!("effect {:?} exists already", row.id.get_ref());
             reader.error(row.id.span(), "effects::id_twice", message, "give it an id of its own".to_owned());

@@ -1,8 +1,6 @@
 //! Lines of a log: bytes between line ends of any kind, mixed too, with number and place. No allocation.
 
 use crate::post::as_written::EndOfLine;
-use nom::bytes::complete::take_till;
-use nom::{IResult, Parser};
 
 /// One line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,9 +79,11 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 /// Blanks and tabs.
-pub fn blanks(input: &[u8]) -> &[u8] {
-    let parsed: IResult<&[u8], &[u8]> = take_till(|b| b != b' ' && b != b'\t').parse(input);
-    parsed.map_or(input, |(rest, _)| rest)
+pub fn blanks(mut input: &[u8]) -> &[u8] {
+    while let [b' ' | b'\t', rest @ ..] = input {
+        input = rest;
+    }
+    input
 }
 
 /// What a punch, a serial line or an old system puts around text: NUL, STX, ETX, EOT, DC1 to DC4, SUB, rub-out.
@@ -108,8 +108,8 @@ pub fn without_trailer(line: &[u8]) -> &[u8] {
 /// Without such bytes, blanks, and the byte order mark of a file that was put behind another one, at its beginning.
 #[must_use]
 pub fn without_leader(line: &[u8]) -> &[u8] {
-    let parsed: IResult<&[u8], &[u8]> = take_till(|b| b != b' ' && b != b'\t' && !is_tape(b)).parse(line);
-    let rest = parsed.map_or(line, |(rest, _)| rest);
+    let leader = line.iter().position(|b| !matches!(b, b' ' | b'\t') && !is_tape(*b)).unwrap_or(line.len());
+    let rest = &line[leader..];
     rest.strip_prefix(BYTE_ORDER_MARK).map_or(rest, without_leader)
 }
 
@@ -124,6 +124,8 @@ pub const HEADS: [&[u8]; 2] = [b"H AXISCAL ", b"HAXISCAL1"];
 pub fn inner_head(line: &[u8]) -> Option<usize> {
     let leader = line.len() - without_leader(line).len();
     let rest = &line[(leader + 1).min(line.len())..];
+    // the usual line of a touch holds no H
+    memchr::memchr(b'H', rest)?;
     HEADS.iter().filter_map(|head| memchr::memmem::find(rest, head)).min().map(|at| leader + 1 + at)
 }
 

@@ -1,23 +1,17 @@
-//! The lines of a log, read: touches at full speed, everything else as events between them.
+//! The lines of a log, read: touches, and everything else as events between them.
 //!
-//! A long log is cut at line ends into stretches that are read at the same time; the result is the same as that of one.
 //! A line that is not understood is only noted here: what is wrong with it is found out for the few that are shown.
 
-use super::fast::{self, Table};
-use super::lines::{BYTE_ORDER_MARK, HEADS, Line, blanks, first, inner_head, without_leader, without_trailer};
+use super::numbers::Fault;
 use super::record::{LogHeader, Record, begin, record, row};
+use super::text_lines::{BYTE_ORDER_MARK, HEADS, Line, Lines, blanks, inner_head, without_leader, without_trailer};
 use super::touch::RawTouch;
-use super::words::Fault;
 use crate::post::as_written::EndOfLine;
 use crate::post::{ColumnRule, LogRule};
-use rayon::prelude::*;
 
-/// A log that is shorter is read in one go, bytes: some milliseconds of work.
-const SHORT: usize = 1 << 20;
-
-/// What is read of a log, or of a part of it that begins and ends with a line.
+/// What the lines of a log say.
 #[derive(Debug, Default)]
-pub struct Stretch<'a> {
+pub struct ReadLines<'a> {
     /// In the order of the log.
     pub touches: Vec<RawTouch>,
     /// Everything else, in the order of the log.
@@ -35,13 +29,13 @@ pub struct Event<'a> {
     pub at: usize,
     /// Where.
     pub line: Line<'a>,
-    /// What.
-    pub what: What,
+    /// What kind of line.
+    pub kind: LineKind,
 }
 
-/// What such a line is.
+/// What kind of line it is, where it is no touch.
 #[derive(Debug)]
-pub enum What {
+pub enum LineKind {
     /// A run begins.
     Head(Box<LogHeader>),
     /// A run has come to its end; number of touches of the plan.
@@ -88,38 +82,12 @@ impl Reader<'_> {
     }
 
     /// Reads lines, the first of which begins at `start` of the log.
-    pub fn read<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
-        let n_parts = if bytes.len() < SHORT { 1 } else { rayon::current_num_threads().max(1) };
-        if n_parts == 1 {
-            return self.stretch(bytes, start);
-        }
-        let mut cuts: Vec<usize> = (0..=n_parts).map(|i| line_start(bytes, bytes.len() / n_parts * i)).collect();
-        if let Some(last) = cuts.last_mut() {
-            *last = bytes.len();
-        }
-        let parts: Vec<Stretch<'a>> =
-            cuts.par_windows(2).map(|c| self.stretch(&bytes[c[0]..c[1]], start + c[0])).collect();
-        parts.into_iter().reduce(join).unwrap_or_default()
-    }
-
-    fn stretch<'a>(&self, bytes: &'a [u8], start: usize) -> Stretch<'a> {
-        let table = Table::new(self.rule);
+    pub fn read<'a>(&self, bytes: &'a [u8], start: usize) -> ReadLines<'a> {
         // lines of touches are some 60 bytes or longer
-        let mut out = Stretch { touches: Vec::with_capacity(bytes.len() / 60), ..Stretch::default() };
-        let mut at = 0;
-        while at < bytes.len() {
-            out.lines += 1;
-            if self.columns.is_none()
-                && let Some((touch, end, used)) = fast::touch(&bytes[at..], out.lines, &table)
-            {
-                out.ends[end as usize] = true;
-                out.touches.push(touch);
-                at += used;
-                continue;
-            }
-            let (line, end, used) = first(&bytes[at..]);
-            end.into_iter().for_each(|e| out.ends[e as usize] = true);
-            let mut line = Line { number: out.lines, start: start + at, bytes: line, end };
+        let mut out = ReadLines { touches: Vec::with_capacity(bytes.len() / 60), ..ReadLines::default() };
+        for mut line in Lines::new(bytes, start) {
+            out.lines = line.number;
+            line.end.into_iter().for_each(|e| out.ends[e as usize] = true);
             // two files put together without a line end between them: the head of the second begins a line of its own
             while self.columns.is_none()
                 && let Some(head) = inner_head(line.bytes)
@@ -129,25 +97,24 @@ impl Reader<'_> {
                 line = Line { start: line.start + head, bytes: &line.bytes[head..], ..line };
             }
             self.note(line, &mut out);
-            at += used;
         }
         out
     }
 
-    /// Reads a line that is not the usual one of a touch.
-    fn note<'a>(&self, line: Line<'a>, out: &mut Stretch<'a>) {
-        let what = match self.line(&line) {
+    /// Reads a line.
+    fn note<'a>(&self, line: Line<'a>, out: &mut ReadLines<'a>) {
+        let kind = match self.line(&line) {
             Ok(Record::Touch(touch)) => {
                 out.touches.push(touch);
                 None
             }
-            Ok(Record::Head(head)) => Some(What::Head(Box::new(head))),
-            Ok(Record::End(count)) => Some(What::End(count)),
+            Ok(Record::Head(head)) => Some(LineKind::Head(Box::new(head))),
+            Ok(Record::End(count)) => Some(LineKind::End(count)),
             Ok(Record::Blank) => None,
-            Err(_) => Some(What::Fault),
+            Err(_) => Some(LineKind::Fault),
         };
         let n_touches = out.touches.len();
-        out.events.extend(what.map(|what| Event { at: n_touches, line, what }));
+        out.events.extend(kind.map(|kind| Event { at: n_touches, line, kind }));
     }
 
     /// What stands before a head in its line, without what belongs to the head.
@@ -170,7 +137,7 @@ pub fn looks_like_columns(bytes: &[u8], columns: &ColumnRule) -> bool {
         let holds = |what: &[u8]| memchr::memmem::find(bytes, what).is_some();
         return holds(columns.prefix.as_bytes()) && !HEADS.iter().any(|head| holds(head));
     }
-    let firsts = super::lines::Lines::new(bytes, 0).filter_map(|l| blanks(l.bytes).first().copied()).take(64);
+    let firsts = Lines::new(bytes, 0).filter_map(|l| blanks(l.bytes).first().copied()).take(64);
     let mut numbers = 0;
     for first in firsts {
         match first {
@@ -189,32 +156,6 @@ pub(super) fn no_text(line: &[u8], start: usize) -> Option<Fault> {
     let at = line.len() - words.len() + words.iter().position(|b| !matches!(b, b'\t' | b' '..=b'~'))?;
     let message = format!("byte 0x{:02X} at offset {} of the file is no text", line[at], start + at);
     Some(Fault::at(line, &line[at..], 1, "log::no_text", message))
-}
-
-/// Where the line begins that holds the byte before `at`, or the next one.
-fn line_start(bytes: &[u8], at: usize) -> usize {
-    if at == 0 || at >= bytes.len() {
-        return at.min(bytes.len());
-    }
-    // one byte back: `at` may be a beginning itself, or stand between CR and LF
-    at - 1 + first(&bytes[at - 1..]).2
-}
-
-/// One stretch after the other.
-fn join<'a>(mut before: Stretch<'a>, after: Stretch<'a>) -> Stretch<'a> {
-    let (n_touches, n_lines) = (before.touches.len(), before.lines);
-    before.touches.extend(after.touches.into_iter().map(|t| RawTouch { line: t.line + n_lines, ..t }));
-    before.events.extend(after.events.into_iter().map(|e| {
-        let line = Line { number: e.line.number + n_lines, ..e.line };
-        let what = match e.what {
-            What::Head(head) => What::Head(Box::new(LogHeader { line: line.number, ..*head })),
-            what => what,
-        };
-        Event { at: e.at + n_touches, line, what }
-    }));
-    before.lines += after.lines;
-    before.ends.iter_mut().zip(after.ends).for_each(|(b, a)| *b |= a);
-    before
 }
 
 impl EndOfLine {

@@ -4,9 +4,9 @@
 //! them, a number that begins or ends with its decimal mark, `+`, `1.5EX+02`. What is not: anything else. A line either
 //! is understood as a whole or is a [`Fault`] with its place.
 
-use super::lines::blanks;
+use super::text_lines::blanks;
 use nom::bytes::complete::take_while_m_n;
-use nom::character::complete::{digit0, one_of};
+use nom::character::complete::one_of;
 use nom::combinator::opt;
 use nom::{IResult, Parser};
 
@@ -41,7 +41,7 @@ pub struct Number {
 }
 
 /// Powers of ten that a double holds exactly.
-pub(super) const POWERS: [f64; 23] = [
+const POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
     1e21, 1e22,
 ];
@@ -49,21 +49,50 @@ pub(super) const POWERS: [f64; 23] = [
 /// A number with this decimal mark; blanks may stand before it and after its sign.
 pub fn number(mark: u8) -> impl Fn(&[u8]) -> IResult<&[u8], Number> {
     move |input| {
-        let (rest, sign) = opt(one_of(&b"+-"[..])).parse(blanks(input))?;
-        let start = blanks(rest);
-        let (rest, whole) = digit0.parse(start)?;
+        let input = blanks(input);
+        let is_negative = input.first() == Some(&b'-');
+        let start = match input {
+            [b'+' | b'-', rest @ ..] => blanks(rest),
+            _ => input,
+        };
+        let (rest, whole) = digits(start);
         let (rest, fraction) = match rest.split_first() {
-            Some((b, after)) if *b == mark => digit0.parse(after).map(|(rest, f)| (rest, Some(f)))?,
+            Some((b, after)) if *b == mark => {
+                let (rest, fraction) = digits(after);
+                (rest, Some(fraction))
+            }
             _ => (rest, None),
         };
-        if whole.is_empty() && fraction.is_none_or(<[u8]>::is_empty) {
+        if whole.text.is_empty() && fraction.is_none_or(|f| f.text.is_empty()) {
             return Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Digit)));
         }
-        let (rest, exponent) = opt(exponent).parse(rest)?;
+        let (rest, exponent) = match rest.first() {
+            Some(b'E' | b'e') => opt(exponent).parse(rest)?,
+            _ => (rest, None),
+        };
         let value = decimal(whole, fraction.unwrap_or_default(), exponent.unwrap_or(0));
-        let value = if sign == Some('-') { -value } else { value };
-        Ok((rest, Number { value, decimals: fraction.map(<[u8]>::len) }))
+        let value = if is_negative { -value } else { value };
+        Ok((rest, Number { value, decimals: fraction.map(|f| f.text.len()) }))
     }
+}
+
+/// Digits and their value; the value of more than 19 digits is not used.
+#[derive(Debug, Clone, Copy, Default)]
+struct Digits<'a> {
+    text: &'a [u8],
+    value: u64,
+}
+
+/// The digits with which a text begins, and what follows them.
+#[inline]
+fn digits(input: &[u8]) -> (&[u8], Digits<'_>) {
+    let (mut count, mut value) = (0, 0_u64);
+    while let Some(digit) = input.get(count).map(|b| b.wrapping_sub(b'0')).filter(|d| *d < 10) {
+        value = value.wrapping_mul(10).wrapping_add(u64::from(digit));
+        count += 1;
+    }
+    let (text, rest) = input.split_at(count);
+    (rest, Digits { text, value })
 }
 
 /// `E+02`, `e2`, `EX-06`.
@@ -77,12 +106,12 @@ fn exponent(input: &[u8]) -> IResult<&[u8], i32> {
 }
 
 /// The double next to a decimal number.
-fn decimal(whole: &[u8], fraction: &[u8], exponent: i32) -> f64 {
-    let digits = whole.len() + fraction.len();
-    let scale = exponent - i32::try_from(fraction.len()).unwrap_or(i32::MAX);
+fn decimal(whole: Digits<'_>, fraction: Digits<'_>, exponent: i32) -> f64 {
+    let digits = whole.text.len() + fraction.text.len();
+    let scale = exponent - i32::try_from(fraction.text.len()).unwrap_or(i32::MAX);
     if digits <= 15 {
         // up to 15 digits and powers up to 10^22 are exact doubles: one rounding, so the result is the nearest one
-        let mantissa = whole.iter().chain(fraction).fold(0u64, |v, d| v * 10 + u64::from(d - b'0')) as f64;
+        let mantissa = whole.value as f64 * POWERS[fraction.text.len()] + fraction.value as f64;
         match (POWERS.get(scale.unsigned_abs() as usize), scale < 0) {
             (Some(power), true) => return mantissa / power,
             (Some(power), false) => return mantissa * power,
@@ -91,9 +120,9 @@ fn decimal(whole: &[u8], fraction: &[u8], exponent: i32) -> f64 {
     }
     // rare: more digits than a log holds. Digits, one point and an exponent are what the standard library reads
     let mut text = String::with_capacity(digits + 8);
-    text.extend(whole.iter().map(|b| *b as char));
+    text.extend(whole.text.iter().map(|b| *b as char));
     text.push('.');
-    text.extend(fraction.iter().map(|b| *b as char));
+    text.extend(fraction.text.iter().map(|b| *b as char));
     if exponent != 0 {
         text.push_str(&format!("e{exponent}"));
     }

@@ -1,7 +1,7 @@
 //! Dual numbers: a value and its derivative by one parameter, computed together step by step (forward-mode differentiation). The
 //! derivative of a formula is never written out, so that it costs no more than the formula itself.
 
-use super::words::{One, Two, Value};
+use super::operators::{One, Two, Value};
 
 /// A value with its derivative.
 #[derive(Debug, Clone, Copy, PartialEq)]

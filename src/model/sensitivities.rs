@@ -7,43 +7,38 @@
 use super::batch::Batch;
 use super::formula::Formula;
 use super::predict::{Active, Model, Observation};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Touches whose slopes stand together.
-const SOME: usize = 64;
-
 /// How the gap of each touch follows displacements at each place of a model.
 #[derive(Debug)]
-pub struct Traces<'a> {
+pub struct Sensitivities<'a> {
     batch: Batch<'a>,
-    /// d gap / d component: mm per mm, or mm per rad. Some touches after others; of these, touches of one component side by side.
-    slope: Vec<f64>,
+    /// d gap / d component, mm per mm or mm per rad: a row for each touch, a column for each component.
+    slope: DMatrix<f64>,
     /// Values of formulas without shape parameters at all touches.
     plain: HashMap<&'a str, Vec<f64>>,
 }
 
-impl<'a> Traces<'a> {
-    /// The traces of a model's effects where none has a size.
+impl<'a> Sensitivities<'a> {
+    /// The sensitivities to a model's effects where none has a size.
     #[must_use]
-    pub fn of(model: &'a Model, observations: &'a [Observation]) -> Self {
+    pub fn new(model: &'a Model, observations: &'a [Observation]) -> Self {
         let batch = model.prepare_places(observations);
         let n = batch.len();
         let theta = model.start();
         let at = batch.at(&theta);
         let n_components = 6 * model.slots.len();
-        let mut slope = vec![0.0; n * n_components];
-        slope.par_chunks_mut((SOME * n_components).max(1)).enumerate().for_each_init(
+        let mut by_touch = DMatrix::zeros(n_components, n);
+        by_touch.as_mut_slice().par_chunks_mut(n_components.max(1)).enumerate().for_each_init(
             || batch.scratch(),
-            |scratch, (k, part)| {
-                let here = part.len() / n_components;
-                for i in 0..here {
-                    for (c, slope) in at.slopes(k * SOME + i, scratch).iter().flatten().enumerate() {
-                        part[c * here + i] = *slope;
-                    }
-                }
+            |scratch, (touch, slopes)| {
+                let found = at.slopes(touch, scratch).iter().flatten();
+                slopes.iter_mut().zip(found).for_each(|(slope, found)| *slope = *found);
             },
         );
+        let slope = by_touch.transpose();
         drop(at);
         let formulas = model.active.iter().map(|a| &a.term.formula);
         let plain: HashMap<&str, &Formula> =
@@ -70,11 +65,9 @@ impl<'a> Traces<'a> {
         for active in self.batch.model().active.iter().filter(|a| a.first == first) {
             let formula = &active.term.formula;
             let column = &mut columns[(active.unknown - first) * n..][..n];
-            let component = 6 * active.slot + active.component;
+            let slope = self.slope.column(6 * active.slot + active.component);
             if let Some(constant) = formula.constant() {
-                for (at, slope) in self.slopes(component) {
-                    self.add(&mut column[at..], active, at, slope.iter().map(|s| s * constant));
-                }
+                self.add(column, active, slope.iter().map(|s| s * constant));
                 continue;
             }
             let coefficient = match self.plain.get(formula.text()) {
@@ -87,32 +80,15 @@ impl<'a> Traces<'a> {
                     all().map(|o| if here(&o) { own.next().unwrap_or_default() } else { 0.0 }).collect()
                 }),
             };
-            for (at, slope) in self.slopes(component) {
-                self.add(&mut column[at..], active, at, slope.iter().zip(&coefficient[at..]).map(|(s, c)| s * c));
-            }
+            self.add(column, active, slope.iter().zip(coefficient).map(|(s, c)| s * c));
         }
     }
 
-    /// The slopes of one component: number of the first touch, and those of it and the next ones.
-    fn slopes(&self, component: usize) -> impl Iterator<Item = (usize, &[f64])> {
-        let n_components = 6 * self.batch.model().slots.len();
-        self.slope.chunks((SOME * n_components).max(1)).enumerate().map(move |(k, part)| {
-            let here = part.len() / n_components;
-            (k * SOME, &part[component * here..][..here])
-        })
-    }
-
-    /// Adds amounts to a column from a touch on.
-    fn add(&self, column: &mut [f64], active: &Active, from: usize, amounts: impl Iterator<Item = f64>) {
-        match active.set_up {
-            None => column.iter_mut().zip(amounts).for_each(|(into, amount)| *into += active.factor * amount),
-            Some(own) => {
-                let touched = self.batch.observations()[from..].iter().map(|o| o.set_up == own);
-                for ((into, amount), here) in column.iter_mut().zip(amounts).zip(touched) {
-                    if here {
-                        *into += active.factor * amount;
-                    }
-                }
+    /// Adds amounts to a column; of one block's effect only those of its touches.
+    fn add(&self, column: &mut [f64], active: &Active, amounts: impl Iterator<Item = f64>) {
+        for ((into, amount), touch) in column.iter_mut().zip(amounts).zip(self.batch.observations()) {
+            if active.set_up.is_none_or(|own| own == touch.set_up) {
+                *into += active.factor * amount;
             }
         }
     }

@@ -1,8 +1,8 @@
 //! When most touches lie far from their places: which simple mistake would explain it?
 
 use super::matching::{POSE_ROOM_DEG, fits, ranges, turned_deg};
-use super::rows::Lines;
-use super::shift::common_shift;
+use super::origin_shift::common_shift;
+use super::position_rows::Lines;
 use super::touch::RawTouch;
 use crate::axes::{AxisName, Position};
 use crate::diag::Finding;

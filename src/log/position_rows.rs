@@ -6,9 +6,9 @@
 //! they stand in another order, the position alone decides. Nothing is invented: what cannot be decided is a finding, and the touch is
 //! missing.
 
+use super::finding_places::Capped;
 use super::matching::ranges;
-use super::place::Capped;
-use super::swaps;
+use super::setup_mistakes;
 use super::touch::{RawTouch, Status};
 use crate::axes::Position;
 use crate::diag::Finding;
@@ -60,7 +60,7 @@ struct Search {
 }
 
 impl Search {
-    fn of(touch: &PlanTouch) -> Self {
+    fn from_plan(touch: &PlanTouch) -> Self {
         let (start, end) = (touch.start_position(), touch.end_position());
         let way = end.xyz_mm() - start.xyz_mm();
         let length = way.norm();
@@ -103,7 +103,7 @@ pub(super) struct Lines<'m> {
 
 impl<'m> Lines<'m> {
     pub(super) fn new(machine: &'m Machine, plan: &Plan) -> Self {
-        let searches: Vec<Search> = plan.touches.iter().map(Search::of).collect();
+        let searches: Vec<Search> = plan.touches.iter().map(Search::from_plan).collect();
         let longest = searches.iter().map(|s| s.length).fold(0.0, f64::max);
         let mut lines = Self { machine, searches, cubes: BTreeMap::new(), edge_mm: longest / 2.0 + 2.0 * LINE_ROOM_MM };
         for (i, search) in lines.searches.iter().enumerate() {
@@ -200,7 +200,7 @@ pub(super) fn number(
     // one mistake in the whole log is one message, not one for each row
     if on_none > 1
         && on_none * 2 > raw.len()
-        && let Some(finding) = swaps::explain_rows(plan, &lines, &raw, on_none)
+        && let Some(finding) = setup_mistakes::explain_rows(plan, &lines, &raw, on_none)
     {
         return Numbered { touches: Vec::new(), unclear: Vec::new(), findings: vec![at(finding, first_line)] };
     }

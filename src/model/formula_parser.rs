@@ -1,4 +1,4 @@
-//! A formula as it is written → its steps in the order of mathematics (`build.rs` shares this file).
+//! A formula as it is written → its steps in the order of mathematics.
 
 /// The value of a formula that is nothing but a number.
 pub(super) fn bare_number(text: &str) -> Option<f64> {

@@ -6,7 +6,7 @@ use crate::units::mm_from_inch;
 /// The coarsest step, mm, of which every position of the linear axes is a multiple: decimal fractions of a millimetre or of an
 /// inch. None where there is none down to a nanometre: nothing is lost that a touch would show.
 #[must_use]
-pub(super) fn digit_mm(positions: impl Iterator<Item = Position> + Clone) -> Option<f64> {
+pub fn digit_mm(positions: impl Iterator<Item = Position> + Clone) -> Option<f64> {
     const STEPS: [f64; 7] = [1e-2, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5, 1e-6];
     let steps = STEPS.iter().flat_map(|&s| [s, mm_from_inch(0.1 * s)]);
     let mut steps: Vec<f64> = steps.collect();

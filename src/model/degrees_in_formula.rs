@@ -1,6 +1,6 @@
 //! Degrees in a formula where radians are meant: angles are radians there, and `step(abs(A) - 30)` never becomes 1.
 
-use super::spelling::{Steps, fold};
+use super::formula_parser::{Steps, fold};
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
@@ -75,7 +75,7 @@ enum Part {
 }
 
 impl Traced {
-    fn of(part: Part, found: Option<InDegrees>) -> Self {
+    fn new(part: Part, found: Option<InDegrees>) -> Self {
         Self { part, found }
     }
 }
@@ -90,7 +90,7 @@ fn against(angle: &str, factor: f64, value: f64, with_pi: bool) -> Option<InDegr
 
 impl Steps for Traced {
     fn number(value: f64) -> Self {
-        Self::of(Part::Number { value, with_pi: false }, None)
+        Self::new(Part::Number { value, with_pi: false }, None)
     }
 
     fn word(name: &str) -> Self {
@@ -99,7 +99,7 @@ impl Steps for Traced {
             _ if ANGLES.contains(&name) => Part::Angle { angle: name.to_owned(), factor: 1.0 },
             _ => Part::Other,
         };
-        Self::of(part, None)
+        Self::new(part, None)
     }
 
     fn negative(self) -> Self {
@@ -108,7 +108,7 @@ impl Steps for Traced {
             Part::Angle { angle, factor } => Part::Angle { angle, factor: -factor },
             Part::Other => Part::Other,
         };
-        Self::of(part, self.found)
+        Self::new(part, self.found)
     }
 
     fn operator(self, sign: char, right: Self) -> Self {
@@ -122,21 +122,21 @@ impl Steps for Traced {
                     '/' => a / b,
                     _ => a.powf(b),
                 };
-                Self::of(Part::Number { value, with_pi: one || two }, found)
+                Self::new(Part::Number { value, with_pi: one || two }, found)
             }
             (Part::Angle { angle, factor }, '+' | '-', Part::Number { value, with_pi })
             | (Part::Number { value, with_pi }, '+' | '-', Part::Angle { angle, factor }) => {
                 let found = found.or_else(|| against(&angle, factor, value, with_pi));
-                Self::of(Part::Angle { angle, factor }, found)
+                Self::new(Part::Angle { angle, factor }, found)
             }
             (Part::Angle { angle, factor }, '*' | '/', Part::Number { value, .. })
             | (Part::Number { value, .. }, '*', Part::Angle { angle, factor }) => {
                 let factor = if sign == '/' { factor / value } else { factor * value };
                 let is_conversion = (factor.abs() * 180.0 / PI - 1.0).abs() < 1e-3;
                 let found = found.or_else(|| is_conversion.then(|| InDegrees::Converted { angle: angle.clone() }));
-                Self::of(Part::Angle { angle, factor }, found)
+                Self::new(Part::Angle { angle, factor }, found)
             }
-            _ => Self::of(Part::Other, found),
+            _ => Self::new(Part::Other, found),
         }
     }
 
@@ -151,12 +151,12 @@ impl Steps for Traced {
             ("mod", [Part::Angle { angle, factor }, Part::Number { value, with_pi }]) => {
                 found = found.or_else(|| against(angle, *factor, *value, *with_pi));
                 let part = Part::Angle { angle: angle.clone(), factor: *factor };
-                Self::of(part, found)
+                Self::new(part, found)
             }
             ("abs", [Part::Angle { angle, factor }]) => {
-                Self::of(Part::Angle { angle: angle.clone(), factor: factor.abs() }, found)
+                Self::new(Part::Angle { angle: angle.clone(), factor: factor.abs() }, found)
             }
-            _ => Self::of(Part::Other, found),
+            _ => Self::new(Part::Other, found),
         }
     }
 

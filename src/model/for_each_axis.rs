@@ -1,0 +1,80 @@
+//! A row of effects with `axes` stands for one row of each axis: letters in braces follow the axis ([`AxisName::fill_in`]).
+
+use super::as_written::{EffectAsWritten, Placed, Typical};
+use crate::axes::AxisName;
+
+/// The rows of a file, one for each axis. Rows with `with_previous` are repeated together with the row before them.
+pub(super) fn expand(
+    rows: Vec<EffectAsWritten>,
+    mut axes: impl FnMut(&[Placed]) -> Vec<AxisName>,
+) -> Vec<EffectAsWritten> {
+    let mut out = Vec::new();
+    for together in rows.chunk_by(|_, next| next.with_previous) {
+        let letters = together.first().map(|row| axes(&row.axes)).unwrap_or_default();
+        if letters.is_empty() {
+            out.extend_from_slice(together);
+        }
+        for (number, axis) in letters.into_iter().enumerate() {
+            out.extend(together.iter().map(|row| row.for_axis(axis, number)));
+        }
+    }
+    out
+}
+
+impl EffectAsWritten {
+    fn for_axis(&self, axis: AxisName, number: usize) -> Self {
+        let mut row = self.clone();
+        let Self { name, says, look, mends, .. } = &mut row;
+        [name, says, look, mends].into_iter().for_each(|text| *text = axis.fill_in(text));
+        let placed = |word: &mut Placed| *word.get_mut() = axis.fill_in(word.get_ref());
+        [&mut row.id, &mut row.at].into_iter().chain(&mut row.needs).chain(&mut row.unless).for_each(placed);
+        for term in &mut row.terms {
+            let always = [&mut term.parameter, &mut term.dof, &mut term.formula];
+            always.into_iter().chain(&mut term.at).for_each(placed);
+            [&mut term.iso, &mut term.alias].into_iter().flatten().for_each(|text| *text = axis.fill_in(text));
+            if let Some(Typical::Each(sizes)) = &term.typical {
+                term.typical = sizes.get(number).copied().map(Typical::All);
+            }
+        }
+        for shape in &mut row.shape {
+            std::iter::once(&mut shape.parameter).chain(&mut shape.between).for_each(placed);
+        }
+        row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diag::source;
+    use crate::model::catalogue::Catalogue;
+
+    #[test]
+    fn a_row_stands_for_each_of_its_axes() {
+        let row = |id: &str, more: &str| {
+            format!(
+                "[[effect]]\nid = \"{id}-{{a}}\"\n{more}\nname = \"Tilt of {{A}}\"\nat = \"{{A}}\"\nterms = [{{ parameter = \
+                 \"q{id}_{{B}}{{A}}\", unit = \"urad\", dof = \"r{{y}}\", formula = \"sin({{A}})\", typical = [3.0, 5.0] }}]\n"
+            )
+        };
+        let text = row("p", "axes = [\"A\", \"C\"]") + &row("q", "with_previous = true");
+        let mut catalogue = Catalogue::default();
+        catalogue.add_file(&source("my.toml", text.clone())).unwrap();
+        let found: Vec<_> = catalogue
+            .iter()
+            .map(|e| {
+                let (p, t) = (&e.parameters[0], &e.terms[0]);
+                (e.id.as_str(), e.name.as_str(), p.name.as_str(), p.typical, t.component, t.formula.text())
+            })
+            .collect();
+        // about A the other two are Y and Z, about C they are X and Y
+        let expected = [
+            ("p-a", "Tilt of A", "qp_BA", 3.0, 4, "sin(A)"),
+            ("q-a", "Tilt of A", "qq_BA", 3.0, 4, "sin(A)"),
+            ("p-c", "Tilt of C", "qp_AC", 5.0, 3, "sin(C)"),
+            ("q-c", "Tilt of C", "qq_AC", 5.0, 3, "sin(C)"),
+        ];
+        assert_eq!(found, expected);
+        let wrong = Catalogue::default().add_file(&source("my.toml", text.replace("\"C\"]", "\"Q\"]"))).unwrap_err();
+        assert_eq!(wrong.0[0].code, "effects::axis");
+    }
+}
