@@ -2,7 +2,6 @@
 //! points that were not measured, or what stays was foretold, or nothing is exported, with the reason.
 //!
 //! `cargo run --release --example any_machine 2000` makes more draws.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod draw;
 mod way;

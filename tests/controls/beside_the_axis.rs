@@ -1,7 +1,6 @@
 //! The loop by its verbs on machines whose axes do not meet, or have no end: what is exported makes the machine right.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use common::verbs::ok;
 use serde_json::Value;
 use std::path::Path;
@@ -153,7 +152,7 @@ fn around(at: &Path, machine: &str, effects: &str) -> (Value, Value) {
 fn the_case_of_an_axis_beside_the_pivot() {
     macro_rules! file {
         ($name:literal) => {
-            ($name, include_str!(concat!("beside_the_axis/axis-beside-pivot/", $name)))
+            ($name, include_str!(concat!("../beside_the_axis/axis-beside-pivot/", $name)))
         };
     }
     let folder =
@@ -210,7 +209,7 @@ fn the_case_of_an_axis_beside_the_pivot() {
 fn the_case_of_a_table_for_an_endless_axis() {
     macro_rules! file {
         ($name:literal) => {
-            ($name, include_str!(concat!("beside_the_axis/endless-axis-table/", $name)))
+            ($name, include_str!(concat!("../beside_the_axis/endless-axis-table/", $name)))
         };
     }
     let folder = public_case(&[file!("endless.toml"), file!("program.toml"), file!("wrong.toml")]);

@@ -1,8 +1,6 @@
 //! `check`: generated programs pass, edited ones are caught.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-#[path = "check/edits.rs"]
-mod edits;
+use crate::edits;
 
 use axiscal::diag::source;
 use axiscal::post::{Postprocessor, parse};

@@ -1,9 +1,6 @@
 //! `axiscal check` without a plan: conditions on what a proof cannot know are run both ways, and what reaches beyond the program is named.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)] // a failure has its place
-#![allow(dead_code)] // it uses a part of what the other tests use
 
-#[path = "check/edits.rs"]
-mod edits;
+use crate::edits;
 
 use assert_cmd::Command;
 use serde_json::Value;

@@ -5,7 +5,6 @@
 //! - The crate `gcode` on the literal motion of Fanuc and Haas: what it does not know is an error.
 //! - `nc-gcode-interpreter` on the motion of SINUMERIK. tests/readers/install.sh installs it; where it is not, the test is left
 //!   out with a word, and AXISCAL_READERS=required makes that a failure.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use axiscal::axes::{AxisName, Position};
 use axiscal::diag::source;

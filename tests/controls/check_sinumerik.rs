@@ -1,10 +1,7 @@
 //! `check` for SINUMERIK: what is generated passes on every machine and in every variant, what is edited is caught with the
 //! right words.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-#[path = "check/edits.rs"]
-#[allow(dead_code)] // it uses a part of it
-mod edits;
+use crate::edits;
 
 use axiscal::check::{Against, Checked, check};
 use axiscal::diag::{Failure, Source, source};

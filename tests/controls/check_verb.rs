@@ -1,9 +1,6 @@
 //! `axiscal check` from outside: exit codes, messages, the files beside a program.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)] // a failure has its place
-#![allow(dead_code)] // it uses a part of what the other tests use
 
-#[path = "check/edits.rs"]
-mod edits;
+use crate::edits;
 
 use assert_cmd::Command;
 use predicates::prelude::*;
@@ -570,7 +567,7 @@ fn a_variant_of_linuxcnc_has_its_transformations() {
 #[test]
 fn a_rotary_axis_may_have_its_own_zero() {
     let folder = tempfile::tempdir().unwrap();
-    let machines = include_str!("../machines.toml");
+    let machines = include_str!("../../machines.toml");
     let (before, own) = machines.split_once("name = \"trunnion\"").unwrap();
     let own = own.replacen("C = 0.0 }", "C = -31.0 }", 1);
     std::fs::write(folder.path().join("ours.toml"), format!("{before}name = \"trunnion\"{own}")).unwrap();

@@ -1,8 +1,7 @@
 //! Identified → exported → applied by the virtual machine's control → probed again: the error is gone, or what is left is
 //! what was predicted.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::diag::source;
 use axiscal::fit::Fit;
 use axiscal::machine::Machine;

@@ -1,7 +1,6 @@
 //! A compensation as `export` writes it, applied by the virtual machine's control: what it carries is gone.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::diag::source;
 use axiscal::machine::{Carrier, Machine, Mounting, Side};
 use axiscal::post::Postprocessor;

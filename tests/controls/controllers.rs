@@ -1,8 +1,7 @@
 //! The programs of every controller: what any of them must hold to, and one of each as a file to read.
 //!
-//! The files stand in `programs/emitted/`. After a change that is meant: `AXISCAL_RENEW=1 cargo test --test controllers
-//! emitted`, then read the difference before it is committed.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)] // a failure has its place
+//! The files stand in `programs/emitted/`. After a change that is meant: `AXISCAL_RENEW=1 cargo test --test controls emitted`, then
+//! read the difference before it is committed.
 
 use axiscal::diag::source;
 use axiscal::machine::{self, Machine};

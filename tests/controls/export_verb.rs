@@ -1,7 +1,6 @@
 //! `axiscal export` from outside: old values, units, refusals, and what stands in the files.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use assert_cmd::Command;
 use common::*;
 use predicates::prelude::*;

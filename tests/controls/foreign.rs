@@ -1,7 +1,6 @@
 //! Files that others wrote: logs of other programs, programs of other people, machines and programs with one mistake in them. Read are
 //! JSON answers and exit codes.
 // a panic in a test is a failure with its place
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use assert_cmd::Command;
 use serde_json::Value;

@@ -1,5 +1,4 @@
 //! `generate` and `programs` from outside: files, exit codes, messages.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use assert_cmd::Command;
 use axiscal::diag::source;

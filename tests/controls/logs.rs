@@ -1,5 +1,4 @@
 //! The corpus of logs: what is good is read, what is damaged is said with its place. One line of a table per file.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use axiscal::diag::{Finding, Severity, source};
 use axiscal::log::{self, Reader, Status, Writer};
@@ -28,7 +27,7 @@ const fn case(
     Case { file, touches, findings, says }
 }
 
-include!("logs/expected.rs");
+include!("../logs/expected.rs");
 
 fn folder() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/logs"))

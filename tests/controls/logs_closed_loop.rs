@@ -3,9 +3,8 @@
 //!
 //! What the decimals of a log cost is measured here for every format and compared with what the guide states
 //! (`docs/guide/controllers.md`).
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::axes::Position;
 use axiscal::check::{Against, check};
 use axiscal::diag::{Severity, source};
@@ -173,7 +172,7 @@ fn logs() -> Vec<Writing> {
 
 /// The table of the guide: format → offsets (um), tilts (deg).
 fn stated() -> BTreeMap<String, [f64; 2]> {
-    let guide = include_str!("../docs/guide/controllers.md");
+    let guide = include_str!("../../docs/guide/controllers.md");
     let table = guide.split("### What the decimals of a log cost").nth(1).unwrap().split("###").next().unwrap();
     let mut stated = BTreeMap::new();
     for row in table.lines().filter(|l| l.starts_with("| mm") || l.starts_with("| inch")) {

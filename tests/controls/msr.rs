@@ -3,7 +3,6 @@
 //!
 //! The public files are Autodesk's (PowerShapeAndPowerMillAPI, MIT) and no part of the project; where they are missing
 //! the test says so. `AXISCAL_REQUIRE_SHARED_DATA=1` makes that a failure.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use axiscal::diag::Finding;
 use axiscal::log::points::{Points, PointsForm, parse};

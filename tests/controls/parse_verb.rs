@@ -1,6 +1,5 @@
 //! `parse` and `controllers` from outside: files, exit codes, messages. What a log gives is in `logs.rs`.
 // a panic in a test is a failure with its place
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use assert_cmd::Command;
 use predicates::prelude::*;

@@ -1,11 +1,6 @@
 //! The tables of a correction: the mapping against an independent calculation, the C component against the Rust one, the
 //! stock modules as installed, and what an export writes.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-#[path = "../common/random.rs"]
-mod random;
-
 mod again;
 mod backups;
 mod by_hand;

@@ -1,10 +1,8 @@
 //! What a plan can tell before the first touch, against the numbers of the design study (head and table programs of the
 //! paper there and here; its typical sizes and grids differ a little, and C turns the other way, so that figures agree to
 //! some tens of per cent and ranks exactly).
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-#[path = "../common/mod.rs"]
-mod common;
+use crate::common;
 mod shapes;
 
 use assert_cmd::Command;

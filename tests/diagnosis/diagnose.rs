@@ -1,7 +1,6 @@
 //! What `diagnose` must never say: a name where nothing is missing, and anything small where touches are missing.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::diagnose::answer::Diagnosis;
 use axiscal::diagnose::{Options, Subject, Verdict, diagnose};
 use axiscal::fit::{self, Settings};

@@ -1,7 +1,6 @@
 //! `diagnose`, `compare` and `sketch-effect` from outside: exit codes, the contract's JSON, rubbish.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use common::verbs::{axiscal, folder, json, ok};
 use serde_json::Value;

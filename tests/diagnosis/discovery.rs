@@ -1,17 +1,12 @@
 //! Hidden effects, at counts that a test can afford; bars are those of docs/discovery.md widened by the sampling error of
 //! these counts (three standard errors). `cargo run --release --example discovery` makes the full counts.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
-#[path = "discovery/mod.rs"]
-mod discovery;
-
+use crate::discovery_bench::find;
+use crate::discovery_bench::measure::{Outcome, both_named, clean, planted, two};
+use crate::discovery_bench::plant::{self, Bench};
+use crate::discovery_bench::strange;
 use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, with_effects};
 use axiscal::model::catalogue::Catalogue;
-use discovery::find;
-use discovery::measure::{Outcome, both_named, clean, planted, two};
-use discovery::plant::{self, Bench};
-use discovery::strange;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

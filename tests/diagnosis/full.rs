@@ -1,8 +1,7 @@
 //! The `full` programs: that the plan holds what names effects, that the program stops where a person must act, and that
 //! its log comes back whole.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use assert_cmd::Command;
 use axiscal::axes::{AxisMap, AxisName};

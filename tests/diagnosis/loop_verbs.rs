@@ -1,7 +1,6 @@
 //! `compare`, `add`, `remove`, `history` and `verify` from outside, and the held-out error against real refits.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use assert_cmd::Command;
 use axiscal::compare::compare;
 use axiscal::fit::{Mask, Settings, held_out};

@@ -1,8 +1,7 @@
 //! What `diagnose` says to do next is something that can be done: each command runs, and what no command can do is said as
 //! an action at the machine. A gross mistake in the log stops every verb alike.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use common::verbs::{axiscal, json, ok, study, touched};
 use serde_json::Value;

@@ -1,7 +1,4 @@
 //! A pair that the paper's plan cannot tell apart, the program that parts it, its log in the study, and the answer.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
-
-mod common;
 
 use assert_cmd::Command;
 use std::path::Path;

@@ -1,8 +1,7 @@
 //! A plan and its log belong together: every number of a plan is edited after the log was made. The fit is then the same one (it
 //! does not read the number), or the plan or the log is refused with a code.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use axiscal::cli::Io;
 use axiscal::cli::load::{load_plan, load_study_alone};
@@ -176,7 +175,7 @@ fn an_edited_number_gives_the_same_fit_or_is_refused() {
     assert!(numbers >= 400 && refused >= 4 * numbers, "{counts:?}");
 }
 
-/// All touches of a program, some minutes: `cargo test --test plan_sweep -- --ignored --nocapture`.
+/// All touches of a program, some minutes: `cargo test --test diagnosis plan_sweep -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes"]
 fn every_number_of_a_plan_gives_the_same_fit_or_is_refused() {

@@ -1,7 +1,6 @@
 //! `solve`: whatever two effects act, it ends on a model that was diagnosed, and never on one that is worse than a model before.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use axiscal::diag::{Result, source};
 use axiscal::diagnose::answer::Candidate;

@@ -1,6 +1,5 @@
 //! The guide's story, run as it stands: every command of its `sh` blocks, with the file that it shows, and every line of
 //! its `text` blocks must be in the answers of the commands before it.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use assert_cmd::Command;
 

@@ -1,6 +1,5 @@
 //! The search on a real machine's measurements with a published answer: 44 pointings of the Rubin Auxiliary Telescope
 //! (tstn-014 of lsst-tstn, © 2020 AURA, CC BY 4.0). The data stand beside the project and are not part of it.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use axiscal::search::forward::{Reason, forward};
 use axiscal::search::{Basis, KEPT, Library, Origin, Question, Search};

@@ -1,6 +1,5 @@
 //! Bad input through the binary: a clear message with the place, exit code 2 (or a warning and 0 where the rest is usable),
 //! never a panic, never a half-written file.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -260,7 +259,7 @@ fn broken_toml_has_line_and_column() {
 #[test]
 fn a_machine_with_several_mistakes_gets_all_findings_at_once() {
     let job = Job::new();
-    let text = include_str!("../machines.toml");
+    let text = include_str!("../../machines.toml");
     let damaged = text
         .replacen("parent = \"base\"\n", "", 1) // X has no parent
         .replacen("direction = [0.0, 1.0, 0.0]\n", "", 1) // Y has no direction

@@ -1,6 +1,5 @@
 //! What the program is made of: every crate has a licence that `licences.toml` allows, and every crate that `Cargo.toml` names stands in
 //! `docs/dependencies.md`.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use std::collections::BTreeSet;
 use std::process::Command;

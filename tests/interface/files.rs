@@ -1,10 +1,7 @@
 //! Files through the binary: no output over an input, one writer at a time, exports whole, inputs that are no files.
 #![cfg(unix)] // links of both kinds, devices, pipes
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
-#![allow(dead_code)] // it uses a part of what the tests of the verbs use
 
-#[path = "common/verbs.rs"]
-mod verbs;
+use crate::common::verbs;
 
 use std::io::Write;
 use std::path::Path;

@@ -1,7 +1,6 @@
 //! Files with very many mistakes: read in a time that grows with their length, and the first mistakes named with the count of the others.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use common::verbs::{COMMON, json, ok};
 use serde_json::Value;
 use std::fmt::Write as _;

@@ -1,6 +1,5 @@
 //! `report` from outside: one page that holds everything and fetches nothing, whatever stands in the user's files; the plots
 //! without a browser; the tolerance.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use assert_cmd::Command;
 use predicates::prelude::*;

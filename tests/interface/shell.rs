@@ -1,5 +1,4 @@
 //! Completions and manual pages: of every verb, for every shell, and the same bytes every time.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use assert_cmd::Command;
 

@@ -1,5 +1,4 @@
 //! What people see: no line is wider than the terminal, a pipe gets neither colours nor bars, `NO_COLOR` is heard.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use assert_cmd::Command;
 use portable_pty::{CommandBuilder, PtySize, native_pty_system};

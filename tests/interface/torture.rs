@@ -1,6 +1,5 @@
 //! A short run of `examples/torture.rs`: calls that are killed, and calls that change one study at the same time.
 #![cfg(unix)] // a kill that nothing can catch
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 #[path = "torture/runs.rs"]
 mod runs;

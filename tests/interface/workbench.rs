@@ -1,5 +1,4 @@
 //! The workbench from outside, over plain HTTP: what it must refuse, what it must not break.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};

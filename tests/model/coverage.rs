@@ -1,9 +1,6 @@
 //! Errors scatter as their uncertainties say: a smaller count of what `examples/coverage.rs` runs in full.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
-#[path = "common/coverage.rs"]
-mod coverage;
+use crate::coverage_cases as coverage;
 
 #[test]
 fn uncertainties_are_those_of_the_errors() {

@@ -1,7 +1,6 @@
 //! Every effect, on every machine to which it applies: the analytic derivative of a touch against central differences.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::axes::{AxisName, Position};
 use axiscal::diag::source;
 use axiscal::machine::{Carrier, Machine, Side};

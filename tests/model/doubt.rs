@@ -1,8 +1,7 @@
 //! What a fit says about its own doubt: noise from repeats and revisits, touches that do not belong, type B rows,
 //! another reference point, priors counted once, weak combinations.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::fit::outcome::{Outcome, Status};
 use axiscal::fit::{Fit, Knowledge, Mask, Settings, uncertainty};
 use axiscal::log::Touch;

@@ -1,7 +1,6 @@
 //! No formula ends the process, and none within the bounds takes long: neither its reading, nor its derivatives, nor a fit.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::diag::source;
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::formula::{Formula, State, VARIABLES};

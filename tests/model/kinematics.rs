@@ -1,8 +1,7 @@
 //! The chain's own check values: displacements of the ball of the paper's two heads, exact and to first order, and readings
 //! of the turntable. (The virtual machine has the same numbers as tests of its own.)
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::axes::{AxisName, Position};
 use axiscal::machine::{Carrier, Machine};
 use axiscal::model::catalogue::Catalogue;

@@ -1,7 +1,6 @@
 //! A fit that did not converge is an answer "no", exit code 1, in every verb that shows a fit.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use common::verbs;
 use std::path::Path;

@@ -1,8 +1,7 @@
 //! A user's own effects are equal to the built-in ones: planted by the virtual machine from the file, predicted by the
 //! model from the same file, by two readings that share no code.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use assert_cmd::Command;
 use axiscal::diag::source;
 use axiscal::machine::{Machine, Mounting};

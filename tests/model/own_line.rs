@@ -12,9 +12,8 @@
 //! With ω = 1 mrad: tan ω = 0.001 000 000 333, 1/cos ω = 1.000 000 500. A turn by ω of a plane whose distance from the
 //! line is h, touched at a distance a along the plane from the foot of that line, is met at h / cos ω + a · tan ω: the
 //! reading (met less nominal, outwards) is h · (1/cos ω - 1) + a · tan ω.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::machine::{self, Machine};

@@ -1,7 +1,6 @@
 //! The paper's tables, digit by digit, and the sequence of its section "head, compensate, table, compensate".
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::model::catalogue::Catalogue;
 use axiscal::paper::tables::{Bench, GIVEN, all};
 use axiscal::program;

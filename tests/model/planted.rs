@@ -1,8 +1,7 @@
 //! Every effect of the catalogue, planted in the virtual machine, against what the model predicts for it: the two share
 //! no arithmetic and no formula, so that where they agree both are right.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::diag::source;
 use axiscal::machine::{Machine, Mounting};
 use axiscal::model::catalogue::{Catalogue, Effect, Parameter};

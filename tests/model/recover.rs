@@ -1,7 +1,6 @@
 //! Plant → touch on the virtual machine → fit: what was planted must come back, and what cannot be told must be said.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 use axiscal::fit::Settings;
 use axiscal::fit::outcome::Status;
 use axiscal::simulate::Scenario;

@@ -1,9 +1,7 @@
 //! Shape parameters: time constants, pitches, moments at which something jumps. What the touches say of them, and where they say
 //! nothing.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-#[path = "../common/mod.rs"]
-mod common;
+use crate::common;
 mod jumps;
 
 use axiscal::fit::Knowledge;

@@ -1,8 +1,7 @@
 //! A log that is better than its probe, a log with temperatures here and there, values that hold more than their names say,
 //! and a statement at another point: nothing is invented, and nothing is left out in silence.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use axiscal::design::{Noise, Planned, Request, Task, assess};
 use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose};

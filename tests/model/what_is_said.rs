@@ -1,8 +1,7 @@
 //! What the answers say is true where data are few, stated wrongly or cannot tell: an aborted run, a wrong noise, a room
 //! that only warms, effects that no touches part.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
-mod common;
+use crate::common;
 
 use axiscal::design;
 use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose};

@@ -1,7 +1,7 @@
 //! The whole way on a drawn machine: program → virtual machine → log → identify → export → the virtual machine with the
 //! compensation → a second program at other points → what is left, and whether it was foretold.
 
-use crate::draw;
+use super::draw;
 use axiscal::diag::source;
 use axiscal::fit::{self, Fit, Settings};
 use axiscal::log::{self, Writer};

@@ -1,10 +1,10 @@
 //! Measured again: what acted on the touches is added to, what did not act is replaced, what the touches do not tell stays.
 
-use crate::controls::{
+use super::controls::{
     CONTROLS, Planted, accepting, correction, described, found_during, found_with_held, left, loaded, plan, readings,
     scenario, tables, text,
 };
-use crate::support::machine;
+use super::support::machine;
 use axiscal::diag::source;
 use axiscal::machine::Machine;
 use axiscal::post::tables::LengthUnit;

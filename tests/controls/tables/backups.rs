@@ -1,7 +1,7 @@
 //! The forms in which controls give their values out, and what a backup must not be taken for.
 
-use crate::controls::{Planted, accepting, correction, tables, text};
-use crate::support::machine;
+use super::controls::{Planted, accepting, correction, tables, text};
+use super::support::machine;
 use axiscal::diag::{Finding, Severity, source};
 use axiscal::post::tables::Tables;
 use axiscal::tables::compensation::Compensation;
@@ -220,7 +220,7 @@ fn each_table_has_its_own_old_values() {
 #[test]
 fn the_head_of_the_position_tables_stands_first() {
     let planted: Planted = vec![("scale-x", "EXX", 20.0)];
-    let export = crate::controls::export(&machine("trunnion"), "sinumerik", &planted, &accepting());
+    let export = super::controls::export(&machine("trunnion"), "sinumerik", &planted, &accepting());
     for name in ["axiscal_cec.ini", "restore_cec.ini"] {
         assert!(text(&export, name).starts_with("%_N_NC_CEC_INI\n;"), "{}", text(&export, name));
     }

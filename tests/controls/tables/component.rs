@@ -1,6 +1,6 @@
 //! The C component: compiled, loaded, and compared with the Rust mapping.
 
-use crate::support::{MACHINES, Spread, all_terms, ask, harness, have, here, machine, pose, run};
+use super::support::{MACHINES, Spread, all_terms, ask, harness, have, here, machine, pose, run};
 use axiscal::axes::Position;
 use axiscal::fit::outcome::Outcome;
 use axiscal::machine::Machine;
@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn source(machine: &Machine) -> String {
-    let outcome: Outcome = crate::export::outcome(&machine.name, &[]);
+    let outcome: Outcome = super::export::outcome(&machine.name, &[]);
     let (correction, _) = Correction::collect(
         machine,
-        &crate::support::catalogue(),
+        &super::support::catalogue(),
         &outcome,
         During { loaded: None, transformation: true },
         Provenance::default(),

@@ -1,7 +1,7 @@
 //! The proof by return: identified errors → the control's own files → read by the virtual machine's control, by what the
 //! manual says that they mean → probed at other points → the error is gone but for what was foretold.
 
-use crate::support::{MACHINES, Spread, catalogue, machine};
+use super::support::{MACHINES, Spread, catalogue, machine};
 use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::fit::outcome::Status;
@@ -66,7 +66,7 @@ pub fn found_with_held(machine: &Machine, planted: &Planted, held: &[&str], duri
         data_date: "2026-11-20".into(),
         forced: Vec::new(),
     };
-    let mut outcome = crate::export::outcome(&machine.name, &rows);
+    let mut outcome = super::export::outcome(&machine.name, &rows);
     // where the virtual machine states its errors
     outcome.reference_mm = machine.reference.pivot.into();
     Correction::collect(machine, &catalogue, &outcome, during, provenance).unwrap().0
@@ -171,7 +171,7 @@ pub fn plan(machine: &Machine, seed: u64) -> Plan {
     let last = machine.side(Side::Workpiece).last().unwrap().name;
     let borne = |m: &&axiscal::machine::Mounting| m.carrier == Carrier::Axis(last) || !last.is_rotary();
     let mounting = machine.mountings.iter().find(borne).unwrap();
-    let mut plan = crate::random::random_plan(machine, mounting, 80, &mut ChaCha8Rng::seed_from_u64(seed));
+    let mut plan = crate::common::random::random_plan(machine, mounting, 80, &mut ChaCha8Rng::seed_from_u64(seed));
     plan.touches.retain(|t| t.tool_length_mm == Some(machine.tool.length_mm));
     plan.controller_frame = ControllerFrame::Tcp;
     plan
@@ -517,7 +517,7 @@ fn a_longer_tool_is_off_as_foretold() {
         let last = machine.side(Side::Workpiece).last().unwrap().name;
         let mounting =
             machine.mountings.iter().find(|m| m.carrier == Carrier::Axis(last) || !last.is_rotary()).unwrap();
-        let mut plan = crate::random::random_plan(&machine, mounting, 200, &mut ChaCha8Rng::seed_from_u64(3));
+        let mut plan = crate::common::random::random_plan(&machine, mounting, 200, &mut ChaCha8Rng::seed_from_u64(3));
         plan.controller_frame = ControllerFrame::Tcp;
         let control = loaded(&machine, &export, None);
         let all = readings(&machine, &plan, &scenario(&machine, &planted), Some(&control));

@@ -43,7 +43,7 @@ pub fn outcome(machine: &str, parameters: &[(&str, &str, f64, &str, Status)]) ->
     }
 }
 
-use crate::support::{Spread, catalogue, have, machine, pose, run};
+use super::support::{Spread, catalogue, have, machine, pose, run};
 use axiscal::axes::AxisName;
 use axiscal::diag::source;
 use axiscal::tables::compensation::{Compensation, Mode, Provenance};
@@ -457,10 +457,10 @@ fn a_table_of_the_user_s_own_is_not_silently_replaced() {
 /// The nine numbers give the offset of any pose, and that offset puts the ball over the point.
 #[test]
 fn the_work_offset_puts_its_point_right_at_every_pose() {
-    for name in crate::support::MACHINES {
+    for name in super::support::MACHINES {
         let machine = machine(name);
         let mut spread = Spread::new(11);
-        let terms = crate::support::all_terms(&machine, &mut spread);
+        let terms = super::support::all_terms(&machine, &mut spread);
         let reference = [0.0, 0.0, -250.0];
         // a zero error turns the second axis's lever at an angle that is off: home offsets hold it
         let terms: Vec<_> = terms.into_iter().filter(|t| t.place != axiscal::tables::place::Place::Zero).collect();
@@ -473,7 +473,7 @@ fn the_work_offset_puts_its_point_right_at_every_pose() {
             let carrier = axiscal::machine::Carrier::Axis(carrier.unwrap().name);
             let world = machine.linear_for_ball(carrier, &at, &offset.point_mm, 202.684).unwrap();
             let told = world.with_xyz_mm(world.xyz_mm() + offset.at(angles));
-            let tip = crate::by_hand::tip(&machine, &told, &terms, reference, 202.684);
+            let tip = super::by_hand::tip(&machine, &told, &terms, reference, 202.684);
             for k in 0..3 {
                 assert!((tip[k] - offset.point_mm[k]).abs() < 1e-8, "{name}: {tip:?}");
             }
@@ -507,7 +507,7 @@ fn names_stay_inside_their_comments() {
         std::fs::write(folder.path().join(c), files[c]).unwrap();
         let mut gcc = std::process::Command::new("gcc");
         gcc.args(["-std=gnu11", "-Wall", "-Werror", "-c", "-o", "/dev/null", "-I"]);
-        run(gcc.arg(crate::support::here("linuxcnc_kins/stub")).arg(folder.path().join(c)));
+        run(gcc.arg(super::support::here("linuxcnc_kins/stub")).arg(folder.path().join(c)));
     }
 }
 

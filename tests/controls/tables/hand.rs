@@ -3,8 +3,8 @@
 //! HEIDENHAIN and Haas have no page that says what their values mean: their examples only hold the sheets to what this program
 //! means by them (round trip only).
 
-use crate::controls::{accepting, correction, export, loaded, plan, readings, scenario, tables, text};
-use crate::support::machine;
+use super::controls::{accepting, correction, export, loaded, plan, readings, scenario, tables, text};
+use super::support::machine;
 use axiscal::diag::source;
 use axiscal::machine::Machine;
 use axiscal::post::tables::LengthUnit;

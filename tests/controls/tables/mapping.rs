@@ -1,7 +1,7 @@
 //! World ↔ joints against the independent chain.
 
-use crate::by_hand::tip;
-use crate::support::{MACHINES, Spread, all_terms, machine, pose};
+use super::by_hand::tip;
+use super::support::{MACHINES, Spread, all_terms, machine, pose};
 use axiscal::tables::kins::{Errors, Kins};
 
 /// The whole purpose: driven to the joints, the real machine holds the tip where the errorless one holds it at the world

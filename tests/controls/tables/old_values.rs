@@ -1,7 +1,7 @@
 //! What the control held before: from the user's backup, by hand, in part, or of another machine.
 
-use crate::controls::{CONTROLS, Planted, accepting, correction, tables, text};
-use crate::support::machine;
+use super::controls::{CONTROLS, Planted, accepting, correction, tables, text};
+use super::support::machine;
 use axiscal::diag::source;
 use axiscal::machine::Machine;
 use axiscal::post::tables::{LengthUnit, Tables};
@@ -221,7 +221,7 @@ fn the_readme_names_no_file_that_is_not_written() {
         (vec![("location-c", "EX0C", 0.01)], false),
         (vec![("location-c", "EX0C", 0.01), ("scale-x", "EXX", 20.0)], true),
     ] {
-        let export = crate::controls::export(&machine, "sinumerik", &planted, &accepting());
+        let export = super::controls::export(&machine, "sinumerik", &planted, &accepting());
         assert_eq!(export.files.iter().any(|(n, _)| n == "axiscal_cec.ini"), there);
         assert_eq!(text(&export, "README.txt").contains("axiscal_cec.ini"), there);
     }
@@ -238,7 +238,7 @@ fn a_sheet_of_the_other_unit_is_converted() {
     let planted: Planted = vec![("location-a", "EY0A", 0.02)];
     for control in ["haas", "heidenhain", "sinumerik"] {
         let t = tables(control);
-        let first = crate::controls::export(&machine, control, &planted, &accepting());
+        let first = super::controls::export(&machine, control, &planted, &accepting());
         let restore = t.file[0].restore.clone().unwrap();
         let old = read_old(&machine, &t, &text(&first, &restore));
         assert_eq!(old.unit(old.values.keys(), LengthUnit::Inch), Some(LengthUnit::Mm), "{control}");
@@ -276,7 +276,7 @@ fn what_was_assumed_stays_assumed() {
     let planted: Planted = vec![("location-a", "EY0A", 0.02)];
     for control in CONTROLS {
         let t = tables(control);
-        let first = crate::controls::export(&machine, control, &planted, &accepting());
+        let first = super::controls::export(&machine, control, &planted, &accepting());
         let restore = t.file[0].restore.clone().unwrap();
         let again = |text_of: &str| {
             let options = Options { old: read_old(&machine, &t, text_of), ..accepting() };
@@ -358,7 +358,7 @@ fn what_is_left_has_one_definition() {
     let machine = machine("trunnion");
     let planted: Planted = vec![("location-a", "EB0A", 0.0041)];
     let of = |control: &str| {
-        let export = crate::controls::export(&machine, control, &planted, &accepting());
+        let export = super::controls::export(&machine, control, &planted, &accepting());
         export.left.iter().find(|l| l.parameter == "EB0A").unwrap().left_um.unwrap()
     };
     let by_hand = 0.0041_f64.to_radians() * 100.0 * 1e3;

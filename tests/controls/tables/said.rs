@@ -1,8 +1,8 @@
 //! What a control cannot carry is said, with the error that it leaves: every parameter of every effect, on every machine,
 //! for every control, is either in a table or in the list of what stays. Nothing is dropped in silence.
 
-use crate::controls::{CONTROLS, accepting, tables, text};
-use crate::support::{MACHINES, catalogue, machine};
+use super::controls::{CONTROLS, accepting, tables, text};
+use super::support::{MACHINES, catalogue, machine};
 use axiscal::diag::{Failure, Severity};
 use axiscal::fit::outcome::Status;
 use axiscal::machine::Machine;
@@ -25,7 +25,7 @@ fn correction(machine: &Machine, effects: &[&Effect]) -> Correction {
             })
         })
         .collect();
-    let mut outcome = crate::export::outcome(&machine.name, &rows);
+    let mut outcome = super::export::outcome(&machine.name, &rows);
     outcome.reference_mm = machine.reference.pivot.into();
     Correction::collect(
         machine,

@@ -1,7 +1,7 @@
 //! The pins of the stock modules against the modules themselves, as LinuxCNC installs them.
 
-use crate::by_hand::tip;
-use crate::support::{Spread, ask, harness, have, machine, pose, term};
+use super::by_hand::tip;
+use super::support::{Spread, ask, harness, have, machine, pose, term};
 use axiscal::axes::{AxisName, Position};
 use axiscal::machine::{Carrier, Machine};
 use axiscal::post::Postprocessor;
@@ -107,7 +107,7 @@ fn a_left_handed_table_needs_the_joints_that_others_expect() {
     let (post, _) = Postprocessor::load_built_in_or_file("linuxcnc").unwrap();
     let module = stock::module_of(&machine, post.release(Some("master")).unwrap()).unwrap();
     assert_eq!((module.name, module.conventional), ("xyzbc-trt-kins", Some(true)));
-    let table = include_str!("../linuxcnc_kins/expected_xyzbc_trt.csv");
+    let table = include_str!("../../linuxcnc_kins/expected_xyzbc_trt.csv");
     assert_eq!(table.lines().count(), 4);
     for line in table.lines().skip(1) {
         let v: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();

@@ -86,17 +86,23 @@ fn draw(bench: &Bench, ids: &[String], bendable: &[String], rng: &mut ChaCha8Rng
     }
 }
 
+/// Cases that are drawn at the same time. The cases and their order do not depend on it.
+fn batch_size() -> u64 {
+    4 * rayon::current_num_threads() as u64
+}
+
 /// Planted cases until `count` of them have a noncentrality of 25 or more.
 pub fn planted(bench: &Bench, count: usize, seed: u64) -> Vec<Outcome> {
     let ids = plant::ids(&bench.machine);
     let bendable = plant::bendable(&bench.machine);
     let mut out = Vec::new();
-    let mut batch = 0;
+    let mut drawn = 0;
     while out.len() < count {
-        let more: Vec<Option<Outcome>> = (0..48)
+        let batch = batch_size();
+        let more: Vec<Option<Outcome>> = (drawn..drawn + batch)
             .into_par_iter()
             .map(|i| {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed + 1000 * (48 * batch + i));
+                let mut rng = ChaCha8Rng::seed_from_u64(seed + 1000 * i);
                 let base = plant::base(bench, &mut rng);
                 let hidden = draw(bench, &ids, &bendable, &mut rng);
                 let case = sized(bench, &base, hidden, rng.random_range(3.0..10.0));
@@ -104,7 +110,7 @@ pub fn planted(bench: &Bench, count: usize, seed: u64) -> Vec<Outcome> {
             })
             .collect();
         out.extend(more.into_iter().flatten());
-        batch += 1;
+        drawn += batch;
     }
     out.truncate(count);
     out
@@ -182,12 +188,13 @@ pub fn two(bench: &Bench, count: usize, seed: u64) -> Vec<(Vec<String>, Vec<Vec<
     let catalogue = Catalogue::built_in().unwrap();
     let ids = plant::ids(&bench.machine);
     let mut out = Vec::new();
-    let mut batch = 0;
+    let mut drawn = 0;
     while out.len() < count {
-        let more: Vec<Option<_>> = (0..24)
+        let batch = batch_size();
+        let more: Vec<Option<_>> = (drawn..drawn + batch)
             .into_par_iter()
             .map(|i| {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed + 1000 * (24 * batch + i));
+                let mut rng = ChaCha8Rng::seed_from_u64(seed + 1000 * i);
                 let base = plant::base(bench, &mut rng);
                 let mut wrong = base.clone();
                 let mut truths = Vec::new();
@@ -214,7 +221,7 @@ pub fn two(bench: &Bench, count: usize, seed: u64) -> Vec<(Vec<String>, Vec<Vec<
             })
             .collect();
         out.extend(more.into_iter().flatten());
-        batch += 1;
+        drawn += batch;
     }
     out.truncate(count);
     out

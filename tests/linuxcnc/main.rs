@@ -11,7 +11,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-#[path = "linuxcnc/stops.rs"]
 mod stops;
 
 type Check = Result<(), String>;
