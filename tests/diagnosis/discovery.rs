@@ -27,14 +27,14 @@ fn count(outcomes: &[Outcome], what: impl Fn(&Outcome) -> bool) -> usize {
 
 #[test]
 fn planted_effects_are_in_the_first_group_on_the_papers_plan() {
-    let found = planted(&Bench::paper(), 60, 101);
+    let found = planted(&Bench::paper(), 40, 101);
     check("first group", count(&found, |o| o.first_group), found.len(), 0.95);
     check("first three groups", count(&found, |o| o.first_three), found.len(), 0.985);
 }
 
 #[test]
 fn planted_effects_are_named_on_full() {
-    let found = planted(&Bench::full(), 40, 102);
+    let found = planted(&Bench::full(), 30, 102);
     check("first group", count(&found, |o| o.first_group), found.len(), 0.99);
     check("by name", count(&found, |o| o.by_name), found.len(), 0.95);
     check("first three groups", count(&found, |o| o.first_three), found.len(), 0.985);
@@ -47,10 +47,10 @@ fn planted_effects_are_named_on_full() {
 #[test]
 fn clean_machines_are_adequate() {
     for (name, bench, n) in [
-        ("paper's plan", Bench::paper(), 60),
-        ("paper's plan with the declared scatter of visits", Bench::paper().with_visits(0.5f64.hypot(0.5)), 60),
-        ("full", Bench::full(), 40),
-        ("full with 0.5 um per visit", Bench::full().with_visits(0.5), 40),
+        ("paper's plan", Bench::paper(), 40),
+        ("paper's plan with the declared scatter of visits", Bench::paper().with_visits(0.5f64.hypot(0.5)), 40),
+        ("full", Bench::full(), 25),
+        ("full with 0.5 um per visit", Bench::full().with_visits(0.5), 25),
     ] {
         let verdicts = clean(&bench, n, None, 103);
         let adequate = verdicts.iter().filter(|c| c.verdict == Verdict::Adequate).count();
@@ -60,7 +60,7 @@ fn clean_machines_are_adequate() {
 
 #[test]
 fn two_hidden_effects_are_both_named_on_full() {
-    let found = two(&Bench::full(), 20, 104);
+    let found = two(&Bench::full(), 12, 104);
     check("both named", found.iter().filter(|(t, s)| both_named(t, s)).count(), found.len(), 0.90);
 }
 
@@ -69,7 +69,7 @@ fn what_is_in_no_catalogue_is_never_adequate() {
     let bench = Bench::full();
     let (mut right_of_all, mut all, mut bare) = (0, 0, 0);
     for (kind, (name, _, smooth)) in strange::KINDS.iter().enumerate() {
-        let seen = strange::run(&bench, kind, 6, 105 + 100 * kind as u64);
+        let seen = strange::run(&bench, kind, 4, 105 + 100 * kind as u64);
         for s in &seen {
             assert!(s.verdict != Verdict::Adequate, "{name}: {s:?}");
             if *smooth {

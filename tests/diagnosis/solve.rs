@@ -130,7 +130,7 @@ impl Bench {
 fn it_never_ends_worse_than_it_was() {
     let bench = Bench::new();
     let started = std::time::Instant::now();
-    let seen: Vec<(usize, usize, usize, usize)> = (0..200u64)
+    let seen: Vec<(usize, usize, usize, usize)> = (0..common::count(50, 200))
         .into_par_iter()
         .map(|seed| {
             let (pair, data) = bench.draw(seed);
@@ -160,7 +160,8 @@ fn it_never_ends_worse_than_it_was() {
         .collect();
     let count = |of: fn(&(usize, usize, usize, usize)) -> usize| seen.iter().map(of).sum::<usize>();
     println!(
-        "200 pairs in {:.0} s: {} complete, {} with an effect that was no longer needed, {} with effects taken back, {} models",
+        "{} pairs in {:.0} s: {} complete, {} with an effect that was no longer needed, {} with effects taken back, {} models",
+        seen.len(),
         started.elapsed().as_secs_f64(),
         count(|s| s.0),
         count(|s| s.1),
