@@ -3,9 +3,9 @@
 //! `cargo run --release --example any_machine 2000 [first seed]`
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a trial is its end
 
-#[path = "../tests/any_machine/draw.rs"]
+#[path = "../tests/controls/any_machine/draw.rs"]
 mod draw;
-#[path = "../tests/any_machine/way.rs"]
+#[path = "../tests/controls/any_machine/way.rs"]
 mod way;
 
 use rayon::prelude::*;

@@ -6,7 +6,7 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "../tests/discovery/mod.rs"]
+#[path = "../tests/diagnosis/discovery_bench/mod.rs"]
 mod discovery;
 
 use axiscal::diagnose::Verdict;

@@ -7,7 +7,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 #![allow(dead_code)] // it uses a part of what the tests use
 
-#[path = "../tests/check/edits.rs"]
+#[path = "../tests/controls/edits.rs"]
 mod edits;
 
 use edits::{Fate, original};

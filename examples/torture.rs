@@ -1,10 +1,10 @@
 //! Calls that are killed at random moments, and calls that change one study at the same time, in numbers.
 //!
 //! `cargo run --release --example torture -- [kills [N] | races [N]]`: both, 1 000 each, where nothing is said. The sweep over all
-//! numbers of a plan is `cargo test --release --test plan_sweep -- --ignored`; the readers are fuzzed by `fuzz/run-short`.
+//! numbers of a plan is `cargo test --release --test diagnosis plan_sweep -- --ignored`; the readers are fuzzed by `fuzz/run-short`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 
-#[path = "../tests/torture/runs.rs"]
+#[path = "../tests/interface/torture/runs.rs"]
 mod runs;
 
 use runs::{Program, Races};

@@ -229,7 +229,7 @@ pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
         assemble(&machine, &runs)
     };
     let perfect = measure(&scenario);
-    // the truth is what a noise-free measurement gives back (tests/recover.rs: exact to 1e-10)
+    // the truth is what a noise-free measurement gives back (tests/model/recover.rs: exact to 1e-10)
     let exact = fit::identify_data(&machine, &catalogue, perfect.clone(), &settings(case)).unwrap();
     let bound = {
         let stated =

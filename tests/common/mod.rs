@@ -15,6 +15,11 @@ use axiscal::model::data::Run;
 use axiscal::program::{self, plan::Plan};
 use axiscal::simulate::{self, Compensation, Scenario};
 
+/// How many cases a statistical test makes: the small number, or the large one where AXISCAL_FULL_COUNTS is set.
+pub fn count(small: u64, large: u64) -> u64 {
+    if std::env::var_os("AXISCAL_FULL_COUNTS").is_some() { large } else { small }
+}
+
 pub fn machines() -> Vec<Machine> {
     machine::load(&source("machines.toml", machine::BUILT_IN)).unwrap().0
 }

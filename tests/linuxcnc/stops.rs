@@ -1,7 +1,7 @@
 //! How an emitted program behaves on a real LinuxCNC when something is wrong: it stops, names the touch, and leaves the
-//! user's own settings as they were. And that it can be started again at a set-up. Black box, like `linuxcnc.rs`.
+//! user's own settings as they were. And that it can be started again at a set-up. Black box, like `main.rs`.
 //!
-//! Cases of `tests/linuxcnc.rs`, which runs them one after the other.
+//! Cases of `main.rs`, which runs them one after the other.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs the reader of SINUMERIK motion that tests/check_readers.rs compares with (PyPI: nc-gcode-interpreter, MIT) into an
+# Installs the reader of SINUMERIK motion that tests/controls/check_readers.rs compares with (PyPI: nc-gcode-interpreter, MIT) into an
 # environment of its own outside of the tree. Does nothing when it is there.
 set -eu
 cd "$(dirname "$0")"

@@ -1,0 +1,700 @@
+//! `check` of the programs that are written for each machine: nothing is wrong with any of them.
+
+use axiscal::check::{Against, Checked, check};
+use axiscal::diag::source;
+use axiscal::machine::{self, Machine};
+use axiscal::post::{Postprocessor, parse};
+use axiscal::program::{self, Generated, Options};
+use rayon::prelude::*;
+
+fn machine(name: &str) -> Machine {
+    let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
+    machines.into_iter().find(|m| m.name == name).unwrap()
+}
+
+fn generated(machine: &Machine, program: &str, tcp: bool) -> Generated {
+    let spec = program::choose(program::built_in().unwrap(), program, machine).unwrap();
+    program::generate(machine, &spec, &Options { strict: false, tcp }).unwrap().0
+}
+
+fn controller(name: &str) -> Postprocessor {
+    Postprocessor::load_built_in_or_file(name).unwrap().0
+}
+
+/// A variant of a built-in controller: its file with these lines.
+fn variant(base: &str, lines: &str) -> Postprocessor {
+    let text = format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}");
+    parse(&source("mine.toml", text)).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+fn checked(post: &Postprocessor, machine: &Machine, generated: &Generated) -> Checked {
+    let nc = post.program(machine, &generated.plan, &generated.path).unwrap();
+    let beside = nc.sources();
+    let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+    check(machine, post, &source(format!("{}.{}", post.name, nc.extension), nc.text), &against)
+        .unwrap_or_else(|e| panic!("{} on {}: {:?}", post.name, machine.name, e.0))
+}
+
+/// Nothing is wrong with a program, and it makes all its touches.
+fn is_clean(post: &Postprocessor, machine: &Machine, generated: &Generated) {
+    let checked = checked(post, machine, generated);
+    let wrong: Vec<String> = checked.findings.iter().map(ToString::to_string).collect();
+    assert!(wrong.is_empty(), "{} on {}: {wrong:#?}", post.name, machine.name);
+    assert_eq!(checked.touches, generated.plan.touches.len());
+    assert!(checked.branches > 4 * checked.touches, "{}", checked.branches);
+}
+
+const CONTROLLERS: [&str; 4] = ["linuxcnc", "fanuc", "haas", "heidenhain"];
+
+const PACKAGES: [&str; 2] = ["fanuc-inspection-plus", "haas-inspection-plus"];
+
+#[test]
+fn with_a_probing_package() {
+    for (machine, program) in [
+        ("swivel-head", "head"),
+        ("swivel-head", "table"),
+        ("double-head", "double-head"),
+        ("trunnion", "basic"),
+        ("swivel-table-b", "basic"),
+        ("nutating-b", "basic"),
+        ("trunnion-offset", "basic"),
+    ] {
+        all_clean(machine, program, false, &PACKAGES);
+    }
+    all_clean("trunnion", "basic", true, &PACKAGES);
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for base in PACKAGES {
+        let lines = "[number]\ndecimals = 4\nunverified = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = 5\nunverified = \"ours\"\n";
+        is_clean(&variant(base, lines), &machine, &generated);
+    }
+}
+
+/// Running numbers stand before blocks only: not before % or an O-word.
+#[test]
+fn with_block_numbers() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    let lines = "[file]\nblock_numbers = { first = 10, step = 10, word = \"N{n} \" }\nunverified = \"ours\"\n";
+    for base in ["sinumerik", "linuxcnc"] {
+        is_clean(&variant(base, lines), &machine, &generated);
+    }
+    // where they are labels they are refused
+    for base in ["fanuc", "haas"] {
+        let text = format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}");
+        let failure = parse(&source("mine.toml", text)).unwrap_err();
+        assert!(failure.0.iter().any(|f| f.code == "post::block_numbers"), "{failure}");
+    }
+}
+
+/// Block numbers that the control does not take are refused by their name, not as a word that nobody understands.
+#[test]
+fn block_numbers_end_somewhere() {
+    let file = |base: &str, numbers: &str| {
+        let lines = format!("[file]\nblock_numbers = {{ {numbers} }}\nunverified = \"ours\"\n");
+        parse(&source(
+            "mine.toml",
+            format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}"),
+        ))
+    };
+    for (base, numbers) in [
+        ("sinumerik", "first = 10, step = 0, word = \"N{n} \""),
+        ("sinumerik", "first = 10, step = 10, word = \"N{n}\""),
+        ("sinumerik", "first = 10, step = 10, word = \"N \""),
+        ("linuxcnc", "first = 10, step = 0, word = \"N{n} \""),
+        ("linuxcnc", "first = 100000, step = 1, word = \"N{n} \""),
+        ("linuxcnc", "first = 0, step = 9223372036854775807, word = \"N{n} \""),
+        ("heidenhain", "first = 0, step = 1, word = \"{n}\""),
+    ] {
+        let failure = file(base, numbers).err().unwrap_or_else(|| panic!("{base} {numbers}"));
+        let finding = failure.0.iter().find(|f| f.code == "post::block_numbers");
+        assert!(finding.is_some_and(|f| f.place().is_some() && f.help.is_some()), "{base} {numbers}: {failure}");
+    }
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for (base, numbers, says, help) in [
+        ("linuxcnc", "first = 90000, step = 10, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("linuxcnc", "first = 10, step = 50, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("sinumerik", "first = 99999990, step = 10, word = \"N{n} \"", "is beyond N99999999", "a smaller first number"),
+    ] {
+        let post = file(base, numbers).unwrap().0;
+        let failure = post.program(&machine, &generated.plan, &generated.path).unwrap_err();
+        let finding = &failure.0[0];
+        assert_eq!(finding.code, "post::block_numbers", "{failure}");
+        assert!(finding.message.contains("block_numbers") && finding.message.contains(says), "{failure}");
+        assert!(finding.help.as_ref().is_some_and(|h| h.contains(help)), "{base} {numbers}: {:?}", finding.help);
+    }
+    // LinuxCNC needs no blank behind a number
+    is_clean(&file("linuxcnc", "first = 1, step = 1, word = \"N{n}\"").unwrap().0, &machine, &generated);
+}
+
+/// The worked example of docs/guide/controllers.md, as it stands there.
+#[test]
+fn the_variant_of_the_guide() {
+    let guide = include_str!("../../docs/guide/controllers.md");
+    let example = guide.split("```toml\n").find(|part| part.contains("shop-mill")).unwrap();
+    let text = example.split("```").next().unwrap();
+    let (post, _) = parse(&source("shop-mill.toml", text)).unwrap_or_else(|e| panic!("{e}"));
+    let machine = machine("swivel-head");
+    is_clean(&post, &machine, &generated(&machine, "table", false));
+    is_clean(&post, &machine, &generated(&machine, "head", false));
+}
+
+/// The machines with a small program, for every control.
+fn all_clean(machine_name: &str, program: &str, tcp: bool, controllers: &[&str]) {
+    let machine = machine(machine_name);
+    let generated = generated(&machine, program, tcp);
+    for name in controllers {
+        is_clean(&controller(name), &machine, &generated);
+    }
+}
+
+#[test]
+fn swivel_head() {
+    all_clean("swivel-head", "head", false, &["heidenhain"]);
+    all_clean("swivel-head", "table", false, &CONTROLLERS);
+}
+
+#[test]
+fn double_head() {
+    all_clean("double-head", "double-head", false, &CONTROLLERS);
+}
+
+#[test]
+fn trunnion() {
+    all_clean("trunnion", "basic", false, &CONTROLLERS);
+}
+
+#[test]
+fn swivel_table_b() {
+    all_clean("swivel-table-b", "basic", false, &CONTROLLERS);
+}
+
+#[test]
+fn nutating_b() {
+    all_clean("nutating-b", "basic", false, &CONTROLLERS);
+}
+
+#[test]
+fn trunnion_offset() {
+    all_clean("trunnion-offset", "basic", false, &CONTROLLERS);
+}
+
+#[test]
+fn under_the_control_s_own_transformation() {
+    all_clean("trunnion", "basic", true, &CONTROLLERS);
+    all_clean("swivel-table-b", "basic", true, &["heidenhain", "fanuc"]);
+    all_clean("nutating-b", "basic", true, &["heidenhain", "fanuc"]);
+    all_clean("trunnion-offset", "basic", true, &["fanuc", "haas"]);
+    // LinuxCNC has no transformation of its own for a head
+    all_clean("swivel-head", "table", true, &CONTROLLERS[1..]);
+}
+
+#[test]
+fn inches() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for base in ["fanuc", "haas", "heidenhain", "linuxcnc", "sinumerik"] {
+        // LinuxCNC writes six decimals of its own accord
+        let log = if base == "linuxcnc" { 6 } else { 5 };
+        for decimals in [4, 5] {
+            let lines = format!(
+                "[number]\ndecimals = {decimals}\nunverified = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = {log}\nunverified = \"ours\"\n"
+            );
+            is_clean(&variant(base, &lines), &machine, &generated);
+        }
+    }
+}
+
+#[test]
+fn names_and_numbers_of_axes() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for (base, names) in [
+        ("fanuc", "axis_names = { C = \"A\" }\naxis_numbers = { B = 6, C = 4 }"),
+        ("haas", "axis_names = { B = \"A\" }"),
+        ("heidenhain", "axis_names = { C = \"W\" }"),
+    ] {
+        let lines = format!("[number]\n{names}\nunverified = \"ours\"\n");
+        is_clean(&variant(base, &lines), &machine, &generated);
+    }
+    // LinuxCNC counts its axes by their letters: one that is called otherwise is refused
+    let post = variant("linuxcnc", "[number]\naxis_names = { B = \"A\" }\nsource = \"ours\"\n");
+    assert!(!checked(&post, &machine, &generated).findings.is_empty());
+}
+
+#[test]
+fn axes_of_0_to_360() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for base in ["heidenhain", "fanuc", "haas"] {
+        is_clean(&variant(base, "[settings]\nmodulo = \"C\"\n"), &machine, &generated);
+    }
+    // turned the other way round it is another program
+    let post = variant("fanuc", "[settings]\nmodulo = \"C\"\n");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    assert!(text.contains("G0 C-"), "no turn in the negative sense");
+    let against = Against { plan: Some(&generated.plan), ..Against::default() };
+    let other = check(&machine, &post, &source("p.nc", text.replacen("G0 C-", "G0 C", 1)), &against).unwrap();
+    assert!(!other.findings.is_empty());
+}
+
+#[test]
+fn stops_for_another_stylus() {
+    all_clean("trunnion", "full", false, &["heidenhain"]);
+}
+
+/// ISO 841 turns a table's axis the other way: some faces, and all of a set-up, are then out of reach. What is left is a program
+/// that can begin at each set-up that it has.
+#[test]
+fn a_swivelling_table_that_turns_the_other_way() {
+    for name in ["trunnion", "swivel-table-b"] {
+        let mut machine = machine(name);
+        machine.axes.iter_mut().find(|a| a.name.is_rotary()).unwrap().sense = -1.0;
+        let spec = program::choose(program::built_in().unwrap(), "full", &machine).unwrap();
+        let generated = program::generate(&machine, &spec, &Options::default()).unwrap().0;
+        for control in ["linuxcnc", "sinumerik"] {
+            let post = controller(control);
+            is_clean(&post, &machine, &generated);
+            let setups = checked(&post, &machine, &generated).setups as usize;
+            assert!(setups < spec.setups.len(), "{control} {name}: all {setups} set-ups are within reach");
+        }
+    }
+}
+
+/// Text between two lines, taken out.
+fn without(text: &str, first: &str, last: &str) -> String {
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let from = lines.iter().position(|l| l.contains(first)).unwrap_or_else(|| panic!("no {first}"));
+    let to = from + lines[from..].iter().position(|l| l.contains(last)).unwrap_or_else(|| panic!("no {last}"));
+    lines[..from].iter().chain(&lines[to + 1..]).copied().collect()
+}
+
+#[test]
+fn under_a_transformation_the_rotary_axes_must_stand_at_0_when_it_begins() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", true);
+    for (name, guard) in [("fanuc", "IF[ABS[#50"), ("haas", "IF[ABS[#50")] {
+        let post = controller(name);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let edited = without(&text, guard, "GOTO9");
+        let against = Against { plan: Some(&generated.plan), ..Against::default() };
+        let found = check(&machine, &post, &source("p.nc", edited), &against).unwrap();
+        assert!(found.findings.iter().any(|f| f.code == "check::start"), "{name}: {:?}", found.findings);
+    }
+}
+
+/// A program that logs where the axes have come to a stand, or what is left of the touch before, in place of what the control has
+/// kept of this one.
+#[test]
+fn a_log_of_another_place_is_found() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for (name, line, instead) in [
+        ("fanuc", "#21=#5061", "#21=#5041"),
+        ("haas", "#21=#5061", "#21=#5041"),
+        ("sinumerik", "AXC_X=$AA_MM[X]", "AXC_X=$AA_IM[X]"),
+        ("fanuc", "#22=#5062\n", ""),
+        ("haas", "#22=#5062\n", ""),
+        ("fanuc", "#24=#5064\n", "#24=0.\n"),
+    ] {
+        let post = controller(name);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        // in one of the first touches; each has the line of a miss behind its own
+        let at = text.match_indices(line).nth(8).unwrap_or_else(|| panic!("{name}: no {line:?}")).0;
+        let edited = format!("{}{instead}{}", &text[..at], &text[at + line.len()..]);
+        let against = Against { plan: Some(&generated.plan), ..Against::default() };
+        let found = check(&machine, &post, &source("p.nc", edited), &against).unwrap();
+        assert!(found.findings.iter().any(|f| f.code == "check::log"), "{name} {line:?}: {:?}", found.findings);
+    }
+}
+
+#[test]
+fn a_number_that_has_lost_its_point_is_no_number() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "table", false);
+    for name in ["fanuc", "haas"] {
+        let post = controller(name);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let at = text.find("\nG0 X").unwrap() + 1;
+        let point = at + text[at..].find('.').unwrap();
+        let edited = format!("{}{}", &text[..point], &text[point + 1..]);
+        let against = Against { plan: Some(&generated.plan), ..Against::default() };
+        let refused = check(&machine, &post, &source("p.nc", edited), &against).unwrap_err();
+        assert!(refused.0[0].message.contains("decimal point"), "{:?}", refused.0);
+    }
+}
+
+/// Findings of an edited program, by code.
+fn codes(post: &Postprocessor, machine: &Machine, generated: &Generated, text: &str) -> Vec<&'static str> {
+    let nc = post.program(machine, &generated.plan, &generated.path).unwrap();
+    let beside = nc.sources();
+    let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+    match check(machine, post, &source("edited", text), &against) {
+        Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
+        Err(failure) => failure.0.iter().map(|f| f.code).collect(),
+    }
+}
+
+/// The text without its `n`th line (from 0) that holds a word; block numbers are counted anew.
+fn without_line(post: &Postprocessor, text: &str, word: &str, n: usize) -> String {
+    let bare =
+        |l: &str| if post.block_numbers.is_some() { l.split_once(' ').unwrap().1.to_owned() } else { l.to_owned() };
+    let mut lines: Vec<String> = text.split_inclusive('\n').map(bare).collect();
+    let found: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].trim_end() == word).collect();
+    lines.remove(*found.get(n).unwrap_or_else(|| panic!("{} has {} lines {word:?}", post.name, found.len())));
+    let Some(rule) = &post.block_numbers else { return lines.concat() };
+    let number = |n: usize| rule.word.replace("{n}", &(rule.first + n * rule.step).to_string());
+    lines.iter().enumerate().map(|(n, l)| number(n) + l).collect()
+}
+
+/// `full` under each control's own transformation, where it takes it: stops for another stylus, and machines that LinuxCNC has no
+/// transformation for, are refused when the program is made.
+#[test]
+fn the_full_program_under_the_control_s_own_transformation() {
+    let of = |name: &str| -> usize {
+        let machine = machine(name);
+        let generated = generated(&machine, "full", true);
+        let proven = ["linuxcnc", "fanuc", "haas", "heidenhain", "sinumerik"].par_iter().filter(|control| {
+            let post = controller(control);
+            match post.program(&machine, &generated.plan, &generated.path) {
+                Ok(_) => is_clean(&post, &machine, &generated),
+                Err(failure) => {
+                    let head = **control == "linuxcnc" && name.contains("head");
+                    assert!(head || failure.0[0].code == "post::other_stylus", "{control} {name}: {failure}");
+                    return false;
+                }
+            }
+            true
+        });
+        proven.count()
+    };
+    let proven: usize = ["swivel-head", "double-head", "nutating-b", "trunnion-offset"].map(of).iter().sum();
+    println!("{proven} programs");
+    assert!(proven >= 12, "{proven}");
+}
+
+/// Functions are off and given back: one that the program has switched on itself, and one of before under which M128 would stand.
+#[test]
+fn the_transformation_is_switched_off_again() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", true);
+    let post = controller("heidenhain");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let of = |word: &str, n: usize| codes(&post, &machine, &generated, &without_line(&post, &text, word, n));
+    assert!(of("M129", 0).contains(&"check::not_run"), "{:?}", of("M129", 0));
+    assert!(of("M129", 1).contains(&"check::not_restored"), "{:?}", of("M129", 1));
+}
+
+/// At its end a program under `--tcp` has the control as it found it: each line that switches something off or gives it back counts.
+/// Where it stops by itself it moves nothing, so the length stays on there, and its alarm says so.
+#[test]
+fn under_a_transformation_the_end_is_as_the_beginning() {
+    for (name, program) in [("trunnion", "basic"), ("swivel-head", "table")] {
+        let machine = machine(name);
+        let generated = generated(&machine, program, true);
+        for (control, alarm) in [("fanuc", "AXISCAL STOPPED TCP IS ON"), ("haas", "STOPPED TCP ON")] {
+            let post = controller(control);
+            let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+            let (touches, end) = text.split_at(text.find("DPRNT[E").unwrap());
+            assert!(!touches.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
+            assert!(end.contains(&format!("\n#3000=1({alarm})\n")), "{control}: {end}");
+            let off = end.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
+            let local = end.lines().find(|l| l.starts_with("G52 ")).unwrap();
+            let with = |line: &str, other: &str| {
+                let found = codes(&post, &machine, &generated, &format!("{touches}{}", end.replacen(line, other, 1)));
+                println!("{control} {name}, {other:?} for {line:?}: {found:?}");
+                found
+            };
+            for line in [off, local, "G#11 G#12 G#13 G#14", "G#15"] {
+                assert!(with(line, "").contains(&"check::not_restored"), "{control} {line}");
+            }
+            // neither where Z goes elsewhere, nor before the rotary axes stand at 0
+            assert!(!with(off, "G0 G49 Z0.").is_empty(), "{control}");
+            assert!(!with(off, "G49").is_empty(), "{control}");
+            let back = touches.rfind("\nG0 ").unwrap() + 1;
+            let turned = format!("{}{}", &touches[..back], touches[back..].split_once('\n').unwrap().1);
+            let found = codes(&post, &machine, &generated, &format!("{turned}{end}"));
+            assert!(found.contains(&"check::not_run"), "{control}: {found:?}");
+            // a stop that takes the length off moves: which axes is not known, the block may be near
+            let wait = post.settings["wait"].clone();
+            let stop = format!("N9\n{wait}\n{off}\n");
+            let found = codes(&post, &machine, &generated, &format!("{touches}{}", end.replacen("N9\n", &stop, 1)));
+            assert!(found.contains(&"check::goes_on"), "{control}: {found:?}");
+        }
+    }
+}
+
+/// A function that a user has left on turns, scales or shifts what a program says: it is taken off or asked for before anything moves.
+#[test]
+fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
+    let machine = machine("trunnion");
+    let plain = generated(&machine, "basic", false);
+    for (control, look, label) in [
+        ("fanuc", "cancel = \"G40 G50 G15 G69 G80\\nG54.2 P0\"", "54.2"),
+        ("haas", "cancel = \"G40 G50 G15 G69 G80\"", "51"),
+    ] {
+        let post = controller(control);
+        let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        // each of them by itself
+        for asked in text.lines().filter(|l| l.starts_with("#4=#4*ABS[#40")) {
+            let found = codes(&post, &machine, &plain, &text.replacen(&format!("{asked}\n"), "", 1));
+            assert!(found.contains(&"check::start"), "{control} {asked}: {found:?}");
+        }
+        assert!(text.contains(&format!("-{label}]\n")), "{control}");
+        // taken off, where the control has them: nothing is asked for
+        let all = variant(control, &format!("[settings]\n{look}\n"));
+        let text = all.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        assert!(!text.contains("#4=#4*ABS[#40"), "{control}");
+        is_clean(&all, &machine, &plain);
+    }
+    let haas = controller("haas");
+    let text = haas.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let found = codes(&haas, &machine, &plain, &text.replacen("G255\n", "", 1));
+    assert!(found.contains(&"check::start"), "{found:?}");
+    let fanuc = controller("fanuc");
+    let text = fanuc.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let found = codes(&fanuc, &machine, &plain, &text.replacen("G40 G69 G80\n", "G40 G69 G80\nG54.2 P1\n", 1));
+    assert!(found.contains(&"check::not_run"), "{found:?}");
+    // under the transformation words are of the workpiece's system
+    let table = generated(&machine, "basic", true);
+    // what no variable shows: the first moves do
+    for (control, plan, line) in [
+        ("fanuc", &plain, "IF[#4LT0.01]GOTO"),
+        ("fanuc", &table, "IF[#4LT0.01]GOTO"),
+        ("haas", &plain, "IF[#4LT0.01]GOTO"),
+        ("heidenhain", &table, "FN 12: IF +Q1620 LT +0.01 GOTO LBL"),
+    ] {
+        let post = controller(control);
+        let text = post.program(&machine, &plan.plan, &plan.path).unwrap().text;
+        assert_eq!(text.matches(line).count(), 3, "{control}");
+        assert!(codes(&post, &machine, plan, &text).is_empty(), "{control}");
+        // it looks, and goes on whatever it sees
+        let blind = text.replace(line, &line.replace("0.01", "9000.01"));
+        let found = codes(&post, &machine, plan, &blind);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+    }
+    // a look from one place only, in one axis, of one sense, at the first set-up: each leaves something unseen, and is not written
+    let fanuc = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/postprocessors/fanuc.toml")).unwrap();
+    let (_, look) = fanuc.split_once("[write.arrived]\ntemplate = \"\"\"\n").unwrap();
+    let (look, _) = look.split_once("\"\"\"").unwrap();
+    let own = |look: &str| {
+        variant("fanuc", &format!("[write.arrived]\nsource = \"tried\"\ntemplate = \"\"\"\n{look}\"\"\"\n"))
+    };
+    for (what, from, to) in [
+        ("one axis", "{% for w in stands %}", "{% for w in stands if w.axis == \"Z\" %}"),
+        ("a sum with signs", "#4=#4+ABS[", "#4=#4+["),
+        ("half a millimetre", "\"0.01\"", "\"0.5\""),
+        ("the beginning only", "{{ settings.wait }}", "IF[#1GT1]GOTO{{ label }}\n{{ settings.wait }}"),
+    ] {
+        let changed = look.replacen(from, to, 1);
+        assert_ne!(changed, look, "{what}");
+        let post = own(&changed);
+        let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        let found = codes(&post, &machine, &plain, &text);
+        assert!(found.contains(&"check::start"), "{what}: {found:?}");
+    }
+    is_clean(&own(look), &machine, &plain);
+    // where it arrives, it has made no way when it is simply started again: it goes some way to see
+    let post = controller("fanuc");
+    let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let lines: Vec<&str> = text.lines().collect();
+    let looks: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].starts_with("IF[#4LT0.01]")).collect();
+    let once = [&lines[..looks[0] + 5], &lines[looks[2] + 7..], &[""]].concat().join("\n");
+    let found = codes(&post, &machine, &plain, &once);
+    assert!(found.contains(&"check::start"), "{found:?}");
+    // where the control has the function, it is taken off
+    let off = variant("fanuc", "[settings]\ncancel = \"G40 G69 G80\\nG54.4 P0\"\n");
+    let text = off.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    assert!(codes(&off, &machine, &plain, &text.replace("IF[#4LT0.01]", "IF[#4LT9000.]")).is_empty());
+    let found = codes(&off, &machine, &plain, &text.replacen("G54.4 P0", "G54.4 P1", 1));
+    assert!(found.contains(&"check::not_run"), "{found:?}");
+    for (control, line, instead) in [
+        ("heidenhain", "FN 18: SYSREAD Q1620 = ID210 NR1 IDX0", "FN 0: Q1620 = +0"),
+        ("sinumerik", "+ABS($P_ACTFRAME[Z,RT])", ""),
+        ("sinumerik", "+ABS($P_ACTFRAME[X,SC]-1)", ""),
+        ("sinumerik", "+$P_ACTFRAME[Y,MI]", ""),
+    ] {
+        let post = controller(control);
+        let text = post.program(&machine, &table.plan, &table.path).unwrap().text;
+        assert!(text.contains(line), "{control} {line}");
+        assert!(codes(&post, &machine, &table, &text).is_empty(), "{control}");
+        let found = codes(&post, &machine, &table, &text.replacen(line, instead, 1));
+        assert!(found.contains(&"check::start"), "{control} {line}: {found:?}");
+    }
+}
+
+/// Axes that count from 0 to 360 are not turned under a transformation by a controller that cannot write the sense of each step.
+#[test]
+fn a_roll_over_axis_under_the_transformation_is_refused_by_its_name() {
+    let machine = machine("trunnion");
+    let table = generated(&machine, "basic", true);
+    for control in ["fanuc", "haas", "heidenhain"] {
+        let post = variant(control, "[settings]\nmodulo = \"C\"\n");
+        let refused = post.program(&machine, &table.plan, &table.path).unwrap_err();
+        assert_eq!(refused.0[0].code, "post::roll_over", "{control}");
+        assert!(refused.0[0].message.contains("axis C"), "{control}: {refused}");
+    }
+    is_clean(&variant("sinumerik", "[settings]\nmodulo = \"C\"\n"), &machine, &table);
+}
+
+/// Each tool offset holds another length: one whose length is read from another one's variable would move Z where it begins to act.
+#[test]
+fn the_length_that_is_counted_on_is_that_of_the_offset_that_acts() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", true);
+    let of = |control: &str, lines: &str| {
+        let post = variant(control, &format!("[settings]\n{lines}\n"));
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        codes(&post, &machine, &generated, &text)
+    };
+    for (control, own) in [("fanuc", "#11025"), ("haas", "#2025")] {
+        let pair = |length: &str| of(control, &format!("tool_offset = \"25\"\ntool_length = \"{length}\""));
+        assert!(pair(own).is_empty(), "{control}: {:?}", pair(own));
+        assert!(pair("#2024").contains(&"check::not_run"), "{control}: {:?}", pair("#2024"));
+        let offset = of(control, "tool_offset = \"25\"");
+        assert!(offset.contains(&"check::not_run"), "{control}: {offset:?}");
+        let length = of(control, &format!("tool_length = \"{own}\""));
+        assert!(length.contains(&"check::not_run"), "{control}: {length:?}");
+    }
+}
+
+/// With No. 5006#6 (TOS) = 0 a G49 takes Z along by the length that acts: the program begins only where none does, and takes its own
+/// off where Z stands.
+#[test]
+fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
+    let machine = machine("trunnion");
+    let (plain, table) = (generated(&machine, "basic", false), generated(&machine, "basic", true));
+    for control in ["fanuc", "haas"] {
+        let post = controller(control);
+        let of = |generated: &Generated| post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = of(&plain);
+        assert!(!text.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
+        // it does not look whether a length acts
+        let look = text.lines().find(|l| l.starts_with("IF[#4008EQ49]")).unwrap();
+        let blind = without(&text, look, "GOTO9");
+        let found = codes(&post, &machine, &plain, &blind);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // nor when it takes it off by itself
+        let found = codes(&post, &machine, &plain, &blind.replacen("G40 G69 G80", "G40 G49 G69 G80", 1));
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // with the rotary axes turned which axes a G49 moves is not known
+        let text = of(&table);
+        let end = text.rfind("M5\n").unwrap();
+        let found = codes(&post, &machine, &table, &format!("{}G49\n{}", &text[..end], &text[end..]));
+        assert!(!found.is_empty(), "{control}");
+    }
+    // at a stop for another stylus: where Z stands, and nowhere else
+    let long = generated(&machine, "full", true);
+    let post = controller("fanuc");
+    let text = post.program(&machine, &long.plan, &long.path).unwrap().text;
+    let off = text.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
+    // and the local system is off as well before a person is asked to do something
+    assert!(text.contains(&format!("{off}\nG52 X0. Y0. Z0. A0. C0.\n#18=0\n#3006=1(")), "{off}");
+    let found = codes(&post, &machine, &long, &text.replace(off, "G49"));
+    assert!(
+        found.iter().any(|c| [
+            "check::collision",
+            "check::unguarded",
+            "check::unknown_start",
+            "check::not_run",
+            "check::start"
+        ]
+        .contains(c)),
+        "{found:?}"
+    );
+}
+
+/// A control reads macro statements ahead: without a block to wait the program would compute from where it has not arrived yet.
+#[test]
+fn a_block_to_wait_that_is_missing_is_found() {
+    let machine = machine("trunnion");
+    for (control, wait) in [("fanuc", "G53"), ("haas", "G4 P0.1")] {
+        for tcp in [false, true] {
+            let post = controller(control);
+            let generated = generated(&machine, "basic", tcp);
+            let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+            let count = text.lines().filter(|l| *l == wait).count();
+            assert!(count >= 3, "{control}: {count}");
+            let lacking: Vec<usize> = (0..count)
+                .filter(|n| codes(&post, &machine, &generated, &without_line(&post, &text, wait, *n)).is_empty())
+                .collect();
+            println!("{control} tcp {tcp}: {count} blocks, without these it is the same: {lacking:?}");
+            // nothing is read between the first and the second one, but under the transformation; a Haas has waited before the
+            // first one already, where it limits reading ahead
+            let free: &[usize] = if tcp && control == "fanuc" { &[] } else { &[0] };
+            assert!(lacking.iter().all(|n| free.contains(n)), "{control} tcp {tcp}: {lacking:?} of {count}");
+            // a dwell does not stop a Fanuc from reading ahead
+            if control == "fanuc" {
+                let found = codes(&post, &machine, &generated, &text.replace("\nG53\n", "\nG4 P10\n"));
+                assert!(found.contains(&"check::not_run"), "{found:?}");
+            }
+        }
+    }
+}
+
+/// What a program finds: further work offsets, an offset of all, a local system, a mirror image.
+#[test]
+fn a_program_sees_what_acts_on_its_coordinates() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", false);
+    for control in ["fanuc", "haas"] {
+        let post = controller(control);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        // the guard against an offset that the program cannot take off
+        let guard = text.lines().find(|l| l.starts_with("IF[#4LT0.02]GOTO")).unwrap();
+        let unguarded = without(&text, guard, "GOTO9");
+        let found = codes(&post, &machine, &generated, &unguarded);
+        assert!(found.contains(&"check::start"), "{control}: {found:?}");
+        // an offset that is taken as it is, and is 0 in some state
+        let taken = text.lines().find(|l| l.starts_with("G52 X#27")).unwrap();
+        let found = codes(&post, &machine, &generated, &text.replacen(taken, "G52 X0. Y0. Z0. A0. C0.", 1));
+        assert!(!found.is_empty(), "{control}");
+    }
+    // the user's further work offset comes back
+    let post = controller("fanuc");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let found = codes(&post, &machine, &generated, &without_line(&post, &text, "G54.1 P#16", 0));
+    assert!(found.contains(&"check::not_restored"), "{found:?}");
+    // Haas cannot give it back: the program does not begin
+    let post = controller("haas");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let found = codes(&post, &machine, &generated, &without(&text, "IF[#15LT59.5]", "GOTO9"));
+    assert!(found.contains(&"check::not_restored"), "{found:?}");
+}
+
+/// The time goes on while a program runs: one that writes another time, or none, shows.
+#[test]
+fn times_follow_the_run() {
+    let machine = machine("trunnion");
+    let generated = generated(&machine, "basic", false);
+    for control in ["fanuc", "haas"] {
+        let post = controller(control);
+        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        assert!(text.contains("*T#8[50]"), "{control}");
+        // the program begins before midnight: without the day that is added its time would go back
+        let found =
+            codes(&post, &machine, &generated, &text.replace("#8=#8-86400.*FIX[#8/86400.]\n", "#8=#8-86400.\n"));
+        assert!(found.contains(&"check::log"), "{control}: {found:?}");
+        let found = codes(&post, &machine, &generated, &text.replace("#8=#3012\n", "#8=0.\n"));
+        assert!(found.contains(&"check::log"), "{control}: {found:?}");
+        // the user's file may say that none is wanted; the log then has none
+        let silent = variant(control, "[settings]\ntime = \"no\"\n");
+        is_clean(&silent, &machine, &generated);
+        assert!(!silent.log.writes_time && post.log.writes_time);
+        let text = silent.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        assert!(!text.contains("#3012") && !text.contains("*T#8"));
+    }
+}
+
+/// A spindle that is not turned as planned, on controls whose word for it is a setting.
+#[test]
+fn the_spindle_is_oriented() {
+    let machine = machine("swivel-head");
+    let generated = generated(&machine, "full", false);
+    let post = controller("fanuc");
+    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let turned = text.lines().filter(|l| l.starts_with("M19 R")).nth(1).unwrap().to_owned();
+    let found = codes(&post, &machine, &generated, &text.replacen(&format!("{turned}\n"), "M19 R77.\n", 1));
+    assert!(found.contains(&"check::not_the_plan"), "{turned}: {found:?}");
+}

@@ -1,0 +1,26 @@
+//! What goes to a control and comes from it: programs, logs and tables.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
+
+mod any_machine;
+mod beside_the_axis;
+mod check;
+mod check_branches;
+mod check_programs;
+mod check_readers;
+mod check_sinumerik;
+mod check_verb;
+mod closed_loop;
+#[path = "../common/mod.rs"]
+mod common;
+mod compensated;
+mod controllers;
+mod edits;
+mod export_verb;
+mod foreign;
+mod generate;
+mod logs;
+mod logs_closed_loop;
+mod msr;
+mod parse_verb;
+mod simulate_verb;
+mod tables;

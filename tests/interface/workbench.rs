@@ -1,0 +1,635 @@
+//! The workbench from outside, over plain HTTP: what it must refuse, what it must not break.
+
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+/// A measured machine with an error that no model of it holds, made once.
+fn measured() -> &'static Path {
+    static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name).display().to_string();
+        let call = |words: &[&str]| {
+            assert_cmd::Command::new(env!("CARGO_BIN_EXE_axiscal")).args(words).assert().success();
+        };
+        std::fs::write(
+            at("wrong.toml"),
+            "seed = 3\n[effects.location-b]\nEX0B = 0.02\n[effects.squareness-xy]\nEC0Y = 400\n[noise]\ntouch_um = 0.5\n",
+        )
+        .unwrap();
+        call(&["generate", "--machine", "swivel-head", "--program", "head", "--controller", "linuxcnc", "--out", &at("")]);
+        call(&[
+            "simulate", "--plan", &at("head.plan.json"), "--machine", "swivel-head", "--scenario", &at("wrong.toml"),
+            "--controller", "linuxcnc", "--out", &at("head.log"),
+        ]);
+        call(&[
+            "new", "--machine", "swivel-head", "--plan", &at("head.plan.json"), "--log", &at("head.log"),
+            "--effects", "location-b,pretravel", "--known-blocks", "--out", &at("study.toml"),
+        ]);
+        dir
+    })
+    .path()
+}
+
+/// A copy of the measurement for one test.
+fn folder() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["head.plan.json", "head.log", "study.toml"] {
+        std::fs::copy(measured().join(name), dir.path().join(name)).unwrap();
+    }
+    dir
+}
+
+struct Workbench {
+    child: Child,
+    port: u16,
+    token: String,
+    study: PathBuf,
+}
+
+impl Drop for Workbench {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+struct Answer {
+    status: u16,
+    head: String,
+    body: String,
+}
+
+impl Answer {
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.body).unwrap_or_else(|e| panic!("{e}: {}", self.body))
+    }
+}
+
+impl Workbench {
+    fn open(dir: &Path) -> Self {
+        let study = dir.join("study.toml");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_axiscal"))
+            .args(["--json", "workbench", &study.display().to_string(), "--no-open"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut lines = String::new();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        while !lines.ends_with("}\n") {
+            assert!(out.read_line(&mut lines).unwrap() > 0, "the workbench ended: {lines}");
+        }
+        let said: Value = serde_json::from_str(&lines).unwrap();
+        let address = said["address"].as_str().unwrap();
+        let (host, token) = address.strip_prefix("http://127.0.0.1:").unwrap().split_once("/#token=").unwrap();
+        Self { child, port: host.parse().unwrap(), token: token.to_owned(), study }
+    }
+
+    /// Sends bytes as they are.
+    fn raw(&self, bytes: &[u8]) -> Answer {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
+        // a server that has seen enough may close before all is sent
+        let _ = stream.write_all(bytes);
+        let mut text = Vec::new();
+        let _ = stream.read_to_end(&mut text);
+        let text = String::from_utf8_lossy(&text).into_owned();
+        let (head, body) = text.split_once("\r\n\r\n").unwrap_or((&text, ""));
+        let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
+        Answer { status, head: head.to_owned(), body: body.to_owned() }
+    }
+
+    fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
+        let mut text = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
+        for (name, value) in headers {
+            text += &format!("{name}: {value}\r\n");
+        }
+        if !body.is_empty() {
+            text += &format!("Content-Length: {}\r\n", body.len());
+        }
+        self.raw(format!("{text}\r\n{body}").as_bytes())
+    }
+
+    fn host(&self) -> String {
+        format!("127.0.0.1:{}", self.port)
+    }
+
+    fn get(&self, path: &str) -> Answer {
+        self.send("GET", path, &[("Host", &self.host()), ("X-Axiscal-Token", &self.token)], "")
+    }
+
+    fn post(&self, path: &str, body: &str) -> Answer {
+        let host = self.host();
+        let origin = format!("http://{host}");
+        let headers = [
+            ("Host", host.as_str()),
+            ("Origin", &origin),
+            ("X-Axiscal-Token", &self.token),
+            ("Content-Type", "application/json"),
+        ];
+        self.send("POST", path, &headers, body)
+    }
+
+    fn version(&self) -> u64 {
+        self.get("/api/state").json()["version"].as_u64().unwrap()
+    }
+
+    fn step(&self, version: u64, ask: &Value) -> Answer {
+        self.post("/api/step", &json!({ "version": version, "ask": ask }).to_string())
+    }
+
+    fn switch(&self, effect: &str, on: bool) -> Answer {
+        self.step(self.version(), &json!({ "switch": { "effect": effect, "on": on } }))
+    }
+
+    fn text(&self) -> String {
+        std::fs::read_to_string(&self.study).unwrap()
+    }
+}
+
+#[test]
+fn foreign_hosts_origins_and_tokens_are_refused() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let before = w.text();
+    let (host, port) = (w.host(), w.port);
+    let own = format!("http://{host}");
+    let body = r#"{"version":1,"ask":{"switch":{"effect":"squareness-xy","on":true}}}"#;
+    let kind = ("Content-Type", "application/json");
+    let token = ("X-Axiscal-Token", w.token.as_str());
+    let post = |headers: &[(&str, &str)]| w.send("POST", "/api/step", headers, body).status;
+    for foreign in ["evil.example", &format!("evil.example:{port}"), "127.0.0.1", "127.0.0.1:1", "localhost"] {
+        assert_eq!(post(&[("Host", foreign), ("Origin", &own), token, kind]), 403, "{foreign}");
+        assert_eq!(w.send("GET", "/", &[("Host", foreign)], "").status, 403, "{foreign}");
+    }
+    assert_eq!(post(&[("Host", &host), ("Host", "evil.example"), ("Origin", &own), token, kind]), 403);
+    for foreign in ["http://evil.example", "null", &format!("https://{host}"), "http://127.0.0.1:1"] {
+        assert_eq!(post(&[("Host", &host), ("Origin", foreign), token, kind]), 403, "{foreign}");
+    }
+    assert_eq!(post(&[("Host", &host), token, kind]), 403, "without an origin");
+    assert_eq!(post(&[("Host", &host), ("Origin", &own), kind]), 401, "without a token");
+    let other = "0".repeat(64);
+    for wrong in ["", "x", &w.token[..63], &other] {
+        assert_eq!(post(&[("Host", &host), ("Origin", &own), ("X-Axiscal-Token", wrong), kind]), 401, "{wrong}");
+    }
+    assert_eq!(post(&[("Host", &host), ("Origin", &own), token, ("Content-Type", "text/plain")]), 415);
+    for path in ["/api/state", "/api/inputs", "/api/evidence", "/api/events"] {
+        assert_eq!(w.send("GET", path, &[("Host", &host)], "").status, 401, "{path}");
+        let with = format!("{path}?token={}", w.token);
+        assert_eq!(w.send("GET", &with, &[("Host", &host)], "").status, 401, "a token in the path is none");
+    }
+    let cross = [("Host", host.as_str()), token, ("Sec-Fetch-Site", "cross-site"), ("Sec-Fetch-Mode", "cors")];
+    assert_eq!(w.send("GET", "/api/state", &cross, "").status, 403);
+    assert_eq!(w.text(), before, "nothing was written");
+    assert_eq!(w.get("/api/state").status, 200, "and the right request is answered");
+    let page = w.send("GET", "/", &[("Host", &host)], "");
+    assert!(page.head.contains("content-security-policy: default-src 'none'; script-src 'self'"), "{}", page.head);
+    assert!(page.head.contains("x-frame-options: DENY"), "{}", page.head);
+    assert!(!page.head.to_lowercase().contains("access-control-allow"), "{}", page.head);
+}
+
+#[test]
+fn no_path_of_a_request_reaches_the_disk() {
+    let dir = folder();
+    std::fs::write(dir.path().join("secret"), "the secret").unwrap();
+    let w = Workbench::open(dir.path());
+    for path in [
+        "/study.toml",
+        "/secret",
+        "/../secret",
+        "/assets/../secret",
+        "/assets/..%2f..%2fsecret",
+        "/assets/%2e%2e/secret",
+        "/assets/%2fetc%2fpasswd",
+        "//etc/passwd",
+        "/assets//etc/passwd",
+        "/assets/",
+        "/assets/secret",
+        "/assets/main.js%00",
+        "/assets/%ff%fe",
+        "/..\\secret",
+        "/api/",
+        "/api/../secret",
+        "/assets/C:%5Cwindows%5Cwin.ini",
+        "/.git/config",
+    ] {
+        let answer = w.get(path);
+        assert!(matches!(answer.status, 400 | 404), "{path}: {} {}", answer.status, answer.body);
+        assert!(
+            !answer.body.contains("secret\"") && !answer.body.contains("the secret") && !answer.body.contains("root:"),
+            "{path}"
+        );
+    }
+    assert_eq!(w.get("/assets/main.js").status, 200);
+    // nor does a word of a body: a controller is a name of the list, an effect an id, an effects file the study's
+    std::fs::write(dir.path().join("mine.toml"), "name = \"mine\"").unwrap();
+    let version = w.version();
+    for controller in ["mine.toml", "../mine.toml", "/etc/passwd", "", "linuxcnc/../linuxcnc", "--out=/tmp/x"] {
+        let body = json!({ "version": version, "verb": "export", "controller": controller }).to_string();
+        assert_eq!(w.post("/api/call", &body).status, 422, "{controller}");
+    }
+    for id in ["../evil", "a/b", "A", "-x", "x\"]\nmachines = \"/etc/passwd\"", ""] {
+        let draft =
+            json!({ "id": id, "at": "B", "terms": [{ "parameter": "p", "unit": "um", "dof": "dz", "formula": "B" }] });
+        let answer = w.step(version, &json!({ "save": { "draft": draft, "on": false } }));
+        assert_eq!(answer.status, 422, "{id}: {}", answer.body);
+        assert_eq!(answer.json()["mistakes"][0]["field"], "id", "{id}");
+        assert_eq!(w.switch(id, true).status, 422, "{id}");
+    }
+    assert!(!dir.path().join("my-effects.toml").exists());
+    let path_asked = w.post(
+        "/api/call",
+        &json!({ "version": version, "verb": "export", "controller": "linuxcnc", "out": "/tmp/x" }).to_string(),
+    );
+    assert_eq!(path_asked.status, 400, "{}", path_asked.body);
+}
+
+#[test]
+fn rubbish_is_answered_and_changes_nothing() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let before = w.text();
+    for body in [
+        "",
+        "{",
+        "[]",
+        "null",
+        "\u{0}",
+        "{\"version\":1}",
+        "{\"version\":-1,\"ask\":\"undo\"}",
+        "{\"version\":1,\"ask\":\"explode\"}",
+        "{\"version\":1e99,\"ask\":\"undo\"}",
+        "{\"version\":1,\"ask\":{\"switch\":{\"effect\":3,\"on\":true}}}",
+        "{\"version\":1,\"ask\":{\"mask\":{\"touches\":[[1]],\"reason\":\"x\"}}}",
+        "{\"version\":1,\"ask\":\"undo\",\"more\":1}",
+    ] {
+        assert_eq!(w.post("/api/step", body).status, 400, "{body}");
+        assert!(matches!(w.post("/api/try", body).status, 400 | 422), "{body}");
+        assert_eq!(w.post("/api/call", body).status, 400, "{body}");
+    }
+    let deep = format!("{}{}", "[".repeat(100_000), "]".repeat(100_000));
+    assert_eq!(w.post("/api/step", &deep).status, 400);
+    let huge = format!("{{\"version\":1,\"ask\":\"{}\"}}", "x".repeat(2_000_000));
+    assert_eq!(w.post("/api/step", &huge).status, 413);
+    let promised = format!(
+        "POST /api/step HTTP/1.1\r\nHost: {}\r\nOrigin: http://{}\r\nX-Axiscal-Token: {}\r\nContent-Type: application/json\r\nContent-Length: 99999999999\r\n\r\n{{",
+        w.host(),
+        w.host(),
+        w.token
+    );
+    assert_eq!(w.raw(promised.as_bytes()).status, 413);
+    let long_head = format!("GET / HTTP/1.1\r\nHost: {}\r\nX: {}\r\n\r\n", w.host(), "x".repeat(1_000_000));
+    assert!(matches!(w.raw(long_head.as_bytes()).status, 0 | 400 | 431));
+    for bytes in [
+        &b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"[..],
+        b"GET\r\n\r\n",
+        b"\0\0\0\0\r\n\r\n",
+        b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+    ] {
+        let _ = w.raw(bytes);
+    }
+    let version = w.version();
+    for ask in [
+        json!({ "switch": { "effect": "no-such-effect", "on": true } }),
+        json!({ "switch": { "effect": "location-b", "on": true } }),
+        json!({ "switch": { "effect": "squareness-xy", "on": false } }),
+        json!({ "mask": { "touches": [], "reason": "none" } }),
+        json!({ "mask": { "touches": [[1, 1]], "reason": " " } }),
+        json!({ "mask": { "touches": [[0, 1]], "reason": "runs count from 1" } }),
+        json!({ "mask": { "touches": [[1, 999_999]], "reason": "no such touch" } }),
+        json!({ "mask": { "touches": [[usize::MAX, u64::MAX]], "reason": "no such touch" } }),
+        json!({ "mask": { "touches": (1..=202).map(|id| (1, id)).collect::<Vec<_>>(), "reason": "all of them" } }),
+        json!("undo"),
+        json!("redo"),
+    ] {
+        let answer = w.step(version, &ask);
+        assert_eq!(answer.status, 422, "{ask}: {:.300}", answer.body);
+        assert!(!answer.json()["messages"][0]["message"].as_str().unwrap().is_empty());
+    }
+    assert_eq!(w.text(), before, "nothing was written");
+    assert_eq!(w.version(), version);
+    for method in ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"] {
+        let origin = format!("http://{}", w.host());
+        let status = w
+            .send(method, "/api/step", &[("Host", &w.host()), ("Origin", &origin), ("X-Axiscal-Token", &w.token)], "")
+            .status;
+        assert_eq!(status, 405, "{method}");
+    }
+}
+
+/// Streams of events take some of the connections only: requests are answered, and a place that is given back can be taken.
+#[test]
+fn streams_of_events_leave_room_for_requests() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let stream = || {
+        let mut stream = TcpStream::connect(("127.0.0.1", w.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let head = format!("GET /api/events HTTP/1.1\r\nHost: {}\r\nX-Axiscal-Token: {}\r\n\r\n", w.host(), w.token);
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut status = String::new();
+        BufReader::new(stream.try_clone().unwrap()).read_line(&mut status).unwrap();
+        (stream, status)
+    };
+    let mut open: Vec<(TcpStream, String)> = (0..24).map(|_| stream()).collect();
+    assert!(open.iter().all(|(_, status)| status.contains(" 200 ")), "{open:?}");
+    let refused = w.get("/api/events");
+    assert_eq!((refused.status, &refused.json()["error"]), (503, &"streams".into()));
+    assert_eq!(w.get("/api/state").status, 200);
+    open.pop();
+    let again = (0..100).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        stream().1.contains(" 200 ")
+    });
+    assert!(again, "the place of a stream that was closed");
+}
+
+#[test]
+fn two_tabs_do_not_corrupt_the_study() {
+    let dir = folder();
+    let w = Arc::new(Workbench::open(dir.path()));
+    let version = w.version();
+    assert_eq!(w.step(version, &json!({ "switch": { "effect": "squareness-xy", "on": true } })).status, 200);
+    let late = w.step(version, &json!({ "switch": { "effect": "zero-b", "on": true } }));
+    assert_eq!(late.status, 409, "the other tab asked of an older state");
+    assert_eq!(late.json()["version"], version + 1);
+    assert!(!w.text().contains("zero-b"));
+    // many at once, each of the state that it has just seen: every one is done whole or refused
+    let threads: Vec<_> = (0..4)
+        .map(|n: u64| {
+            let w = w.clone();
+            std::thread::spawn(move || {
+                let mut done = 0;
+                for k in 0..6 {
+                    let touch = 1 + n * 10 + k;
+                    let answer = w.step(
+                        w.version(),
+                        &json!({ "mask": { "touches": [[1, touch]], "reason": format!("tab {n}") } }),
+                    );
+                    assert!(matches!(answer.status, 200 | 409), "{} {}", answer.status, answer.body);
+                    done += u64::from(answer.status == 200);
+                }
+                done
+            })
+        })
+        .collect();
+    let done: u64 = threads.into_iter().map(|t| t.join().unwrap()).sum();
+    assert!(done >= 6);
+    assert_eq!(w.text().matches("[[mask]]").count() as u64, done);
+    assert_eq!(w.version(), version + 1 + done);
+    let masked = w.get("/api/state").json()["masked"].as_array().unwrap().len() as u64;
+    assert_eq!(masked, done);
+}
+
+#[test]
+fn every_step_can_be_undone_to_the_byte() {
+    let dir = folder();
+    let text = std::fs::read_to_string(dir.path().join("study.toml")).unwrap();
+    let text = format!("# mine, with a comment that stays\n{}", text.replace('\n', "\r\n"));
+    std::fs::write(dir.path().join("study.toml"), &text).unwrap();
+    let w = Workbench::open(dir.path());
+    let draft = json!({ "id": "my-sag", "name": "Sag", "at": "B", "terms": [{ "parameter": "sag", "unit": "um", "dof": "dz", "formula": "1 - cos(B)" }] });
+    let asks = [
+        json!({ "switch": { "effect": "squareness-xy", "on": true } }),
+        json!({ "mask": { "touches": [[1, 3], [1, 4]], "reason": "a chip \"here\"" } }),
+        json!({ "save": { "draft": draft, "on": true } }),
+        json!({ "unmask": { "touches": [[1, 3]] } }),
+        json!({ "switch": { "effect": "pretravel", "on": false } }),
+    ];
+    let mut texts = vec![text.clone()];
+    for ask in &asks {
+        let answer = w.step(w.version(), ask);
+        assert_eq!(answer.status, 200, "{ask}: {}", answer.body);
+        texts.push(w.text());
+    }
+    let own = std::fs::read_to_string(dir.path().join("my-effects.toml")).unwrap();
+    assert!(own.contains("id = \"my-sag\"") && w.text().contains("effects_file = [\"my-effects.toml\"]"), "{own}");
+    for expected in texts.iter().rev().skip(1) {
+        assert_eq!(w.step(w.version(), &json!("undo")).status, 200);
+        assert_eq!(&w.text(), expected);
+    }
+    assert!(!dir.path().join("my-effects.toml").exists(), "the effects file is gone with its step");
+    assert_eq!(w.step(w.version(), &json!("undo")).status, 422);
+    for expected in texts.iter().skip(1) {
+        assert_eq!(w.step(w.version(), &json!("redo")).status, 200);
+        assert_eq!(&w.text(), expected);
+    }
+    assert_eq!(std::fs::read_to_string(dir.path().join("my-effects.toml")).unwrap(), own);
+    // an effect that is not called on by the study any more cannot be lost from a file that somebody else has changed
+    assert_eq!(w.step(w.version(), &json!("undo")).status, 200);
+    assert_eq!(w.step(w.version(), &json!("undo")).status, 200);
+    std::fs::write(dir.path().join("my-effects.toml"), format!("{own}\n# mine\n")).unwrap();
+    let mut answer = w.step(w.version(), &json!("undo"));
+    until("the change is seen", || {
+        answer = w.step(w.version(), &json!("undo"));
+        answer.status != 409
+    });
+    assert_eq!(answer.status, 422, "{}", answer.body);
+    assert!(std::fs::read_to_string(dir.path().join("my-effects.toml")).unwrap().ends_with("# mine\n"));
+}
+
+fn until(what: &str, mut done: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !done() {
+        assert!(began.elapsed() < Duration::from_secs(120), "not in time: {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn what_changes_on_the_disk_shows() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let (version, text) = (w.version(), w.text());
+    std::fs::write(&w.study, text.replace("\"pretravel\"", "\"pretravel\", \"squareness-xy\"")).unwrap();
+    until("a new effect", || w.version() > version);
+    let state = w.get("/api/state").json();
+    assert_eq!(state["effects"].as_array().unwrap().len(), 3);
+    // a file that cannot be used is said, with its place, and nothing is written over it
+    std::fs::write(&w.study, "machine = \n").unwrap();
+    until("a fault", || {
+        w.get("/api/state").json()["fault"][0]["place"].as_str().is_some_and(|p| p.contains("study.toml:1:"))
+    });
+    let refused = w.switch("zero-b", true);
+    assert_eq!(refused.status, 422, "{}", refused.body);
+    assert_eq!(w.text(), "machine = \n");
+    std::fs::write(&w.study, &text).unwrap();
+    until("mended", || w.get("/api/state").json()["fault"].as_array().is_some_and(Vec::is_empty));
+    // the change of another can be undone like a step
+    assert_eq!(w.step(w.version(), &json!("undo")).status, 200);
+    assert!(w.text().contains("squareness-xy"));
+    // a log that grows worse is read again
+    let log = dir.path().join("head.log");
+    let version = w.version();
+    std::fs::write(&log, std::fs::read_to_string(&log).unwrap() + "\n").unwrap();
+    until("a new log", || w.version() > version);
+}
+
+#[test]
+fn a_killed_workbench_leaves_the_study_whole() {
+    let dir = folder();
+    for round in 0..6 {
+        let mut w = Workbench::open(dir.path());
+        let version = w.version();
+        let (port, token, host) = (w.port, w.token.clone(), w.host());
+        // steps as fast as they go, until the process is gone
+        let began = w.text();
+        let on = !began.contains("squareness-xy");
+        let writer = std::thread::spawn(move || {
+            for k in 0..10_000_u64 {
+                let ask = if k % 2 == 0 {
+                    json!({ "switch": { "effect": "squareness-xy", "on": on } })
+                } else {
+                    json!("undo")
+                };
+                let body = json!({ "version": version + k, "ask": ask }).to_string();
+                let text = format!(
+                    "POST /api/step HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nX-Axiscal-Token: {token}\r\nContent-Type: application/json\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{body}",
+                    body.len()
+                );
+                let Ok(mut stream) = TcpStream::connect(("127.0.0.1", port)) else { return k };
+                let mut answer = String::new();
+                if stream.write_all(text.as_bytes()).is_err()
+                    || stream.read_to_string(&mut answer).is_err()
+                    || answer.is_empty()
+                {
+                    return k;
+                }
+            }
+            10_000
+        });
+        until("a first step", || w.text() != began || writer.is_finished());
+        std::thread::sleep(Duration::from_millis(37 * round));
+        w.child.kill().unwrap();
+        w.child.wait().unwrap();
+        writer.join().unwrap();
+        for entry in std::fs::read_dir(dir.path()).unwrap().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let known = ["head.plan.json", "head.log", "study.toml", "study.history.json"].contains(&name.as_str());
+            // the temporary file of a write that was cut short is left, and the lock file, which locks nothing any more
+            assert!(known || name.starts_with(".axiscal-") || name == ".study.toml.lock", "{name}");
+        }
+        let output = Command::new(env!("CARGO_BIN_EXE_axiscal"))
+            .args(["--json", "history", &dir.path().join("study.toml").display().to_string()])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
+fn a_slow_or_silent_client_does_not_hold_the_others_up() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let silent: Vec<TcpStream> = (0..40).map(|_| TcpStream::connect(("127.0.0.1", w.port)).unwrap()).collect();
+    for mut stream in &silent {
+        stream.write_all(b"GET / HTTP/1.1\r\nHost:").unwrap();
+    }
+    assert_eq!(w.get("/api/state").status, 200);
+    // what says nothing more is sent away
+    let mut answer = Vec::new();
+    let mut first = &silent[0];
+    first.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    assert!(first.read_to_end(&mut answer).is_ok(), "the connection is still open");
+}
+
+#[test]
+fn a_model_at_hand_is_what_a_fresh_fit_says() {
+    let dir = folder();
+    let told =
+        |state: &Value| (state["residual_um"].clone(), state["parameters"].clone(), state["correlation"].clone());
+    let (off, on) = {
+        let w = Workbench::open(dir.path());
+        let off = w.get("/api/state").json();
+        let on = w.switch("squareness-xy", true).json();
+        assert!(on["rms_um"].as_f64().unwrap() < 0.5 * off["rms_um"].as_f64().unwrap());
+        for expected in [&off, &on] {
+            let again = w.switch("squareness-xy", expected == &on).json();
+            assert_eq!(again["fit_ms"], 0.0, "this model was fitted before");
+            assert_eq!(told(&again), told(expected));
+        }
+        // other touches are another fit, and the way back is none
+        let masked = w.step(w.version(), &json!({ "mask": { "touches": [[1, 7]], "reason": "a chip" } })).json();
+        assert!(masked["fit_ms"].as_f64().unwrap() > 0.0);
+        assert_ne!(told(&masked), told(&on));
+        let back = w.step(w.version(), &json!("undo")).json();
+        assert_eq!((back["fit_ms"].as_f64(), told(&back)), (Some(0.0), told(&on)));
+        (off, on)
+    };
+    let fresh = Workbench::open(dir.path()).get("/api/state").json();
+    assert!(fresh["fit_ms"].as_f64().unwrap() > 0.0);
+    assert_eq!(told(&fresh), told(&on));
+    assert_ne!(told(&fresh), told(&off));
+}
+
+#[test]
+fn an_effect_that_changes_on_the_disk_is_fitted_anew() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let draft = |formula: &str| json!({ "id": "mine", "at": "Y", "terms": [{ "parameter": "mine", "unit": "urad", "dof": "dx", "formula": formula }] });
+    let saved = w.step(w.version(), &json!({ "save": { "draft": draft("-Y"), "on": true } })).json();
+    let value = |state: &Value| {
+        let all = state["parameters"].as_array().unwrap();
+        all.iter().find(|p| p["name"] == "mine").unwrap()["value"].as_f64().unwrap()
+    };
+    let file = dir.path().join("my-effects.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("formula = \"-Y\"", "formula = \"-0.25*Y\"")).unwrap();
+    let began = Instant::now();
+    loop {
+        let now = w.get("/api/state").json();
+        if now["version"] != saved["version"] {
+            assert!((value(&now) / value(&saved) - 4.0).abs() < 1e-6, "{} and {}", value(&saved), value(&now));
+            break;
+        }
+        assert!(began.elapsed() < Duration::from_secs(20), "the change is not seen");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Formulas that are long, deep or multiply a shape parameter many times: each is tried or refused with its place, at once.
+#[test]
+fn no_formula_ends_the_process() {
+    let dir = folder();
+    let w = Workbench::open(dir.path());
+    let version = w.version();
+    let attempt = |formula: &str, shapes: usize| {
+        let name = |i: usize| if i == 0 { "s".to_owned() } else { format!("s{i}") };
+        let shape: Vec<Value> =
+            (0..shapes).map(|i| json!({ "parameter": name(i), "unit": "mm", "start": 0.9 })).collect();
+        let term = json!({ "parameter": "p", "unit": "um", "dof": "dx", "formula": formula });
+        let draft = json!({ "id": "my-a", "at": "X", "terms": [term], "shape": shape });
+        let begun = Instant::now();
+        let answer = w.post("/api/try", &json!({ "version": version, "draft": draft }).to_string());
+        (answer, begun.elapsed())
+    };
+    for formula in [
+        format!("X{}", "*s".repeat(18)),
+        format!("X{}", "*s".repeat(100)),
+        format!("{}s", "s^".repeat(18)),
+        format!("{}s{}", "sin(".repeat(32), ")".repeat(32)),
+        vec!["cos(Y/s)"; 24].join("+"),
+        vec!["cos(Y/s)"; 60].join("+"),
+    ] {
+        let (answer, time) = attempt(&formula, 1);
+        assert_eq!(answer.status, 200, "{formula}: {:.300}", answer.body);
+        assert!(time < Duration::from_secs(20), "{formula}: {time:?}");
+    }
+    for (formula, from) in [("(".repeat(100) + "s" + &")".repeat(100), 64), ("s^".repeat(100) + "s", 129)] {
+        let (answer, _) = attempt(&formula, 1);
+        assert_eq!(answer.status, 422, "{formula}: {:.300}", answer.body);
+        let mistake = &answer.json()["mistakes"][0];
+        assert_eq!((&mistake["field"], &mistake["from"]), (&json!("terms.0.formula"), &json!(from)), "{mistake}");
+        assert!(mistake["help"].is_string(), "{mistake}");
+    }
+    let (answer, _) = attempt("s + s1 + s2 + s3 + s4 + s5 + s6 + s7 + s8", 9);
+    assert_eq!(answer.status, 422, "{:.300}", answer.body);
+    assert_eq!(answer.json()["mistakes"][0]["field"], "shape.8.parameter");
+    assert_eq!(w.version(), version);
+}
