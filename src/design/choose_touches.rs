@@ -294,14 +294,14 @@ impl Choice {
         Some(Self { chosen: Vec::new(), seen: &design.rows * &covariance, covariance })
     }
 
-    /// L⁻¹AC of a bundle with rows A: the covariance C changes by what these rows are squared, less for one more bundle
+    /// L⁻¹AC of a bundle with rows A, some of its columns: the covariance C changes by what these rows are squared, less for one more bundle
     /// (`sign` 1), more for one that goes (−1).
-    fn change(&self, design: &Design, bundle: usize, sign: f64) -> Option<DMatrix<f64>> {
+    fn change(&self, design: &Design, bundle: usize, sign: f64, columns: Range<usize>) -> Option<DMatrix<f64>> {
         let range = &design.ranges[bundle];
         let seen = self.seen.rows(range.start, range.len());
         let within = &seen * design.rows.rows(range.start, range.len()).transpose() * sign;
         let factor = (within + DMatrix::identity(range.len(), range.len())).cholesky()?;
-        let mut out = seen.into_owned();
+        let mut out = seen.columns(columns.start, columns.len()).into_owned();
         factor.l_dirty().solve_lower_triangular_mut(&mut out).then_some(out)
     }
 
@@ -322,14 +322,15 @@ impl Choice {
     /// The value with one bundle more (`sign` 1) or less (−1).
     fn value(&self, design: &Design, bundle: usize, sign: f64, value: &Value) -> Option<f64> {
         let (p, q) = (design.n_base, self.covariance.ncols() - design.n_base);
-        let change = self.change(design, bundle, sign)?.columns(p, q).into_owned();
+        let change = self.change(design, bundle, sign, p..p + q)?;
         let covariance = self.covariance.view((p, p), (q, q)) - change.tr_mul(&change) * sign;
         Some(value(&Self::of_covariance(covariance)))
     }
 
     /// One bundle more (`sign` 1) or less (−1).
     fn take(&mut self, design: &Design, bundle: usize, sign: f64) {
-        let Some(change) = self.change(design, bundle, sign) else { return };
+        let all = 0..self.covariance.ncols();
+        let Some(change) = self.change(design, bundle, sign, all) else { return };
         self.seen -= (&design.rows * change.transpose()) * &change * sign;
         self.covariance -= change.tr_mul(&change) * sign;
         if sign > 0.0 {

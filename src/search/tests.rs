@@ -6,7 +6,6 @@ use super::power::{power, separation};
 use super::testing::{noise, noise_matrix, rng};
 use super::*;
 use nalgebra::{DMatrix, DVector};
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
