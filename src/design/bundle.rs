@@ -367,7 +367,7 @@ pub fn without(pool: &[Bundle], skipped: &[plan::Skipped]) -> Vec<Bundle> {
         .filter_map(|b| {
             let mut left = b.clone();
             left.faces.retain(|f| !is_out(b, f));
-            left.touches.retain(|t| left.faces.iter().any(|f| t.face == *f));
+            left.touches.retain(|t| left.faces.contains(&t.face));
             (left.touches.len() >= 3).then_some(left)
         })
         .collect()

@@ -299,7 +299,7 @@ impl Choice {
     fn change(&self, design: &Design, bundle: usize, sign: f64, columns: Range<usize>) -> Option<DMatrix<f64>> {
         let range = &design.ranges[bundle];
         let seen = self.seen.rows(range.start, range.len());
-        let within = &seen * design.rows.rows(range.start, range.len()).transpose() * sign;
+        let within = seen * design.rows.rows(range.start, range.len()).transpose() * sign;
         let factor = (within + DMatrix::identity(range.len(), range.len())).cholesky()?;
         let mut out = seen.columns(columns.start, columns.len()).into_owned();
         factor.l_dirty().solve_lower_triangular_mut(&mut out).then_some(out)

@@ -301,7 +301,7 @@ impl Pool<'_> {
                 .filter_map(|t| {
                     let (n, p, c) = (Vector3::from(t.normal), Vector3::from(t.point), Vector3::from(block.centre));
                     let other = p - n * (2.0 * (p - c).dot(&n));
-                    let face = turned_face(&t.face).into();
+                    let face = turned_face(&t.face);
                     let mirrored = PlanTouch { point: other.into(), normal: (-n).into(), face, ..(*t).clone() };
                     again(self.machine, plan, &mirrored, &change)
                 })

@@ -38,11 +38,11 @@ pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, setti
 
 /// Finds start values of the effects that the touches show, and takes these out of `waiting`; the others stay at usual shapes. The
 /// scatter of index positions beside all that show, mm.
-fn look_for<'e>(
+fn look_for(
     job: Job,
     data: &Data,
     settings: &Settings,
-    waiting: &mut Vec<&'e Effect>,
+    waiting: &mut Vec<&Effect>,
     starts: &mut Starts,
 ) -> Result<f64> {
     while !waiting.is_empty() && !data.observations.is_empty() {

@@ -444,7 +444,7 @@ impl Router<'_, '_> {
             repeat,
             carrier: planned.carrier.to_string(),
             mounting: (part.label != one.label).then(|| part.label.clone()),
-            block: block.into(),
+            block,
             face: target.face.to_string(),
             point: target.point.into(),
             normal: target.normal.into(),

@@ -8,6 +8,7 @@ mod dependencies;
 mod files;
 mod many_findings;
 mod report;
+mod rooms;
 mod shell;
 mod terminal;
 mod torture;

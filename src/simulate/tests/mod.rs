@@ -72,7 +72,7 @@ pub fn add_touch(plan: &mut Plan, machine: &Machine, block: &str, point: Vec3, n
         carrier: found.carrier.as_str().into(),
         mounting: None,
         block: block.into(),
-        face: String::new().into(),
+        face: String::new(),
         point,
         normal,
         pose,
