@@ -134,7 +134,7 @@ fn every_crate_has_a_licence_that_is_allowed() {
 #[test]
 fn every_direct_dependency_is_explained() {
     let manifest: toml::Table = read("Cargo.toml").parse().unwrap();
-    let tables = ["dependencies", "build-dependencies", "dev-dependencies"];
+    let tables = ["dependencies", "dev-dependencies"];
     let named: BTreeSet<String> =
         tables.iter().flat_map(|table| manifest[*table].as_table().unwrap().keys().cloned()).collect();
     let page = read("docs/dependencies.md");
