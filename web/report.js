@@ -230,16 +230,15 @@
     const list = make('ul.plain');
     const effectName = (n) => d.effects[n]?.name ?? n;
     // what is said of several alike is said once
-    const NO_TRACE = ' has no effect on these touches';
-    const untold = view.undetermined.map((u) => ({ says: u.says.split('; what parts them:')[0], takes: u.parted_by?.length ? u.parted_by.join('; or ') : '' }));
-    const silent = untold.filter((u) => u.says.includes(NO_TRACE));
-    const many = silent.length > 2 ? [{ says: `These have no effect on these touches and cannot be determined; they stay at their start values: ${silent.map((u) => u.says.split(NO_TRACE)[0]).join('; ')}.`, takes: [...new Set(silent.map((u) => u.takes).filter(Boolean))].join('; or ') }] : silent;
-    const said = new Set();
-    const lines = [...untold.filter((u) => !silent.includes(u)), ...many].map((u) => {
-      const takes = !u.takes ? '' : said.has(u.takes) ? ' It would take the same.' : ` It would take: ${u.takes}.`;
-      if (u.takes) said.add(u.takes);
-      return u.says.replace(/\.?$/, '.') + takes;
-    });
+    const isSilent = (u) => Object.keys(u.combination).length === 1;
+    const silent = view.undetermined.filter(isSilent);
+    const others = silent.length > 2 ? view.undetermined.filter((u) => !isSilent(u)) : view.undetermined;
+    const lines = others.map((u) => u.says);
+    if (silent.length > 2) {
+      const parted = [...new Set(silent.flatMap((u) => u.parted_by ?? []))];
+      const takes = parted.length ? ` It would take: ${parted.join('; or ')}.` : '';
+      lines.push(`These have no effect on these touches and cannot be determined; they stay at their start values: ${silent.map((u) => Object.keys(u.combination)[0]).join(', ')}.${takes}`);
+    }
     for (const text of new Set([...lines, ...view.weak.map((w) => w.says)])) list.append(make('li', {}, text));
     if (d.not_seen.length) list.append(make('li', {}, `These effects leave no trace in these touches, so nobody can say whether the machine has them: ${d.not_seen.map(effectName).join(', ')}.`));
     const seen = [...d.power].sort((a, b) => b.minimal_detectable_um - a.minimal_detectable_um).slice(0, 8);
