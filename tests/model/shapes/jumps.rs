@@ -140,9 +140,9 @@ fn sizes_of_a_slip_are_no_surer_than_its_moment() {
     let machine = machine("swivel-head");
     let full = plan(&machine, "full");
     let model = ["location-b", "location-c", "block-setup", "pretravel", "block-slip"];
-    for (from_h, seeds) in [(0.03, 1..=20), (0.06, 1..=20), (1.49, 1..=6)] {
+    for (from_h, runs) in [(0.03, 20), (0.06, 20), (1.49, 6)] {
         let (mut inside, mut told, mut of_blocks, mut blocks) = (0, 0, 0, 0);
-        for seed in seeds {
+        for seed in 1..=runs {
             let slip = [("dx", 8.0), ("dy", -5.0), ("from_h", from_h)];
             let scenario =
                 Scenario::flawless().with_noise(1e-3, 0.5e-3, seed).with(&machine, "block-slip", &slip).unwrap();
@@ -152,7 +152,7 @@ fn sizes_of_a_slip_are_no_surer_than_its_moment() {
                 let p = parameter(&fit, name);
                 if p.status == Status::Identified {
                     told += 1;
-                    inside += usize::from(holds(p, truth));
+                    inside += u64::from(holds(p, truth));
                 }
             }
             for p in
@@ -164,7 +164,8 @@ fn sizes_of_a_slip_are_no_surer_than_its_moment() {
         }
         println!("{from_h}: {inside} of {told} sizes, {of_blocks} of {blocks} set-ups");
         assert!(inside * 100 >= told * 87 && of_blocks * 100 >= blocks * 90, "{from_h}");
-        assert!(from_h > 1.0 || told >= 54, "{from_h}: {told} told");
+        // nine tenths of three sizes a run
+        assert!(from_h > 1.0 || 10 * told >= 27 * runs, "{from_h}: {told} told");
     }
 }
 
