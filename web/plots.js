@@ -80,8 +80,8 @@ globalThis.axiscalPlots = (() => {
     const { before, after, noise_um: noise } = view.errors;
     const proposed = view.ladder[after].kind === 'proposed';
     const rows = [
-      { i: before, name: view.ladder[before].kind === 'uncorrected' ? 'the machine<br>as it stands' : 'before<br>(model now)', colour: OKABE.red },
-      { i: after, name: proposed ? `after, with<br>${safe(view.ladder[after].added.join(', '))}` : 'after (what the<br>model leaves)', colour: OKABE.blue },
+      { i: before, name: view.ladder[before].kind === 'uncorrected' ? 'the machine<br>uncorrected' : 'before<br>(model now)', colour: OKABE.red },
+      { i: after, name: proposed ? `after, with<br>${safe(view.ladder[after].added.join(', '))}` : 'after<br>(remaining)', colour: OKABE.blue },
     ].filter((r, k, all) => k === 0 || r.i !== all[0].i);
     const values = rows.map((r) => view.ladder[r.i].rms_um);
     // as many unknowns as touches leave nothing but the computer's rounding
@@ -96,18 +96,18 @@ globalThis.axiscalPlots = (() => {
     if (held.some((h) => h !== null)) {
       traces.push({
         type: 'scatter', mode: 'markers', y: rows.map((r) => r.name), x: held, marker: { symbol: 'diamond-open', size: 11, color: c.ink, line: { width: 2 } },
-        hovertemplate: 'touches that had no part in the fit: %{x:.2f} µm<extra></extra>',
+        hovertemplate: 'cross-validated: %{x:.2f} µm<extra></extra>',
       });
     }
     const lay = layout(el, {
       margin: { l: 8, r: 14, t: 26, b: 44 },
-      xaxis: { title: { text: narrow(el, 330) ? 'miss (RMS), µm' : 'the touches miss by (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
+      xaxis: { title: { text: narrow(el, 330) ? 'error (RMS), µm' : 'error of the touches (RMS), µm' }, range: [0, 1.1 * Math.max(top, ...held.filter((h) => h !== null), 0)] },
       yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [{ type: 'line', x0: noise, x1: noise, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash: 'dash' } }],
-      annotations: [{ x: noise, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: noise > 0.6 * top ? 'right' : 'left', showarrow: false, text: `probe's noise ${digits(noise)} µm`, font: { size: 11 } }],
+      annotations: [{ x: noise, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: noise > 0.6 * top ? 'right' : 'left', showarrow: false, text: `probe noise ${digits(noise)} µm`, font: { size: 11 } }],
     });
     const say = rows.map((r) => r.name.replace(/<[^>]*>/g, ' ')).join('; ');
-    return draw(el, traces, lay, `Error of the touches: ${say}; the probe's noise is ${digits(noise)} µm.`);
+    return draw(el, traces, lay, `Error of the touches: ${say}; the probe noise is ${digits(noise)} µm.`);
   }
 
   const JUDGEMENTS = { within: { symbol: 'circle', colour: OKABE.blue, word: 'within' }, beyond: { symbol: 'diamond', colour: OKABE.red, word: 'too large' }, open: { symbol: 'square', colour: OKABE.orange, word: 'uncertain' }, none: { symbol: 'x', colour: '#888888', word: 'no tolerance' } };
@@ -122,8 +122,8 @@ globalThis.axiscalPlots = (() => {
     shown.sort((a, b) => sized.indexOf(a) - sized.indexOf(b));
     const name = (p) => `${safe(p.says)} <b>${safe(p.name)}</b>`;
     if (!shown.length) {
-      const none = layout(el, { xaxis: { visible: false }, yaxis: { visible: false }, annotations: [{ x: 0.5, y: 0.5, xref: 'paper', yref: 'paper', showarrow: false, text: 'these touches tell no error' }] });
-      return draw(el, [], none, 'These touches tell no error of the machine.');
+      const none = layout(el, { xaxis: { visible: false }, yaxis: { visible: false }, annotations: [{ x: 0.5, y: 0.5, xref: 'paper', yref: 'paper', showarrow: false, text: 'no error can be determined' }] });
+      return draw(el, [], none, 'These touches determine no error of the machine.');
     }
     const y = shown.map(name);
     const kinds = shown.map((p) => JUDGEMENTS[p.judgement]);
@@ -165,19 +165,19 @@ globalThis.axiscalPlots = (() => {
     const names = view.ladder.map((r) => safe(r.label).replace(/ (?=\S{12})/g, '<br>'));
     const noise = view.errors.noise_um;
     const traces = [
-      { type: 'scatter', mode: 'lines+markers+text', x, y: view.ladder.map((r) => r.rms_um), line: { color: OKABE.blue, width: 3, shape: 'hv' }, marker: { size: 10, color: OKABE.blue, symbol: view.ladder.map((r) => (r.kind === 'proposed' ? 'circle-open' : 'circle')) }, text: view.ladder.map((r) => `${digits(r.rms_um)}`), textposition: 'top right', name: 'touches that were fitted', hovertemplate: '%{y:.3f} µm<extra>touches that were fitted</extra>', cliponaxis: false },
-      { type: 'scatter', mode: 'markers', x, y: view.ladder.map((r) => r.held_out_rms_um), marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'index visits left out (predicted)', hovertemplate: '%{y:.3f} µm<extra>index visits left out</extra>' },
+      { type: 'scatter', mode: 'lines+markers+text', x, y: view.ladder.map((r) => r.rms_um), line: { color: OKABE.blue, width: 3, shape: 'hv' }, marker: { size: 10, color: OKABE.blue, symbol: view.ladder.map((r) => (r.kind === 'proposed' ? 'circle-open' : 'circle')) }, text: view.ladder.map((r) => `${digits(r.rms_um)}`), textposition: 'top right', name: 'fitted', hovertemplate: '%{y:.3f} µm<extra>fitted</extra>', cliponaxis: false },
+      { type: 'scatter', mode: 'markers', x, y: view.ladder.map((r) => r.held_out_rms_um), marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'cross-validated', hovertemplate: '%{y:.3f} µm<extra>cross-validated</extra>' },
     ];
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
     const wide = Math.max(...all) / Math.min(...all) > 12;
     const lay = layout(el, {
       showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
       xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], zeroline: false, title: { text: 'model, step by step' } },
-      yaxis: { title: { text: 'error left (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
+      yaxis: { title: { text: 'remaining error (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
-      annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'bottom', bgcolor: c.paper, borderpad: 1, yshift: 2, showarrow: false, text: `probe's noise ${digits(noise)} µm` }],
+      annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'bottom', bgcolor: c.paper, borderpad: 1, yshift: 2, showarrow: false, text: `probe noise ${digits(noise)} µm` }],
     });
-    return draw(el, traces, lay, `Error left by each model: ${view.ladder.map((r) => `${r.label} ${digits(r.rms_um)} µm`).join(', ')}; the probe's noise is ${digits(noise)} µm.`);
+    return draw(el, traces, lay, `Remaining error of each model: ${view.ladder.map((r) => `${r.label} ${digits(r.rms_um)} µm`).join(', ')}; the probe noise is ${digits(noise)} µm.`);
   }
 
   /** Where a touch is found again. */
@@ -229,9 +229,9 @@ globalThis.axiscalPlots = (() => {
         traces.push({ type, mode: 'markers', x: s.x, y: s.y, customdata: s.ids, marker, text: s.ids.map((i) => about(view, i)), hovertemplate: `%{text}<br>${word}: %{y:.2f} µm<extra></extra>` });
       };
       if (from !== to) add(from, { symbol: `${style.symbol}-open`, size: 6, color: style.colour, opacity: 0.45 }, 'before');
-      add(to, { symbol: style.symbol, size: 4, color: style.colour, opacity: 0.85 }, from === to ? 'misses by' : 'after');
+      add(to, { symbol: style.symbol, size: 4, color: style.colour, opacity: 0.85 }, from === to ? 'residual' : 'after');
       for (const curve of view.curves.filter((k) => k.variable === variable.id && k.direction === d && k.from === from && k.to === to)) {
-        traces.push({ type: 'scatter', mode: 'lines', x: curve.x, y: curve.y_um, line: { color: style.colour, width: 2.5, dash: style.dash }, hovertemplate: `what the model adds: %{y:.2f} µm<extra>${d}</extra>` });
+        traces.push({ type: 'scatter', mode: 'lines', x: curve.x, y: curve.y_um, line: { color: style.colour, width: 2.5, dash: style.dash }, hovertemplate: `the added effect: %{y:.2f} µm<extra>${d}</extra>` });
       }
     }
     const marked = highlight.filter((i) => x[i] !== null && x[i] !== undefined);
@@ -242,12 +242,12 @@ globalThis.axiscalPlots = (() => {
     const noise = 2 * view.errors.noise_um;
     const lay = layout(el, {
       xaxis: { title: { text: safe(variable.title), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false },
-      yaxis: { title: { text: alongNormal ? 'miss along the face, µm' : 'miss, µm' }, zeroline: true },
+      yaxis: { title: { text: alongNormal ? 'residual along the normal, µm' : 'residual, µm' }, zeroline: true },
       shapes: [{ type: 'rect', x0: 0, x1: 1, xref: 'paper', y0: -noise, y1: noise, fillcolor: c.band, line: { width: 0 }, layer: 'below' }],
       hovermode: 'closest',
     });
-    const share = variable.share ? ` ${Math.round(100 * variable.share)} % of what the model does not explain goes with it.` : '';
-    return draw(el, traces, lay, `How far the touches miss, in µm, against ${variable.title}; ${view.ladder[from].label} and ${view.ladder[to].label}.${share}`);
+    const share = variable.share ? ` ${Math.round(100 * variable.share)} % of the unexplained error depends on it.` : '';
+    return draw(el, traces, lay, `Residuals in µm against ${variable.title}; ${view.ladder[from].label} and ${view.ladder[to].label}.${share}`);
   }
 
   // ---------------------------------------------------------------- the machine
@@ -403,7 +403,7 @@ globalThis.axiscalPlots = (() => {
       if (heads) traces.push(arrowHeads(view, rung, a, colour, parts.extent));
       // what is pointed at; seen only where there are no heads
       traces.push(marks(a.tips, { size: flat ? 5 : 4, color: colour, symbol: 'diamond', opacity: heads ? 0 : 1 }, {
-        legendgroup: a.name, customdata: a.which, text: a.which.map((i) => `${about(view, i)}<br>misses by ${digits(view.touches.residual_um[rung][i])} µm`), hovertemplate: '%{text}<extra></extra>',
+        legendgroup: a.name, customdata: a.which, text: a.which.map((i) => `${about(view, i)}<br>residual ${digits(view.touches.residual_um[rung][i])} µm`), hovertemplate: '%{text}<extra></extra>',
       }));
     });
     if (parts.rejected.length) {
@@ -434,7 +434,7 @@ globalThis.axiscalPlots = (() => {
       lay.yaxis.range = [around[1] - r, around[1] + r];
     }
     el.dataset.magnification = parts.magnification;
-    return draw(el, traces, lay, `The machine with its blocks; an arrow at each touch shows how far it misses (${view.ladder[rung].label}), drawn ${parts.magnification} times as long as it is.`)
+    return draw(el, traces, lay, `The machine with its blocks; an arrow at each touch shows its residual (${view.ladder[rung].label}), ${parts.magnification} times enlarged.`)
       .then(() => parts);
   }
 
@@ -444,7 +444,7 @@ globalThis.axiscalPlots = (() => {
     const { names, matrix } = view.correlation;
     const traces = [{
       type: 'heatmap', x: names, y: names, z: matrix, zmin: -1, zmax: 1,
-      // blue to orange over the paper: told apart by everybody
+      // blue to orange over the paper: also for colour-blind people
       colorscale: [[0, OKABE.blue], [0.5, c.paper], [1, OKABE.red]], colorbar: { title: { text: 'correlation' }, thickness: 12, tickvals: [-1, -0.5, 0, 0.5, 1] },
       text: matrix.map((row) => row.map((r) => (r === null ? '' : r.toFixed(2).replace('-0.00', '0.00').replace('-', '−')))), texttemplate: names.length <= 12 ? '%{text}' : '', xgap: 1, ygap: 1,
       hovertemplate: '%{y} and %{x}: %{z:.2f}<extra></extra>',
@@ -458,11 +458,11 @@ globalThis.axiscalPlots = (() => {
   const tried = (k) => k.held_out_before_um > 0 || k.held_out_after_um > 0;
   function standing(d, k) {
     if (k.proposed) return { word: 'proposed', symbol: 'circle', proposed: true };
-    if (!(k.p_adjusted < LEVEL)) return { word: 'no more than chance', symbol: 'x-thin-open' };
+    if (!(k.p_adjusted < LEVEL)) return { word: 'no more than noise', symbol: 'x-thin-open' };
     const part = { symbol: 'circle-open' };
     if (d.verdict === 'too-little-data') return { word: 'cannot be judged yet', ...part };
-    if (d.verdict === 'unexplained' && !tried(k)) return { word: 'may be it: these poses cannot tell', ...part };
-    return { word: k === d.candidates[0] ? 'explains part, but not of index visits left out' : 'explains part, less than the first', ...part };
+    if (d.verdict === 'unexplained' && !tried(k)) return { word: 'possible: these poses cannot decide', ...part };
+    return { word: k === d.candidates[0] ? 'explains part, but not in cross-validation' : 'explains part, less than the first', ...part };
   }
 
   /** What each candidate would leave. */
@@ -471,21 +471,21 @@ globalThis.axiscalPlots = (() => {
     const list = view.diagnosis.candidates;
     const y = list.map((k) => safe(k.name).slice(0, 44));
     const traces = [
-      { type: 'scatter', mode: 'markers', x: list.map((k) => k.rms_after_um), y, marker: { size: 12, symbol: list.map((k) => standing(view.diagnosis, k).symbol), color: OKABE.blue, line: { width: 2, color: OKABE.blue } }, name: 'error left with it', hovertemplate: '%{x:.2f} µm<extra>left with it</extra>' },
-      { type: 'scatter', mode: 'markers', x: list.map((k) => (tried(k) ? k.held_out_after_um : null)), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'on index visits left out', hovertemplate: '%{x:.2f} µm<extra>index visits left out</extra>' },
+      { type: 'scatter', mode: 'markers', x: list.map((k) => k.rms_after_um), y, marker: { size: 12, symbol: list.map((k) => standing(view.diagnosis, k).symbol), color: OKABE.blue, line: { width: 2, color: OKABE.blue } }, name: 'remaining error', hovertemplate: '%{x:.2f} µm<extra>remaining</extra>' },
+      { type: 'scatter', mode: 'markers', x: list.map((k) => (tried(k) ? k.held_out_after_um : null)), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'cross-validated', hovertemplate: '%{x:.2f} µm<extra>cross-validated</extra>' },
     ];
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });
     const lay = layout(el, {
       showlegend: true, legend: { orientation: 'h', y: 1.12, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 16, t: 50, b: 44 },
-      xaxis: { title: { text: 'error left (RMS), µm' }, range: [0, 1.12 * top] }, yaxis: { autorange: 'reversed', ticks: '' },
+      xaxis: { title: { text: 'remaining error (RMS), µm' }, range: [0, 1.12 * top] }, yaxis: { autorange: 'reversed', ticks: '' },
       shapes: [line(view.diagnosis.rms_um, 'solid'), line(view.errors.noise_um, 'dash')],
       annotations: [
         { x: view.diagnosis.rms_um, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: 'right', showarrow: false, text: 'model now' },
         { x: view.errors.noise_um, y: 1, yref: 'paper', yanchor: 'bottom', showarrow: false, text: 'noise' },
       ],
     });
-    return draw(el, traces, lay, `Error left with each candidate: ${list.map((k) => `${k.name} ${digits(k.rms_after_um)} µm`).join(', ')}.`);
+    return draw(el, traces, lay, `Remaining error with each candidate: ${list.map((k) => `${k.name} ${digits(k.rms_after_um)} µm`).join(', ')}.`);
   }
 
   return { errors, parameters, ladder, residuals, machine, correlation, candidates, standing, tried, digits, valued, source, about, column, rungName, DIRECTION, JUDGEMENTS, OKABE };

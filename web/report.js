@@ -92,13 +92,13 @@
   // ---------------------------------------------------------------- the first screen
   const proposed = view.proposed.length > 0;
   plot(id('errors'), () => P.errors(id('errors'), view), true);
-  id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: touches that had no part in the fit, each index visit left out in turn' : ''}. Touches cannot miss by less than about the probe's noise.`;
+  id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: cross-validated, each index position left out of the fit in turn' : ''}. No model can fall below about the probe noise.`;
   plot(id('parameters'), () => P.parameters(id('parameters'), view), true);
   const t = view.tolerance;
-  const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (nobody stated one: this is the default; [tolerance] in the study changes it)'}.`;
+  const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (default; set [tolerance] in the study)'}.`;
   id('parameters-says').append(
-    proposed ? make('span.warn', {}, 'Values with the missing error in the model. Tick: without it; these values hold part of what is missing. ')
-      : view.diagnosis.verdict !== 'adequate' && view.parameters.some((p) => p.status !== 'undetermined') ? make('span.warn', {}, `These values ${view.diagnosis.faint || view.diagnosis.verdict === 'too-little-data' ? 'may hold' : 'hold'} part of what is missing. `) : '',
+    proposed ? make('span.warn', {}, 'Values with the missing error in the model. Tick: without it; these values include part of the missing error. ')
+      : view.diagnosis.verdict !== 'adequate' && view.parameters.some((p) => p.status !== 'undetermined') ? make('span.warn', {}, `These values ${view.diagnosis.faint || view.diagnosis.verdict === 'too-little-data' ? 'may include' : 'include'} part of the missing error. `) : '',
     `Circle: within, diamond: too large, square: uncertain. ${limit}`,
   );
   const copy = (text) => make('button.noprint', { type: 'button', 'aria-label': `copy the command ${text}`, onclick: (ev) => {
@@ -110,14 +110,14 @@
 
   // ---------------------------------------------------------------- results
   {
-    const s = section('results', 'The results', proposed ? 'With the missing error in the model. What the model without it says is in the last column: it is not to be used.' : '', true);
+    const s = section('results', 'The results', proposed ? 'With the missing error in the model. The last column shows the values without it: do not use them.' : '', true);
     const list = proposed ? view.proposed : view.parameters;
     const head = ['', 'symbol', 'what it is', 'value', 'std. unc.', '95 %', 'unit', `at ${t.radius_mm} mm, µm`, 'tolerance', ...(proposed ? ['without it'] : [])];
     const body = list.map((p) => {
       const j = P.JUDGEMENTS[p.judgement];
       const old = view.parameters.find((q) => q.name === p.name);
       const untold = p.status === 'undetermined';
-      const word = untold ? 'not told' : p.status === 'fixed' ? 'held' : j.word;
+      const word = untold ? 'not determined' : p.status === 'fixed' ? 'held' : j.word;
       const kind = { within: 'good', beyond: 'act', open: 'unknown' }[p.judgement] ?? '';
       return make('tr', {}, make('td', {}, make(`span.badge${kind ? `.${kind}` : ''}`, {}, word)),
         make('th', { scope: 'row' }, p.name + (p.alias ? ` (${p.alias})` : '')), make('td', {}, p.says),
@@ -139,7 +139,7 @@
     if (d.where.length && !view.headline.detail.includes(d.where[0].says)) s.append(make('p', {}, d.where[0].says));
     if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it goes with (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
     if (d.candidates.length) {
-      const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: takes away no more than chance may. Diamond: the same on index visits left out.');
+      const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: explains no more than noise could. Diamond: cross-validated error.');
       plot(div, () => P.candidates(div, view));
       const cards = make('div.grid');
       const alike = (c) => [...c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)), ...(c.or_else ? [c.or_else] : [])];
@@ -151,11 +151,11 @@
         const mends = d.effects[c.effect]?.mends;
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('on index visits left out', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
+            ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
             ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
-            ...(alike(c).length ? fact('cannot be told from', alike(c).join('; ')) : []),
-            ...(c.tell_apart ? fact('what tells them apart', c.tell_apart) : []),
+            ...(alike(c).length ? fact('cannot be separated from', alike(c).join('; ')) : []),
+            ...(c.tell_apart ? fact('what separates them', c.tell_apart) : []),
             ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
           make('p', {}, c.says), c.look ? make('p', {}, make('strong', {}, 'Look: '), c.look) : null, mends ? make('p', {}, make('strong', {}, 'Mends it: '), mends) : null));
       });
@@ -166,8 +166,8 @@
 
   // ---------------------------------------------------------------- the ladder
   {
-    const s = section('ladder', 'Step by step to the noise', 'What each model leaves. The lower the better, and nothing is gained below the noise; a model that falls on its own touches and not on those left out only learns by heart.');
-    const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Touches left out are here all that the model itself can predict, each index visit left out in turn; the cards of the candidates count only those that the model without the candidate can predict, too: their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
+    const s = section('ladder', 'Step by step to the noise', 'Remaining error of each model: lower is better, down to the noise. If the fitted error falls and the cross-validated error does not, the model fits noise.');
+    const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Each index position is left out in turn. The cards of the candidates count only touches that the model without the candidate can predict too, so their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
     plot(div, () => P.ladder(div, view));
     s.append(f);
   }
@@ -179,7 +179,7 @@
     return el;
   };
   {
-    const s = section('residuals', 'How far each touch misses, and on what that depends', 'Hollow marks: before; full marks: after; line: what the added effect says. A miss is stated as the ball standing off in X, Y or Z of the machine. What lies in the shaded band (twice the noise) is the probe itself.');
+    const s = section('residuals', 'Residual of each touch, and what it depends on', 'Hollow marks: before; full marks: after; line: the added effect. A residual is a displacement of the ball in X, Y or Z of the machine. The shaded band is twice the probe noise.');
     const plots = [];
     const again = () => plots.forEach((job) => job());
     const toggles = ['X', 'Y', 'Z'].map((l) => {
@@ -213,20 +213,20 @@
 
   // ---------------------------------------------------------------- the machine
   {
-    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch points the way the touched face seems to stand off.');
+    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch shows its residual.');
     const [f, div] = figure('machine-plot', '', true);
     const scale = make('figcaption', {});
     const job = () => P.machine(div, view, state).then((parts) => {
-      scale.textContent = `Misses of the model: ${view.ladder[state.rung].label}. Arrows are drawn ${parts.magnification.toLocaleString('en')} times as long as the misses are; the thick bar is ${digits(parts.scale.um, 1)} µm. ${view.machine.says}.`;
+      scale.textContent = `Residuals of the model: ${view.ladder[state.rung].label}. Arrows are drawn ${parts.magnification.toLocaleString('en')} times the residuals; the thick bar is ${digits(parts.scale.um, 1)} µm. ${view.machine.says}.`;
     });
     plot(div, job);
     f.append(scale);
-    s.append(make('div.controls.noprint', {}, 'model: ', select('model whose misses are drawn', state.rung, (v) => { state.rung = v; job(); })), f);
+    s.append(make('div.controls.noprint', {}, 'model: ', select('model whose residuals are drawn', state.rung, (v) => { state.rung = v; job(); })), f);
   }
 
   // ---------------------------------------------------------------- what is not told
   {
-    const s = section('doubt', 'What this data cannot tell', '');
+    const s = section('doubt', 'What cannot be determined', '');
     const list = make('ul.plain');
     const effectName = (n) => d.effects[n]?.name ?? n;
     // what is said of several alike is said once
@@ -240,12 +240,12 @@
       lines.push(`These have no effect on these touches and cannot be determined; they stay at their start values: ${silent.map((u) => Object.keys(u.combination)[0]).join(', ')}.${takes}`);
     }
     for (const text of new Set([...lines, ...view.weak.map((w) => w.says)])) list.append(make('li', {}, text));
-    if (d.not_seen.length) list.append(make('li', {}, `These effects leave no trace in these touches, so nobody can say whether the machine has them: ${d.not_seen.map(effectName).join(', ')}.`));
+    if (d.not_seen.length) list.append(make('li', {}, `This program cannot measure these effects: ${d.not_seen.map(effectName).join(', ')}.`));
     const seen = [...d.power].sort((a, b) => b.minimal_detectable_um - a.minimal_detectable_um).slice(0, 8);
-    if (seen.length) list.append(make('li', {}, `Effects that would have been found only from this size on: ${seen.map((q) => `${effectName(q.effect)} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));
-    s.append(list.children.length ? list : make('p', {}, 'Every result of the model is told by these touches.'));
+    if (seen.length) list.append(make('li', {}, `Smallest size at which these effects would be found: ${seen.map((q) => `${effectName(q.effect)} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));
+    s.append(list.children.length ? list : make('p', {}, 'Every result of the model is determined.'));
     if (view.correlation.names.length > 1) {
-      const [f, div] = figure('correlation-plot', proposed ? 'How the results of the model now (without what is proposed) hang together: near 0 they are told apart, near 1 or −1 only their difference or sum is known well.' : 'How the results of the model hang together: near 0 they are told apart, near 1 or −1 only their difference or sum is known well.');
+      const [f, div] = figure('correlation-plot', proposed ? 'Correlation of the results of the present model: near 0 they are independent; near 1 or −1 only their difference or sum is well known.' : 'Correlation of the results: near 0 they are independent; near 1 or −1 only their difference or sum is well known.');
       div.style.height = `${Math.min(640, 160 + 34 * view.correlation.names.length)}px`;
       f.style.maxWidth = '760px';
       plot(div, () => P.correlation(div, view));
@@ -257,7 +257,7 @@
   {
     const c = view.compensation;
     const s = section('compensation', 'The compensation, and what it leaves', c.active ? 'A compensation was active during the measurement: what was found is added to it.' : '');
-    if (d.verdict === 'missing-effect' || d.verdict === 'unexplained') s.append(make('p.warn', {}, 'Not to be loaded yet: something is missing in the model, and these values hold part of it.'));
+    if (d.verdict === 'missing-effect' || d.verdict === 'unexplained') s.append(make('p.warn', {}, 'Do not load it yet: an effect is missing in the model, and these values include part of it.'));
     if (c.refused) s.append(make('p.warn', {}, c.refused));
     const table = (name, head, rows, from) => make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': name }, make('table', {}, make('thead', {}, make('tr', {}, ...head.map((h, k) => make(k >= from[0] && k <= from[1] ? 'th.n' : 'th', { scope: 'col' }, h)))),
       make('tbody', {}, ...rows.map((r) => make('tr', {}, ...r.map((v, k) => make(k >= from[0] && k <= from[1] ? 'td.n' : 'td', {}, v)))))));
@@ -265,7 +265,7 @@
       if (q.place === 'zero') return 'where its zero is';
       const along = q.dof.at(-1).toUpperCase();
       const turns = q.place === 'after' ? `turns with ${q.axis}` : `does not turn with ${q.axis}`;
-      return `${q.dof.startsWith('d') ? `place in ${along}` : `tilt about ${along}`}, ${turns}`;
+      return `${q.dof.startsWith('d') ? `position in ${along}` : `tilt about ${along}`}, ${turns}`;
     };
     const fixed = (v) => v.toFixed(5).replace('-', '−');
     if (c.terms.length) s.append(table('what the control is given', ['carried', 'axis', 'component', 'active before', 'found', 'given to the control', 'std. unc.', 'unit'], c.terms.map((q) => [q.parameter, q.axis, component(q), fixed(q.active_before), fixed(q.identified), fixed(q.value), digits(q.sigma, 2), q.unit]), [3, 6]));
@@ -273,7 +273,7 @@
     if (c.tool_length_mm !== null) s.append(make('p', {}, `Tool table: the tool is ${digits(c.tool_length_mm)} mm longer than was assumed.`));
     s.append(make('h3', {}, 'What it leaves'));
     s.append(c.left.length ? table('what the compensation leaves', ['not carried', 'effect', 'value', 'unit', `leaves at ${t.radius_mm} mm, µm`, 'why'], c.left.map((q) => [q.parameter, q.effect, digits(q.value), q.unit, q.left_um === null ? '–' : digits(q.left_um), q.why]), [2, 2])
-      : make('p', {}, `Nothing of what was found, whatever the control can carry: axiscal export says what its tables leave.${proposed ? '' : ` The touches are then missed by about ${digits(view.ladder[e.after].rms_um)} µm, and the noise is ${digits(e.noise_um)} µm.`}`));
+      : make('p', {}, `Nothing of what was found, whatever the control can carry: axiscal export says what its tables leave.${proposed ? '' : ` The remaining error is then about ${digits(view.ladder[e.after].rms_um)} µm, and the noise is ${digits(e.noise_um)} µm.`}`));
   }
 
   // ---------------------------------------------------------------- every touch
@@ -285,7 +285,7 @@
       before: q.residual_um[e.before][i], after: q.residual_um[e.after][i], std: q.standardised[i], why: q.rejected[i] ?? '', source: P.source(view, i) }));
     for (const u of view.unusable) rows.push({ i: -1, run: u.run, id: u.id, stage: '', block: '', face: '', time: null, before: null, after: null, std: null, why: u.reason, source: `${view.study.runs[u.run - 1]?.log ?? 'log'}:${u.line}` });
     // of the study's own model, whose miss stands beside it
-    const unusual = ['std', 'how unusual', 1, `The miss ${proposed ? 'before' : 'after'}, over the standard deviation that the other touches let expect (studentised): beyond 4 chance alone seldom makes it`];
+    const unusual = ['std', 'how unusual', 1, `The residual ${proposed ? 'before' : 'after'}, over the standard deviation that the other touches let expect (studentised): beyond 4 chance alone seldom makes it`];
     const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? 'deg' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ...(proposed ? [unusual] : []), ['after', 'after, µm', 1], ...(proposed ? [] : [unusual]), ['why', 'not used because'], ['source', 'source line']];
     const SIZE = 50;
     const sort = { by: 'after', down: true };
@@ -340,7 +340,7 @@
     }
     const input = make('input', { type: 'search', id: 'filter', placeholder: 'block, face, line …' });
     input.addEventListener('input', () => { filter = input.value; page = 0; show(); });
-    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest misses first; the source line is the touch's place in the log. How unusual: the miss ${proposed ? 'before' : 'after'} over what the other touches let expect; beyond 4 chance alone seldom makes it.`), printed,
+    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest residuals first; the source line is the touch's place in the log. How unusual: the miss ${proposed ? 'before' : 'after'} over what the other touches let expect; beyond 4 chance alone seldom makes it.`), printed,
       make('div.controls.noprint', {}, make('label', { for: 'filter' }, 'show only'), input, previous, next, count),
       make('div.scroll', { id: 'touches-table', tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
     show();
@@ -348,7 +348,7 @@
 
   id('foot').append(
     make('p', {}, `${view.program}; study ${view.study.name}, SHA-256 ${view.study.sha256}; data of ${view.study.date}. Runs: ${view.study.runs.map((r) => `${r.program} (${r.plan}, ${r.log}, ${r.controller}, ${r.touches} touches)`).join('; ')}.`),
-    make('p', {}, 'Misses are measured less model along the outward normal of the touched face. Location errors are stated as ISO 230-1 and 230-7 name them. Bars and ± are 95 % unless they are called standard uncertainties. Plots: plotly.js, MIT licence.'),
+    make('p', {}, 'Residual: measured minus model, along the outward normal of the touched face. Names of errors follow ISO 230-1 and 230-7. Bars and ± are 95 % unless they are called standard uncertainties. Plots: plotly.js, MIT licence.'),
   );
   document.documentElement.dataset.ready = 'yes';
 })();

@@ -32,7 +32,7 @@ async function opensFromDisk(t) {
   });
   holds(cards.length > 1 && cards[0][0] === "proposed", JSON.stringify(cards));
   for (const [word, proposed, passes] of cards) equal([word === "proposed", word === "no more than chance"], [proposed, !passes], word);
-  holds(!(await page.textContent("#compensation-title >> xpath=..")).includes("The touches are then missed"), "the figure of another model");
+  holds(!(await page.textContent("#compensation-title >> xpath=..")).includes("The remaining error is then"), "the figure of another model");
   await page.screenshot({ path: join(out, "report-whole.png"), fullPage: true });
   equal(seen.errors, [], "errors in the console");
   equal(seen.asked.filter((url) => url !== address && !/^(data|blob):/.test(url)), [], "addresses that were asked for");

@@ -292,7 +292,7 @@ async function correlationMap(t) {
   const known = JSON.parse(readFileSync(view, "utf8")).correlation;
   equal([names, z], [known.names, known.matrix], "the map");
   holds(names.length > 4 && z.every((row, i) => Math.abs(row[i] - 1) < 1e-9), "the diagonal");
-  holds(/told apart/.test(await page.textContent("#correlation-says")), "no words");
+  holds(/independent/.test(await page.textContent("#correlation-says")), "no words");
   await page.screenshot({ path: join(t.out, "workbench-correlation.png") });
   await page.fill("#find", "squareness-xy");
   await page.click("[data-switch=squareness-xy]");

@@ -24,12 +24,12 @@ function draw() {
   matrix.forEach((row, i) => row.slice(0, i).forEach((r, k) => { if (Math.abs(r ?? 0) >= STRONG) strong.push([Math.abs(r), `${names[k]} and ${names[i]} (${r.toFixed(2)})`]); }));
   strong.sort((a, b) => b[0] - a[0]);
   const more = strong.length > 4 ? ` and ${strong.length - 4} more` : "";
-  show("correlation-says", `Results of the model as it is switched now. Near 0 two results are told apart; near 1 or −1 only their difference or sum is known well. ${strong.length
-    ? `Hard to tell apart here: ${strong.slice(0, 4).map((s) => s[1]).join(", ")}${more}.` : `No two results hang together by ${STRONG} or more.`}`);
+  show("correlation-says", `Correlation of the results of the present model. Near 0 two results are independent; near 1 or −1 only their difference or sum is well known. ${strong.length
+    ? `Hard to separate here: ${strong.slice(0, 4).map((s) => s[1]).join(", ")}${more}.` : `No two results correlate by ${STRONG} or more.`}`);
   box.style.height = `${Math.min(40, 9 + 1.7 * names.length)}em`;
   const traces = [{
     type: "heatmap", x: names, y: names, z: matrix, zmin: -1, zmax: 1, xgap: 1, ygap: 1,
-    // blue over paper to orange: told apart by everybody
+    // blue over paper to orange: also for colour-blind people
     colorscale: [[0, colour("x")], [0.5, colour("paper")], [1, colour("y")]], colorbar: { thickness: 12, tickvals: [-1, -0.5, 0, 0.5, 1] },
     text: matrix.map((row) => row.map((r) => (r === null ? "" : r.toFixed(2).replace("-0.00", "0.00")))), texttemplate: names.length <= 12 ? "%{text}" : "",
     hovertemplate: "%{y} and %{x}: %{z:.2f}<extra></extra>",

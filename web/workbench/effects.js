@@ -48,19 +48,19 @@ function row(effect, score) {
   item.append(element("div", { class: "head" }, toggle(effect, isOn, isOn && live.effects.length === 1), what));
   if (isOn) {
     const own = live.parameters.filter((p) => p.effect === effect.id).slice(0, 6);
-    if (own.length) what.append(element("small", {}, own.map((p) => (p.sigma || p.status === "fixed" ? `${p.name} ${stated(p.value, p.sigma)} ${p.unit}` : `${p.name} not told`)).join(", ")));
+    if (own.length) what.append(element("small", {}, own.map((p) => (p.sigma || p.status === "fixed" ? `${p.name} ${stated(p.value, p.sigma)} ${p.unit}` : `${p.name} not determined`)).join(", ")));
   } else if (score) {
     const strength = score.visible ? Math.min(1, Math.max(0, -score.ln_p / Math.LN10 / 20)) : 0;
     const bar = element("i");
     bar.style.width = `${100 * strength}%`;
     const first = score.parameters[0];
     const words = score.visible
-      ? `${standing(effect.id, score)}; chance ${chance(score.p_adjusted, score.ln_p)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
+      ? `${standing(effect.id, score)}; probability ${chance(score.p_adjusted, score.ln_p)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
       : "leaves no trace in these touches";
     const found = candidate(effect.id);
     const same = [...(found?.same_as ?? []), ...(found?.or_else ? [found.or_else] : [])];
     what.append(element("div", { class: "bar", "aria-hidden": "true" }, bar), element("small", {}, words));
-    if (same.length) what.append(element("small", {}, `these touches cannot tell it from ${same.join(", ")}`));
+    if (same.length) what.append(element("small", {}, `cannot be separated from ${same.join(", ")}`));
   }
   if (isOpen) item.append(details(effect, isOn));
   return item;

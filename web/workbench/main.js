@@ -46,24 +46,24 @@ function verdict() {
   const ratio = significant(Math.sqrt(live.chi2_per_dof), 2);
   const soFar = noise === null ? "As many unknowns as touches: nothing is left over to judge the model by."
     : noise ? "What is left is as small as noise; whether it depends on something is being worked out …"
-    : `The model misses the touches by ${ratio} times their noise; what is missing is being worked out …`;
+    : `The residuals are ${ratio} times the noise. Searching for the missing effect …`;
   // the rooms write um in plain letters
   const first = found?.candidates[0];
   // several effects would do, and no touches are left over to try one of them on
   const untried = (c) => c.p_adjusted < 0.05 && !(c.held_out_before_um > 0 || c.held_out_after_um > 0);
   const open = found?.verdict === "unexplained" && !found.faint && first && !first.proposed && untried(first)
     ? new Set(found.candidates.filter(untried).flatMap((c) => [c.effect, ...c.same_as])) : new Set();
-  const which = open.size > 1 ? `one of ${open.size} known effects explains it; these poses cannot tell which.` : `one known effect explains it (${first?.name}); these poses cannot tell whether it is the right one.`;
-  const says = open.size ? `Something is missing in the model (${found.rms_um.toFixed(2)} µm RMS against ${found.noise_um.toFixed(2)} µm noise): ${which}` : found?.says;
+  const which = open.size > 1 ? `one of ${open.size} known effects explains it; these poses cannot decide which.` : `one known effect explains it (${first?.name}); these poses cannot confirm it.`;
+  const says = open.size ? `An effect is missing in the model (${found.rms_um.toFixed(2)} µm RMS against ${found.noise_um.toFixed(2)} µm noise): ${which}` : found?.says;
   show("verdict", says?.replace(/(\d )um\b/g, "$1µm") ?? soFar);
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
-    ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` These touches cannot tell it from ${[...first.same_as, ...(first.or_else ? [first.or_else] : [])].join(", ")}: a further program would.` : ""}`
+    ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` It cannot be separated from ${[...first.same_as, ...(first.or_else ? [first.or_else] : [])].join(", ")}: a further program can.` : ""}`
     : found.faint ? "What is left is as small as the noise, but for a faint pattern: write the program that tells more."
     : open.size ? "Measure further poses: write the program that tells more, or run the full program."
     : found.verdict === "unexplained" ? "No known effect explains what is left: try a formula of your own, or look at the touches that stand out."
     : found.verdict === "adequate" ? "Nothing is missing that these touches can show: write the compensation." : "There are too few touches to judge: write a further program.");
   const t = live.tolerance;
-  const partly = !found || found.verdict === "adequate" ? "" : `; these values ${found.faint || found.verdict === "too-little-data" ? "may hold" : "hold"} part of what is missing`;
+  const partly = !found || found.verdict === "adequate" ? "" : `; these values ${found.faint || found.verdict === "too-little-data" ? "may include" : "include"} part of the missing error`;
   byId("parameters").caption.textContent = `Results with their 95 % uncertainty, against ${t.error_um} µm at ${t.radius_mm} mm${partly}`;
   if (behind?.version === live.version && behind.failed.length) trouble({ messages: behind.failed });
 }
@@ -81,7 +81,7 @@ function parameters(live) {
       element("td", {}, significant(p.expanded, 2)), element("td", { class: "word" }, p.unit), element("td", { class: "word" }, p.tolerance === null ? "–" : `${told && VERDICTS[p.judgement] ? `${VERDICTS[p.judgement]}: ` : ""}${significant(p.tolerance)}`), element("td", {}, told ? bar(p, top[p.unit]) : ""));
   });
   table.replaceChildren(table.caption, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows));
-  const remarks = [...live.warnings, ...live.undetermined.map((u) => `not told by this data: ${u.says}`)].filter((r, i, all) => all.indexOf(r) === i);
+  const remarks = [...live.warnings, ...live.undetermined.map((u) => `not determined: ${u.says}`)].filter((r, i, all) => all.indexOf(r) === i);
   byId("warnings").replaceChildren(...remarks.map((r) => element("li", {}, r)));
 }
 

@@ -19,7 +19,7 @@ export function significant(value, digits = 3) {
 
 /** A result with its uncertainty; without one it is none. */
 export function sized(p) {
-  return p.sigma ? `${p.name} = ${stated(p.value, p.sigma)} ± ${significant(p.sigma, 2)} ${p.unit}` : `${p.name}: not told by these touches`;
+  return p.sigma ? `${p.name} = ${stated(p.value, p.sigma)} ± ${significant(p.sigma, 2)} ${p.unit}` : `${p.name}: not determined`;
 }
 
 /** A probability; its natural logarithm where it is too small to be a number. */
