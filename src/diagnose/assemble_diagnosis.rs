@@ -303,10 +303,11 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
 fn faces(fit: &Fit, seen: &Examination, features: &Features, drawn: Option<&Dependence>) -> Vec<String> {
     let of_touches = super::clustered_rejections::faces(fit, features);
     let named = |number: usize| words::group("face", number, fit, features);
-    // where four of five touches of a face are not used the whole face lies elsewhere, and not a chip on it
+    // a chip lies at some touches of a face: where the others show it too, or four of five are excluded, the whole face differs
     let whole = |face: usize| {
         let here = || (0..features.face.len()).filter(|&i| features.face[i] == face);
-        5 * here().filter(|i| fit.rejected.contains_key(i)).count() >= 4 * here().count()
+        drawn.is_some_and(|d| d.on == "face")
+            || 5 * here().filter(|i| fit.rejected.contains_key(i)).count() >= 4 * here().count()
     };
     let found: Vec<(usize, bool)> = if of_touches.is_empty() {
         let Some(d) = drawn.filter(|d| d.on == "face") else { return Vec::new() };

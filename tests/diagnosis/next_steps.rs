@@ -119,7 +119,7 @@ fn what_is_said_to_be_next_can_be_done() {
     let visits = touched(&["full"], "seed = 400\n[noise]\ntouch_um = 0.5\nvisit_um = 6.0\n", None);
     study(visits.path(), &["full"]);
     let said = diagnosed(visits.path());
-    assert!(commands(&said).is_empty() && said.contains("next: look for play"), "{said}");
+    assert!(commands(&said).is_empty() && said.contains("next: check the clamping and indexing"), "{said}");
 }
 
 /// One block is knocked in mid-program: its jump is drawn, its touches are one finding, and the formula takes it away.
