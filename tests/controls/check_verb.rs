@@ -544,7 +544,7 @@ fn few_digits_under_the_transformation() {
             .args(["identify", "study.toml"])
             .assert()
             .success()
-            .stdout(predicate::str::contains("that the digits of the log make"));
+            .stdout(predicate::str::contains("from the digits of the log"));
     }
 }
 
