@@ -42,7 +42,7 @@ pub struct Member {
 pub struct Group {
     /// The most significant candidate.
     pub leader: usize,
-    /// The leader and every candidate after which it adds nothing ([`super::apart`]): as likely as the leader first (a wrong
+    /// The leader and every candidate after which it adds nothing ([`super::distinguishability`]): as likely as the leader first (a wrong
     /// sign makes a member less so), then the right sign, fewest parameters, plausible size, user's own, p-value.
     pub members: Vec<Member>,
 }
