@@ -129,7 +129,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         });
     }
     let mut parameters = parameters;
-    let of_shapes = shapes(task, &view, &parameters);
+    let of_shapes = shapes(task, &view, &mut parameters);
     for p in &mut parameters {
         // where the lines of two axes miss each other, a turn about the first moves the second in more than one way
         let equal = effects.iter().filter(|e| !e.visible && e.habits.is_empty() && e.absorbed_by.contains(&p.name));

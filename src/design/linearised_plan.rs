@@ -6,6 +6,7 @@ use crate::diag::{Failure, Result};
 use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
+use crate::fit::whitening::Whitening;
 use crate::fit::{design_jacobian, every_formula_has_a_value, free_in_a_design, jumps_in_a_design, scan};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
@@ -368,6 +369,11 @@ impl LinearisedPlan {
         whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whiten(&mut touched));
         without_rounding(&mut touched);
         touched.resize_vertically(plain.nrows(), 0.0)
+    }
+
+    /// What whitens columns of the touches.
+    pub(super) fn whitening(&self) -> Whitening {
+        whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whitening())
     }
 
     /// Share of a block's norm that the model cannot follow.

@@ -52,9 +52,10 @@ fn what_is_expected_of_a_time_constant_is_what_the_fit_says() {
     );
 }
 
-/// The moment of a jump is found by trying: no uncertainty is expected of it before.
+/// A pitch is told by touches at many places; where few take one for the other, that is said before they are made. The moment of a
+/// jump is found by trying.
 #[test]
-fn no_uncertainty_of_a_moment_is_expected() {
+fn a_shape_that_touches_would_not_tell_is_said_before() {
     let machine = common::machine("swivel-head");
     let catalogue = Catalogue::built_in().unwrap();
     let with = |program: &str, more: &str| {
@@ -70,6 +71,14 @@ fn no_uncertainty_of_a_moment_is_expected() {
     };
     let row = |a: &Assessment, name: &str| a.parameters.iter().find(|p| p.name == name).cloned();
     let says = |a: &Assessment, word: &str| a.warnings.iter().any(|w| w.contains(word));
+    let told = with("full", "pitch-x");
+    assert!(
+        row(&told, "pitch_X").unwrap().sigma.is_some_and(|s| s < 0.1) && !says(&told, "may not tell it from"),
+        "{:?}",
+        told.warnings
+    );
+    let not = with("head", "pitch-x");
+    assert!(row(&not, "pitch_X").unwrap().sigma.is_none() && says(&not, "may not tell it from"), "{:?}", not.warnings);
     let slip = with("full", "block-slip");
     assert!(row(&slip, "from_h").is_none() && row(&slip, "dx").unwrap().sigma.is_some(), "{:?}", slip.parameters);
     assert!(says(&slip, "from_h") && says(&slip, "trying every place"), "{:?}", slip.warnings);
