@@ -12,7 +12,7 @@ mod temporary;
 pub use folder::{Folder, MANIFEST};
 pub use inputs::{check_outputs, forget_inputs};
 pub use lock::{Lock, lock};
-pub use size::{max_input, read_size, set_max_input};
+pub use size::{enough_memory, max_input, read_size, set_max_input};
 
 use crate::diag::{Failure, Result};
 use std::io::Write;

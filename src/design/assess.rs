@@ -84,7 +84,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
     let tried: Vec<Tried> = variations(task.machine, &request.runs, &view.model)
         .into_iter()
         .map(|variation| {
-            let varied = LinearisedPlan::new(task, &variation.runs, &variation.known, acting)?;
+            let varied = LinearisedPlan::new(task, &variation.runs(&request.runs), &variation.known, acting)?;
             let power = power(&varied.base, &varied.library, &varied.raw_um);
             let pairs = alias_pairs(&varied.base, &varied.library);
             // further blocks bring further unknowns: only what was unknown before counts

@@ -11,6 +11,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// A direction is parted when less than this share of it (the cosine of an angle) is left among what leaves no trace.
 const LEFT: f64 = 0.9;
@@ -181,10 +182,14 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
     let mut planned: Vec<Planned> = runs.iter().map(Planned::of).collect();
     keep_measured(&mut planned, &fit.data);
     let remedies: Vec<Remedy> = variations(machine, &planned, &fit.model)
-        .into_iter()
+        .into_par_iter()
         .map(|variation| {
             let known: Vec<Known> = priors.iter().chain(&variation.known).cloned().collect();
-            Ok(Remedy::new(&variation, &LinearisedPlan::of_model(&task, &variation.runs, &known, noise)?, &results))
+            Ok(Remedy::new(
+                &variation,
+                &LinearisedPlan::of_model(&task, &variation.runs(&planned), &known, noise)?,
+                &results,
+            ))
         })
         .collect::<Result<_>>()?;
     fit.outcome.parted_together = part(&directions, &remedies, &mut fit.outcome.undetermined);

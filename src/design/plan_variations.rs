@@ -1,14 +1,14 @@
 //! Habits of good measurement as data: what else could be touched (or looked up), and what it costs.
 
 use super::linearised_plan::{Known, MOUNTING_S, Planned, STYLUS_S};
-use super::vary::{Change, Visit, again, append, faces_the_spindle, visits};
+use super::vary::{Change, Visit, again, append, duration_s, faces_the_spindle, visits};
 use crate::axes::{AxisMap, AxisName};
 use crate::geometry::apply;
 use crate::machine::{Axis, Machine, Side};
 use crate::model::predict::{Model, SetUp};
-use crate::program::plan::{Plan, PlanTouch};
+use crate::program::plan::{Plan, PlanBlock, PlanTouch};
 use nalgebra::Vector3;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 /// A stylus that is this much longer, mm, where the machine's file knows no other.
 const LONGER_MM: f64 = 100.0;
@@ -41,8 +41,10 @@ pub struct Variation {
     pub id: String,
     /// What a person does.
     pub says: String,
-    /// All runs with the further touches at their ends.
-    pub runs: Vec<Planned>,
+    /// Further visits at the end of a run, by its place among the runs.
+    pub added: Vec<(usize, Vec<Vec<PlanTouch>>)>,
+    /// A further block, and the run in which it stands.
+    pub block: Option<(usize, PlanBlock)>,
     /// What is known beside the touches.
     pub known: Vec<Known>,
     /// Further touches.
@@ -52,6 +54,19 @@ pub struct Variation {
 }
 
 impl Variation {
+    /// The runs with the further touches at their ends: made when they are asked for, since each is as long as all that was measured.
+    #[must_use]
+    pub fn runs(&self, before: &[Planned]) -> Vec<Planned> {
+        let mut runs = before.to_vec();
+        if let Some((run, block)) = &self.block {
+            runs[*run].plan.blocks.push(block.clone());
+        }
+        for (run, visits) in &self.added {
+            append(&mut runs[*run].plan, visits.clone());
+        }
+        runs
+    }
+
     /// Touches that a further program could make: of the blocks as they stand, with a stylus that the machine's file knows. A
     /// gauge is no touch, and a riser or a star is nothing that a program has.
     #[must_use]
@@ -100,14 +115,21 @@ impl Pool<'_> {
 
     /// Puts a variation into the pool unless nothing of it can be touched.
     fn push(&mut self, id: &str, says: String, added: Vec<(usize, Vec<Vec<PlanTouch>>)>, more_s: f64) {
-        let mut runs = self.runs.to_vec();
-        let (mut touches, mut seconds) = (0, more_s);
-        for (run, list) in added {
-            touches += list.iter().map(Vec::len).sum::<usize>();
-            seconds += append(&mut runs[run].plan, list);
-        }
+        self.push_all(id, says, added, None, more_s);
+    }
+
+    fn push_all(
+        &mut self,
+        id: &str,
+        says: String,
+        added: Vec<(usize, Vec<Vec<PlanTouch>>)>,
+        block: Option<(usize, PlanBlock)>,
+        more_s: f64,
+    ) {
+        let touches = added.iter().flat_map(|(_, visits)| visits).map(Vec::len).sum();
+        let seconds = more_s + added.iter().map(|(_, visits)| duration_s(visits)).sum::<f64>();
         if touches > 0 {
-            self.out.push(Variation { id: id.into(), says, runs, known: Vec::new(), touches, seconds });
+            self.out.push(Variation { id: id.into(), says, added, block, known: Vec::new(), touches, seconds });
         }
     }
 
@@ -238,12 +260,14 @@ impl Pool<'_> {
     fn all_faces(&mut self, all: &[Visit]) {
         let mut added: Vec<(usize, Vec<Vec<PlanTouch>>)> = Vec::new();
         let mut where_at: BTreeSet<String> = BTreeSet::new();
+        // a plan touches few places, each of them in many poses
+        let places: Vec<Vec<&PlanTouch>> = self.runs.iter().map(|run| places(&run.plan)).collect();
         for v in all {
             let plan = self.plan(v.run);
             let Some(like) = v.touches.first() else { continue };
             let here = |n: &[f64; 3], block: &str| v.touches.iter().any(|t| t.block == block && t.normal == *n);
             let mut light: Vec<PlanTouch> = Vec::new();
-            for t in &plan.touches {
+            for &t in &places[v.run] {
                 let of_visit =
                     v.touches.iter().any(|o| o.block == t.block && o.carrier == t.carrier && o.mounting == t.mounting);
                 let of_face = |o: &&PlanTouch| o.block == t.block && o.normal == t.normal;
@@ -357,13 +381,7 @@ impl Pool<'_> {
                 added.push(there);
             }
         }
-        let mut runs = self.runs.to_vec();
-        runs[run].plan.blocks.push(fresh);
-        let touches = added.iter().map(Vec::len).sum();
-        let seconds = MOUNTING_S + append(&mut runs[run].plan, added);
-        if touches > 0 {
-            self.out.push(Variation { id: id.into(), says: says.into(), runs, known: Vec::new(), touches, seconds });
-        }
+        self.push_all(id, says.into(), vec![(run, added)], Some((run, fresh)), MOUNTING_S);
     }
 
     fn higher_block(&mut self, all: &[Visit]) {
@@ -462,13 +480,21 @@ impl Pool<'_> {
             self.out.push(Variation {
                 id: id.into(),
                 says,
-                runs: self.runs.to_vec(),
+                added: Vec::new(),
+                block: None,
                 known,
                 touches: 0,
                 seconds: CERTIFICATE_S,
             });
         }
     }
+}
+
+/// The first touch of each place on a block.
+fn places(plan: &Plan) -> Vec<&PlanTouch> {
+    let mut seen = HashSet::new();
+    let place = |t: &PlanTouch| (t.mounting.clone(), t.carrier.clone(), t.block.clone(), t.point.map(f64::to_bits));
+    plan.touches.iter().filter(|t| seen.insert((place(t), t.normal.map(f64::to_bits)))).collect()
 }
 
 /// The machine direction into which a face looks, in words.

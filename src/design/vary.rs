@@ -141,10 +141,15 @@ pub fn faces_the_spindle(machine: &Machine, carrier: Carrier, at: &Position, nor
     in_r.dot(&spindle) > TURNED_AWAY
 }
 
-/// Adds visits at the end of a plan; returns what they cost, s. Empty visits are passed over.
-pub fn append(plan: &mut Plan, added: Vec<Vec<PlanTouch>>) -> f64 {
-    let begin_s = times_s(&plan.touches).last().copied().unwrap_or(0.0);
-    let mut clock_s = begin_s;
+/// What visits cost, s.
+#[must_use]
+pub fn duration_s(visits: &[Vec<PlanTouch>]) -> f64 {
+    visits.iter().filter(|v| !v.is_empty()).map(|v| INDEX_S + TOUCH_S * v.len() as f64).sum()
+}
+
+/// Adds visits at the end of a plan. Empty visits are passed over.
+pub fn append(plan: &mut Plan, added: Vec<Vec<PlanTouch>>) {
+    let mut clock_s = times_s(&plan.touches).last().copied().unwrap_or(0.0);
     let mut id = plan.touches.iter().map(|t| t.id).max().unwrap_or(0);
     let mut visit = plan.touches.iter().filter_map(|t| t.visit).max().unwrap_or(0);
     for touches in added.into_iter().filter(|t| !t.is_empty()) {
@@ -157,5 +162,4 @@ pub fn append(plan: &mut Plan, added: Vec<Vec<PlanTouch>>) -> f64 {
             plan.touches.push(touch);
         }
     }
-    clock_s - begin_s
 }

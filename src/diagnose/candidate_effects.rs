@@ -1,6 +1,6 @@
 //! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, WhiteRows};
 use crate::fit::candidates::{Columns, Trials, Variant, with_values};
 use crate::fit::{Fit, around, between, scan};
 use crate::machine::Machine;
@@ -8,10 +8,13 @@ use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
 use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation, Unknown};
-use crate::search::{Library, Origin, Search};
+use crate::search::library::Make;
+use crate::search::pattern_tests::Rows;
+use crate::search::{self, Library, Origin, Search};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// A parameter of a candidate: one column.
 #[derive(Debug, Clone)]
@@ -48,10 +51,80 @@ pub struct Named<'c> {
     pub scanned: Vec<Option<Scanned>>,
     /// What is said of effects that could not be tested.
     pub left_out: Vec<String>,
-    /// All effects on an errorless machine, and the touches: the columns before whitening are made when they are asked for.
+    source: Arc<Source>,
+    weight: Vec<f64>,
+}
+
+/// All effects on an errorless machine, and the touches: what columns are made of.
+#[derive(Debug)]
+struct Source {
     model: Model,
     places: Vec<Observation>,
-    weight: Vec<f64>,
+    /// Values at which the shape parameters of each effect start.
+    starts: Vec<Vec<f64>>,
+    rows: Arc<WhiteRows>,
+}
+
+/// An effect, by its place, with one of its shapes (by its place among them) at a value.
+#[derive(Debug, Clone, Copy)]
+struct Chosen {
+    effect: usize,
+    shape: Option<(usize, f64)>,
+}
+
+impl Source {
+    /// Sizes of an effect and what they do, mm per typical size.
+    fn columns(&self, trials: &Trials, chosen: Chosen) -> Columns {
+        let mut shapes = self.starts[chosen.effect].clone();
+        if let Some((which, value)) = chosen.shape {
+            shapes[which] = value;
+        }
+        let mut made = trials.columns(&Variant { effects: vec![chosen.effect], shapes });
+        let shaped: Vec<usize> = (0..made.unknowns.len()).filter(|&c| made.unknowns[c].shape).collect();
+        made.values = made.values.remove_columns_at(&shaped);
+        made.unknowns.retain(|u| !u.shape);
+        for (mut values, u) in made.values.column_iter_mut().zip(&made.unknowns) {
+            values *= typical(u);
+        }
+        made
+    }
+
+    /// Columns of some choices, each with the place of a column in it, at some touches; mm per typical size.
+    fn some(&self, wanted: &[(Chosen, usize)], places: &[Observation]) -> DMatrix<f64> {
+        let trials = Trials::of(&self.model, places);
+        let mut out = DMatrix::zeros(places.len(), wanted.len());
+        let mut at = 0;
+        while at < wanted.len() {
+            let (chosen, first) = wanted[at];
+            let made = self.columns(&trials, chosen).values;
+            // the columns of a choice follow one another
+            while at < wanted.len() && wanted[at].1 >= first && wanted[at].0.is(chosen) {
+                out.set_column(at, &made.column(wanted[at].1));
+                at += 1;
+            }
+        }
+        out
+    }
+
+    /// Whitened columns that are made whenever they are needed.
+    fn make(self: &Arc<Self>, columns: Vec<(Chosen, usize)>) -> Make {
+        let source = self.clone();
+        Arc::new(move |numbers, rows| {
+            let wanted: Vec<(Chosen, usize)> = numbers.iter().map(|&n| columns[n]).collect();
+            let Some(rows) = rows else { return source.rows.of_mm(source.some(&wanted, &source.places)) };
+            let touches = source.rows.touches_of(rows);
+            let places: Vec<Observation> = touches.iter().map(|&i| source.places[i].clone()).collect();
+            let mm = source.some(&wanted, &places);
+            let value = |touch: usize, column: usize| touches.binary_search(&touch).map_or(0.0, |i| mm[(i, column)]);
+            source.rows.some(rows, wanted.len(), &|touch, column| um_from_mm(value(touch, column)))
+        })
+    }
+}
+
+impl Chosen {
+    fn is(self, other: Self) -> bool {
+        self.effect == other.effect && self.shape == other.shape
+    }
 }
 
 /// Effects of catalogue and user that the model does not hold. Not the paper's sets, not whole hypotheses (gross
@@ -77,7 +150,7 @@ struct Tried {
     value: f64,
     /// Its parameters.
     columns: Vec<Column>,
-    /// What they would do, as rows of the tests.
+    /// What they would do, as rows of the tests; nothing where it is made anew whenever it is needed.
     white: DMatrix<f64>,
 }
 
@@ -85,13 +158,14 @@ struct Tried {
 struct Maker<'a> {
     fit: &'a Fit,
     evidence: &'a Evidence,
+    source: &'a Source,
     trials: Trials<'a>,
 }
 
 impl Maker<'_> {
     /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at another value.
     fn make(&self, i: usize, effect: &Effect, scanned: Option<(usize, f64)>) -> Tried {
-        let made = made(&self.trials, i, effect, scanned);
+        let made = self.source.columns(&self.trials, Chosen { effect: i, shape: scanned });
         let column = |u: &Unknown| {
             let bare = u.name.split('@').next().unwrap_or(&u.name);
             let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
@@ -157,23 +231,6 @@ fn typical(u: &Unknown) -> f64 {
     if u.typical > 0.0 { u.typical } else { 1.0 }
 }
 
-/// Sizes of effect number i and what they do, mm per typical size, with one of its shapes (by its place among the shapes) at a
-/// value.
-fn made(trials: &Trials, i: usize, effect: &Effect, scanned: Option<(usize, f64)>) -> Columns {
-    let mut shapes = starts(effect);
-    if let Some((which, value)) = scanned {
-        shapes[which] = value;
-    }
-    let mut made = trials.columns(&Variant { effects: vec![i], shapes });
-    let shaped: Vec<usize> = (0..made.unknowns.len()).filter(|&c| made.unknowns[c].shape).collect();
-    made.values = made.values.remove_columns_at(&shaped);
-    made.unknowns.retain(|u| !u.shape);
-    for (mut values, u) in made.values.column_iter_mut().zip(&made.unknowns) {
-        values *= typical(u);
-    }
-    made
-}
-
 /// Where the shape parameters of an effect start.
 fn starts(effect: &Effect) -> Vec<f64> {
     effect.parameters.iter().filter_map(|p| p.shape.map(|(start, _, _)| start)).collect()
@@ -208,49 +265,64 @@ impl<'c> Named<'c> {
         let places = without_noise(fit);
         let (effects, left_out) = with_values(effects, &places);
         let model = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
-        let maker = Maker { fit, evidence, trials: Trials::of(&model, &places) };
-        let tried: Vec<(Option<Scanned>, Vec<Tried>)> = effects
-            .par_iter()
-            .enumerate()
-            .map(|(i, effect)| match scan_of(effect, &fit.data) {
-                None => (None, vec![maker.make(i, effect, None)]),
-                Some((which, values)) => {
-                    let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
-                    let named = shape.map(|p| Scanned { name: p.name.clone(), unit: p.unit.clone() });
-                    (named, maker.scan(i, effect, (which, values)))
-                }
-            })
-            .collect();
-
+        let starts = effects.iter().map(|e| starts(e)).collect();
+        let source = Arc::new(Source { model, places, starts, rows: evidence.rows.clone() });
+        let maker = Maker { fit, evidence, source: &source, trials: Trials::of(&source.model, &source.places) };
+        let kept = Library::keeps(evidence.n_rows());
+        let all_of = |(i, effect): (usize, &&Effect)| {
+            let scan = scan_of(effect, &fit.data);
+            let which = scan.as_ref().map(|(which, _)| *which);
+            let mut tried = scan.map_or_else(|| vec![maker.make(i, effect, None)], |scan| maker.scan(i, effect, scan));
+            if !kept {
+                tried.iter_mut().for_each(|t| t.white = DMatrix::zeros(0, 0));
+            }
+            (which, tried)
+        };
+        let tried: Vec<(Option<usize>, Vec<Tried>)> = effects.par_iter().enumerate().map(all_of).collect();
         drop(maker);
-        let mut library = Library::new(evidence.n_rows());
-        let mut columns = Vec::new();
-        let mut scanned = Vec::new();
-        for (effect, (shape, tried)) in effects.iter().zip(tried) {
+        let chosen = |i: usize, which: Option<usize>, t: &Tried| {
+            let chosen = Chosen { effect: i, shape: which.map(|which| (which, t.value)) };
+            (0..t.columns.len()).map(move |k| (chosen, k))
+        };
+        let each = || tried.iter().enumerate().flat_map(|(i, (which, all))| all.iter().map(move |t| (i, *which, t)));
+        let mut library = if kept {
+            let data = each().flat_map(|(_, _, t)| t.white.as_slice()).copied().collect();
+            Library::kept(evidence.n_rows(), data)
+        } else {
+            let all: Vec<(Chosen, usize)> = each().flat_map(|(i, which, t)| chosen(i, which, t)).collect();
+            Library::made(evidence.n_rows(), all.len(), source.make(all))
+        };
+        let (mut columns, mut scanned, mut at) = (Vec::new(), Vec::new(), 0);
+        for (effect, (which, tried)) in effects.iter().zip(tried) {
             let own = tried.first().map_or_else(Vec::new, |t| t.columns.clone());
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
-            let variants = tried.into_iter().map(|t| (t.value, t.white));
-            library.push_scan(&effect.id, origin, variants, usize::from(shape.is_some()));
+            let variant = |t: &Tried| {
+                at += t.columns.len();
+                search::Variant { shape: t.value, columns: at - t.columns.len()..at }
+            };
+            library.place(&effect.id, origin, tried.iter().map(variant).collect(), usize::from(which.is_some()));
             library.positive_of_last((0..own.len()).filter(|&k| own[k].positive).collect());
             columns.push(own);
-            scanned.push(shape);
+            let shape = which.and_then(|which| effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which));
+            scanned.push(shape.map(|p| Scanned { name: p.name.clone(), unit: p.unit.clone() }));
         }
         let weight = fit.weight.clone();
-        Self { effects, library, columns, scanned, left_out, model, places, weight }
+        Self { effects, library, columns, scanned, left_out, source, weight }
     }
 
     /// Columns of some variants of candidates (both by index) before whitening, µm per typical size; touches that are not used
     /// are zero.
     #[must_use]
     pub fn raw_um(&self, wanted: &[(usize, usize)]) -> Vec<DMatrix<f64>> {
-        let trials = Trials::of(&self.model, &self.places);
+        let trials = Trials::of(&self.source.model, &self.source.places);
         let each = wanted.par_iter().map(|&(candidate, variant)| {
             let effect = self.effects[candidate];
             let value = self.library.candidates()[candidate].variants[variant].shape;
             let which = self.scanned[candidate]
                 .as_ref()
                 .and_then(|s| effect.parameters.iter().filter(|p| p.shape.is_some()).position(|p| p.name == s.name));
-            let mut values = made(&trials, candidate, effect, which.map(|which| (which, value))).values;
+            let chosen = Chosen { effect: candidate, shape: which.map(|which| (which, value)) };
+            let mut values = self.source.columns(&trials, chosen).values;
             for mut column in values.column_iter_mut() {
                 column.iter_mut().zip(&self.weight).for_each(|(mm, weight)| *mm = um_from_mm(*mm) * weight);
             }

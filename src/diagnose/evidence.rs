@@ -43,7 +43,13 @@ pub(super) struct WhiteRows {
 }
 
 impl WhiteRows {
-    fn of_mm(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
+    /// Observations that whitened rows are made of, in ascending order.
+    pub(super) fn touches_of(&self, rows: &[usize]) -> Vec<usize> {
+        let touches: Vec<usize> = rows.iter().filter_map(|&row| self.used.get(row).copied()).collect();
+        self.whitening.mixed_with(&touches)
+    }
+
+    pub(super) fn of_mm(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
         self.whitening.apply(&mut columns_mm);
         if self.used.len() == columns_mm.nrows() && self.n_priors == 0 {
             return columns_mm;

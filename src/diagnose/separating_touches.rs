@@ -113,7 +113,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
         .into_par_iter()
         .map(|variation| {
             let known: Vec<Known> = priors.iter().chain(&variation.known).cloned().collect();
-            let view = LinearisedPlan::with_effects(&task, &variation.runs, &known, noise, &effects)?;
+            let view = LinearisedPlan::with_effects(&task, &variation.runs(&planned), &known, noise, &effects)?;
             let spans = view.library.candidates().iter().map(|c| c.variants[0].columns.clone());
             let effects = candidates
                 .iter()

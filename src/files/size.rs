@@ -99,6 +99,33 @@ fn too_large(path: &Path, most: u64) -> Failure {
         .help("is this the right file? If it is, give a larger limit with --max-input, for example --max-input 8G")
 }
 
+/// Memory that one touch takes at most in any command (measured: docs/testing.md), bytes.
+const BYTES_PER_TOUCH: u64 = 30_000;
+
+/// Refuses so many touches that the system would end the process for want of memory. Only Linux says how much is free.
+///
+/// # Errors
+/// When there is not so much memory free.
+pub fn enough_memory(n_touches: usize) -> Result<()> {
+    let said = std::fs::read_to_string("/proc/meminfo").ok();
+    enough_of(n_touches, said.and_then(|text| available_bytes(&text)))
+}
+
+/// What `/proc/meminfo` says is free.
+fn available_bytes(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1 << 10)
+}
+
+fn enough_of(n_touches: usize, available: Option<u64>) -> Result<()> {
+    let needed = BYTES_PER_TOUCH.saturating_mul(n_touches as u64);
+    let Some(free) = available.filter(|free| *free < needed) else { return Ok(()) };
+    let mb = |bytes: u64| bytes / 1_000_000;
+    let says = format!("{n_touches} touches need about {} MB of memory; {} MB are free", mb(needed), mb(free));
+    Err(Failure::new("file::no_memory", says)
+        .help("close other programs, use a computer with more memory, or divide the runs between several studies"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,5 +139,16 @@ mod tests {
         for wrong in ["", "0", "G", "-1", "1.5G", "3T", "1KB", "99999999999999999999", "18446744073709551615K", "3µ"] {
             assert!(read_size(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn too_many_touches_for_the_memory_are_refused() {
+        let meminfo = "MemTotal:       24000000 kB\nMemAvailable:    1000000 kB\n";
+        assert_eq!(available_bytes(meminfo), Some(1_024_000_000));
+        assert_eq!(available_bytes("MemTotal: 24000000 kB\n"), None);
+        assert!(enough_of(30_000, available_bytes(meminfo)).is_ok());
+        assert!(enough_of(usize::MAX, None).is_ok(), "nothing is known of the memory");
+        let refused = enough_of(40_000, available_bytes(meminfo)).unwrap_err().to_string();
+        assert!(refused.contains("40000 touches need about 1200 MB of memory; 1024 MB are free"), "{refused}");
     }
 }

@@ -1,4 +1,4 @@
-//! Outliers: touches that do not agree with the rest.
+//! Outliers: touches that do not agree with the rest. Here are the measure and its limit; `outlier_loop.rs` decides which touches go.
 //!
 //! With P = V⁻¹ − V⁻¹JCJᵀV⁻¹ and a = P·y, touch i misses the others by ∇ᵢ = aᵢ/Pᵢᵢ with the variance 1/Pᵢᵢ (Baarda's mean shift).
 //! The scale is the externally studentised one: a missing effect widens it, and good touches are not excluded because of a bad model.

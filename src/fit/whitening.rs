@@ -38,6 +38,23 @@ impl Whitening {
         self.apply_to(columns.view_mut((0, 0), (rows, columns.ncols())));
     }
 
+    /// The touches of the visits of some touches, in ascending order as these: whitening mixes them, and no others.
+    #[must_use]
+    pub fn mixed_with(&self, touches: &[usize]) -> Vec<usize> {
+        let mut out = Vec::new();
+        let (mut place, mut from) = (0, 0);
+        for visit in &self.visits {
+            let to = from + visit.normals.len();
+            let end = touches.partition_point(|&touch| touch < to).max(place);
+            if end > place {
+                out.extend(from..to);
+            }
+            (place, from) = (end, to);
+        }
+        out.extend(&touches[place..]);
+        out
+    }
+
     /// Whitened rows of some touches, in ascending order: `value` is a touch's in a column. What whitening mixes with them are the
     /// touches of their visits, and no others.
     pub fn some(&self, touches: &[usize], columns: usize, value: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64> {

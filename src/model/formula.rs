@@ -7,7 +7,8 @@ use super::expression::{Expression, MOST_VARIABLES};
 use super::formula_parser::bare_number;
 use std::sync::Arc;
 
-/// The variables of a touch that a formula may use, in the order of [`State`].
+/// The variables of a touch that a formula may use, in the order of [`State`]. A new one is also written in `fit::MOVING` (if it
+/// changes between two visits of one pose), `diagnose/features.rs`, `words::diagnose::is_plain` and `simulate/own/formula.rs`.
 pub const VARIABLES: [&str; 40] = [
     "X", "Y", "Z", "A", "B", "C", "t", "T", "nx", "ny", "nz", "mx", "my", "mz", "sX", "sY", "sZ", "sA", "sB", "sC",
     "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge", "wA", "wB",

@@ -1,4 +1,4 @@
-//! What became of a planned touch.
+//! Did the probe trigger at a planned touch, and near its place? Outliers are decided in `fit/outlier_loop.rs`.
 
 /// Did the probe trigger?
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

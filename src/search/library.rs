@@ -64,6 +64,9 @@ pub struct Candidate {
 /// Makes whitened columns, by their numbers, at some rows (`None`: at all).
 pub type Make = Arc<dyn Fn(&[usize], Option<&[usize]>) -> DMatrix<f64> + Send + Sync>;
 
+/// Rows up to which columns are kept in memory.
+const MOST_ROWS_KEPT: usize = 4_000;
+
 /// Columns that are worked on at once.
 const CHUNK: usize = 64;
 
@@ -105,6 +108,12 @@ impl Library {
     #[must_use]
     pub fn new(n_rows: usize) -> Self {
         Self { n_rows, ..Self::default() }
+    }
+
+    /// Are columns of so many rows kept in memory? Thousands of candidates have a column each.
+    #[must_use]
+    pub fn keeps(n_rows: usize) -> bool {
+        n_rows <= MOST_ROWS_KEPT
     }
 
     /// A library of columns in memory that belong to no candidate yet ([`Library::place`]).

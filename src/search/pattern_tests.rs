@@ -200,9 +200,6 @@ impl Generics {
     }
 }
 
-/// Numbers of a library up to which it lies in memory (120 MB).
-const MOST_KEPT: usize = 15_000_000;
-
 /// What makes rows of a regression of columns of gaps.
 pub trait Rows: Send + Sync {
     /// Rows, those of priors (zeros) included.
@@ -240,7 +237,7 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
             Some(at) => rows.some(at, numbers.len(), &um),
         }
     };
-    let mut library = if n_columns * n_rows > MOST_KEPT {
+    let mut library = if !Library::keeps(n_rows) {
         Library::made(n_rows, n_columns, Arc::new(make))
     } else {
         let numbers: Vec<usize> = (0..n_columns).collect();

@@ -208,6 +208,7 @@ impl Heidenhain {
         vm.note(Event::Release { from, to: vm.at });
     }
 
+    /// An M function. A new one stands in `KNOWN` (of `unknown`) too.
     fn auxiliary(&mut self, m: f64, vm: &mut Vm) -> Result<Next, String> {
         match m as u32 {
             0 => vm.note(Event::Wait(String::new())),
@@ -291,6 +292,7 @@ impl Dialect for Heidenhain {
     }
 
     fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
+        // what `auxiliary` runs: a program without a plan is asked here, one with a plan there
         const KNOWN: [f64; 9] = [0.0, 5.0, 9.0, 19.0, 30.0, 126.0, 127.0, 128.0, 129.0];
         let known = |m: &f64| KNOWN.contains(m) || self.builder.contains(m);
         let numbers = words.iter().filter(|w| w.address == "M" && w.value.is_finite()).map(|w| w.value);

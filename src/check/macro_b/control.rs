@@ -7,8 +7,8 @@
 mod places;
 mod variables;
 
-use super::builder::Builder;
 use super::lasting;
+use super::machine_builder::Builder;
 use crate::axes::{AxisName, Position};
 use crate::check::code::{UnknownKind, Values, Var};
 use crate::check::doubt::Doubt;
@@ -127,6 +127,7 @@ impl MacroB {
         Err(format!("M{m} is not known to axiscal"))
     }
 
+    /// An M function. A new one stands in `knows` too, which is asked without a plan.
     fn auxiliary(&mut self, m: f64, words: &[Spoken], vm: &mut Vm) -> Result<bool, String> {
         let value = |address: &str| words.iter().find(|w| w.address == address).map(|w| w.value);
         let whole = m.round() as i64;

@@ -1,8 +1,8 @@
 //! Custom macro B of Fanuc, and the macros of Haas, as far as our programs use them.
 
-mod builder;
 mod control;
 mod lasting;
+mod machine_builder;
 mod parse;
 
 pub use control::MacroB;

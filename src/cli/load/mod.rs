@@ -300,6 +300,7 @@ pub fn load_study(path: &Path, io: &Io) -> Result<Loaded> {
             compensation: entry.compensation.as_ref().map(|c| folder.join(c)),
         });
     }
+    files::enough_memory(runs.iter().map(|run: &LoadedRun| run.touches.len()).sum())?;
     let hexadecimal = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
     let (sha256, data_sha256) = (hexadecimal(hash), hexadecimal(data));
     Ok(Loaded { path: path.to_path_buf(), study, machine, catalogue, runs, sha256, data_sha256 })
