@@ -1,7 +1,7 @@
 //! What a program does when something goes wrong: it must say so and stay where it is.
 
-use super::explore::{Branch, Deviation, Told};
-use super::judge::{Case, SIDEWAYS_MM, Said};
+use super::explore::{Branch, Deviation, ExploredRun};
+use super::judge::{Case, CollectedFindings, SIDEWAYS_MM};
 use super::run::{Alarm, Event, Happened};
 use super::settings::{compare_settings, stopped_by_itself};
 use crate::axes::Position;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// The line with which the log of a run ends.
-pub fn last_line(told: &Told) -> Option<&str> {
+pub fn last_line(told: &ExploredRun) -> Option<&str> {
     told.trunk.iter().rev().find_map(|h| match &h.event {
         Event::Log(text) => Some(text.as_str()),
         _ => None,
@@ -17,7 +17,13 @@ pub fn last_line(told: &Told) -> Option<&str> {
 }
 
 /// When something went wrong the program must say so and stay where it is. `last_line` is that of the run.
-pub fn branch_stops(case: &Case<'_>, told: &Told, last_line: Option<&str>, branch: &Branch, said: &mut Said) {
+pub fn branch_stops(
+    case: &Case<'_>,
+    told: &ExploredRun,
+    last_line: Option<&str>,
+    branch: &Branch,
+    said: &mut CollectedFindings,
+) {
     if !branch.deviation.must_stop() {
         return;
     }

@@ -131,7 +131,7 @@ pub struct Word {
 
 /// What a statement does.
 #[derive(Debug, Clone, PartialEq)]
-pub enum What {
+pub enum Instruction {
     /// Moves, modes, auxiliary functions.
     Block(Vec<Word>),
     /// A value is kept.
@@ -198,7 +198,7 @@ pub struct Statement {
     /// Bytes.
     pub at: Range<usize>,
     /// What it does.
-    pub what: What,
+    pub what: Instruction,
 }
 
 /// A program.
@@ -248,7 +248,7 @@ impl Code {
     }
 
     /// Adds a statement and gives its place.
-    pub fn push(&mut self, at: Range<usize>, what: What) -> usize {
+    pub fn push(&mut self, at: Range<usize>, what: Instruction) -> usize {
         self.statements.push(Statement { at, what });
         self.statements.len() - 1
     }

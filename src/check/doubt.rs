@@ -5,7 +5,7 @@
 //! the other way. Where the two ways only compute something and meet again, with differences in unknown values alone, there is
 //! nothing else to run.
 
-use super::code::{Expr, Statement, Var, What};
+use super::code::{Expr, Instruction, Statement, Var};
 use super::run::{Dialect, Run};
 use std::collections::BTreeMap;
 
@@ -163,7 +163,7 @@ impl<D: Dialect> Run<'_, D> {
             if run.statement(statement).is_err() {
                 break;
             }
-            if let What::Set(var, _) = &statement.what {
+            if let Instruction::Set(var, _) = &statement.what {
                 written.insert(var.clone(), (run.bits(var), run.held_doubt(var)));
             }
             states.push(Computed { next: run.next, written: written.clone() });
@@ -173,8 +173,8 @@ impl<D: Dialect> Run<'_, D> {
 
     fn only_computes(&self, statement: &Statement) -> bool {
         match &statement.what {
-            What::Set(..) | What::Jump(_) => true,
-            What::JumpUnless(condition, _) => {
+            Instruction::Set(..) | Instruction::Jump(_) => true,
+            Instruction::JumpUnless(condition, _) => {
                 self.doubt(condition).is_none() && !condition.reads(&|var| self.dialect.is_probe_input(var))
             }
             _ => false,

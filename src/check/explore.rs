@@ -56,7 +56,7 @@ pub struct Branch {
 
 /// A run with its branches.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct ExploredRun {
     /// Set-up at which it was told to begin.
     pub from: u32,
     /// In what state it found the control.
@@ -83,7 +83,7 @@ pub struct Told {
 /// A run that was made, and what can begin from it.
 pub struct Explored<'p, D> {
     /// What happened.
-    pub told: Told,
+    pub told: ExploredRun,
     /// Runs that take the other way at a condition that depends on a value that is not known.
     pub forks: Vec<Fork<'p, D>>,
     /// The first condition whose other way was not kept, because there are too many.
@@ -95,7 +95,7 @@ pub struct Explored<'p, D> {
 /// A probing move that asks whether the probe is deflected is no longer than this, mm.
 const ASKED_MM: f64 = 0.1;
 
-impl Told {
+impl ExploredRun {
     /// It was told to begin at a later set-up, and stopped before it probed anything: it says that it cannot. The moves of its
     /// opening, from wherever the machine stands, are judged like those of any run.
     pub fn declines(&self) -> bool {
@@ -146,7 +146,7 @@ pub fn explore<'p, D: Dialect>(
     restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
 ) -> Explored<'p, D> {
     let before = run.dialect.settings();
-    let told = Told {
+    let told = ExploredRun {
         from,
         start: Start::Fresh,
         trunk: Vec::new(),
@@ -164,7 +164,7 @@ pub fn explore<'p, D: Dialect>(
 /// Runs a program on from where it stands; `told`: what is known of it so far.
 pub fn explore_on<'p, D: Dialect>(
     mut run: Run<'p, D>,
-    mut told: Told,
+    mut told: ExploredRun,
     limits: Option<Limits>,
     restart: &dyn Fn(&Run<'p, D>) -> Option<Run<'p, D>>,
 ) -> Explored<'p, D> {

@@ -8,7 +8,7 @@ mod proofs;
 
 use super::branches::{branch_stops, last_line};
 use super::doubt::Doubt;
-use super::explore::Told;
+use super::explore::ExploredRun;
 use super::run::{Event, Happened, Rate};
 use super::settings::settings_return;
 use super::touches::{Made, against_plan};
@@ -57,7 +57,7 @@ const SHOWN: usize = 8;
 
 /// Collects findings; equal ones are said once.
 #[derive(Default)]
-pub struct Said {
+pub struct CollectedFindings {
     findings: Vec<Finding>,
     seen: BTreeSet<(&'static str, usize, String)>,
     count: BTreeMap<&'static str, usize>,
@@ -65,7 +65,7 @@ pub struct Said {
     when: Option<String>,
 }
 
-impl Said {
+impl CollectedFindings {
     /// Notes a finding at a place.
     pub fn say(&mut self, case: &Case<'_>, code: &'static str, at: &Range<usize>, message: String, help: &str) {
         if !self.seen.insert((code, at.start, message.clone())) {
@@ -93,7 +93,7 @@ impl Said {
 /// Judges runs one by one.
 pub struct Judge<'a> {
     case: &'a Case<'a>,
-    said: Said,
+    said: CollectedFindings,
     /// Moves that are to be proven, and those that were.
     proofs: BTreeMap<Key, Proof>,
     proven: BTreeSet<Key>,
@@ -102,11 +102,11 @@ pub struct Judge<'a> {
 impl<'a> Judge<'a> {
     /// Nothing is judged yet.
     pub fn new(case: &'a Case<'a>) -> Self {
-        Self { case, said: Said::default(), proofs: BTreeMap::new(), proven: BTreeSet::new() }
+        Self { case, said: CollectedFindings::default(), proofs: BTreeMap::new(), proven: BTreeSet::new() }
     }
 
     /// The whole program, or its run from a set-up.
-    pub fn run(&mut self, told: &Told) {
+    pub fn run(&mut self, told: &ExploredRun) {
         let (case, said) = (self.case, &mut self.said);
         let mut walk = Walk::new(case, told, said, &mut self.proofs);
         walk.trunk();
@@ -120,13 +120,13 @@ impl<'a> Judge<'a> {
     }
 
     /// A run that finds the control in another state: only what it leaves to the user.
-    pub fn other(&mut self, told: &Told) {
+    pub fn other(&mut self, told: &ExploredRun) {
         settings_return(self.case, told, &mut self.said);
     }
 
     /// A run that takes the other way at a condition on an unknown value: its moves must be clear as well, and it must stop where
     /// something goes wrong. It may stop by itself.
-    pub fn doubted(&mut self, told: &Told) {
+    pub fn doubted(&mut self, told: &ExploredRun) {
         self.prove();
         let case = self.case;
         self.said.when = Some(when(case, told));
@@ -162,7 +162,7 @@ impl<'a> Judge<'a> {
 }
 
 /// In which run it is.
-fn when(case: &Case<'_>, told: &Told) -> String {
+fn when(case: &Case<'_>, told: &ExploredRun) -> String {
     let line = |at: &Range<usize>| case.source.inner().get(..at.start).map_or(0, |text| text.matches('\n').count()) + 1;
     let each = |(at, doubt): &(Range<usize>, Doubt)| format!("line {} (it depends on {})", line(at), doubt.says());
     let conditions: Vec<String> = told.otherwise.iter().map(each).collect();
@@ -185,8 +185,8 @@ struct Contact {
 
 struct Walk<'a, 'b> {
     case: &'a Case<'a>,
-    told: &'b Told,
-    said: &'b mut Said,
+    told: &'b ExploredRun,
+    said: &'b mut CollectedFindings,
     proofs: &'b mut BTreeMap<Key, Proof>,
     senses: AxisMap,
     spindle: Option<f64>,
@@ -199,7 +199,12 @@ struct Walk<'a, 'b> {
 }
 
 impl<'a, 'b> Walk<'a, 'b> {
-    fn new(case: &'a Case<'a>, told: &'b Told, said: &'b mut Said, proofs: &'b mut BTreeMap<Key, Proof>) -> Self {
+    fn new(
+        case: &'a Case<'a>,
+        told: &'b ExploredRun,
+        said: &'b mut CollectedFindings,
+        proofs: &'b mut BTreeMap<Key, Proof>,
+    ) -> Self {
         let lift = case.scenes.first().and_then(Scene::lift);
         Self {
             case,
@@ -470,7 +475,7 @@ impl<'a, 'b> Walk<'a, 'b> {
 }
 
 /// Does the whole program end in the middle, or with a stop before its log is closed?
-fn stops_by_itself(told: &Told) -> bool {
+fn stops_by_itself(told: &ExploredRun) -> bool {
     if !matches!(told.trunk.last(), Some(Happened { event: Event::End, .. })) {
         return true;
     }

@@ -9,15 +9,16 @@
 //! program was made; shapes and the proof of a single move come from [`crate::program`], contacts from
 //! [`crate::simulate`].
 
-mod blind;
 mod branches;
 mod code;
 mod doubt;
 mod explore;
 mod heidenhain;
+mod hidden_rotation;
 mod judge;
 mod lines;
 mod macro_b;
+mod needs_plan;
 mod ngc;
 mod proof;
 mod run;
@@ -25,7 +26,6 @@ mod runs;
 mod seconds;
 mod settings;
 mod sinumerik;
-mod skew;
 mod statements;
 mod touches;
 mod vm;

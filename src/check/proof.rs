@@ -7,7 +7,7 @@
 //! probe triggers early, late, not at all, does not close again, or when the block stands off; and the same settings left to
 //! the user each time.
 
-use super::explore::{Branch, Told};
+use super::explore::{Branch, ExploredRun};
 use super::run::{Event, Happened, Rate};
 use crate::axes::Position;
 use crate::program::plan::Proof;
@@ -24,7 +24,7 @@ pub struct Proving {
 
 impl Proving {
     /// The next run; the first one is that of the whole program.
-    pub fn add(&mut self, told: &Told) {
+    pub fn add(&mut self, told: &ExploredRun) {
         let Self { all, lines, runs: n } = self;
         let mut text = String::new();
         // writing into a String cannot fail

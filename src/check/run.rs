@@ -3,9 +3,9 @@
 //! It stops at every move that a probe may end ([`Pause::Probe`]); whoever runs it decides how that move ends. So one
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
-use super::code::{Code, Expr, Piece, Statement, UnknownKind, Values, Var, What, Word, numbered};
+use super::code::{Code, Expr, Instruction, Piece, Statement, UnknownKind, Values, Var, Word, numbered};
 use super::doubt::{Doubt, Doubts, Fork};
-use super::skew::Turn;
+use super::hidden_rotation::Turn;
 use super::vm;
 use crate::axes::Position;
 use crate::machine::Machine;
@@ -51,14 +51,14 @@ pub enum Start {
     LengthActs,
     /// Something turns the program's coordinates against the axes that no variable shows: it must take it off, or see after its first
     /// moves that the axes stand elsewhere, and probe nothing.
-    Skewed(Turn),
+    Rotated(Turn),
     /// A function that the user has left on acts on the program's coordinates: it must take it off, or see it and not move.
-    Lasting(Lasting),
+    LeftoverMode(LeftoverMode),
 }
 
 /// A function that outlasts programs and acts on their coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lasting {
+pub enum LeftoverMode {
     /// Lengths are multiplied.
     Scaled,
     /// X and Y are a radius and an angle.
@@ -71,7 +71,7 @@ pub enum Lasting {
     Mirrored,
 }
 
-impl Lasting {
+impl LeftoverMode {
     /// What it is to a person.
     pub fn says(self) -> &'static str {
         match self {
@@ -89,11 +89,11 @@ pub trait Dialect: Clone + Send + Sync {
     /// States in which a program must see that it cannot begin, because it cannot switch off what acts.
     const OBSTRUCTED: &'static [Start] = &[];
     /// What a user may have left on that acts on the coordinates of a program. `tcp`: under the control's own transformation.
-    fn lasting(_tcp: bool) -> &'static [Lasting] {
+    fn lasting(_tcp: bool) -> &'static [LeftoverMode] {
         &[]
     }
     /// Something that no variable shows may turn the program's coordinates. `tcp`: under the control's own transformation.
-    fn may_be_skewed(_tcp: bool) -> bool {
+    fn may_be_rotated(_tcp: bool) -> bool {
         false
     }
     /// The control before the program.
@@ -429,7 +429,7 @@ impl<'p, D: Dialect> Run<'p, D> {
 
     pub(super) fn statement(&mut self, statement: &Statement) -> Result<Option<Probe>, String> {
         match &statement.what {
-            What::Block(words) => {
+            Instruction::Block(words) => {
                 self.refuse_outside(words)?;
                 let spoken = self.spoken(words)?;
                 match self.dialect.block(&spoken, &mut self.vm)? {
@@ -438,19 +438,19 @@ impl<'p, D: Dialect> Run<'p, D> {
                     Next::End => self.end(Event::End),
                 }
             }
-            What::Set(var, expr) => {
+            Instruction::Set(var, expr) => {
                 let (value, doubt) = (self.value(expr)?, self.doubt(expr));
                 self.dialect.write(var, value, &self.vm)?;
                 self.given(var, doubt);
             }
-            What::SetIndirect(number, expr) => {
+            Instruction::SetIndirect(number, expr) => {
                 let (var, value) = (self.variable(number)?, self.value(expr)?);
                 let doubt = self.doubt(number).max(self.doubt(expr));
                 self.dialect.write(&var, value, &self.vm)?;
                 self.given(&var, doubt);
             }
-            What::Jump(to) => self.next = *to,
-            What::JumpUnless(condition, to) => {
+            Instruction::Jump(to) => self.next = *to,
+            Instruction::JumpUnless(condition, to) => {
                 if condition.reads(&|var| self.dialect.is_probe_input(var)) {
                     self.fork(Trouble::Deflected);
                     self.vm.asked = true;
@@ -463,7 +463,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                     self.next = *to;
                 }
             }
-            What::Call(to) => {
+            Instruction::Call(to) => {
                 const DEEPEST: usize = 10;
                 if self.returns.len() >= DEEPEST {
                     return Err("subroutines call each other more than ten deep".to_owned());
@@ -472,30 +472,30 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.next = *to;
                 self.dialect.entered();
             }
-            What::Return(expr) => {
+            Instruction::Return(expr) => {
                 let value = expr.as_ref().map(|v| self.value(v)).transpose()?;
                 let doubt = expr.as_ref().and_then(|v| self.doubt(v));
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
                 self.dialect.left(value, &self.vm);
                 self.given(&Var::Name("_value".into()), doubt);
             }
-            What::Message(text) => self.say(text, Event::Message)?,
-            What::Wait(text) => self.say(text, Event::Wait)?,
-            What::LogLine(text) => self.say(text, Event::Log)?,
-            What::LogOpen { name, append } => {
+            Instruction::Message(text) => self.say(text, Event::Message)?,
+            Instruction::Wait(text) => self.say(text, Event::Wait)?,
+            Instruction::LogLine(text) => self.say(text, Event::Log)?,
+            Instruction::LogOpen { name, append } => {
                 let name = self.text(name)?;
                 self.vm.note(Event::LogOpen { name, append: *append });
             }
-            What::LogClose => self.vm.note(Event::LogClose),
-            What::SetText { var, most, text } => {
+            Instruction::LogClose => self.vm.note(Event::LogClose),
+            Instruction::SetText { var, most, text } => {
                 let text = self.text(text)?;
                 if text.chars().count() > *most {
                     return Err(format!("{var} holds {most} characters, the text has {}", text.chars().count()));
                 }
                 self.texts.insert(var.clone(), text);
             }
-            What::LogWrite { error, name, text } => self.log_write(error, name, text)?,
-            What::LogDelete { error, name } => {
+            Instruction::LogWrite { error, name, text } => self.log_write(error, name, text)?,
+            Instruction::LogDelete { error, name } => {
                 let name = self.text(name)?;
                 if self.writes_to.as_ref() == Some(&name) {
                     return Err(format!("the log {name} is thrown away after something was written into it"));
@@ -503,11 +503,11 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.deleted.insert(name);
                 self.dialect.write(error, 0.0, &self.vm)?;
             }
-            What::Abort(text) => {
+            Instruction::Abort(text) => {
                 let text = self.text(text)?;
                 self.end(Event::Abort(text));
             }
-            What::End => self.end(Event::End),
+            Instruction::End => self.end(Event::End),
         }
         Ok(None)
     }

@@ -3,14 +3,14 @@
 
 mod doubted;
 mod files;
+mod hidden_rotation;
 mod otherwise;
-mod skewed;
 mod spindle;
 
-use super::blind;
-use super::code::{Code, Expr, Statement, Unknown, UnknownKind, Var, What, Word};
+use super::code::{Code, Expr, Instruction, Statement, Unknown, UnknownKind, Var, Word};
 use super::doubt::Taken;
-use super::explore::{Explored, Limits, Told, explore};
+use super::explore::{Explored, ExploredRun, Limits, explore};
+use super::needs_plan;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Spoken, Start, Vm};
 use super::seconds::Clock;
 use super::world::World;
@@ -21,9 +21,9 @@ use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
 use crate::program::plan::Plan;
 use crate::program::scene::Scene;
+use hidden_rotation::Begun;
 use otherwise::otherwise;
 use rayon::prelude::*;
-use skewed::Begun;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -53,10 +53,11 @@ impl Program {
             DialectName::Sinumerik => sinumerik::parse(text, post)?,
         };
         let var = variable(&rule.from);
-        let set_at = code.statements.iter().position(|s| matches!(&s.what, What::Set(v, Expr::Number(_)) if *v == var));
+        let set_at =
+            code.statements.iter().position(|s| matches!(&s.what, Instruction::Set(v, Expr::Number(_)) if *v == var));
         let mut highest = 1.0_f64;
         for statement in &code.statements {
-            if let What::JumpUnless(condition, _) = &statement.what {
+            if let Instruction::JumpUnless(condition, _) = &statement.what {
                 compared(condition, &var, &mut |n| highest = highest.max(n));
             }
         }
@@ -94,7 +95,7 @@ impl Program {
             _ => f64::NAN,
         };
         let blocks = self.code.statements.iter().filter_map(|statement| match &statement.what {
-            What::Block(words) => Some((&statement.at, words)),
+            Instruction::Block(words) => Some((&statement.at, words)),
             _ => None,
         });
         let unknown = blocks.flat_map(|(at, words)| {
@@ -104,7 +105,7 @@ impl Program {
             names.into_iter().map(|(kind, name)| Unknown { at: at.clone(), name, kind }).collect::<Vec<_>>()
         });
         let outputs = self.code.statements.iter().filter_map(|statement| match &statement.what {
-            What::Set(var, _) if control.is_output(var) => {
+            Instruction::Set(var, _) if control.is_output(var) => {
                 Some(Unknown { at: statement.at.clone(), name: var.to_string(), kind: UnknownKind::Output })
             }
             _ => None,
@@ -119,12 +120,12 @@ impl Program {
 
     /// Where it goes over to the control's own transformation: it cannot be judged without its plan.
     pub fn transforms(&self, source: &Source) -> Option<Failure> {
-        blind::transforms(self.dialect, &self.code, source)
+        needs_plan::transforms(self.dialect, &self.code, source)
     }
 
     /// Where it waits for a person between two touches: it cannot be judged without its plan.
     pub fn waits_for_a_mounting(&self, trunk: &[Happened], source: &Source) -> Option<Failure> {
-        blind::waits(trunk, source)
+        needs_plan::waits(trunk, source)
     }
 
     /// The set-up at which it is told to begin.
@@ -132,7 +133,9 @@ impl Program {
         let (_, at) = self.from.as_ref()?;
         match self.code.statements.get(*at)?.what {
             // a number that is no set-up begins nowhere
-            What::Set(_, Expr::Number(n)) => Some(if n.fract() == 0.0 && n >= 0.0 { n as u32 } else { u32::MAX }),
+            Instruction::Set(_, Expr::Number(n)) => {
+                Some(if n.fract() == 0.0 && n >= 0.0 { n as u32 } else { u32::MAX })
+            }
             _ => None,
         }
     }
@@ -164,7 +167,7 @@ impl Program {
     fn begins(&self, setup: u32) -> Option<(usize, Arc<Statement>)> {
         let (var, at) = self.from.as_ref()?;
         let statement = self.code.statements.get(*at)?;
-        let what = What::Set(var.clone(), Expr::Number(f64::from(setup)));
+        let what = Instruction::Set(var.clone(), Expr::Number(f64::from(setup)));
         Some((*at, Arc::new(Statement { what, at: statement.at.clone() })))
     }
 
@@ -174,7 +177,7 @@ impl Program {
         if let Some((var, at)) = &self.from
             && let Some(statement) = code.statements.get_mut(*at)
         {
-            statement.what = What::Set(var.clone(), Expr::Number(f64::from(setup)));
+            statement.what = Instruction::Set(var.clone(), Expr::Number(f64::from(setup)));
         }
         code
     }
@@ -227,7 +230,7 @@ pub enum Kind {
 /// is as long as what is left of it.
 pub struct All {
     /// The run of the whole program.
-    pub whole: Told,
+    pub whole: ExploredRun,
     /// The first condition whose other way was not run, where there are too many.
     pub beyond: Option<Range<usize>>,
     /// What is wrong in the comparison of runs.
@@ -266,7 +269,7 @@ pub fn opening(stage: Stage<'_>) -> Opening {
 }
 
 /// Makes all runs. `each` is told of them in the order of [`Kind`], the whole program first.
-pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(Kind, &Told)) -> All {
+pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(Kind, &ExploredRun)) -> All {
     match stage.program.dialect {
         DialectName::Ngc => Runs::<ngc::Ngc>::new(stage).all(opening, each),
         DialectName::MacroB => Runs::<macro_b::MacroB>::new(stage).all(opening, each),
@@ -301,7 +304,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         Opening { window, clear_from_anywhere, neutral }
     }
 
-    fn all(&self, opening: &Opening, each: &mut dyn FnMut(Kind, &Told)) -> All {
+    fn all(&self, opening: &Opening, each: &mut dyn FnMut(Kind, &ExploredRun)) -> All {
         let window = opening.window;
         let beginning = self.start(&window, 0.5, 0.3);
         // a touch takes a dozen, with the guarded moves to it
@@ -321,7 +324,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let mut all_taken = Taken::new();
         let setting = |name: &str| self.post.settings.get(name).map_or("", String::as_str);
         let (on, off) = (setting("probe_on"), setting("probe_off"));
-        let mut looked_at = |kind: Kind, told: &Told| {
+        let mut looked_at = |kind: Kind, told: &ExploredRun| {
             if matches!(kind, Kind::Begun | Kind::Doubted) {
                 turns.extend(spindle::turns(told));
                 dead.extend(spindle::searches_dead(told, on, off));
@@ -353,11 +356,11 @@ impl<'a, D: Dialect> Runs<'a, D> {
         // the same from elsewhere
         let starts: Vec<Start> = [Start::Fresh, Start::Third]
             .into_iter()
-            .chain(D::lasting(self.tcp()).iter().map(|what| Start::Lasting(*what)))
+            .chain(D::lasting(self.tcp()).iter().map(|what| Start::LeftoverMode(*what)))
             .collect();
         let mut findings = Vec::new();
         for some in starts.chunks(some) {
-            let made: Vec<Told> = some.par_iter().map(|start| self.told(1, *start, elsewhere, None)).collect();
+            let made: Vec<ExploredRun> = some.par_iter().map(|start| self.told(1, *start, elsewhere, None)).collect();
             for other in made {
                 findings.extend(otherwise(&whole, &other).filter(|_| !stays(&other)));
                 note(&mut all_taken, &other);
@@ -377,7 +380,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         findings.extend(turns);
         findings.extend(dead);
         findings.dedup();
-        if D::may_be_skewed(self.tcp()) && faultless {
+        if D::may_be_rotated(self.tcp()) && faultless {
             findings.extend(self.skewed(elsewhere, &begun));
         }
         findings.extend(moving);
@@ -387,7 +390,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
 
     /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And those in
     /// which the program must look before it moves.
-    fn refused(&self, beginning: Position) -> Vec<Told> {
+    fn refused(&self, beginning: Position) -> Vec<ExploredRun> {
         const ELSEWHERE_DEG: f64 = 0.01;
         let obstructed = D::OBSTRUCTED.iter().map(|start| self.told(1, *start, beginning, None));
         let elsewhere = |axis: AxisName, by: f64| {
@@ -401,13 +404,13 @@ impl<'a, D: Dialect> Runs<'a, D> {
     }
 
     /// Runs that are told to begin at a set-up that the program does not have, nor takes for the order to give settings back.
-    fn nowhere(&self, beginning: Position) -> Vec<Told> {
+    fn nowhere(&self, beginning: Position) -> Vec<ExploredRun> {
         if self.program.from.is_none() {
             return Vec::new();
         }
         let told = |setup: u32| {
             let run = self.run(setup, Start::Awkward, beginning, 0, false);
-            Told { start: Start::Awkward, ..explore(run, setup, None, &|_| None).told }
+            ExploredRun { start: Start::Awkward, ..explore(run, setup, None, &|_| None).told }
         };
         [0, self.program.setups + 2].map(told).into()
     }
@@ -463,7 +466,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
         run
     }
 
-    fn told(&self, k: u32, start: Start, at: Position, limits: Option<Limits>) -> Told {
+    fn told(&self, k: u32, start: Start, at: Position, limits: Option<Limits>) -> ExploredRun {
         self.explored(k, start, at, limits).told
     }
 
@@ -598,7 +601,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
 }
 
 /// Notes the ways that a run took at conditions on values that are not known.
-fn note(taken: &mut Taken, told: &Told) {
+fn note(taken: &mut Taken, told: &ExploredRun) {
     for (statement, [no, yes]) in &told.taken {
         let ways = taken.entry(*statement).or_default();
         *ways = [ways[0] | no, ways[1] | yes];
@@ -606,7 +609,7 @@ fn note(taken: &mut Taken, told: &Told) {
 }
 
 /// It begins where it must not.
-fn moves_all_the_same(told: &Told, setups: u32) -> Option<(Range<usize>, String)> {
+fn moves_all_the_same(told: &ExploredRun, setups: u32) -> Option<(Range<usize>, String)> {
     let moves = told.trunk.iter().find(|h| is_motion(h))?;
     let says = match told.start {
         _ if !(1..=setups).contains(&told.from) => {
@@ -630,7 +633,7 @@ fn is_motion(happened: &Happened) -> bool {
 }
 
 /// It says that it cannot begin so, and moves nothing.
-fn stays(told: &Told) -> bool {
+fn stays(told: &ExploredRun) -> bool {
     let says = |h: &Happened| matches!(&h.event, Event::Wait(t) | Event::Abort(t) | Event::Message(t) if !t.is_empty());
     told.fault.is_none() && !told.trunk.iter().any(is_motion) && told.trunk.iter().any(says)
 }

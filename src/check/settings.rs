@@ -1,14 +1,14 @@
 //! The user's settings: what a program leaves of them.
 
-use super::explore::Told;
-use super::judge::{Case, Said};
+use super::explore::ExploredRun;
+use super::judge::{Case, CollectedFindings};
 use super::run::{Event, Happened};
 use crate::program::plan::ControllerFrame;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Compares what a run leaves, at its end and after a person has broken it off, with what it found.
-pub fn settings_return(case: &Case<'_>, told: &Told, said: &mut Said) {
+pub fn settings_return(case: &Case<'_>, told: &ExploredRun, said: &mut CollectedFindings) {
     if told.fault.is_some() {
         return;
     }
@@ -38,7 +38,7 @@ pub fn compare_settings(
     stopped: bool,
     at: &Range<usize>,
     when: &str,
-    said: &mut Said,
+    said: &mut CollectedFindings,
 ) {
     let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
     let tcp = case.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);

@@ -4,7 +4,7 @@
 //! between the old and the new one. The statements can. Remarks, blanks, numbers of blocks and labels, and how a number is spelled
 //! are gone when a program has been read; what the operator is shown is not.
 
-use super::code::{Code, Statement, What};
+use super::code::{Code, Instruction, Statement};
 use super::proof::hex;
 use crate::program::plan::Proof;
 use sha2::{Digest, Sha256};
@@ -75,10 +75,12 @@ impl Ahead {
 
 fn write(text: &mut String, place: usize, statement: &Statement, ahead: &mut Ahead, points: bool) {
     let _ = match &statement.what {
-        What::Jump(to) => writeln!(text, "jump {}", ahead.name(place, *to)),
-        What::JumpUnless(condition, to) => writeln!(text, "unless {condition:?} jump {}", ahead.name(place, *to)),
-        What::Call(to) => writeln!(text, "call {}", ahead.name(place, *to)),
-        What::Block(words) if !points => {
+        Instruction::Jump(to) => writeln!(text, "jump {}", ahead.name(place, *to)),
+        Instruction::JumpUnless(condition, to) => {
+            writeln!(text, "unless {condition:?} jump {}", ahead.name(place, *to))
+        }
+        Instruction::Call(to) => writeln!(text, "call {}", ahead.name(place, *to)),
+        Instruction::Block(words) if !points => {
             words.iter().for_each(|w| {
                 let _ = write!(text, "{} {:?} ", w.address, w.value);
             });

@@ -1,7 +1,7 @@
 //! The touches that a program made, against those of its plan.
 
-use super::explore::Told;
-use super::judge::{Case, Said};
+use super::explore::ExploredRun;
+use super::judge::{Case, CollectedFindings};
 use super::run::{Event, Probe};
 use crate::axes::{AxisMap, Position};
 use crate::log;
@@ -75,7 +75,7 @@ impl Made {
 const LOGGED: f64 = 1e-6;
 
 /// Compares the touches of a run with the plan.
-pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said) {
+pub fn against_plan(case: &Case<'_>, told: &ExploredRun, made: &[Made], said: &mut CollectedFindings) {
     let lines: Vec<(&Range<usize>, &str)> = told
         .trunk
         .iter()
@@ -164,7 +164,7 @@ pub fn against_plan(case: &Case<'_>, told: &Told, made: &[Made], said: &mut Said
 }
 
 /// Where the log has times, each touch has one, it goes on as the run does, and it does not jump.
-fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &str)], said: &mut Said) {
+fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &str)], said: &mut CollectedFindings) {
     // no touch with the way to it takes as long
     const LONGEST_S: f64 = 3600.0;
     if !case.post.log.writes_time {
@@ -194,7 +194,7 @@ fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &s
 }
 
 /// The whole log must read as that of a complete run of this plan.
-fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut Said) {
+fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut CollectedFindings) {
     let Some(plan) = case.plan else { return };
     let writer = log::Writer::Controller(case.post);
     let mut complain = |message: &str| {
@@ -213,7 +213,7 @@ fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut Said) {
 }
 
 /// Lines that are written while no log is open are lost.
-fn log_is_open(case: &Case<'_>, told: &Told, said: &mut Said) {
+fn log_is_open(case: &Case<'_>, told: &ExploredRun, said: &mut CollectedFindings) {
     if case.post.check.as_ref().is_some_and(|c| c.log_always_open) {
         return;
     }
@@ -256,12 +256,18 @@ fn log_is_open(case: &Case<'_>, told: &Told, said: &mut Said) {
     }
 }
 
-fn moves(told: &Told) -> bool {
+fn moves(told: &ExploredRun) -> bool {
     told.trunk.iter().any(|h| matches!(h.event, Event::Move { .. }))
 }
 
 /// The whole plan, or all of it from some touch on.
-fn order(case: &Case<'_>, told: &Told, ids: &[(u64, Range<usize>)], end: &Range<usize>, said: &mut Said) {
+fn order(
+    case: &Case<'_>,
+    told: &ExploredRun,
+    ids: &[(u64, Range<usize>)],
+    end: &Range<usize>,
+    said: &mut CollectedFindings,
+) {
     let Some(plan) = case.plan else { return };
     let begin = match ids.first() {
         _ if told.from == 1 => 0,

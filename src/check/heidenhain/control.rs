@@ -8,10 +8,10 @@
 use crate::axes::{AxisName, Position};
 use crate::check::code::{UnknownKind, Values, Var};
 use crate::check::doubt::Doubt;
+use crate::check::hidden_rotation::HiddenRotation;
 use crate::check::run::{
-    Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
+    Alarm, Dialect, Event, LeftoverMode, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
-use crate::check::skew::Skew;
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
@@ -31,7 +31,7 @@ pub struct Heidenhain {
     /// Basic rotation of the preset, deg.
     rotation: f64,
     /// A basic rotation in space (SPA, SPB).
-    skew: Skew,
+    skew: HiddenRotation,
     tilted: bool,
     tcpm: Tcpm,
     /// M126: rotary axes take the short way.
@@ -261,11 +261,11 @@ fn builder(post: &Postprocessor) -> Arc<[f64]> {
 
 impl Dialect for Heidenhain {
     /// With M91 and in the machine's system nothing of it acts.
-    fn lasting(tcp: bool) -> &'static [Lasting] {
-        if tcp { &[Lasting::Rotated] } else { &[] }
+    fn lasting(tcp: bool) -> &'static [LeftoverMode] {
+        if tcp { &[LeftoverMode::Rotated] } else { &[] }
     }
 
-    fn may_be_skewed(tcp: bool) -> bool {
+    fn may_be_rotated(tcp: bool) -> bool {
         tcp
     }
 
@@ -278,8 +278,8 @@ impl Dialect for Heidenhain {
             preset: some([7.5, -3.25, 11.0, 1.5, -2.0, 0.75], awkward || third),
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0], awkward),
-            rotation: if start == Start::Lasting(Lasting::Rotated) { 1.5 } else { 0.0 },
-            skew: Skew::of(start),
+            rotation: if start == Start::LeftoverMode(LeftoverMode::Rotated) { 1.5 } else { 0.0 },
+            skew: HiddenRotation::of(start),
             tilted: awkward,
             tcpm: if awkward || third { Tcpm::Found } else { Tcpm::Off },
             short_way: awkward,

@@ -7,7 +7,7 @@ use super::formula::formula;
 use super::masks::{Masks, folder, string};
 use super::scan::Scan;
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Op, Piece, UnknownKind, Var, What, Word};
+use crate::check::code::{Code, Expr, Instruction, Op, Piece, UnknownKind, Var, Word};
 use crate::check::lines::{Line, lines};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
@@ -142,13 +142,13 @@ impl<'a> Reader<'a> {
             _ => return Err(Fault { at, says: format!("the unit is {unit:?}, MM or INCH is expected") }),
         };
         self.begun = Some((name, unit));
-        self.code.push(at, What::Block(vec![number("INCH", inches)]));
+        self.code.push(at, Instruction::Block(vec![number("INCH", inches)]));
         Ok(())
     }
 
     fn block(&mut self, scan: &mut Scan<'_>) -> Result<(), Fault> {
         let at = scan.place();
-        let one = |address: &'static str| What::Block(vec![number(address, 0.0)]);
+        let one = |address: &'static str| Instruction::Block(vec![number(address, 0.0)]);
         if scan.rest().starts_with("L ") && scan.take("L") {
             return self.linear(scan, at);
         }
@@ -159,22 +159,23 @@ impl<'a> Reader<'a> {
             let var = string(scan)?;
             scan.need(" = \"", "= and a text in quotes")?;
             let text = scan.up_to("\"", "the quote that ends the text")?;
-            self.code.push(at, What::SetText { var, most: usize::MAX, text: vec![Piece::Text(Arc::from(text))] });
+            self.code
+                .push(at, Instruction::SetText { var, most: usize::MAX, text: vec![Piece::Text(Arc::from(text))] });
         } else if scan.rest().starts_with('Q') {
             let var = scan.parameter("a Q parameter")?;
             scan.need(" = ", "= and a formula")?;
             let value = formula(scan, 0)?;
-            self.code.push(at, What::Set(var, value));
+            self.code.push(at, Instruction::Set(var, value));
         } else if scan.take("LBL ") {
             let label = self.label(scan)?;
             if label == 0 {
-                self.code.push(at, What::Return(None));
+                self.code.push(at, Instruction::Return(None));
             } else if self.labels.insert(label, self.code.statements.len()).is_some() {
                 return Err(Fault { at, says: format!("LBL {label} stands twice") });
             }
         } else if scan.take("CALL LBL ") {
             let label = self.label(scan)?;
-            let call = self.code.push(at.clone(), What::Call(0));
+            let call = self.code.push(at.clone(), Instruction::Call(0));
             self.jumps.push((call, label, at));
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
             self.opened(at, Cycle::Probe);
@@ -196,24 +197,24 @@ impl<'a> Reader<'a> {
         } else if scan.take_whole("PLANE RESET STAY") {
             self.code.push(at, one("PLANE"));
         } else if scan.take_whole("FUNCTION RESET TCPM") {
-            self.code.push(at, What::Block(vec![number("M", 129.0)]));
+            self.code.push(at, Instruction::Block(vec![number("M", 129.0)]));
         } else if scan.take_whole("TRANS DATUM RESET") {
             self.code.push(at, one("NO SHIFT"));
         } else if scan.take("TRANS DATUM AXIS") {
             let words = self.axes(scan)?;
-            self.code.push(at, What::Block(std::iter::once(number("SHIFT", 0.0)).chain(words).collect()));
+            self.code.push(at, Instruction::Block(std::iter::once(number("SHIFT", 0.0)).chain(words).collect()));
         } else if scan.take_whole("STOP") {
-            self.code.push(at, What::Wait(Vec::new()));
+            self.code.push(at, Instruction::Wait(Vec::new()));
         } else if scan.take("END PGM ") {
             let (name, unit) = self.begun.clone().unwrap_or_default();
             if scan.all() != format!("{name} {unit}") {
                 return Err(Fault { at, says: format!("END PGM {name} {unit} is expected") });
             }
             self.ended = true;
-            self.code.push(at, What::End);
+            self.code.push(at, Instruction::End);
         } else if scan.take("M") {
             let m = scan.whole("the number of an M function")?;
-            self.code.push(at, What::Block(vec![number("M", f64::from(m))]));
+            self.code.push(at, Instruction::Block(vec![number("M", f64::from(m))]));
         } else {
             let words: Vec<&str> = scan.rest().split_whitespace().take(3).collect();
             let name: String = words.join(" ").chars().take(24).collect();
@@ -281,7 +282,7 @@ impl<'a> Reader<'a> {
         if scan.take_whole(" M91") {
             words.push(number("M91", 0.0));
         }
-        self.code.push(at, What::Block(words));
+        self.code.push(at, Instruction::Block(words));
         Ok(())
     }
 
@@ -295,7 +296,7 @@ impl<'a> Reader<'a> {
             14 => {
                 scan.need("ERROR = ", "ERROR = and a number")?;
                 let error = scan.whole("the number of a message")?;
-                self.code.push(at, What::Abort(vec![Piece::Text(Arc::from(format!("error {error}")))]));
+                self.code.push(at, Instruction::Abort(vec![Piece::Text(Arc::from(format!("error {error}")))]));
                 Ok(())
             }
             16 => self.print(scan, at),
@@ -318,7 +319,7 @@ impl<'a> Reader<'a> {
             scan.need(sign, "the sign of the function")?;
             value = Expr::Two(op, Box::new(value), Box::new(scan.signed(WHAT)?));
         }
-        self.code.push(at, What::Set(var, value));
+        self.code.push(at, Instruction::Set(var, value));
         Ok(())
     }
 
@@ -337,8 +338,9 @@ impl<'a> Reader<'a> {
         let right = scan.signed(WHAT)?;
         scan.need(" GOTO LBL ", "GOTO LBL")?;
         let label = self.label(scan)?;
-        let over = self.code.push(at.clone(), What::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
-        let jump = self.code.push(at.clone(), What::Jump(0));
+        let over =
+            self.code.push(at.clone(), Instruction::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
+        let jump = self.code.push(at.clone(), Instruction::Jump(0));
         self.jumps.push((jump, label, at));
         self.aim(over, jump + 1);
         Ok(())
@@ -362,7 +364,7 @@ impl<'a> Reader<'a> {
         }
         let several = if id == 210 { format!(" NR{nr}") } else { String::new() };
         let data = Var::Name(Arc::from(format!("ID{id}{several} IDX{index}")));
-        self.code.push(at, What::Set(var, Expr::Var(data)));
+        self.code.push(at, Instruction::Set(var, Expr::Var(data)));
         Ok(())
     }
 
@@ -381,7 +383,7 @@ impl<'a> Reader<'a> {
             fault(format!("the mask {name} does not lie beside the program: what is written cannot be said"))
         })?;
         if to == "SCREEN:" {
-            self.code.push(at, What::Message(mask.text.clone()));
+            self.code.push(at, Instruction::Message(mask.text.clone()));
             return Ok(());
         }
         let append = mask.append.ok_or_else(|| {
@@ -394,9 +396,9 @@ impl<'a> Reader<'a> {
         }
         // a log elsewhere keeps its whole path: it is then not the one of the plan
         let log = Arc::from(to.strip_prefix(folder).unwrap_or(to));
-        self.code.push(at.clone(), What::LogOpen { name: vec![Piece::Text(log)], append });
-        self.code.push(at.clone(), What::LogLine(mask.text.clone()));
-        self.code.push(at, What::LogClose);
+        self.code.push(at.clone(), Instruction::LogOpen { name: vec![Piece::Text(log)], append });
+        self.code.push(at.clone(), Instruction::LogLine(mask.text.clone()));
+        self.code.push(at, Instruction::LogClose);
         Ok(())
     }
 
@@ -416,30 +418,30 @@ impl<'a> Reader<'a> {
                     return Ok(());
                 }
                 let back = open.words.iter().find(|w| w.address == "MB").map_or(Expr::Number(0.0), |w| w.value.clone());
-                self.code.push(at.clone(), What::Block(open.words));
-                self.code.push(at, What::Block(vec![word("BACK", back)]));
+                self.code.push(at.clone(), Instruction::Block(open.words));
+                self.code.push(at, Instruction::Block(vec![word("BACK", back)]));
             }
             Cycle::Orientation => {
                 scan.need("CYCL DEF 13.1 ANGLE", "CYCL DEF 13.1 ANGLE")?;
                 let angle = scan.signed("an angle with its sign")?;
                 scan.end()?;
-                self.code.push(at, What::Block(vec![word("ANGLE", angle)]));
+                self.code.push(at, Instruction::Block(vec![word("ANGLE", angle)]));
             }
             Cycle::DatumShift => {
                 scan.need(&format!("CYCL DEF 7.{}", open.stage), "the next block of the cycle: CYCL DEF 7.1")?;
                 let words = self.axes(scan)?;
                 scan.end()?;
-                self.code.push(at, What::Block(std::iter::once(number("SHIFT", 0.0)).chain(words).collect()));
+                self.code.push(at, Instruction::Block(std::iter::once(number("SHIFT", 0.0)).chain(words).collect()));
             }
             Cycle::Rotation => {
                 scan.need("CYCL DEF 10.1 ROT+0", "CYCL DEF 10.1 ROT+0: axiscal knows no other rotation")?;
                 scan.end()?;
-                self.code.push(at, What::Block(vec![number("NO ROTATION", 0.0)]));
+                self.code.push(at, Instruction::Block(vec![number("NO ROTATION", 0.0)]));
             }
             Cycle::WorkingPlane => {
                 scan.need("CYCL DEF 19.1 A+0 B+0 C+0", "CYCL DEF 19.1 A+0 B+0 C+0: axiscal knows no other plane")?;
                 scan.end()?;
-                self.code.push(at, What::Block(vec![number("PLANE", 0.0)]));
+                self.code.push(at, Instruction::Block(vec![number("PLANE", 0.0)]));
             }
         }
         Ok(())
@@ -482,7 +484,8 @@ impl<'a> Reader<'a> {
 
     fn aim(&mut self, jump: usize, to: usize) {
         if let Some(statement) = self.code.statements.get_mut(jump)
-            && let What::Jump(place) | What::JumpUnless(_, place) | What::Call(place) = &mut statement.what
+            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) | Instruction::Call(place) =
+                &mut statement.what
         {
             *place = to;
         }

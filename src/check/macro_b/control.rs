@@ -7,15 +7,15 @@
 mod places;
 mod variables;
 
-use super::lasting;
+use super::leftover_modes;
 use super::machine_builder::Builder;
 use crate::axes::{AxisName, Position};
 use crate::check::code::{UnknownKind, Values, Var};
 use crate::check::doubt::Doubt;
+use crate::check::hidden_rotation::HiddenRotation;
 use crate::check::run::{
-    Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
+    Alarm, Dialect, Event, LeftoverMode, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
-use crate::check::skew::Skew;
 use crate::machine::Machine;
 use crate::post::{CallRule, Does, Postprocessor};
 use crate::units::mm_from_inch;
@@ -53,9 +53,9 @@ pub struct MacroB {
     /// X of the program runs against the axis: a mirror image that none of its words takes off.
     mirrored: bool,
     /// What the user has left on.
-    lasting: Option<Lasting>,
+    lasting: Option<LeftoverMode>,
     /// A workpiece setting error compensation (G54.4).
-    skew: Skew,
+    skew: HiddenRotation,
     /// Blocks before this place may not have been done yet.
     ahead: bool,
     /// mm/min
@@ -85,10 +85,10 @@ impl MacroB {
             if value("P") != Some(0.0) {
                 return Err("G54.4 is known with P0 only, which ends it".to_owned());
             }
-            self.skew = Skew::None;
+            self.skew = HiddenRotation::None;
             return Ok(());
         }
-        if let Some(ended) = lasting::ended_by(tenth, value("P"))? {
+        if let Some(ended) = leftover_modes::ended_by(tenth, value("P"))? {
             self.lasting = self.lasting.filter(|acts| *acts != ended);
             return Ok(());
         }
@@ -241,7 +241,7 @@ impl MacroB {
             return Err("it moves in a rotated coordinate system: G69 is missing".to_owned());
         }
         if let Some(acts) = self.lasting {
-            return Err(format!("it moves under {}: {} is missing", acts.says(), lasting::ends(acts)));
+            return Err(format!("it moves under {}: {} is missing", acts.says(), leftover_modes::ends(acts)));
         }
         Ok(())
     }
@@ -280,11 +280,11 @@ fn calls_if(word: &Spoken, numbers: &[f64]) -> UnknownKind {
 impl Dialect for MacroB {
     const OBSTRUCTED: &'static [Start] = &[Start::Obstructed, Start::LengthActs];
 
-    fn lasting(_tcp: bool) -> &'static [Lasting] {
-        lasting::ALL
+    fn lasting(_tcp: bool) -> &'static [LeftoverMode] {
+        leftover_modes::ALL
     }
 
-    fn may_be_skewed(_tcp: bool) -> bool {
+    fn may_be_rotated(_tcp: bool) -> bool {
         true
     }
 
@@ -338,10 +338,10 @@ impl Dialect for MacroB {
             local: some([-2.0, 0.75, 1.125, -0.25, 0.5, 0.375]),
             mirrored: start == Start::Obstructed,
             lasting: match start {
-                Start::Lasting(what) => Some(what).filter(|what| lasting::may_act(*what, post)),
+                Start::LeftoverMode(what) => Some(what).filter(|what| leftover_modes::may_act(*what, post)),
                 _ => None,
             },
-            skew: Skew::of(start),
+            skew: HiddenRotation::of(start),
             ahead: false,
             feed: 0.0,
             holds: 0.0,
@@ -543,11 +543,11 @@ impl Dialect for MacroB {
 
     fn settings(&self) -> BTreeMap<String, String> {
         let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
-        let acts = |what: Lasting| if self.lasting == Some(what) { "on" } else { "off" }.to_owned();
+        let acts = |what: LeftoverMode| if self.lasting == Some(what) { "on" } else { "off" }.to_owned();
         BTreeMap::from([
-            ("scaling".to_owned(), acts(Lasting::Scaled)),
-            ("polar coordinates".to_owned(), acts(Lasting::Polar)),
-            ("dynamic fixture offset".to_owned(), acts(Lasting::TurnsAlong)),
+            ("scaling".to_owned(), acts(LeftoverMode::Scaled)),
+            ("polar coordinates".to_owned(), acts(LeftoverMode::Polar)),
+            ("dynamic fixture offset".to_owned(), acts(LeftoverMode::TurnsAlong)),
             ("units".to_owned(), if self.inch { "G20" } else { "G21" }.to_owned()),
             ("distance".to_owned(), if self.incremental { "G91" } else { "G90" }.to_owned()),
             ("plane".to_owned(), format!("G{}", self.plane)),

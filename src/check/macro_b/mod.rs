@@ -1,7 +1,7 @@
 //! Custom macro B of Fanuc, and the macros of Haas, as far as our programs use them.
 
 mod control;
-mod lasting;
+mod leftover_modes;
 mod machine_builder;
 mod parse;
 

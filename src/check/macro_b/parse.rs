@@ -4,7 +4,7 @@
 //! (p. 116) for DPRNT; the rest as the postprocessor files say, unverified where they say so.
 
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Function, Op, Piece, Text, Var, What, Word};
+use crate::check::code::{Code, Expr, Function, Instruction, Op, Piece, Text, Var, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
@@ -122,7 +122,7 @@ impl Reader<'_> {
                 .map(|(e, _)| e)
                 .parse(after)
                 .map_err(|e: Failed<'_>| line.unread(&e, "a condition"))?;
-            let over = self.code.push(at.clone(), What::JumpUnless(condition, 0));
+            let over = self.code.push(at.clone(), Instruction::JumpUnless(condition, 0));
             let left = self.goto(line, after, at)?;
             let here = self.code.statements.len();
             self.aim(over, here);
@@ -132,16 +132,16 @@ impl Reader<'_> {
             return self.goto(line, rest, at);
         }
         if let Some(after) = rest.strip_prefix("POPEN") {
-            self.code.push(at, What::LogOpen { name: Vec::new(), append: true });
+            self.code.push(at, Instruction::LogOpen { name: Vec::new(), append: true });
             return Ok(after);
         }
         if let Some(after) = rest.strip_prefix("PCLOS") {
-            self.code.push(at, What::LogClose);
+            self.code.push(at, Instruction::LogClose);
             return Ok(after);
         }
         if let Some(after) = rest.strip_prefix("DPRNT[") {
             let (left, text) = printed(line, after)?;
-            self.code.push(at, What::LogLine(text));
+            self.code.push(at, Instruction::LogLine(text));
             return Ok(left);
         }
         if rest.starts_with('#') {
@@ -155,7 +155,7 @@ impl Reader<'_> {
             .parse(rest)
             .map_err(|e: Failed<'_>| line.unread(&e, "GOTO and a sequence number"))?;
         let label = self.label(line, rest, digits)?;
-        let jump = self.code.push(at.clone(), What::Jump(0));
+        let jump = self.code.push(at.clone(), Instruction::Jump(0));
         self.jumps.push((jump, label, at));
         Ok(after)
     }
@@ -182,10 +182,10 @@ impl Reader<'_> {
                 return Err(line.fault(rest, format!("#{variable} is known with the value 1 only")));
             }
             let text = vec![Piece::Text(Arc::from(body))];
-            self.code.push(at, if variable == 3000 { What::Abort(text) } else { What::Wait(text) });
+            self.code.push(at, if variable == 3000 { Instruction::Abort(text) } else { Instruction::Wait(text) });
             return Ok(left);
         }
-        self.code.push(at, What::Set(Var::Number(variable), value));
+        self.code.push(at, Instruction::Set(Var::Number(variable), value));
         Ok(after)
     }
 
@@ -224,7 +224,7 @@ impl Reader<'_> {
         }
         if !words.is_empty() {
             self.ended |= words.iter().any(|w| w.address == "M" && w.value == Expr::Number(30.0));
-            self.code.push(line.rest(rest), What::Block(words));
+            self.code.push(line.rest(rest), Instruction::Block(words));
         }
         Ok(left)
     }
@@ -242,7 +242,7 @@ impl Reader<'_> {
 
     fn aim(&mut self, jump: usize, to: usize) {
         if let Some(statement) = self.code.statements.get_mut(jump)
-            && let What::Jump(place) | What::JumpUnless(_, place) = &mut statement.what
+            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) = &mut statement.what
         {
             *place = to;
         }

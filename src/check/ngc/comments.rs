@@ -3,7 +3,7 @@
 //! The control acts on the last comment of a line only: `(LOG,one)(A)` logs nothing.
 
 use super::parse::parameter;
-use crate::check::code::{Piece, Text, What};
+use crate::check::code::{Instruction, Piece, Text};
 use crate::check::lines::{Line, blanks};
 use crate::check::run::Fault;
 use nom::branch::alt;
@@ -49,7 +49,7 @@ fn active(body: &str) -> Option<&'static str> {
 /// A comment that acts.
 pub enum Acting {
     /// What it does, and where it stands.
-    Does(Range<usize>, What),
+    Does(Range<usize>, Instruction),
     /// It does something that is not known to axiscal, of this name.
     Unknown(Range<usize>, String),
 }
@@ -105,7 +105,7 @@ pub fn comments(line: &Line<'_>, rest: &str, alone: bool) -> Result<Option<Actin
 }
 
 /// `None`: something that is not known to axiscal.
-fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<Option<What>, Fault> {
+fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<Option<Instruction>, Fault> {
     let (head, tail) = body.split_once(',').map_or((body, None), |(h, t)| (h, Some(t)));
     let text = |fixed: bool| -> Result<Text, Fault> {
         let tail = tail
@@ -114,13 +114,13 @@ fn does(line: &Line<'_>, place: &str, body: &str, word: &str) -> Result<Option<W
         if fixed { Ok(vec![Piece::Text(Arc::from(tail))]) } else { expanded(line, tail) }
     };
     Ok(Some(match word {
-        "MSG" => What::Message(text(true)?),
-        "DEBUG" => What::Message(text(false)?),
-        "ABORT" => What::Abort(text(false)?),
-        "LOG" => What::LogLine(text(false)?),
-        "LOGOPEN" => What::LogOpen { name: text(true)?, append: false },
-        "LOGAPPEND" => What::LogOpen { name: text(true)?, append: true },
-        "LOGCLOSE" if body.trim_start().eq_ignore_ascii_case("LOGCLOSE") => What::LogClose,
+        "MSG" => Instruction::Message(text(true)?),
+        "DEBUG" => Instruction::Message(text(false)?),
+        "ABORT" => Instruction::Abort(text(false)?),
+        "LOG" => Instruction::LogLine(text(false)?),
+        "LOGOPEN" => Instruction::LogOpen { name: text(true)?, append: false },
+        "LOGAPPEND" => Instruction::LogOpen { name: text(true)?, append: true },
+        "LOGCLOSE" if body.trim_start().eq_ignore_ascii_case("LOGCLOSE") => Instruction::LogClose,
         _ => return Ok(None),
     }))
 }

@@ -3,7 +3,7 @@
 //! Source: LinuxCNC 2.9 manual, chapters 11.3 (lines, words, expressions), 11.4 (comments), 11.7 (O-codes).
 
 use super::comments::{Acting, comments};
-use crate::check::code::{Code, Expr, Function, Op, UnknownKind, Var, What, Word};
+use crate::check::code::{Code, Expr, Function, Instruction, Op, UnknownKind, Var, Word};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
 use nom::branch::alt;
@@ -91,7 +91,7 @@ impl Reader {
             }
             (self.percents, self.begun) = (self.percents + 1, true);
             if self.percents == 2 {
-                self.code.push(line.all(), What::End);
+                self.code.push(line.all(), Instruction::End);
             }
             return Ok(());
         }
@@ -121,8 +121,8 @@ impl Reader {
             .parse(after)
             .map_err(|e| line.unread(&e, "= and a value"))?;
         let what = match target {
-            Expr::Var(var) => What::Set(var, value),
-            Expr::Indirect(number) => What::SetIndirect(*number, value),
+            Expr::Var(var) => Instruction::Set(var, value),
+            Expr::Indirect(number) => Instruction::SetIndirect(*number, value),
             _ => return Err(line.not_understood(rest, "a parameter")),
         };
         self.code.push(line.rest(rest), what);
@@ -154,7 +154,7 @@ impl Reader {
             left = blanks(after).map_err(|e| line.unread(&e, "a word"))?.0;
         }
         if !words.is_empty() {
-            self.code.push(line.rest(rest), What::Block(words));
+            self.code.push(line.rest(rest), Instruction::Block(words));
         }
         Ok(left)
     }
@@ -182,7 +182,7 @@ impl Reader {
             "if" => {
                 let (left, test) = condition(after)?;
                 self.first_use(line, rest, &label)?;
-                let past = self.code.push(at.clone(), What::JumpUnless(test, 0));
+                let past = self.code.push(at.clone(), Instruction::JumpUnless(test, 0));
                 self.open.push(Open { label, at, kind: Kind::If { past: Some(past), ends: Vec::new(), other: false } });
                 left
             }
@@ -205,7 +205,7 @@ impl Reader {
                     return Err(line.fault(rest, "a subroutine begins inside of something else"));
                 }
                 self.first_use(line, rest, &label)?;
-                let over = self.code.push(at.clone(), What::Jump(0));
+                let over = self.code.push(at.clone(), Instruction::Jump(0));
                 self.subs.insert(label.clone(), self.code.statements.len());
                 self.open.push(Open { label, at, kind: Kind::Sub { over } });
                 after
@@ -218,7 +218,7 @@ impl Reader {
                 if !self.open.iter().any(inside) {
                     return Err(line.fault(rest, format!("{word} outside of a subroutine of that name")));
                 }
-                self.code.push(at, What::Return(value));
+                self.code.push(at, Instruction::Return(value));
                 if word == "endsub" {
                     let Some(Open { kind: Kind::Sub { over }, .. }) = self.close(&label, false) else {
                         return Err(line.fault(rest, "the subroutine ends inside of something else"));
@@ -233,7 +233,7 @@ impl Reader {
                 return Ok(());
             }
             "call" => {
-                let call = self.code.push(at.clone(), What::Call(0));
+                let call = self.code.push(at.clone(), Instruction::Call(0));
                 self.calls.push((call, label, at));
                 after
             }
@@ -257,7 +257,7 @@ impl Reader {
 
     fn next_branch(&mut self, line: &Line<'_>, rest: &str, label: &str, test: Option<Expr>) -> Result<(), Fault> {
         let wrong = |says: &str| Err(line.fault(rest, format!("o{label} {says}")));
-        let to_end = self.code.push(line.rest(rest), What::Jump(0));
+        let to_end = self.code.push(line.rest(rest), Instruction::Jump(0));
         let here = self.code.statements.len();
         let Some(Open { label: open, kind: Kind::If { past, ends, other }, .. }) = self.open.last_mut() else {
             return wrong("else belongs to no if");
@@ -273,7 +273,7 @@ impl Reader {
         let before = past.take();
         if let Some(test) = test {
             *past = Some(here);
-            self.code.push(line.rest(rest), What::JumpUnless(test, 0));
+            self.code.push(line.rest(rest), Instruction::JumpUnless(test, 0));
         }
         if let Some(jump) = before {
             self.aim(jump, here);
@@ -289,7 +289,7 @@ impl Reader {
     fn aim(&mut self, jump: usize, to: usize) {
         if let Some(statement) = self.code.statements.get_mut(jump) {
             match &mut statement.what {
-                What::Jump(place) | What::JumpUnless(_, place) | What::Call(place) => *place = to,
+                Instruction::Jump(place) | Instruction::JumpUnless(_, place) | Instruction::Call(place) => *place = to,
                 _ => {}
             }
         }
@@ -422,7 +422,7 @@ mod tests {
     #[test]
     fn words_keep_their_fractions() {
         let code = parse("G92.2 X-1.5 Y.25 Z[1 + 2 * 3]\n").unwrap();
-        let What::Block(words) = &code.statements[0].what else { panic!() };
+        let Instruction::Block(words) = &code.statements[0].what else { panic!() };
         assert_eq!(words[0].value, Expr::Number(92.2), "{words:?}");
         assert_eq!(words[1].value, Expr::Number(-1.5));
         assert_eq!(words[2].value, Expr::Number(0.25));

@@ -3,7 +3,7 @@
 use super::Runs;
 use crate::axes::Position;
 use crate::check::doubt::{Doubt, Fork, Taken};
-use crate::check::explore::{Explored, Limits, Told, explore, explore_on};
+use crate::check::explore::{Explored, ExploredRun, Limits, explore, explore_on};
 use crate::check::run::{Dialect, Start};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use std::ops::Range;
 /// The runs, and what could not be run.
 pub(super) struct Doubted {
     /// Each with the conditions at which it took the other way.
-    pub runs: Vec<Told>,
+    pub runs: Vec<ExploredRun>,
     /// The first condition whose other way was not run, where there are too many.
     pub beyond: Option<Range<usize>>,
 }
@@ -20,7 +20,7 @@ pub(super) struct Doubted {
 const MOST_RUNS: usize = 23;
 
 /// A run that is to begin at a condition: what was before it, and the run.
-type Begun<'c, D> = (Told, Fork<'c, D>);
+type Begun<'c, D> = (ExploredRun, Fork<'c, D>);
 
 impl<'a, D: Dialect> Runs<'a, D> {
     /// Each condition the other way in a run of its own; conditions that only such a run comes to as well; and pairs, where they are few.
@@ -59,22 +59,27 @@ impl<'a, D: Dialect> Runs<'a, D> {
 
     /// The forks of a run as runs that are to begin. Of a run that begins at a later set-up only those at conditions that the whole run
     /// does not come to.
-    pub(super) fn forks<'c>(&self, told: &Told, forks: Vec<Fork<'c, D>>, whole: Option<&Told>) -> Vec<Begun<'c, D>> {
+    pub(super) fn forks<'c>(
+        &self,
+        told: &ExploredRun,
+        forks: Vec<Fork<'c, D>>,
+        whole: Option<&ExploredRun>,
+    ) -> Vec<Begun<'c, D>> {
         let is_new = |fork: &Fork<'c, D>| whole.is_none_or(|whole| !whole.taken.contains_key(&fork.statement));
         forks.into_iter().filter(is_new).map(|fork| (self.begun(told, &fork), fork)).collect()
     }
 
     /// The program once more, with the control as its own run has left it; `None`: nothing of it lasts.
-    pub(super) fn again(&self, whole: &Explored<'_, D>, at: Position) -> Option<Told> {
+    pub(super) fn again(&self, whole: &Explored<'_, D>, at: Position) -> Option<ExploredRun> {
         let mut run = self.run(1, Start::Awkward, at, 0, false);
         run.dialect = whole.left.after_abort().filter(|_| whole.told.fault.is_none())?;
-        Some(Told { start: Start::Awkward, ..explore(run, 1, None, &|_| None).told })
+        Some(ExploredRun { start: Start::Awkward, ..explore(run, 1, None, &|_| None).told })
     }
 
-    fn begun(&self, parent: &Told, fork: &Fork<'_, D>) -> Told {
+    fn begun(&self, parent: &ExploredRun, fork: &Fork<'_, D>) -> ExploredRun {
         let mut otherwise = parent.otherwise.clone();
         otherwise.push((self.program.place(fork.statement), fork.doubt));
-        Told {
+        ExploredRun {
             from: parent.from,
             start: parent.start,
             trunk: Vec::new(),

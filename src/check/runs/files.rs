@@ -1,6 +1,6 @@
 //! Files of the control that a program writes or deletes beside its log.
 
-use crate::check::code::{Code, Piece, Text, Unknown, UnknownKind, What};
+use crate::check::code::{Code, Instruction, Piece, Text, Unknown, UnknownKind};
 use std::ops::Range;
 
 /// All but the log: the file into which the first line is written.
@@ -9,16 +9,16 @@ pub(super) fn others(code: &Code) -> Vec<Unknown> {
     let mut named: Vec<(&Range<usize>, &Text)> = Vec::new();
     for statement in &code.statements {
         match &statement.what {
-            What::LogOpen { name, .. } => {
+            Instruction::LogOpen { name, .. } => {
                 open = Some(name);
                 named.push((&statement.at, name));
             }
-            What::LogLine(_) => log = log.or(open),
-            What::LogWrite { name, .. } => {
+            Instruction::LogLine(_) => log = log.or(open),
+            Instruction::LogWrite { name, .. } => {
                 log = log.or(Some(name));
                 named.push((&statement.at, name));
             }
-            What::LogDelete { name, .. } => named.push((&statement.at, name)),
+            Instruction::LogDelete { name, .. } => named.push((&statement.at, name)),
             _ => {}
         }
     }

@@ -1,13 +1,13 @@
 //! Two runs of one program, from different beginnings: do they do the same?
 
 use crate::axes::AxisName;
-use crate::check::explore::Told;
+use crate::check::explore::ExploredRun;
 use crate::check::proof::write_event;
 use crate::check::run::{Event, Rate, Start};
 use std::ops::Range;
 
 /// Where a run from elsewhere, with the control in another state, does otherwise.
-pub(super) fn otherwise(one: &Told, other: &Told) -> Option<(Range<usize>, String)> {
+pub(super) fn otherwise(one: &ExploredRun, other: &ExploredRun) -> Option<(Range<usize>, String)> {
     let (a, b) = (deeds(one), deeds(other));
     let differs = |x: &Deed, y: &Deed| {
         let apart = |(p, q): (&f64, &f64)| (p - q).abs() > ROUNDING;
@@ -17,7 +17,7 @@ pub(super) fn otherwise(one: &Told, other: &Told) -> Option<(Range<usize>, Strin
     let shorter = (a.len() != b.len()).then(|| a.get(b.len()).or(a.last()).map_or(0..0, |x| x.at.clone()));
     let place = first.or(shorter)?;
     let says = match other.start {
-        Start::Lasting(what) => format!(
+        Start::LeftoverMode(what) => format!(
             "with {} left on by the user the program does otherwise: it must take it off, or see it and say so without a move{}",
             what.says(),
             other.fault.as_ref().map_or(String::new(), |fault| format!(" ({})", fault.says))
@@ -38,7 +38,7 @@ struct Deed {
     numbers: Vec<f64>,
 }
 
-fn deeds(told: &Told) -> Vec<Deed> {
+fn deeds(told: &ExploredRun) -> Vec<Deed> {
     let all_known = one_known(told);
     let mut out = Vec::new();
     for happened in &told.trunk {
@@ -70,7 +70,7 @@ fn deeds(told: &Told) -> Vec<Deed> {
 }
 
 /// The axes of the machine, all known.
-fn one_known(told: &Told) -> [bool; 6] {
+fn one_known(told: &ExploredRun) -> [bool; 6] {
     let known = told.trunk.iter().rev().find_map(|h| match &h.event {
         Event::Probe { probe, .. } => Some(probe.known),
         _ => None,

@@ -2,12 +2,12 @@
 //! other on before it searches.
 
 use super::is_motion;
-use crate::check::explore::Told;
+use crate::check::explore::ExploredRun;
 use crate::check::run::{Event, Happened, SPINDLE_OFF};
 use std::ops::Range;
 
 /// The first move, or search, that comes before the spindle stands: switched off, or turned to an angle.
-pub(super) fn turns(told: &Told) -> Option<(Range<usize>, String)> {
+pub(super) fn turns(told: &ExploredRun) -> Option<(Range<usize>, String)> {
     let stands = |h: &Happened| match &h.event {
         Event::Orient(_) => true,
         Event::Other(what) => what == SPINDLE_OFF,
@@ -39,7 +39,7 @@ fn switches(lines: &str) -> Option<Vec<String>> {
 }
 
 /// The first search with a probe that the postprocessor file says is to be switched on, and is not.
-pub(super) fn searches_dead(told: &Told, on: &str, off: &str) -> Option<(Range<usize>, String)> {
+pub(super) fn searches_dead(told: &ExploredRun, on: &str, off: &str) -> Option<(Range<usize>, String)> {
     let (on, off) = (switches(on)?, switches(off).unwrap_or_default());
     let mut seen = vec![false; on.len()];
     for happened in &told.trunk {

@@ -10,7 +10,7 @@ use crate::axes::{AxisName, Position};
 use crate::check::code::{UnknownKind, Values, Var};
 use crate::check::doubt::Doubt;
 use crate::check::run::{
-    Alarm, Dialect, Event, Lasting, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
+    Alarm, Dialect, Event, LeftoverMode, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own,
 };
 use crate::machine::Machine;
 use crate::post::Postprocessor;
@@ -65,7 +65,7 @@ pub struct Sinumerik {
     settable: [f64; 6],
     programmed: [f64; 6],
     /// What a basic or a system frame holds beside an offset.
-    lasting: Option<Lasting>,
+    lasting: Option<LeftoverMode>,
     tool_on: bool,
     /// mm
     tool_mm: f64,
@@ -316,11 +316,11 @@ impl Sinumerik {
             "$AC_MEA" => input(truth(self.triggered)),
             "$A_PROBE" => input(truth(vm.deflected())),
             "$P_ACTFRAME" => {
-                let holds = |axis: &str, what: Lasting| index.starts_with(axis) && self.lasting == Some(what);
+                let holds = |axis: &str, what: LeftoverMode| index.starts_with(axis) && self.lasting == Some(what);
                 Ok(match index.split_once(',').map(|(_, component)| component) {
-                    Some("RT") => truth(holds("Z", Lasting::Rotated)) * 1.5,
-                    Some("SC") => 1.0 + truth(holds("X", Lasting::Scaled)) * 0.002,
-                    _ => truth(holds("Y", Lasting::Mirrored)),
+                    Some("RT") => truth(holds("Z", LeftoverMode::Rotated)) * 1.5,
+                    Some("SC") => 1.0 + truth(holds("X", LeftoverMode::Scaled)) * 0.002,
+                    _ => truth(holds("Y", LeftoverMode::Mirrored)),
                 })
             }
             "$AA_IM" => Ok(self.of_machine(vm, &vm.at, axis()?)),
@@ -344,8 +344,8 @@ const GROUPS: [&[i64]; 8] =
 
 impl Dialect for Sinumerik {
     /// SUPA takes the frames away.
-    fn lasting(tcp: bool) -> &'static [Lasting] {
-        if tcp { &[Lasting::Rotated, Lasting::Scaled, Lasting::Mirrored] } else { &[] }
+    fn lasting(tcp: bool) -> &'static [LeftoverMode] {
+        if tcp { &[LeftoverMode::Rotated, LeftoverMode::Scaled, LeftoverMode::Mirrored] } else { &[] }
     }
 
     fn begin(start: Start, post: &Postprocessor, machine: &Machine) -> Self {
@@ -402,7 +402,7 @@ impl Dialect for Sinumerik {
             base: offsets(0.5, 0.0),
             settable: offsets(1.25, -0.75),
             programmed: offsets(-2.0, 1.5),
-            lasting: if let Start::Lasting(what) = start { Some(what) } else { None },
+            lasting: if let Start::LeftoverMode(what) = start { Some(what) } else { None },
             tool_on: awkward || third,
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             transformed: awkward,

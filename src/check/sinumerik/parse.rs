@@ -7,7 +7,7 @@
 use super::expression::{Names, Type, identifier, is_truth, quoted};
 use super::words::{means_something, words};
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Function, Piece, Text, UnknownKind, Var, What};
+use crate::check::code::{Code, Expr, Function, Instruction, Piece, Text, UnknownKind, Var};
 use crate::check::lines::{Line, blanks, lines};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
@@ -137,7 +137,7 @@ impl Reader {
                     Some(_) => Ok((i, Text::new())),
                     None => names.text(i, true),
                 })?;
-                self.code.push(at, What::Message(text));
+                self.code.push(at, Instruction::Message(text));
                 left
             }
             "SETAL" => self.alarm(line, after, at)?,
@@ -147,7 +147,7 @@ impl Reader {
                     let (i, text) = names.text(i, false)?;
                     Ok((i, (error, Arc::<str>::from(name), text)))
                 })?;
-                self.code.push(at, What::LogWrite { error, name: vec![Piece::Text(name)], text });
+                self.code.push(at, Instruction::LogWrite { error, name: vec![Piece::Text(name)], text });
                 left
             }
             "DELETE" => {
@@ -155,7 +155,7 @@ impl Reader {
                     let (i, (error, _, name)) = (error_variable(names), comma, quoted).parse(i)?;
                     Ok((i, (error, Arc::<str>::from(name))))
                 })?;
-                self.code.push(at, What::LogDelete { error, name: vec![Piece::Text(name)] });
+                self.code.push(at, Instruction::LogDelete { error, name: vec![Piece::Text(name)] });
                 left
             }
             _ if OUTPUTS.iter().any(|output| rest.starts_with(output)) => {
@@ -185,7 +185,7 @@ impl Reader {
         let words = words(&self.names, line, rest, &mut self.code)?;
         let ends = |w: &crate::check::code::Word| w.address == "M" && w.value == Expr::Number(30.0);
         self.ended |= words.iter().any(ends);
-        self.code.push(line.rest(rest), What::Block(words));
+        self.code.push(line.rest(rest), Instruction::Block(words));
         Ok(())
     }
 
@@ -222,8 +222,8 @@ impl Reader {
                 self.assignment(line, after, var, kind, at)?
             } else {
                 let what = match kind {
-                    Type::Text(most) => What::SetText { var, most, text: Text::new() },
-                    _ => What::Set(var, Expr::Number(0.0)),
+                    Type::Text(most) => Instruction::SetText { var, most, text: Text::new() },
+                    _ => Instruction::Set(var, Expr::Number(0.0)),
                 };
                 self.code.push(at, what);
                 after
@@ -262,7 +262,7 @@ impl Reader {
         let unread = |e: &Failed<'_>| line.not_understood(place(e), "a value");
         if let Type::Text(most) = kind {
             let (left, text) = self.names.text(value, false).map_err(|e| unread(&e))?;
-            self.code.push(at, What::SetText { var, most, text });
+            self.code.push(at, Instruction::SetText { var, most, text });
             return Ok(left);
         }
         let (left, value) = self.names.value_of(value).map_err(|e| unread(&e))?;
@@ -273,7 +273,7 @@ impl Reader {
             }
             value => value,
         };
-        self.code.push(at, What::Set(var, value));
+        self.code.push(at, Instruction::Set(var, value));
         Ok(left)
     }
 
@@ -290,7 +290,7 @@ impl Reader {
             return Err(line.fault(rest, "alarms of programs have numbers from 60000 to 69999"));
         }
         text.insert(0, Piece::Text(Arc::from(format!("{number} "))));
-        self.code.push(at, What::Message(text));
+        self.code.push(at, Instruction::Message(text));
         Ok(left)
     }
 
@@ -308,7 +308,7 @@ impl Reader {
 
     fn condition<'a>(&mut self, line: &Line<'_>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
         let (left, condition) = self.whether(line, rest)?;
-        let over = self.code.push(at.clone(), What::JumpUnless(condition, 0));
+        let over = self.code.push(at.clone(), Instruction::JumpUnless(condition, 0));
         let left = blanks(left).map_err(|e| line.unread(&e, "GOTOF or the end of the block"))?.0;
         if left.is_empty() {
             self.opened(Open::If { over, end: None }, at);
@@ -333,7 +333,7 @@ impl Reader {
         if gap.is_empty() {
             return Err(unread(after));
         }
-        let statement = self.code.push(at.clone(), What::Jump(0));
+        let statement = self.code.push(at.clone(), Instruction::Jump(0));
         let inside = self.inside();
         self.jumps.push(Jump { statement, label: label.to_owned(), direction, at, inside });
         Ok(left)
@@ -380,7 +380,7 @@ impl Reader {
         match keyword {
             "WHILE" => {
                 let (left, condition) = self.whether(line, after)?;
-                let out = self.code.push(at.clone(), What::JumpUnless(condition, 0));
+                let out = self.code.push(at.clone(), Instruction::JumpUnless(condition, 0));
                 self.opened(Open::While { start: here, out }, at);
                 return Ok(left);
             }
@@ -403,22 +403,22 @@ impl Reader {
         let (open, _, begun) = self.open.pop().ok_or_else(alone)?;
         match (keyword, open) {
             ("ELSE", Open::If { over, end: None }) => {
-                let end = self.code.push(at, What::Jump(0));
+                let end = self.code.push(at, Instruction::Jump(0));
                 self.aim(over, self.code.statements.len());
                 // another part: a jump from one into the other goes into a structure
                 self.opened(Open::If { over, end: Some(end) }, begun);
             }
             ("ENDIF", Open::If { over, end }) => self.aim(end.unwrap_or(over), self.code.statements.len()),
             ("ENDWHILE", Open::While { start, out }) => {
-                self.code.push(at, What::Jump(start));
+                self.code.push(at, Instruction::Jump(start));
                 self.aim(out, self.code.statements.len());
             }
             ("ENDLOOP", Open::Loop { start }) => {
-                self.code.push(at, What::Jump(start));
+                self.code.push(at, Instruction::Jump(start));
             }
             ("UNTIL", Open::Repeat { start }) => {
                 let (left, condition) = self.whether(line, after)?;
-                self.code.push(at, What::JumpUnless(condition, start));
+                self.code.push(at, Instruction::JumpUnless(condition, start));
                 return Ok(left);
             }
             _ => return Err(alone()),
@@ -428,7 +428,7 @@ impl Reader {
 
     fn aim(&mut self, jump: usize, to: usize) {
         if let Some(statement) = self.code.statements.get_mut(jump)
-            && let What::Jump(place) | What::JumpUnless(_, place) = &mut statement.what
+            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) = &mut statement.what
         {
             *place = to;
         }

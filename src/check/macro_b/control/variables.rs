@@ -2,7 +2,7 @@
 
 use super::MacroB;
 use crate::axes::AxisName;
-use crate::check::macro_b::lasting;
+use crate::check::macro_b::leftover_modes;
 use crate::check::run::Vm;
 
 /// What #3001 counts.
@@ -60,7 +60,7 @@ impl MacroB {
                 let axis = self.axis(n - 5060)?;
                 self.shown(axis, self.skipped[axis.index()]) / self.unit(axis)
             }
-            _ => return lasting::modal(n, self.lasting),
+            _ => return leftover_modes::modal(n, self.lasting),
         })
     }
 }

@@ -89,7 +89,7 @@ fn operations_bind_as_in_the_list_of_the_control() {
     let value = |written: &str| {
         let code = read(&format!("DEF REAL AB={written}\nM30\n")).unwrap();
         match &code.statements[0].what {
-            What::Set(_, expr) => expr.value(&|v| Err(v.to_string()), &|_| false).unwrap(),
+            Instruction::Set(_, expr) => expr.value(&|v| Err(v.to_string()), &|_| false).unwrap(),
             other => panic!("{other:?}"),
         }
     };

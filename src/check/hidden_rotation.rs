@@ -5,7 +5,7 @@ use crate::axes::{AxisName, Position};
 
 /// What turns a program's coordinates against the axes, once it acts: where they stood when it began to be reckoned.
 #[derive(Debug, Clone, Copy, Default)]
-pub enum Skew {
+pub enum HiddenRotation {
     /// Nothing does.
     #[default]
     None,
@@ -35,7 +35,7 @@ impl Turn {
     }
 }
 
-impl Skew {
+impl HiddenRotation {
     /// A probing move that only asks whether the probe is closed is no longer, mm.
     const ASKING_MM: f64 = 0.1;
     /// Some 0.02 deg.
@@ -43,7 +43,7 @@ impl Skew {
 
     /// The state that a control begins in.
     pub fn of(start: Start) -> Self {
-        if let Start::Skewed(turn) = start { Self::Acts(turn) } else { Self::None }
+        if let Start::Rotated(turn) = start { Self::Acts(turn) } else { Self::None }
     }
 
     /// Something is about to happen here.

@@ -1,6 +1,6 @@
 //! What nobody can judge of a program whose plan is not there.
 
-use super::code::{Code, Expr, What};
+use super::code::{Code, Expr, Instruction};
 use super::run::Event;
 use super::vm::Happened;
 use crate::diag::{Failure, Finding, Source};
@@ -40,7 +40,7 @@ fn transformation(dialect: DialectName, code: &Code, text: &str) -> Option<Range
         _ => false,
     };
     let found = code.statements.iter().find(|s| match &s.what {
-        What::Block(words) => words.iter().any(|w| turns_on(w.address, &w.value)),
+        Instruction::Block(words) => words.iter().any(|w| turns_on(w.address, &w.value)),
         _ => false,
     });
     found.map(|s| s.at.clone())

@@ -2,9 +2,9 @@
 
 use super::Runs;
 use crate::axes::Position;
-use crate::check::explore::Told;
+use crate::check::explore::ExploredRun;
+use crate::check::hidden_rotation::Turn;
 use crate::check::run::{Dialect, Event, Happened, Start};
-use crate::check::skew::Turn;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ pub(super) struct Begun {
 }
 
 impl Begun {
-    pub(super) fn of(told: &Told) -> Self {
+    pub(super) fn of(told: &ExploredRun) -> Self {
         let leads = |h: &Happened| if let Event::Move { to, .. } = &h.event { Some(*to) } else { None };
         Self { from: told.from, places: told.trunk.iter().filter_map(leads).take(FIRST_MOVES).collect() }
     }
@@ -38,7 +38,7 @@ impl<D: Dialect> Runs<'_, D> {
             begins.map(move |(turn, at)| (from, turn, at))
         };
         let all: Vec<_> = runs.iter().enumerate().flat_map(of).collect();
-        let told = |(from, turn, at): &(u32, Turn, Position)| self.told(*from, Start::Skewed(*turn), *at, None);
+        let told = |(from, turn, at): &(u32, Turn, Position)| self.told(*from, Start::Rotated(*turn), *at, None);
         let fault = all.par_iter().find_map_first(|begun| told(begun).fault)?;
         Some((fault.at, fault.says))
     }
