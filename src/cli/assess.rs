@@ -1,20 +1,18 @@
 //! `axiscal assess`: what a plan will be able to tell, before the first touch.
 
-use super::common::MachineArgs;
-use super::generate::load_program;
 use super::identify::reference;
-use super::load::load_plan;
-use super::new::default_effects;
+use super::load::{MachineArgs, load_plan};
 use super::{Answer, Io};
 use crate::design::{Noise, Planned, Request, Task, assess};
-use crate::diag::{Failure, Result, source};
-use crate::files;
+use crate::diag::{Failure, Result};
 use crate::fit::effects_of;
 use crate::machine::Machine;
-use crate::model::catalogue::Catalogue;
 use crate::program::plan::Plan;
 use crate::program::{self, Options};
 use crate::units::mm_from_um;
+use crate::workflow::generate::load_program;
+use crate::workflow::new::default_effects;
+use crate::workflow::{Disk, load_effects};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `assess`.
@@ -56,10 +54,7 @@ pub struct Args {
 /// When machine, plan or effects are unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machine = args.machine.load(io)?;
-    let mut catalogue = Catalogue::built_in()?;
-    for file in &args.effects_file {
-        io.report(&catalogue.add_file(&source(file.display().to_string(), files::read_text(file)?))?.0);
-    }
+    let catalogue = io.remarked(|remarks| load_effects(&args.effects_file, &Disk, remarks))?;
     let ids = if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
     let noise_um = args.noise_um.unwrap_or(machine.probe.repeatability_um);
     let unusable = |word: &str, um: f64, least: &str| {
@@ -110,7 +105,7 @@ pub(super) fn plan_of(word: &str, machine: &Machine, io: &Io) -> Result<Plan> {
     if word.ends_with(".json") {
         return load_plan(Path::new(word), machine, io);
     }
-    let spec = load_program(word, machine, io)?;
+    let spec = io.remarked(|remarks| load_program(word, machine, &Disk, remarks))?;
     let (generated, findings) = program::generate(machine, &spec, &Options::default())?;
     io.report(&findings.0);
     Ok(generated.plan)

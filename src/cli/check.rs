@@ -1,7 +1,7 @@
 //! `axiscal check`: an NC program read back, run on the virtual machine, and judged.
 
-use super::common::{MachineArgs, finding_record};
-use super::load::load_plan;
+use super::common::finding_record;
+use super::load::{MachineArgs, load_plan};
 use super::{Answer, Io};
 use crate::check::{self, Against, Checked};
 use crate::diag::{Finding, Result, Severity, Source, source};

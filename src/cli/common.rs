@@ -1,12 +1,9 @@
-//! What every verb shares: printing, exit codes, and finding machines.
+//! What every verb shares: printing and exit codes.
 
-use crate::diag::{Failure, Finding, Findings, Result, Severity, shown, source};
-use crate::files;
+use crate::diag::{Failure, Finding, Findings, Result, Severity, shown};
 use crate::fit::outcome::Outcome;
-use crate::machine::{self, Machine};
 use crate::report::plot::Paper;
 use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -78,15 +75,13 @@ pub struct Io {
     pub json: bool,
     /// A verb that another one calls: it says and answers nothing, findings go to stderr all the same.
     pub within: bool,
-    /// Findings go here instead of to stderr: a page shows them.
-    pub heard: Option<&'static std::sync::Mutex<Vec<Finding>>>,
 }
 
 impl Io {
     /// For a call with or without `--json`.
     #[must_use]
     pub fn new(json: bool) -> Self {
-        Self { json, within: false, heard: None }
+        Self { json, within: false }
     }
 
     /// For a verb that this one calls: the caller answers.
@@ -131,13 +126,20 @@ impl Io {
         }
     }
 
+    /// What a work remarks is reported, whether or not it succeeds.
+    ///
+    /// # Errors
+    /// Those of the work.
+    pub fn remarked<T>(&self, work: impl FnOnce(&mut Findings) -> Result<T>) -> Result<T> {
+        let mut remarks = Findings::default();
+        let done = work(&mut remarks);
+        self.report(&remarks.0);
+        done
+    }
+
     /// Findings to stderr, each with its place and remedy; of very many the first ones.
     pub fn report(&self, findings: &[Finding]) {
         let findings = shown(findings);
-        if let Some(heard) = self.heard {
-            heard.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend(findings);
-            return;
-        }
         for finding in &findings {
             let place = finding.place().map(|p| format!("{p}: ")).unwrap_or_default();
             let word = match finding.severity {
@@ -210,58 +212,5 @@ impl miette::Diagnostic for Bare<'_> {
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = miette::LabeledSpan> + '_>> {
         self.0.labels()
-    }
-}
-
-/// The machines of a file, or the built-in ones; warnings are printed.
-///
-/// # Errors
-/// When the file is unusable.
-pub fn load_machines(path: Option<&Path>, io: &Io) -> Result<Vec<Machine>> {
-    let src = match path {
-        Some(path) => source(path.display().to_string(), files::read_text(path)?),
-        None => source("machines.toml (built in)", machine::BUILT_IN),
-    };
-    let (machines, Findings(findings)) = machine::load(&src)?;
-    io.report(&findings);
-    Ok(machines)
-}
-
-/// One machine by name.
-///
-/// # Errors
-/// When there is none of that name; the message lists those that exist.
-pub fn load_machine(name: &str, path: Option<&Path>, io: &Io) -> Result<Machine> {
-    if let (None, Some(machine)) = (path, machine::built_in(name)?) {
-        return Ok(machine);
-    }
-    let machines = load_machines(path, io)?;
-    let names: Vec<String> = machines.iter().map(|m| m.name.clone()).collect();
-    machines.into_iter().find(|m| m.name == name).ok_or_else(|| {
-        Finding::error("machine::unknown", format!("no machine is called {name:?}"))
-            .about(name)
-            .help(format!("there are: {}; a file of your own goes with --machines FILE", names.join(", ")))
-            .into()
-    })
-}
-
-/// `--machines FILE`, shared by every verb that names a machine.
-#[derive(Debug, Clone, clap::Args)]
-pub struct MachineArgs {
-    /// Name of the machine (`axiscal machines` lists them)
-    #[arg(long, short)]
-    pub machine: String,
-    /// A machines.toml of your own (default: the one built in)
-    #[arg(long, value_name = "FILE")]
-    pub machines: Option<PathBuf>,
-}
-
-impl MachineArgs {
-    /// The machine that is meant.
-    ///
-    /// # Errors
-    /// When the file is unusable or has no machine of that name.
-    pub fn load(&self, io: &Io) -> Result<Machine> {
-        load_machine(&self.machine, self.machines.as_deref(), io)
     }
 }

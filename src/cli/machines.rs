@@ -1,6 +1,6 @@
 //! `axiscal machines`: what is built in or found, one line each; `machines show NAME` prints one.
 
-use super::common::{load_machine, load_machines};
+use super::load::{load_machine, load_machines};
 use super::{Answer, Io};
 use crate::diag::Result;
 use crate::machine::{Axis, Carrier, Machine, Side};

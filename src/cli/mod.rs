@@ -17,7 +17,7 @@ mod export;
 mod generate;
 mod guard;
 mod identify;
-pub mod load;
+mod load;
 mod machines;
 mod new;
 mod next;
@@ -31,7 +31,6 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
-pub mod view;
 mod workbench;
 
 pub use common::{Answer, Io};

@@ -1,11 +1,11 @@
 //! What to do after a diagnosis. A command is named only where its verb will do something: the same findings decide here
 //! and there.
 
-use super::load::{Loaded, controller_path};
 use crate::diagnose::answer::Diagnosis;
 use crate::diagnose::next_step::NextStep;
 use crate::post::Postprocessor;
 use crate::words::diagnose as words;
+use crate::workflow::{Disk, Loaded, controller_path};
 use std::path::{Path, PathBuf};
 
 /// A path as a shell takes it: in quotes where it has signs that a shell reads.
@@ -20,8 +20,7 @@ pub fn quoted(path: &Path) -> String {
 /// written for.
 #[must_use]
 pub fn controller(loaded: &Loaded) -> Option<String> {
-    let folder = loaded.path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, &folder));
+    let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, loaded.folder(), &Disk));
     let mut each = each.filter(|c| c != "csv");
     each.find(|c| Postprocessor::load_built_in_or_file(c).is_ok())
 }

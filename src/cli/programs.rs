@@ -1,13 +1,13 @@
 //! `axiscal programs`: what is built in, one line each; `programs show NAME` prints the set-ups of one.
 
-use super::common::load_machine;
-use super::generate::is_file;
+use super::load::load_machine;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result, source};
 use crate::files;
 use crate::program::layout::{Layout, lay_out};
 use crate::program::{self, ProgramSpec, pose_says};
 use crate::report::fit::{number, table};
+use crate::workflow::generate::is_file;
 use comfy_table::Cell;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

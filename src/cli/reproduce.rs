@@ -1,6 +1,6 @@
 //! `axiscal reproduce`: the paper's tables and its statements of rank.
 
-use super::common::load_machines;
+use super::load::load_machines;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;

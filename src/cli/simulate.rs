@@ -1,15 +1,14 @@
 //! `axiscal simulate`: the virtual machine writes the log that the controller would have written.
 
-use super::common::MachineArgs;
-use super::load::load_plan;
+use super::load::{MachineArgs, load_plan};
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
-use crate::log::{self, RawTouch, Status, Touch};
+use crate::log::{RawTouch, Status};
 use crate::machine::Machine;
-use crate::post::{LogRecord, Postprocessor};
-use crate::program::plan::Plan;
+use crate::post::Postprocessor;
 use crate::simulate::{self, Compensation, Scenario};
+use crate::workflow::simulated_log::simulated_log;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -81,10 +80,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     });
     bar.finish_and_clear();
     let touches = reported(touches?, io);
-    let text = match &post {
-        None => log::csv::write(&machine, &numbered(&touches)),
-        Some(post) => log_text(post, &machine, &plan, &touches),
-    };
+    let text = simulated_log(&machine, &plan, &touches, post.as_ref());
     files::write_whole(&args.out, text.as_bytes())?;
     if post.is_some() && touches.iter().any(|t| t.temperature_deg_c.is_some()) {
         io.report(&[Finding::info(
@@ -142,21 +138,6 @@ fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Fi
     })?;
     findings.0.extend(said.0);
     Ok((loaded, findings))
-}
-
-/// The touches as a CSV holds them; every simulated touch has its number.
-fn numbered(touches: &[RawTouch]) -> Vec<Touch> {
-    let touch = |t: &RawTouch| {
-        let RawTouch { position, status, time_s, temperature_deg_c, line, .. } = *t;
-        Some(Touch { id: t.id?, position, status, time_s, digit_mm: None, temperature_deg_c, line })
-    };
-    touches.iter().filter_map(touch).collect()
-}
-
-fn log_text(post: &Postprocessor, machine: &Machine, plan: &Plan, touches: &[RawTouch]) -> String {
-    let record = |t: &RawTouch| Some(LogRecord { id: t.id?, status: t.status, position: t.position, time_s: t.time_s });
-    let records: Vec<LogRecord> = touches.iter().filter_map(record).collect();
-    post.log_text(machine, plan, &records)
 }
 
 fn missed(touches: &[RawTouch]) -> Vec<u64> {

@@ -5,7 +5,7 @@ use super::session::Snapshot;
 use crate::diag::Result;
 use crate::diagnose::candidate_effects::Named;
 use crate::diagnose::evidence::Evidence;
-use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
+use crate::diagnose::{Diagnosis, Options};
 use crate::search::Search;
 use serde::Serialize;
 
@@ -84,12 +84,5 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
 /// # Errors
 /// When a refit is impossible.
 pub fn diagnosis(state: &Snapshot) -> Result<Diagnosis> {
-    let settings = super::shelf::settings(&state.opened);
-    let subject = Subject {
-        machine: &state.opened.machine,
-        catalogue: &state.opened.catalogue,
-        settings: &settings,
-        fit: &state.fit,
-    };
-    diagnose(subject, &Options::default())
+    state.opened.diagnose(&state.opened.quick_settings(), &state.fit, &Options::default())
 }

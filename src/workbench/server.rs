@@ -3,12 +3,13 @@
 //! Every answer but the page itself and its scripts needs the token. Bodies, heads, connections and times are limited; a
 //! panic in a handler is the answer 500 and leaves the session as it was, because a step puts its result in place last.
 
+use super::desk::Desk;
 use super::draft::Draft;
 use super::guard::{Denied, Guard};
 use super::record::{self, Behind, Job};
 use super::session::{Ask, Refused, Session, Snapshot};
 use super::shelf::Shelf;
-use super::{Host, Verb, evidence, pages};
+use super::{Verb, evidence, pages};
 use crate::diag::{Failure, Result};
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -52,7 +53,7 @@ pub struct Shared {
     events: broadcast::Sender<String>,
     streams: Arc<Semaphore>,
     guard: Guard,
-    host: Arc<dyn Host>,
+    desk: Arc<Desk>,
 }
 
 /// A panic elsewhere has left what the lock guards as it was before: see the head of this file.
@@ -85,8 +86,9 @@ impl Server {
     ///
     /// # Errors
     /// When the study is unusable or the port is taken.
-    pub fn new(host: Arc<dyn Host>, port: u16) -> Result<Self> {
-        let session = Session::open(host.clone())?;
+    pub fn new(desk: Desk, port: u16) -> Result<Self> {
+        let desk = Arc::new(desk);
+        let session = Session::open(desk.clone())?;
         let taken = |e: std::io::Error| {
             Failure::new("workbench::port", format!("port {port} of 127.0.0.1 cannot be used: {e}"))
                 .help("name another one with --port, or none: then a free one is taken")
@@ -105,7 +107,7 @@ impl Server {
             events: broadcast::channel(64).0,
             streams: Arc::new(Semaphore::new(MOST_STREAMS)),
             guard: Guard::new(port, super::guard::token()?),
-            host,
+            desk,
         });
         Ok(Self { listener, shared, woken })
     }
@@ -280,13 +282,13 @@ async fn state(State(shared): State<Arc<Shared>>) -> Response {
     aside(shared, |shared| {
         let now = snapshot(shared);
         let job = lock(&shared.job).clone();
-        answer_json(record::live(&now, &shared.host.name(), job.as_ref()))
+        answer_json(record::live(&now, job.as_ref()))
     })
     .await
 }
 
 async fn inputs(State(shared): State<Arc<Shared>>) -> Response {
-    aside(shared, |shared| answer_json(record::inputs(&snapshot(shared), &*shared.host))).await
+    aside(shared, |shared| answer_json(record::inputs(&snapshot(shared)))).await
 }
 
 async fn evidence_of(State(shared): State<Arc<Shared>>) -> Response {
@@ -381,7 +383,7 @@ async fn step(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
         match made {
             Ok(now) => {
                 let job = lock(&shared.job).clone();
-                answer_json(record::live(&now, &shared.host.name(), job.as_ref()))
+                answer_json(record::live(&now, job.as_ref()))
             }
             Err(why) => refused(why),
         }
@@ -445,7 +447,7 @@ async fn call(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
     let unusable =
         |says: &str, help: &str| refused(Refused::Unusable(Failure::new("workbench::call", says).help(help)));
     // a word of the table, and never a path
-    if !shared.host.controllers().contains(&asked.controller) {
+    if !Desk::controllers().contains(&asked.controller) {
         return unusable("no controller has that name", "choose one of the list");
     }
     let minutes = asked.minutes.unwrap_or(10.0);
@@ -468,7 +470,7 @@ async fn call(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
     *lock(&shared.job) = Some(began.clone());
     shared.tell("job", now.version);
     tokio::task::spawn_blocking(move || {
-        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| shared.host.call(&verb)));
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| shared.desk.call(&verb)));
         let done = match result {
             Ok(Ok(answered)) => Job { answered: Some(answered), ..began },
             Ok(Err(failure)) => Job { failed: record::messages(&failure.0), ..began },

@@ -1,10 +1,8 @@
 //! A run's plan and log, read: what is to be said of them is kept for who says it in the order of the study.
 
-use super::controller_path;
-use crate::cli::common::{Io, load_machine};
-use crate::diag::{Failure, Finding, Findings, Result, source};
-use crate::files;
-use crate::log::{self, Touch};
+use super::{Files, load_machine};
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::log::{self, MatchedLog, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
 use crate::program::{plan_check, plan_digest};
@@ -16,10 +14,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// When it is unusable or for another machine.
-pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
-    let mut read = ReadPlan::read(path)?;
-    read.check_belongs(path, machine)?;
-    io.report(&read.findings);
+pub fn load_plan(path: &Path, machine: &Machine, files: &dyn Files, remarks: &mut Findings) -> Result<Plan> {
+    let mut read = ReadPlan::read(path, files)?;
+    read.check_belongs(path, machine, files)?;
+    remarks.0.extend(read.findings);
     Ok(read.plan)
 }
 
@@ -27,11 +25,16 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
 ///
 /// # Errors
 /// When one of them is unusable.
-pub fn load_plan_and_machine(path: &Path, machines: Option<&Path>, io: &Io) -> Result<(Plan, Machine)> {
-    let mut read = ReadPlan::read(path)?;
-    let machine = load_machine(&read.plan.machine, machines, io)?;
-    read.check_belongs(path, &machine)?;
-    io.report(&read.findings);
+pub fn load_plan_and_machine(
+    path: &Path,
+    machines: Option<&Path>,
+    files: &dyn Files,
+    remarks: &mut Findings,
+) -> Result<(Plan, Machine)> {
+    let mut read = ReadPlan::read(path, files)?;
+    let machine = load_machine(&read.plan.machine, machines, files, remarks)?;
+    read.check_belongs(path, &machine, files)?;
+    remarks.0.extend(read.findings);
     Ok((read.plan, machine))
 }
 
@@ -52,8 +55,8 @@ impl ReadPlan {
     ///
     /// # Errors
     /// When it is unusable.
-    pub fn read(path: &Path) -> Result<Self> {
-        let src = source(path.display().to_string(), files::read_text(path)?);
+    pub fn read(path: &Path, files: &dyn Files) -> Result<Self> {
+        let src = files.source(path)?;
         let ((plan, written), Findings(findings)) = Plan::read(&src)?;
         let fields = plan_digest::field_digests(&plan);
         let changed = plan_digest::changed(&written, &fields, &src);
@@ -61,7 +64,7 @@ impl ReadPlan {
         Ok(Self { plan, findings, changed, digest })
     }
 
-    fn check_belongs(&mut self, path: &Path, machine: &Machine) -> Result<()> {
+    fn check_belongs(&mut self, path: &Path, machine: &Machine, files: &dyn Files) -> Result<()> {
         let plan = &self.plan;
         if plan.machine != machine.name {
             return Err(Failure::new(
@@ -84,7 +87,7 @@ impl ReadPlan {
         let faults = plan_check::on_machine(plan, machine);
         if !faults.is_empty() {
             // the text was not kept: it is read once more for the places
-            let src = source(path.display().to_string(), files::read_text(path)?);
+            let src = files.source(path)?;
             wrong.extend(faults.findings(plan, &src).0);
         }
         let ((), said) = Findings(wrong).finish(())?;
@@ -116,20 +119,22 @@ impl ReadRun {
     ///
     /// # Errors
     /// When the plan is unusable or for another machine.
-    pub fn read(entry: &DataEntry, folder: &Path, machine: &Machine) -> Result<Self> {
+    pub fn read(entry: &DataEntry, folder: &Path, machine: &Machine, files: &dyn Files) -> Result<Self> {
         let plan_path = folder.join(&entry.plan);
-        let mut plan = ReadPlan::read(&plan_path)?;
-        plan.check_belongs(&plan_path, machine)?;
+        let mut plan = ReadPlan::read(&plan_path, files)?;
+        plan.check_belongs(&plan_path, machine, files)?;
         let path = folder.join(&entry.log);
-        let log = files::read_bytes(&path).map(|bytes| {
-            let controller = controller_path(&entry.controller, folder);
-            let (findings, mut touches) = matched(&bytes, &path, &controller, entry.run, machine, &plan.plan);
+        let log = files.read(&path).map(|bytes| {
+            let controller = controller_path(&entry.controller, folder, files);
+            let log = LogFile { bytes: &bytes, path: &path, controller: &controller, run: entry.run };
+            let mut findings = Findings::default();
+            let mut touches = log.read(machine, &plan.plan, files, &mut findings).map(|read| read.touches);
             if let Ok(touches) = &mut touches
                 && controller != "csv"
             {
                 on_the_study_clock(touches, &plan.plan, entry.started_s);
             }
-            ReadLog { findings, touches, digest: Sha256::digest(&bytes).to_vec() }
+            ReadLog { findings: findings.0, touches, digest: Sha256::digest(&bytes).to_vec() }
         });
         Ok(Self { plan, log })
     }
@@ -156,43 +161,43 @@ fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>
     }
 }
 
-/// Reads a log (or touches CSV), of several runs the last complete one, and matches it to its plan.
-///
-/// # Errors
-/// When nothing in it can be used.
-pub fn read_log(
-    bytes: &[u8],
-    path: &Path,
-    controller: &str,
-    machine: &Machine,
-    plan: &Plan,
-    io: &Io,
-) -> Result<Vec<Touch>> {
-    let (findings, touches) = matched(bytes, path, controller, None, machine, plan);
-    io.report(&findings);
-    touches
+/// A controller's log, a touches CSV or an inspection result, and what it is.
+#[derive(Debug, Clone, Copy)]
+pub struct LogFile<'a> {
+    pub bytes: &'a [u8],
+    pub path: &'a Path,
+    /// Name of a controller, a postprocessor file, or `csv`.
+    pub controller: &'a str,
+    /// Which run, from 1; `None`: the last complete one.
+    pub run: Option<usize>,
 }
 
-/// What is to be said of a log, and its touches: of the run of this number, or of the last complete one.
-fn matched(
-    bytes: &[u8],
-    path: &Path,
-    controller: &str,
-    run: Option<usize>,
-    machine: &Machine,
-    plan: &Plan,
-) -> (Vec<Finding>, Result<Vec<Touch>>) {
-    let mut findings = Vec::new();
-    let mut read = || {
-        let (reader, said) = log::Reader::load(controller, files::read_text)?;
-        findings.extend(said);
-        let name = path.display().to_string();
-        let (read, said) = log::read_run(bytes, &name, reader.writer(), machine, plan, run)?;
-        findings.extend(said.0);
-        Ok(read.touches)
-    };
-    let touches = read();
-    (findings, touches)
+impl LogFile<'_> {
+    /// Reads it and matches it to its plan.
+    ///
+    /// # Errors
+    /// When nothing in it can be used.
+    pub fn read(
+        &self,
+        machine: &Machine,
+        plan: &Plan,
+        files: &dyn Files,
+        remarks: &mut Findings,
+    ) -> Result<MatchedLog> {
+        let (reader, said) = log::Reader::load(self.controller, |path| files.text(path))?;
+        remarks.0.extend(said);
+        let name = self.path.display().to_string();
+        let (read, said) = log::read_run(self.bytes, &name, reader.writer(), machine, plan, self.run)?;
+        remarks.0.extend(said.0);
+        Ok(read)
+    }
+}
+
+/// A controller is a name, or a postprocessor file relative to the study.
+#[must_use]
+pub fn controller_path(word: &str, folder: &Path, files: &dyn Files) -> String {
+    let file = folder.join(word);
+    if word.ends_with(".toml") && files.exists(&file) { file.display().to_string() } else { word.to_owned() }
 }
 
 #[cfg(test)]
