@@ -9,13 +9,13 @@ fn main() -> Result<()> {
 
 /// RMS of the residuals with each model, µm.
 pub fn run() -> Result<Vec<f64>> {
-    let (files, mut remarks) = (InMemory::default(), Findings::default());
-    let machine = load_machine("swivel-head", None, &files, &mut remarks)?;
+    let files = InMemory::default();
+    let machine = load_machine("swivel-head", None, &files)?;
     let (control, _) = Controller::load_built_in_or_file("linuxcnc")?;
 
     // a probing program for the control
-    let program = load_program("full", &machine, &files, &mut remarks)?;
-    let made = generate(&machine, &program, &control, &ProgramOptions::default(), &mut remarks)?;
+    let program = load_program("full", &machine, &files)?;
+    let made = generate(&machine, &program, &control, &ProgramOptions::default())?;
     let plan = &made.generated.plan;
     println!("{} touches in {:.0} min", plan.touches.len(), made.seconds / 60.0);
 
@@ -34,8 +34,8 @@ pub fn run() -> Result<Vec<f64>> {
     let effects = default_effects(&machine, false);
     let new = NewStudy { folder: Path::new(""), machines: None, effects: &effects, effects_files: &[], runs: &[run] };
     let study = Path::new("study.toml");
-    files.write(study, Some(new.text(&machine, &files, &mut remarks)?.as_bytes()))?;
-    let mut loaded = load_study(study, &files, &mut remarks)?;
+    files.write(study, Some(new.text(&machine, &files)?.as_bytes()))?;
+    let mut loaded = load_study(study, &files)?;
 
     // fit, diagnose, add what is missing, fit again
     let mut rms_um = Vec::new();
@@ -46,13 +46,13 @@ pub fn run() -> Result<Vec<f64>> {
         rms_um.push(fit.outcome.rms_um);
         let Some(missing) = found.candidates.first().filter(|c| c.proposed) else { break };
         let edit = [missing.effect.clone()];
-        loaded = change_study(study, Edit::Add(&edit), None, false, &files, &mut remarks)?.loaded;
+        loaded = change_study(study, Edit::Add(&edit), None, false, &files)?.loaded;
     }
 
     // the compensation as the control's own tables
     let request = ExportRequest::of("linuxcnc");
-    let form = request.form(&mut remarks)?;
-    let exported = export(&loaded, &form, &request, &files, &mut remarks)?;
+    let form = request.form(&files)?;
+    let exported = export(&loaded, &form, &request, &files)?;
     for (name, contents) in exported.files() {
         println!("{name}: {} bytes", contents.len());
     }

@@ -22,12 +22,12 @@
 //! ```
 //! use axiscal::prelude::*;
 //!
-//! let (files, mut remarks) = (InMemory::default(), Findings::default());
-//! let machine = load_machine("swivel-head", None, &files, &mut remarks)?;
+//! let files = InMemory::default();
+//! let machine = load_machine("swivel-head", None, &files)?;
 //! let (control, _) = Controller::load_built_in_or_file("linuxcnc")?;
-//! let program = load_program("head", &machine, &files, &mut remarks)?;
+//! let program = load_program("head", &machine, &files)?;
 //! // every move is checked against limits and collisions, and the NC text is read back
-//! let made = generate(&machine, &program, &control, &ProgramOptions::default(), &mut remarks)?;
+//! let made = generate(&machine, &program, &control, &ProgramOptions::default())?;
 //! assert_eq!(made.generated.plan.touches.len(), 202);
 //! assert!(made.nc.text.contains("G38.3"));
 //! # Ok::<(), Failure>(())
@@ -38,18 +38,18 @@
 //! ```
 //! # use axiscal::prelude::*;
 //! # use std::path::Path;
-//! # let (files, mut remarks) = (InMemory::default(), Findings::default());
-//! # let machine = load_machine("swivel-head", None, &files, &mut remarks)?;
+//! # let files = InMemory::default();
+//! # let machine = load_machine("swivel-head", None, &files)?;
 //! # let (control, _) = Controller::load_built_in_or_file("linuxcnc")?;
-//! # let program = load_program("head", &machine, &files, &mut remarks)?;
-//! # let plan = generate(&machine, &program, &control, &ProgramOptions::default(), &mut remarks)?.generated.plan;
+//! # let program = load_program("head", &machine, &files)?;
+//! # let plan = generate(&machine, &program, &control, &ProgramOptions::default())?.generated.plan;
 //! # let scenario = Scenario::flawless().with_noise(0.5e-3, 0.0, 1);
 //! # let scenario = scenario.with(&machine, "location-b", &[("EX0B", 0.021)])?.with(&machine, "zero-b", &[("EB0B", 0.02)])?;
 //! # let touches = simulate(&machine, &plan, &scenario, None)?.0;
 //! # let log = simulated_log(&machine, &plan, &touches, Some(&control));
 //! // what a control has written, matched to the plan
 //! let log_file = LogFile { bytes: log.as_bytes(), path: Path::new("head.log"), controller: "linuxcnc", run: None };
-//! assert_eq!(log_file.read(&machine, &plan, &files, &mut remarks)?.touches.len(), 202);
+//! assert_eq!(log_file.read(&machine, &plan, &files)?.touches.len(), 202);
 //!
 //! // a study: what was measured, and what the model holds
 //! files.write(Path::new("head.plan.json"), Some(plan.to_json().as_bytes()))?;
@@ -63,20 +63,20 @@
 //! let effects = ["location-b", "block-setup", "pretravel"].map(str::to_owned);
 //! let new = NewStudy { folder: Path::new(""), machines: None, effects: &effects, effects_files: &[], runs: &[run] };
 //! let study = Path::new("study.toml");
-//! files.write(study, Some(new.text(&machine, &files, &mut remarks)?.as_bytes()))?;
-//! let loaded = load_study(study, &files, &mut remarks)?;
+//! files.write(study, Some(new.text(&machine, &files)?.as_bytes()))?;
+//! let loaded = load_study(study, &files)?;
 //!
 //! let fit = loaded.fit(&loaded.settings())?;
 //! let found = loaded.diagnose(&loaded.settings(), &fit, &DiagnosisOptions::default())?;
 //! assert_eq!(found.verdict, Verdict::MissingEffect);
 //! let missing = [found.candidates[0].effect.clone()];
 //!
-//! let changed = change_study(study, Edit::Add(&missing), None, false, &files, &mut remarks)?;
+//! let changed = change_study(study, Edit::Add(&missing), None, false, &files)?;
 //! assert!(changed.after.outcome.rms_um < 0.5 * changed.before.outcome.rms_um);
 //!
 //! let request = ExportRequest::of("linuxcnc");
-//! let form = request.form(&mut remarks)?;
-//! let exported = export(&changed.loaded, &form, &request, &files, &mut remarks)?;
+//! let form = request.form(&files)?;
+//! let exported = export(&changed.loaded, &form, &request, &files)?;
 //! assert!(exported.files().iter().any(|(name, _)| name == "README.txt"));
 //! # Ok::<(), Failure>(())
 //! ```
@@ -94,4 +94,4 @@ pub use crate::workflow::generate::{ForControl, generate, load_program};
 pub use crate::workflow::new::{NewRun, NewStudy, default_effects};
 pub use crate::workflow::plan_next::{Next, Request as PlanNextRequest, plan_next};
 pub use crate::workflow::simulated_log::simulated_log;
-pub use crate::workflow::{Disk, Files, InMemory, Loaded, LogFile, load_machine, load_plan, load_study};
+pub use crate::workflow::{Disk, Environment, InMemory, Loaded, LogFile, load_machine, load_plan, load_study};

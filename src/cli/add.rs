@@ -1,18 +1,16 @@
 //! `axiscal add`, `remove` and `history`: the study's model is changed in place, and every model tried is kept.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::{Finding, Result};
 use crate::fit::outcome::Outcome;
-use crate::workflow::Disk;
+use crate::report;
 use crate::workflow::change::{Edit, change_study};
-use crate::workflow::history::{history_path, with_present_model};
-use crate::{files, report};
+use crate::workflow::history::with_present_model;
+use crate::workflow::load_study;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `add` and `remove`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study; it is edited in place
@@ -25,7 +23,6 @@ pub struct Args {
     pub dry_run: bool,
 }
 
-/// Arguments of `history`.
 #[derive(Debug, clap::Args)]
 pub struct HistoryArgs {
     /// The study
@@ -35,16 +32,12 @@ pub struct HistoryArgs {
     pub ascii: bool,
 }
 
-/// Runs `add`.
-///
 /// # Errors
 /// When the study is unusable, an effect is unknown, does not apply or is in the model, or the study changed meanwhile.
 pub fn add(args: &Args, io: &Io) -> Result<Answer> {
     run(args, Edit::Add(&args.effects), None, io)
 }
 
-/// Runs `remove`.
-///
 /// # Errors
 /// When the study is unusable, an effect is not in the model, or the study changed meanwhile.
 pub fn remove(args: &Args, io: &Io) -> Result<Answer> {
@@ -53,9 +46,7 @@ pub fn remove(args: &Args, io: &Io) -> Result<Answer> {
 
 /// Changes the model and says what that did; `nested_rms_um` as [`crate::workflow::Loaded::change`].
 pub(super) fn run(args: &Args, edit: Edit, nested_rms_um: Option<f64>, io: &Io) -> Result<Answer> {
-    files::protect(&history_path(&args.study));
-    let changed =
-        io.remarked(|remarks| change_study(&args.study, edit, nested_rms_um, args.dry_run, &Disk, remarks))?;
+    let changed = change_study(&args.study, edit, nested_rms_um, args.dry_run, io)?;
     let (before, after) = (&changed.before.outcome, &changed.after.outcome);
     let (later, doubt) = (changed.later_run_rms_um, &changed.held_out);
     io.say(report::ladder::change((before, after), &changed.parameters, later, doubt, io.paper(false)));
@@ -82,13 +73,11 @@ pub(super) fn run(args: &Args, edit: Edit, nested_rms_um: Option<f64>, io: &Io) 
     Ok(of_fit(after, Answer::Done, io))
 }
 
-/// Runs `history`.
-///
 /// # Errors
 /// When the study or its history is unusable.
 pub fn history(args: &HistoryArgs, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
-    let history = with_present_model(&loaded, &Disk)?;
+    let history = with_present_model(&loaded, io)?;
     let other = history.on_other_data(&loaded.data_sha256);
     if !other.is_empty() {
         let steps: Vec<String> = other.iter().map(ToString::to_string).collect();

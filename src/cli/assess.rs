@@ -1,7 +1,7 @@
 //! `axiscal assess`: what a plan will be able to tell, before the first touch.
 
+use super::common::MachineArgs;
 use super::identify::reference;
-use super::load::{MachineArgs, load_plan};
 use super::{Answer, Io};
 use crate::design::{Noise, Planned, Request, Task, assess};
 use crate::diag::{Failure, Result};
@@ -12,10 +12,9 @@ use crate::program::{self, Options};
 use crate::units::mm_from_um;
 use crate::workflow::generate::load_program;
 use crate::workflow::new::default_effects;
-use crate::workflow::{Disk, load_effects};
+use crate::workflow::{load_effects, load_plan};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `assess`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -48,13 +47,11 @@ pub struct Args {
     pub no_temperature: bool,
 }
 
-/// Runs `assess`.
-///
 /// # Errors
 /// When machine, plan or effects are unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machine = args.machine.load(io)?;
-    let catalogue = io.remarked(|remarks| load_effects(&args.effects_file, &Disk, remarks))?;
+    let catalogue = load_effects(&args.effects_file, io)?;
     let ids = if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
     let noise_um = args.noise_um.unwrap_or(machine.probe.repeatability_um);
     let unusable = |word: &str, um: f64, least: &str| {
@@ -105,7 +102,7 @@ pub(super) fn plan_of(word: &str, machine: &Machine, io: &Io) -> Result<Plan> {
     if word.ends_with(".json") {
         return load_plan(Path::new(word), machine, io);
     }
-    let spec = io.remarked(|remarks| load_program(word, machine, &Disk, remarks))?;
+    let spec = load_program(word, machine, io)?;
     let (generated, findings) = program::generate(machine, &spec, &Options::default())?;
     io.report(&findings.0);
     Ok(generated.plan)

@@ -1,7 +1,6 @@
 //! `axiscal check`: an NC program read back, run on the virtual machine, and judged.
 
-use super::common::finding_record;
-use super::load::{MachineArgs, load_plan};
+use super::common::{MachineArgs, finding_record};
 use super::{Answer, Io};
 use crate::check::{self, Against, Checked};
 use crate::diag::{Finding, Result, Severity, Source, source};
@@ -10,11 +9,11 @@ use crate::machine::Machine;
 use crate::post::{DialectName, Postprocessor};
 use crate::program;
 use crate::program::plan::Plan;
+use crate::workflow::load_plan;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The NC program
@@ -35,8 +34,6 @@ pub struct Args {
     from: u32,
 }
 
-/// Runs `check`.
-///
 /// # Errors
 /// When an input is unusable, or the program holds something that axiscal does not know.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

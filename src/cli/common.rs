@@ -1,13 +1,15 @@
-//! What every verb shares: printing and exit codes.
+//! What every verb shares: printing, exit codes, and the machine that is named.
 
-use crate::diag::{Failure, Finding, Findings, Result, Severity, shown};
+use crate::diag::{Failure, Finding, Result, Severity, shown};
 use crate::fit::outcome::Outcome;
+use crate::machine::Machine;
 use crate::report::plot::Paper;
+use crate::workflow::{Environment, load_machine};
 use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a verb answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// Exit code 0.
@@ -68,7 +70,6 @@ fn columns() -> Option<usize> {
     stated.or_else(|| measured().filter(|_| terminal)).map(|c| c.clamp(40, 400))
 }
 
-/// How to print.
 #[derive(Debug, Clone, Copy)]
 pub struct Io {
     /// One JSON object on stdout, messages on stderr.
@@ -124,17 +125,6 @@ impl Io {
             print(&text);
             ANSWERED.store(true, Ordering::Relaxed);
         }
-    }
-
-    /// What a work remarks is reported, whether or not it succeeds.
-    ///
-    /// # Errors
-    /// Those of the work.
-    pub fn remarked<T>(&self, work: impl FnOnce(&mut Findings) -> Result<T>) -> Result<T> {
-        let mut remarks = Findings::default();
-        let done = work(&mut remarks);
-        self.report(&remarks.0);
-        done
     }
 
     /// Findings to stderr, each with its place and remedy; of very many the first ones.
@@ -212,5 +202,32 @@ impl miette::Diagnostic for Bare<'_> {
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = miette::LabeledSpan> + '_>> {
         self.0.labels()
+    }
+}
+
+impl Environment for Io {
+    fn remark(&self, findings: &[Finding]) {
+        self.report(findings);
+    }
+}
+
+/// `--machines FILE`, shared by every verb that names a machine.
+#[derive(Debug, Clone, clap::Args)]
+pub struct MachineArgs {
+    /// Name of the machine (`axiscal machines` lists them)
+    #[arg(long, short)]
+    pub machine: String,
+    /// A machines.toml of your own (default: the one built in)
+    #[arg(long, value_name = "FILE")]
+    pub machines: Option<PathBuf>,
+}
+
+impl MachineArgs {
+    /// The machine that is meant.
+    ///
+    /// # Errors
+    /// When the file is unusable or has no machine of that name.
+    pub fn load(&self, io: &Io) -> Result<Machine> {
+        load_machine(&self.machine, self.machines.as_deref(), io)
     }
 }

@@ -1,13 +1,12 @@
 //! `axiscal compare`: model against measurement, where it fails.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
+use crate::workflow::load_study;
 use crate::{files, report};
 use std::path::PathBuf;
 
-/// Arguments of `compare`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -23,8 +22,6 @@ pub struct Args {
     pub ascii: bool,
 }
 
-/// Runs `compare`.
-///
 /// # Errors
 /// When the study or a file that it names is unusable, or the CSV cannot be written.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

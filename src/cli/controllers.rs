@@ -6,7 +6,6 @@ use crate::log::Reader;
 use crate::log::points::PointsForm;
 use crate::post::Postprocessor;
 
-/// Arguments of `controllers`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -22,8 +21,6 @@ enum What {
     },
 }
 
-/// Runs `controllers`.
-///
 /// # Errors
 /// When there is none of that name, or the user's own file is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

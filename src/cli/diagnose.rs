@@ -1,13 +1,12 @@
 //! `axiscal diagnose`: which physical effect is missing.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
 use crate::diagnose::{Options, Verdict};
+use crate::workflow::load_study;
 use std::path::PathBuf;
 
-/// Arguments of `diagnose`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study

@@ -1,16 +1,14 @@
 //! `axiscal effects`: what is built in or found, one line each; `effects show ID` prints one.
 
-use super::load::{load_machine, load_machines};
 use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Result};
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::{Catalogue, Effect, Parameter, Place, Term};
-use crate::workflow::{Disk, load_effects};
+use crate::workflow::{load_effects, load_machine, load_machines};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `effects`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// `show ID` prints one effect
@@ -37,12 +35,10 @@ pub enum What {
     },
 }
 
-/// Runs `effects`.
-///
 /// # Errors
 /// When a file is unusable or there is no such effect.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let catalogue = io.remarked(|remarks| load_effects(&args.effects_file, &Disk, remarks))?;
+    let catalogue = load_effects(&args.effects_file, io)?;
     let machine = match &args.machine {
         Some(name) => Some(load_machine(name, args.machines.as_deref(), io)?),
         None => None,

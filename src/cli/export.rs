@@ -1,6 +1,5 @@
 //! `axiscal export`: the compensation as the controller's own tables.
 
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result, source};
 use crate::files;
@@ -12,12 +11,11 @@ use crate::tables::control::{self, backup};
 use crate::tables::linuxcnc::{self, Left};
 use crate::tables::rows::TableError;
 use crate::workflow::export::{Exported, Exports, Request, export};
-use crate::workflow::{Disk, Loaded};
+use crate::workflow::{Loaded, load_study};
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `export`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -57,8 +55,6 @@ pub struct Args {
     pub date: Option<String>,
 }
 
-/// Runs `export`.
-///
 /// # Errors
 /// When the study is unusable, the controller has no tables, or a value is beyond the limits.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -74,11 +70,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         old: &args.old,
         date: args.date.as_deref(),
     };
-    let form = io.remarked(|remarks| request.form(remarks))?;
+    let form = request.form(io)?;
     let loaded = load_study(&args.study, io)?;
     let folder = files::Folder::open(&args.out)?;
     free_folder(&args.out, &folder, &loaded)?;
-    let exported = io.remarked(|remarks| export(&loaded, &form, &request, &Disk, remarks))?;
+    let exported = export(&loaded, &form, &request, io)?;
     if let Exports::Control(_, tables) = exported.tables {
         keep_restoring(&loaded.machine, tables, exported.files(), args)?;
     }

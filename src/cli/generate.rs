@@ -1,9 +1,9 @@
 //! `axiscal generate`: the NC program and its plan, written only when the whole path is proven clear.
 
-use super::load::MachineArgs;
+use super::common::MachineArgs;
 use super::{Answer, Io};
 use crate::axes::AxisMap;
-use crate::diag::{Failure, Finding, Findings, Result, source};
+use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
 use crate::machine::Machine;
 use crate::post::Postprocessor;
@@ -11,14 +11,13 @@ use crate::program::path::{Step, Stop};
 use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
-use crate::workflow::Disk;
+use crate::workflow::Environment;
 use crate::workflow::generate::{ForControl, generate, load_program};
 use comfy_table::Cell;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `generate`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -43,13 +42,11 @@ pub struct Args {
     strict: bool,
 }
 
-/// Runs `generate`.
-///
 /// # Errors
 /// When machine, program or controller are unusable, or nothing can be reached; nothing is written then.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machine = args.machine.load(io)?;
-    let spec = io.remarked(|remarks| load_program(&args.program, &machine, &Disk, remarks))?;
+    let spec = load_program(&args.program, &machine, io)?;
     let word = match (&args.postprocessor, &args.controller) {
         // a path without a folder or an ending would read as the name of a controller
         (Some(file), _) => Path::new(".").join(file).display().to_string(),
@@ -63,12 +60,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;
     let options = Options { strict: args.strict, tcp: args.tcp };
-    let mut remarks = Findings::default();
-    let made = generate(&machine, &spec, &post, &options, &mut remarks);
-    // the summary shows what was left out; with --json it goes to stderr, finding by finding
-    let shown = |f: &&Finding| made.is_err() || io.json || !matches!(f.code, "program::unreachable" | "program::lost");
-    io.report(&remarks.0.iter().filter(shown).cloned().collect::<Vec<_>>());
-    let ForControl { mut generated, nc, proof, seconds } = made?;
+    let ForControl { mut generated, nc, proof, seconds } = generate(&machine, &spec, &post, &options, &Summarised(io))?;
 
     let files: Vec<(PathBuf, &str)> =
         nc.files(&spec.name).into_iter().map(|(name, text)| (args.out.join(name), text)).collect();
@@ -85,6 +77,16 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
     summary(&machine, &post, &generated, seconds, (&written, &plan_file), io);
     Ok(Answer::Done)
+}
+
+/// The summary shows what was left out; with --json it goes to stderr, finding by finding.
+struct Summarised<'a>(&'a Io);
+
+impl Environment for Summarised<'_> {
+    fn remark(&self, findings: &[Finding]) {
+        let shown = |f: &&Finding| self.0.json || !matches!(f.code, "program::unreachable" | "program::lost");
+        self.0.report(&findings.iter().filter(shown).cloned().collect::<Vec<_>>());
+    }
 }
 
 /// What was proven of other programs for the same plan.

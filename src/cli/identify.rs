@@ -1,16 +1,14 @@
 //! `axiscal identify`: the fit of a study.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
-use crate::workflow::Disk;
 use crate::workflow::examine::put_covariance;
+use crate::workflow::load_study;
 use nalgebra::Vector3;
 use std::path::PathBuf;
 
-/// Arguments of `identify`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -29,8 +27,6 @@ pub struct Args {
     pub quick: bool,
 }
 
-/// Runs `identify`.
-///
 /// # Errors
 /// When the study or a file that it names is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -38,7 +34,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
     settings.bare = args.quick;
-    let mut fit = loaded.identify(&settings, &Disk)?;
+    let mut fit = loaded.identify(&settings, io)?;
     if args.covariance {
         put_covariance(&mut fit);
     }

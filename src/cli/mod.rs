@@ -17,7 +17,6 @@ mod export;
 mod generate;
 mod guard;
 mod identify;
-mod load;
 mod machines;
 mod new;
 mod next;

@@ -1,15 +1,13 @@
 //! `axiscal new`: writes a study from plans and logs.
 
-use super::load::MachineArgs;
+use super::common::MachineArgs;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::files;
-use crate::workflow::Disk;
 use crate::workflow::new::{NewRun, NewStudy, default_effects};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `new`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -40,8 +38,6 @@ pub struct Args {
     pub out: PathBuf,
 }
 
-/// Runs `new`.
-///
 /// # Errors
 /// When a file is unusable, plans and logs do not pair, or the study exists already.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -70,7 +66,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects_files: &args.effects_file,
         runs: &runs,
     };
-    let text = io.remarked(|remarks| new.text(&machine, &Disk, remarks))?;
+    let text = new.text(&machine, io)?;
     // another call may have written it meanwhile. Only beside it can be locked; that it cannot be made is said on writing
     let _ = std::fs::create_dir_all(new.folder);
     let alone = files::lock(&args.out)?;

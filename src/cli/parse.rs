@@ -3,17 +3,16 @@
 use super::common::finding_record;
 use super::{Answer, Io};
 use crate::axes::AxisName;
-use crate::diag::{Findings, Result};
+use crate::diag::Result;
 use crate::files;
 use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
-use crate::workflow::{Disk, LogFile, load_plan_and_machine};
+use crate::workflow::load_plan_and_machine;
 use comfy_table::CellAlignment;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Arguments of `parse`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The log that the probing program wrote
@@ -58,21 +57,17 @@ struct Parsed<'a> {
     findings: Vec<serde_json::Value>,
 }
 
-/// Runs `parse`.
-///
 /// # Errors
 /// When the plan, the machine or the log is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machines = args.machines.as_deref();
-    let (plan, machine) = io.remarked(|remarks| load_plan_and_machine(&args.plan, machines, &Disk, remarks))?;
+    let (plan, machine) = load_plan_and_machine(&args.plan, machines, io)?;
+    let (reader, findings) = log::Reader::load(&args.controller, files::read_text)?;
+    io.report(&findings);
     let bytes = files::read_bytes(&args.log)?;
-    let log = LogFile { bytes: &bytes, path: &args.log, controller: &args.controller, run: args.run };
-    let mut findings = Findings::default();
-    let read = io.remarked(|remarks| {
-        let read = log.read(&machine, &plan, &Disk, &mut findings);
-        remarks.0.clone_from(&findings.0);
-        read
-    })?;
+    let (read, findings) =
+        log::read_run(&bytes, &args.log.display().to_string(), reader.writer(), &machine, &plan, args.run)?;
+    io.report(&findings.0);
     if let Some(out) = &args.out {
         files::write_whole(out, log::csv::write(&machine, &read.touches).as_bytes())?;
     }

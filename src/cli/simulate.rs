@@ -1,6 +1,6 @@
 //! `axiscal simulate`: the virtual machine writes the log that the controller would have written.
 
-use super::load::{MachineArgs, load_plan};
+use super::common::MachineArgs;
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
@@ -8,12 +8,12 @@ use crate::log::{RawTouch, Status};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::simulate::{self, Compensation, Scenario};
+use crate::workflow::load_plan;
 use crate::workflow::simulated_log::simulated_log;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `simulate`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -41,8 +41,6 @@ pub struct Args {
 /// A plan of fewer touches is done before a person sees a bar.
 const LONG: usize = 50_000;
 
-/// Runs `simulate`.
-///
 /// # Errors
 /// When an input is unusable or does not fit the machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

@@ -1,15 +1,13 @@
 //! `axiscal sketch-effect`: a starting formula for what no known effect explains.
 
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::workflow::Disk;
+use crate::workflow::load_study;
 use crate::workflow::new::relative;
 use crate::workflow::sketch::sketch_into;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `sketch-effect`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -19,14 +17,12 @@ pub struct Args {
     pub out: PathBuf,
 }
 
-/// Runs `sketch-effect`.
-///
 /// # Errors
 /// When the study or the effects file is unusable. Where nothing is left over that a formula could say the answer is "no".
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let name = args.out.display().to_string();
-    let made = match sketch_into(&loaded, &args.out, &Disk) {
+    let made = match sketch_into(&loaded, &args.out, io) {
         Ok(made) => made,
         // the study is usable: the answer is "no"
         Err(failure) if failure.0.iter().all(|f| ["sketch::nothing_left", "sketch::no_formula"].contains(&f.code)) => {

@@ -2,7 +2,6 @@
 //! `--yes`; the loop never goes past what the test with all candidates counted in and the held-out touches allow.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io, add};
 use crate::compare::parameter_combinations;
 use crate::diag::{Failure, Result};
@@ -15,13 +14,12 @@ use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
 use crate::search::groups::PLAUSIBLE;
 use crate::words::diagnose::{list, one_of};
-use crate::workflow::Loaded;
 use crate::workflow::change::Edit;
+use crate::workflow::{Loaded, load_study};
 use serde::Serialize;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 
-/// Arguments of `solve`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study; effects that you agree to are added in place
@@ -34,7 +32,6 @@ pub struct Args {
     pub at_most: usize,
 }
 
-/// What was done.
 #[derive(Debug, Serialize)]
 struct Solution {
     format: &'static str,
@@ -61,7 +58,6 @@ struct Solution {
     effects: Vec<String>,
 }
 
-/// One step of the loop.
 #[derive(Debug, Serialize)]
 struct Step {
     added: String,
@@ -263,7 +259,6 @@ fn leaves(ids: &[String], why: &Why, added: &[Added]) -> String {
     }
 }
 
-/// The proposal and its reason.
 fn propose(first: &Candidate, io: &Io) {
     let mut sizes: Vec<String> = first
         .parameters

@@ -7,7 +7,6 @@ use crate::workbench::Answered;
 use crate::workbench::desk::Desk;
 use crate::workbench::server::Server;
 use crate::workflow::Disk;
-use crate::workflow::history::history_path;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -16,7 +15,6 @@ use std::time::{Duration, Instant};
 /// Longest time for a verb that the page calls.
 const CALL_TIME: Duration = Duration::from_secs(600);
 
-/// Arguments of `workbench`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study; what is switched in the page is written into it
@@ -37,8 +35,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     super::guard::say_at_once();
     // a later change of the working folder, or a link that is turned elsewhere, must not move the study
     let study = std::path::absolute(&args.study).unwrap_or_else(|_| args.study.clone());
-    files::protect(&history_path(&study));
-    let server = Server::new(Desk::new(study, Box::new(Disk), run_verb)?, args.port)?;
+    let server = Server::new(Desk::new(study, Disk::default(), run_verb)?, args.port)?;
     let address = server.address();
     io.say(format!("{}: {address}", args.study.display()));
     io.say("every step is written into the study at once; Ctrl-C ends the workbench");

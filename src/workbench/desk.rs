@@ -1,12 +1,12 @@
 //! The study of a session on its files: the study itself, and what is beside it under names that the study gives.
 
 use super::{Answered, Opened, Place, Verb};
-use crate::diag::{Failure, Findings, Result};
+use crate::diag::{Failure, Result};
 use crate::model::data::assemble;
 use crate::post::Postprocessor;
 use crate::study::Study;
 use crate::workflow::history::{history_path, read_history};
-use crate::workflow::{Files, load_study};
+use crate::workflow::{Disk, Environment, load_study};
 use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,14 +22,14 @@ pub struct Desk {
     study: PathBuf,
     folder: PathBuf,
     stem: String,
-    files: Box<dyn Files>,
+    files: Disk,
     call: CallVerb,
 }
 
 impl Desk {
     /// # Errors
     /// When there is no such study.
-    pub fn new(study: PathBuf, files: Box<dyn Files>, call: CallVerb) -> Result<Self> {
+    pub fn new(study: PathBuf, files: Disk, call: CallVerb) -> Result<Self> {
         let stem = study.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         if !files.exists(&study) || stem.is_empty() {
             return Err(Failure::new("file::unreadable", format!("{} is no study", study.display()))
@@ -44,15 +44,16 @@ impl Desk {
     /// # Errors
     /// When something is missing or unusable, or was changed while it was read.
     pub fn open(&self) -> Result<Opened> {
-        let mut remarks = Findings::default();
-        let loaded = load_study(&self.study, &*self.files, &mut remarks)?;
+        let loaded = load_study(&self.study, &self.files);
+        let remarks = self.files.remarks.take();
+        let loaded = loaded?;
         if self.files.read(&self.study)? != loaded.bytes {
             return Err(Failure::new("study::changed", "the study was changed while it was read"));
         }
         Ok(Opened {
             data: Arc::new(assemble(&loaded.machine, &loaded.runs())),
-            history: read_history(&self.study, &*self.files)?.unwrap_or_default(),
-            remarks: remarks.0,
+            history: read_history(&self.study, &self.files)?.unwrap_or_default(),
+            remarks,
             loaded,
         })
     }

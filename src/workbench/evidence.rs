@@ -12,7 +12,6 @@ use serde::Serialize;
 /// What the touches say of one effect that is not in the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scored {
-    /// Its id.
     pub effect: String,
     /// Does it leave a trace in these touches?
     pub visible: bool,
@@ -26,20 +25,14 @@ pub struct Scored {
     pub passes: bool,
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
-    /// Expected sizes.
     pub parameters: Vec<Size>,
 }
 
-/// An expected size.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Size {
-    /// Parameter.
     pub name: String,
-    /// Expected value.
     pub value: f64,
-    /// Its unit.
     pub unit: String,
-    /// Standard uncertainty.
     pub sigma: f64,
 }
 

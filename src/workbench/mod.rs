@@ -31,9 +31,7 @@ pub struct Opened {
     pub loaded: Loaded,
     /// The touches, ready for the model.
     pub data: Arc<Data>,
-    /// The history beside the study.
     pub history: History,
-    /// What was noticed on reading.
     pub remarks: Vec<Finding>,
 }
 
@@ -48,9 +46,7 @@ impl std::ops::Deref for Opened {
 /// What a step writes. Their paths are the desk's: none is named here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// The study.
     Study,
-    /// The ladder beside it.
     History,
     /// The file of the user's own effects to which the formula box adds.
     Effects,
@@ -70,7 +66,6 @@ pub enum Verb {
 pub struct Answered {
     /// Exit code: 0 done, 1 the answer is "no", 2 unusable.
     pub code: i32,
-    /// Its JSON.
     pub answer: Value,
     /// What it said on the side.
     pub messages: Vec<String>,

@@ -23,10 +23,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The format line.
 pub const FORMAT: &str = "axiscal-workbench/1";
 
-/// A finding for the page.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
     severity: &'static str,
@@ -39,7 +37,6 @@ pub struct Message {
     place: Option<String>,
 }
 
-/// Findings for the page.
 #[must_use]
 pub fn messages(findings: &[Finding]) -> Vec<Message> {
     let each = findings.iter().map(|f| Message {
@@ -59,19 +56,14 @@ pub fn messages(findings: &[Finding]) -> Vec<Message> {
 /// What is worked out behind a state.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Behind {
-    /// Of which state.
     pub version: u64,
-    /// Is everything there?
     pub complete: bool,
-    /// The score tests.
     pub scores: Option<Vec<Scored>>,
-    /// The diagnosis.
     pub diagnosis: Option<Diagnosis>,
     /// RMS on index visits left out.
     pub held_out_rms_um: Option<f64>,
     /// RMS on the last run left out.
     pub later_run_rms_um: Option<f64>,
-    /// Milliseconds that it took.
     pub ms: f64,
     /// Why there is none.
     pub failed: Vec<Message>,
@@ -82,7 +74,6 @@ pub struct Behind {
 pub struct Job {
     /// `plan-next` or `export`.
     pub verb: &'static str,
-    /// The state that it was called on.
     pub version: u64,
     /// Its answer, once it is there.
     pub answered: Option<Answered>,

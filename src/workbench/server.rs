@@ -29,13 +29,10 @@ use tokio::sync::{Semaphore, broadcast};
 
 /// Longest body of a request, bytes: 30 000 touches chosen at once are 300 kB.
 const LONGEST_BODY: usize = 512 * 1024;
-/// Connections at a time.
 const MOST_CONNECTIONS: usize = 64;
 /// Streams of events at a time: the other connections stay free for requests. The tabs of a browser share one.
 const MOST_STREAMS: usize = 24;
-/// Time for the head of a request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
-/// Time for an answer.
 const ANSWER_TIME: Duration = Duration::from_secs(120);
 /// How often the disk is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(300);
@@ -164,7 +161,6 @@ async fn serve(listener: std::net::TcpListener, router: Router) -> std::io::Resu
     }
 }
 
-/// The routes.
 pub fn router(shared: Arc<Shared>) -> Router {
     let api = Router::new()
         .route("/api/state", get(state))
@@ -355,7 +351,6 @@ impl AskAsWritten {
     }
 }
 
-/// What the body asks for.
 fn read<'a, T: Deserialize<'a>>(body: &'a Bytes) -> std::result::Result<T, Box<Response>> {
     serde_json::from_slice(body).map_err(|e| {
         Box::new(refusal(StatusCode::BAD_REQUEST, "json", &format!("the request cannot be read: {e}"), None))

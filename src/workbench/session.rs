@@ -16,10 +16,8 @@ use crate::workflow::change::Edit;
 use crate::workflow::history::step_without_validation;
 use std::sync::Arc;
 
-/// Most steps that can be undone.
 const MOST_STEPS: usize = 500;
 
-/// Why something is not done.
 #[derive(Debug)]
 pub enum Refused {
     /// It was asked of an older state; the number of the present one.
@@ -43,7 +41,6 @@ struct Files {
     effects: Option<Option<Vec<u8>>>,
 }
 
-/// A step that was made.
 #[derive(Debug, Clone)]
 struct Made {
     says: String,
@@ -51,21 +48,17 @@ struct Made {
     after: Files,
 }
 
-/// What is asked for.
 #[derive(Debug, Clone)]
 pub enum Ask {
     /// An effect into the model, or out of it.
     Switch {
-        /// Its id.
         effect: String,
-        /// In or out.
         on: bool,
     },
     /// Touches taken out.
     Mask {
         /// Run (from 0) and number of each.
         touches: Vec<(usize, u64)>,
-        /// Why.
         reason: String,
     },
     /// Touches taken back in.
@@ -75,12 +68,10 @@ pub enum Ask {
     },
     /// An effect of the user's own into the effects file, and into the model if so wanted.
     Save {
-        /// The effect.
         draft: Box<Draft>,
         /// Into the model, too?
         on: bool,
     },
-    /// The last step taken back.
     Undo,
     /// The step that was taken back made again.
     Redo,
@@ -89,11 +80,9 @@ pub enum Ask {
 /// A state as others see it: nothing in it changes any more.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
-    /// Number of the state.
     pub version: u64,
     /// Number of the reading: touches and effects are the same while it is.
     pub inputs: u64,
-    /// The study.
     pub opened: Arc<Opened>,
     /// Its fit, without the figures that need the whole catalogue.
     pub fit: Arc<Fit>,
@@ -107,7 +96,6 @@ pub struct Snapshot {
     pub fit_ms: f64,
 }
 
-/// The study that is being worked on.
 pub struct Session {
     desk: Arc<Desk>,
     shelf: Arc<Shelf>,
@@ -151,7 +139,6 @@ impl Session {
         self.shelf.clone()
     }
 
-    /// The present state.
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {

@@ -13,14 +13,12 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-/// Fits that are kept.
 const MOST_FITS: usize = 32;
 /// Touches of all fits that are kept: some hundred megabytes.
 const MOST_TOUCHES: usize = 160_000;
 /// Candidates that are fitted before anybody asks.
 const AHEAD: usize = 3;
 
-/// A model that was fitted.
 struct Kept {
     /// Number of the reading.
     inputs: u64,
@@ -72,7 +70,6 @@ impl Shelf {
         Some(Behind { version: now.version, ms: 0.0, ..found })
     }
 
-    /// Keeps it.
     pub fn keep_behind(&self, now: &Snapshot, behind: &Behind) {
         self.with(now.inputs, &now.opened.quick_settings(), |kept| kept.behind = Some(behind.clone()));
     }

@@ -1,6 +1,6 @@
 //! The compensation that the control applied while the touches were made: what it did to them.
 
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::diag::{Failure, Finding, Result};
 use crate::machine::{Machine, Side};
 use crate::program::plan::{ControllerFrame, Plan, PlanBlock};
@@ -14,11 +14,11 @@ impl Loaded {
     ///
     /// # Errors
     /// When a file is unusable, belongs to another machine, or the runs differ.
-    pub fn active(&self, files: &dyn Files) -> Result<Option<Compensation>> {
+    pub fn active(&self, env: &dyn Environment) -> Result<Option<Compensation>> {
         let mut found: Option<Option<Compensation>> = None;
         for run in &*self.runs {
             let here = match &run.compensation {
-                Some(path) => Some(load_compensation(path, &self.machine, files)?),
+                Some(path) => Some(load_compensation(path, &self.machine, env)?),
                 None => None,
             };
             match &found {
@@ -135,9 +135,9 @@ pub fn beside_the_axis(compensation: &Compensation, machine: &Machine, plan: &Pl
 ///
 /// # Errors
 /// When it is unusable or belongs to another machine.
-pub fn load_compensation(path: &Path, machine: &Machine, files: &dyn Files) -> Result<Compensation> {
+pub fn load_compensation(path: &Path, machine: &Machine, env: &dyn Environment) -> Result<Compensation> {
     let inside = path.join("compensation.json");
-    let compensation = Compensation::read(&files.source(if files.exists(&inside) { &inside } else { path })?)?;
+    let compensation = Compensation::read(&env.source(if env.exists(&inside) { &inside } else { path })?)?;
     compensation.check_belongs(machine, &compensation.controller)?;
     Ok(compensation)
 }

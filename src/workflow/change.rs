@@ -1,17 +1,16 @@
 //! The study's model is changed: the model before and after, both fitted on the same touches.
 
 use super::history::{history_path, read_history, step};
-use super::{Files, Loaded, load_study};
+use super::{Environment, Loaded, load_study};
 use crate::compare::change::{self, change};
 use crate::compare::parameter_combinations::{Bracket, Together, bracket, together};
-use crate::diag::{Failure, Findings, Result};
+use crate::diag::{Failure, Result};
 use crate::fit::{self, Fit, held_out};
 use crate::report::ladder::HeldOutDoubt;
 use crate::study::edit;
 use crate::study::history::{History, Step};
 use std::path::Path;
 
-/// What is done to the model.
 #[derive(Debug, Clone, Copy)]
 pub enum Edit<'a> {
     Add(&'a [String]),
@@ -106,21 +105,20 @@ pub fn change_study(
     edit: Edit,
     nested_rms_um: Option<f64>,
     dry_run: bool,
-    files: &dyn Files,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<Changed> {
     // from here to the last byte written nobody else changes it
-    let _alone = if dry_run { None } else { Some(files.lock(path)?) };
-    let before = load_study(path, files, remarks)?;
-    let history = read_history(path, files)?.unwrap_or_default();
+    let _alone = if dry_run { None } else { Some(env.lock(path)?) };
+    let before = load_study(path, env)?;
+    let history = read_history(path, env)?.unwrap_or_default();
     let changed = before.change(edit, nested_rms_um, history)?;
     if !dry_run {
-        if files.read(path)? != before.bytes {
+        if env.read(path)? != before.bytes {
             return Err(Failure::new("study::changed", format!("{} was changed meanwhile", path.display()))
                 .help("nothing was written: call again"));
         }
-        files.write(path, Some(&changed.loaded.bytes))?;
-        files.write(&history_path(path), Some(changed.history.to_json()?.as_bytes()))?;
+        env.write(path, Some(&changed.loaded.bytes))?;
+        env.write(&history_path(path), Some(changed.history.to_json()?.as_bytes()))?;
     }
     Ok(changed)
 }

@@ -1,6 +1,6 @@
 //! A study is fitted and diagnosed.
 
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::compare::{Comparison, Lead, compare};
 use crate::design;
 use crate::diag::Result;
@@ -58,12 +58,12 @@ impl Loaded {
     ///
     /// # Errors
     /// When the model, the touches or a compensation are unusable.
-    pub fn identify(&self, settings: &Settings, files: &dyn Files) -> Result<Fit> {
+    pub fn identify(&self, settings: &Settings, env: &dyn Environment) -> Result<Fit> {
         let mut fit = self.fit(settings)?;
         if !settings.bare {
             design::explain(&self.machine, &self.catalogue, &self.runs(), &mut fit)?;
         }
-        if let Some(active) = self.active(files)? {
+        if let Some(active) = self.active(env)? {
             let on = self.transformation() == Some(true);
             let idle = if on { 0 } else { active.idle_without_transformation(&self.machine) };
             let acts = active.terms.len().saturating_sub(idle);

@@ -1,9 +1,9 @@
 //! A probing program for a control: every move proven before anything is written.
 
-use super::Files;
+use super::Environment;
 use super::new::default_effects;
 use crate::check::{self, Against};
-use crate::diag::{Failure, Finding, Findings, Result, Severity, source};
+use crate::diag::{Failure, Finding, Result, Severity, source};
 use crate::fit;
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
@@ -36,7 +36,7 @@ pub fn generate(
     spec: &ProgramSpec,
     post: &Postprocessor,
     options: &Options,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<ForControl> {
     if options.tcp
         && post.check.as_ref().is_some_and(|rule| rule.dialect == DialectName::Ngc)
@@ -56,10 +56,10 @@ pub fn generate(
         }
     }
     let nc = post.program(&machine, &generated.plan, &generated.path)?;
-    remarks.0.extend(findings.0);
-    remarks.0.extend(nc.findings.0.iter().cloned());
+    env.remark(&findings.0);
+    env.remark(&nc.findings.0);
     let name = format!("{}.{}", spec.name, nc.extension);
-    let proven = prove(machine, post, &generated.plan, &name, &nc, remarks)?;
+    let proven = prove(machine, post, &generated.plan, &name, &nc, env)?;
     // the figure of `check`, move by move as this control makes them
     let seconds = proven.as_ref().map_or(generated.path.seconds, |(_, s)| s + generated.path.waiting);
     Ok(ForControl { generated, nc, proof: proven.map(|(proof, _)| proof), seconds })
@@ -76,17 +76,15 @@ pub fn prove(
     plan: &Plan,
     name: &str,
     nc: &NcProgram,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<Option<(Proof, f64)>> {
     if post.check.is_none() {
         let what = format!(
             "controller {} does not say how its programs are read back: the program was not checked",
             post.name
         );
-        remarks.push(
-            Finding::warning("check::no_dialect", what)
-                .help("write [check] in the postprocessor file: docs/guide/check.md"),
-        );
+        env.remark(&[Finding::warning("check::no_dialect", what)
+            .help("write [check] in the postprocessor file: docs/guide/check.md")]);
         return Ok(None);
     }
     let beside = nc.sources();
@@ -136,12 +134,12 @@ fn lost_parameters(machine: &Machine, spec: &ProgramSpec, plan: &Plan) -> Result
 ///
 /// # Errors
 /// When there is none of that name for this machine, or the file is unusable.
-pub fn load_program(word: &str, machine: &Machine, files: &dyn Files, remarks: &mut Findings) -> Result<ProgramSpec> {
+pub fn load_program(word: &str, machine: &Machine, env: &dyn Environment) -> Result<ProgramSpec> {
     if !is_file(word) {
         return program::choose(program::built_in()?, word, machine);
     }
-    let (spec, findings) = program::load(&files.source(Path::new(word))?)?;
-    remarks.0.extend(findings.0);
+    let (spec, findings) = program::load(&env.source(Path::new(word))?)?;
+    env.remark(&findings.0);
     Ok(spec)
 }
 

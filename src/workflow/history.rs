@@ -1,6 +1,6 @@
 //! The history beside a study: every model that was tried.
 
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::diag::Result;
 use crate::fit::{Fit, held_out};
 use crate::study::history::{History, Step};
@@ -16,9 +16,9 @@ pub fn history_path(study: &Path) -> PathBuf {
 ///
 /// # Errors
 /// When it is there and cannot be read.
-pub fn read_history(study: &Path, files: &dyn Files) -> Result<Option<History>> {
+pub fn read_history(study: &Path, env: &dyn Environment) -> Result<Option<History>> {
     let path = history_path(study);
-    if files.exists(&path) { History::parse(&files.source(&path)?).map(Some) } else { Ok(None) }
+    if env.exists(&path) { History::parse(&env.source(&path)?).map(Some) } else { Ok(None) }
 }
 
 /// A fit as a step of the history, without the errors on touches left out, which take longer than the fit.
@@ -52,8 +52,8 @@ pub fn step(loaded: &Loaded, fit: &Fit) -> Step {
 ///
 /// # Errors
 /// When the history or the study is unusable.
-pub fn with_present_model(loaded: &Loaded, files: &dyn Files) -> Result<History> {
-    let mut history = read_history(&loaded.path, files)?.unwrap_or_default();
+pub fn with_present_model(loaded: &Loaded, env: &dyn Environment) -> Result<History> {
+    let mut history = read_history(&loaded.path, env)?.unwrap_or_default();
     let is_present = |s: &Step| s.effects == loaded.study.effects && s.data_sha256 == loaded.data_sha256;
     if !history.steps.last().is_some_and(is_present) {
         history.push(step(loaded, &loaded.fit(&loaded.settings())?));

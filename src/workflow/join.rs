@@ -1,12 +1,11 @@
 //! The log of a program is put into the study as its next run.
 
 use super::new::{relative, relative_controller};
-use super::{Files, Loaded, LogFile, load_plan};
-use crate::diag::{Failure, Finding, Findings, Result};
+use super::{Environment, Loaded, LogFile, load_plan};
+use crate::diag::{Failure, Finding, Result};
 use crate::study;
 use std::path::Path;
 
-/// The run.
 #[derive(Debug, Clone, Copy)]
 pub struct Join<'a> {
     pub plan: &'a Path,
@@ -20,27 +19,25 @@ pub struct Join<'a> {
 ///
 /// # Errors
 /// When plan or log are unusable, or the log is in the study already.
-pub fn join(loaded: &Loaded, run: &Join, files: &dyn Files, remarks: &mut Findings) -> Result<usize> {
+pub fn join(loaded: &Loaded, run: &Join, env: &dyn Environment) -> Result<usize> {
     let &Join { plan: plan_file, log, controller, moved } = run;
     let folder = loaded.folder();
-    let same = |name: &str| files.is_same(&folder.join(name), log);
+    let same = |name: &str| env.is_same(&folder.join(name), log);
     if let Some(run) = loaded.study.data.iter().position(|d| same(&d.log)) {
         return Err(Failure::new("next::joined", format!("{} is run {} of the study already", log.display(), run + 1))
             .help("a log counts once: name the log of a further run"));
     }
-    let plan = load_plan(plan_file, &loaded.machine, files, remarks)?;
-    let read = LogFile { bytes: &files.read(log)?, path: log, controller, run: None };
-    let touches = read.read(&loaded.machine, &plan, files, remarks)?.touches;
+    let plan = load_plan(plan_file, &loaded.machine, env)?;
+    let read = LogFile { bytes: &env.read(log)?, path: log, controller, run: None };
+    let touches = read.read(&loaded.machine, &plan, env)?.touches;
     let runs = loaded.planned();
     // whoever made the program for blocks put up anew has put them up anew
     if plan.blocks_anew && !moved {
-        remarks.push(
-            Finding::info(
-                "next::blocks_anew",
-                "this program was made for blocks that are put up anew: their set-up counts as unknown",
-            )
-            .help("where they were not moved after all, write the [[data]] by hand with the same mounting"),
-        );
+        env.remark(&[Finding::info(
+            "next::blocks_anew",
+            "this program was made for blocks that are put up anew: their set-up counts as unknown",
+        )
+        .help("where they were not moved after all, write the [[data]] by hand with the same mounting")]);
     }
     let moved = moved || plan.blocks_anew;
     let stood = runs.last().and_then(|last| {
@@ -56,6 +53,6 @@ pub fn join(loaded: &Loaded, run: &Join, files: &dyn Files, remarks: &mut Findin
         stood,
     };
     let text = study::join(&loaded.text(), &joined)?;
-    files.write(&loaded.path, Some(text.as_bytes()))?;
+    env.write(&loaded.path, Some(text.as_bytes()))?;
     Ok(touches.len())
 }

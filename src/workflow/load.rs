@@ -1,8 +1,9 @@
 //! From a study's path to machine, effects and touches: opens what the study names.
 
-use super::Files;
+use super::Environment;
 use super::active_compensation::{beside_the_axis, does_not_act, load_compensation};
-use super::read_run::{ReadLog, ReadPlan, ReadRun};
+use super::history::history_path;
+use super::read_run::{LogFile, ReadPlan, controller_path, touches_of_run};
 use crate::design::{Planned, keep_measured};
 use crate::diag::{Failure, Finding, Findings, Result, Source, shown, source};
 use crate::fit::{self, Fit, Settings};
@@ -33,7 +34,6 @@ pub struct Loaded {
     pub data_sha256: String,
 }
 
-/// One run, read.
 #[derive(Debug)]
 pub struct LoadedRun {
     pub plan: Plan,
@@ -56,7 +56,6 @@ impl Loaded {
             .map_err(|failure| placed(failure, &source(self.path.display().to_string(), self.text())))
     }
 
-    /// The study's text.
     #[must_use]
     pub fn text(&self) -> String {
         String::from_utf8_lossy(without_mark(&self.bytes)).into_owned()
@@ -121,7 +120,6 @@ impl Loaded {
         out
     }
 
-    /// What the study asks of the fit.
     #[must_use]
     pub fn settings(&self) -> Settings {
         self.study.settings()
@@ -137,11 +135,11 @@ fn without_mark(bytes: &[u8]) -> &[u8] {
 ///
 /// # Errors
 /// When the file is unusable or has none of that name; the message lists those that exist.
-pub fn load_machine(name: &str, path: Option<&Path>, files: &dyn Files, remarks: &mut Findings) -> Result<Machine> {
+pub fn load_machine(name: &str, path: Option<&Path>, env: &dyn Environment) -> Result<Machine> {
     if let (None, Some(machine)) = (path, machine::built_in(name)?) {
         return Ok(machine);
     }
-    let machines = load_machines(path, files, remarks)?;
+    let machines = load_machines(path, env)?;
     let names: Vec<String> = machines.iter().map(|m| m.name.clone()).collect();
     machines.into_iter().find(|m| m.name == name).ok_or_else(|| {
         Finding::error("machine::unknown", format!("no machine is called {name:?}"))
@@ -155,13 +153,13 @@ pub fn load_machine(name: &str, path: Option<&Path>, files: &dyn Files, remarks:
 ///
 /// # Errors
 /// When the file is unusable.
-pub fn load_machines(path: Option<&Path>, files: &dyn Files, remarks: &mut Findings) -> Result<Vec<Machine>> {
+pub fn load_machines(path: Option<&Path>, env: &dyn Environment) -> Result<Vec<Machine>> {
     let text = match path {
-        Some(path) => files.source(path)?,
+        Some(path) => env.source(path)?,
         None => source("machines.toml (built in)", machine::BUILT_IN),
     };
     let (machines, Findings(said)) = machine::load(&text)?;
-    remarks.0.extend(said);
+    env.remark(&said);
     Ok(machines)
 }
 
@@ -169,10 +167,10 @@ pub fn load_machines(path: Option<&Path>, files: &dyn Files, remarks: &mut Findi
 ///
 /// # Errors
 /// When a file is unusable.
-pub fn load_effects<P: AsRef<Path>>(paths: &[P], files: &dyn Files, remarks: &mut Findings) -> Result<Catalogue> {
+pub fn load_effects<P: AsRef<Path>>(paths: &[P], env: &dyn Environment) -> Result<Catalogue> {
     let mut catalogue = Catalogue::built_in()?;
     for path in paths {
-        remarks.0.extend(catalogue.add_file(&files.source(path.as_ref())?)?.0);
+        env.remark(&catalogue.add_file(&env.source(path.as_ref())?)?.0);
     }
     Ok(catalogue)
 }
@@ -180,58 +178,59 @@ pub fn load_effects<P: AsRef<Path>>(paths: &[P], files: &dyn Files, remarks: &mu
 /// Reads a study and everything that it names.
 ///
 /// # Errors
-/// When a file is missing or unusable. What was noticed before is in `remarks`.
-pub fn load_study(path: &Path, files: &dyn Files, remarks: &mut Findings) -> Result<Loaded> {
-    let bytes = files.read(path)?;
+/// When a file is missing or unusable.
+pub fn load_study(path: &Path, env: &dyn Environment) -> Result<Loaded> {
+    let bytes = env.read(path)?;
+    env.protect(&history_path(path));
     let text = crate::files::text_of(path, bytes.clone())?;
     let mut hash = Sha256::new();
     let mut data = Sha256::new();
     hash.update(text.as_bytes());
     let src = source(path.display().to_string(), text);
     let (study, findings) = Study::parse(&src)?;
-    remarks.0.extend(findings.0);
+    env.remark(&findings.0);
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let machines = study.machines.as_ref().map(|m| folder.join(m));
-    let machine = located(load_machine(&study.machine, machines.as_deref(), files, remarks), &src)?;
+    let machine = located(load_machine(&study.machine, machines.as_deref(), env), &src)?;
     hash.update(machine.sha256.as_bytes());
     let mut catalogue = Catalogue::built_in()?;
     for name in &study.effects_files {
-        let file = at_the_name(files.source(&folder.join(name)), name, &src)?;
+        let file = at_the_name(env.source(&folder.join(name)), name, &src)?;
         hash.update(file.inner().as_bytes());
-        remarks.0.extend(catalogue.add_file(&file)?.0);
+        env.remark(&catalogue.add_file(&file)?.0);
     }
     located(fit::effects_of(&study.effects, &catalogue, &machine), &src)?;
     let mut runs = Vec::new();
     let mut seen: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in &study.data {
-        let read = ReadRun::read(entry, &folder, &machine, files);
-        let ReadRun { plan: ReadPlan { plan, findings, digest: plan_digest, .. }, log } =
-            at_the_name(read, &entry.plan, &src)?;
-        remarks.0.extend(findings);
+        let plan_path = folder.join(&entry.plan);
+        let mut plan = at_the_name(ReadPlan::read(&plan_path, env), &entry.plan, &src)?;
+        at_the_name(plan.check_belongs(&plan_path, &machine, env), &entry.plan, &src)?;
+        let ReadPlan { plan, digest: plan_digest, .. } = plan;
         let log_path = folder.join(&entry.log);
-        let ReadLog { findings, touches, digest } = at_the_name(log, &entry.log, &src)?;
+        let bytes = at_the_name(env.read(&log_path), &entry.log, &src)?;
+        let digest = Sha256::digest(&bytes).to_vec();
         if let Some((first, _)) = seen.iter().find(|(_, d)| *d == digest) {
-            remarks.push(
-                Finding::warning(
-                    "study::log_twice",
-                    format!("{} and {} hold the same bytes", first.display(), log_path.display()),
-                )
-                .help("a log counted twice makes every uncertainty too small: name each run once"),
-            );
+            env.remark(&[Finding::warning(
+                "study::log_twice",
+                format!("{} and {} hold the same bytes", first.display(), log_path.display()),
+            )
+            .help("a log counted twice makes every uncertainty too small: name each run once")]);
         }
-        seen.push((log_path, digest.clone()));
+        seen.push((log_path.clone(), digest.clone()));
         if let Some(path) = &entry.compensation {
-            let active = at_the_name(load_compensation(&folder.join(path), &machine, files), path, &src)?;
+            let active = at_the_name(load_compensation(&folder.join(path), &machine, env), path, &src)?;
             let idle = does_not_act(&active, &machine, &plan);
             let beside = if idle.is_some() { None } else { beside_the_axis(&active, &machine, &plan) };
-            remarks.0.extend(idle.into_iter().chain(beside));
+            env.remark(idle.or(beside).as_slice());
         }
         for part in [&plan_digest[..], &digest, format!("{:?}", entry.run).as_bytes()] {
             hash.update(part);
             data.update(part);
         }
-        remarks.0.extend(findings);
-        let touches = at_the_name(touches, &entry.controller, &src)?;
+        let controller = controller_path(&entry.controller, &folder, env);
+        let log = LogFile { bytes: &bytes, path: &log_path, controller: &controller, run: entry.run };
+        let touches = at_the_name(touches_of_run(entry, log, &machine, &plan, env), &entry.controller, &src)?;
         runs.push(LoadedRun {
             plan,
             touches,

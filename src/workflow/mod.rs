@@ -1,13 +1,13 @@
 //! The loop: a study is opened, fitted, diagnosed and changed; then it is reported, exported, or measured further.
 //!
-//! Functions over records, with a trait for the [`Files`] of a study. `cli` reads arguments, calls them and prints; the
-//! workbench and users of the library call the same. What is to be noticed on the way is pushed to `remarks`.
+//! Functions over records, with the [`Environment`] for files and remarks. `cli` reads arguments, calls them and prints; the
+//! workbench and users of the library call the same.
 
 pub mod active_compensation;
 pub mod change;
+mod environment;
 pub mod examine;
 pub mod export;
-mod files;
 pub mod generate;
 pub mod history;
 pub mod join;
@@ -20,6 +20,6 @@ pub mod sketch;
 pub mod verify;
 pub mod view;
 
-pub use files::{Disk, Files, InMemory};
+pub use environment::{Disk, Environment, InMemory};
 pub use load::{Loaded, LoadedRun, load_effects, load_machine, load_machines, load_study};
 pub use read_run::{LogFile, controller_path, load_plan, load_plan_and_machine};

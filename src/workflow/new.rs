@@ -1,8 +1,8 @@
 //! The text of a new study, of plans and logs that were read once to see that they are usable.
 
 use super::active_compensation::load_compensation;
-use super::{Files, LogFile, load_effects, load_plan};
-use crate::diag::{Findings, Result};
+use super::{Environment, LogFile, load_effects, load_plan};
+use crate::diag::Result;
 use crate::fit::effects_of;
 use crate::machine::Machine;
 use crate::study::tolerance::Tolerance;
@@ -10,7 +10,6 @@ use crate::study::{DataEntry, Study};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A measurement run.
 #[derive(Debug, Clone)]
 pub struct NewRun {
     pub plan: PathBuf,
@@ -39,16 +38,15 @@ impl NewStudy<'_> {
     ///
     /// # Errors
     /// When a file is unusable or an effect is unknown.
-    pub fn text(&self, machine: &Machine, files: &dyn Files, remarks: &mut Findings) -> Result<String> {
-        let catalogue = load_effects(self.effects_files, files, remarks)?;
+    pub fn text(&self, machine: &Machine, env: &dyn Environment) -> Result<String> {
+        let catalogue = load_effects(self.effects_files, env)?;
         effects_of(self.effects, &catalogue, machine)?;
         let mut data = Vec::new();
         for NewRun { plan, log, controller, compensation } in self.runs {
-            let read = load_plan(plan, machine, files, remarks)?;
-            LogFile { bytes: &files.read(log)?, path: log, controller, run: None }
-                .read(machine, &read, files, remarks)?;
+            let read = load_plan(plan, machine, env)?;
+            LogFile { bytes: &env.read(log)?, path: log, controller, run: None }.read(machine, &read, env)?;
             if let Some(active) = compensation {
-                load_compensation(active, machine, files)?;
+                load_compensation(active, machine, env)?;
             }
             data.push(DataEntry {
                 plan: relative(plan, self.folder),

@@ -1,6 +1,6 @@
 //! A starting formula for what no known effect explains, written into an effects file of the user's own.
 
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::diag::{Result, source};
 use crate::diagnose::sketch::{Sketch, sketch};
 use crate::model::catalogue::Catalogue;
@@ -10,12 +10,12 @@ use std::path::Path;
 ///
 /// # Errors
 /// When the study or the file is unusable, nothing significant is left, or what is left has no formula.
-pub fn sketch_into(loaded: &Loaded, file: &Path, files: &dyn Files) -> Result<Sketch> {
+pub fn sketch_into(loaded: &Loaded, file: &Path, env: &dyn Environment) -> Result<Sketch> {
     let settings = loaded.quick_settings();
     let fit = loaded.fit(&settings)?;
     // what was read of it must still be there when it is written
-    let _alone = files.lock(file)?;
-    let before = if files.exists(file) { files.text(file)? } else { String::new() };
+    let _alone = env.lock(file)?;
+    let before = if env.exists(file) { env.text(file)? } else { String::new() };
     let name = file.display().to_string();
     // what stands in the file must be readable: its ids are taken, whether or not the study names the file
     let mut own = Catalogue::default();
@@ -30,6 +30,6 @@ pub fn sketch_into(loaded: &Loaded, file: &Path, files: &dyn Files) -> Result<Sk
     };
     let text = format!("{before}{gap}{}", made.toml);
     Catalogue::built_in()?.add_file(&source(&name, text.clone()))?;
-    files.write(file, Some(text.as_bytes()))?;
+    env.write(file, Some(text.as_bytes()))?;
     Ok(made)
 }

@@ -1,7 +1,7 @@
 //! Two studies side by side: did the compensation work, has the machine changed?
 
 use super::examine::VERDICT;
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::compare::verify::{Figures, Question, Verification, verify as side_by_side};
 use crate::diag::{Failure, Result};
 use crate::diagnose;
@@ -23,7 +23,7 @@ pub struct Verified {
 ///
 /// # Errors
 /// When they are of two machines or of the same logs, the runs after cannot show what is asked, or a fit is impossible.
-pub fn verify(before: &Loaded, after: &Loaded, files: &dyn Files) -> Result<Verified> {
+pub fn verify(before: &Loaded, after: &Loaded, env: &dyn Environment) -> Result<Verified> {
     if before.machine.name != after.machine.name {
         return Err(Failure::new(
             "verify::machines",
@@ -35,9 +35,8 @@ pub fn verify(before: &Loaded, after: &Loaded, files: &dyn Files) -> Result<Veri
         return Err(Failure::new("verify::same_data", "both studies hold the same logs")
             .help("name the study of the runs before first, then that of the runs after"));
     }
-    let question =
-        if before.active(files)? == after.active(files)? { Question::Change } else { Question::Compensation };
-    can_show(after, question, files)?;
+    let question = if before.active(env)? == after.active(env)? { Question::Change } else { Question::Compensation };
+    can_show(after, question, env)?;
     let fitted = |l: &Loaded| l.fit(&l.settings());
     let (first, second) = (fitted(before)?, fitted(after)?);
     let same_plans = before.runs.len() == after.runs.len()
@@ -71,8 +70,8 @@ fn still_missing(after: &Loaded, fit: &Fit) -> Result<Option<String>> {
 }
 
 /// A run with the transformation off reads the bare machine, whatever pins are set.
-fn can_show(after: &Loaded, question: Question, files: &dyn Files) -> Result<()> {
-    let Some(active) = after.active(files)? else { return Ok(()) };
+fn can_show(after: &Loaded, question: Question, env: &dyn Environment) -> Result<()> {
+    let Some(active) = after.active(env)? else { return Ok(()) };
     if question != Question::Compensation {
         return Ok(());
     }

@@ -2,11 +2,11 @@
 
 use super::examine::leads;
 use super::export::{correction, newest_log};
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::compare::model_ladder::{Kind, Ladder, Rung, climb};
 use crate::compare::{Comparison, compare};
 use crate::design;
-use crate::diag::{Findings, Result};
+use crate::diag::Result;
 use crate::diagnose::{Diagnosis, Options, Verdict, with_effects};
 use crate::fit::Fit;
 use crate::study::history::History;
@@ -19,7 +19,6 @@ pub struct Worked {
     pub fit: Fit,
     /// The fit with what the diagnosis proposes.
     pub proposed: Option<Fit>,
-    /// Where it fails.
     pub comparison: Comparison,
     /// What is missing.
     pub diagnosis: Diagnosis,
@@ -35,7 +34,7 @@ pub struct Worked {
 ///
 /// # Errors
 /// When the study cannot be fitted.
-pub fn work_out(loaded: &Loaded, history: Option<&History>, files: &dyn Files) -> Result<Worked> {
+pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environment) -> Result<Worked> {
     let settings = loaded.settings();
     let mut fit = loaded.fit(&settings)?;
     design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
@@ -56,13 +55,16 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>, files: &dyn Files) -
             Err(failure) => ladder.notes.push(format!("{} cannot be put beside the model: {failure}", first.effect)),
         }
     }
-    let date = newest_log(loaded, files);
-    let correction = correction(loaded, &fit, &date, Vec::new(), files, &mut Findings::default());
+    let date = newest_log(loaded, env);
+    let correction = loaded
+        .active(env)
+        .and_then(|active| correction(loaded, &fit, &date, Vec::new(), active.as_ref()))
+        .map(|(correction, _)| correction)
+        .map_err(|failure| failure.to_string());
     let comparison = compare(&fit).led_by(&leads(&diagnosis));
-    Ok(Worked { comparison, proposed, diagnosis, ladder, correction: correction.map_err(|f| f.to_string()), date, fit })
+    Ok(Worked { comparison, proposed, diagnosis, ladder, correction, date, fit })
 }
 
-/// The view of what was worked out.
 #[must_use]
 pub fn view_of(loaded: &Loaded, worked: &Worked) -> View {
     let runs: Vec<RunFiles> = loaded

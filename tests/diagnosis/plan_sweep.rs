@@ -69,7 +69,7 @@ impl Job {
 
     /// As `identify --quick --json` does it.
     fn identify(&self) -> Result<String, Failure> {
-        let loaded = load_study(&self.folder.path().join("study.toml"), &Disk, &mut Findings::default())?;
+        let loaded = load_study(&self.folder.path().join("study.toml"), &Disk::default())?;
         let fit = loaded.fit(&axiscal::fit::Settings { bare: true, ..loaded.settings() })?;
         Ok(serde_json::to_string(&fit.outcome).unwrap())
     }
@@ -93,7 +93,7 @@ impl Job {
     fn refusal(&self, text: &str) -> Option<Vec<Finding>> {
         std::fs::write(self.plan_file(), text).unwrap();
         // the study reads its plans in the same way, and much besides: most edits end here
-        if let Err(Failure(findings)) = load_plan(&self.plan_file(), &self.machine, &Disk, &mut Findings::default()) {
+        if let Err(Failure(findings)) = load_plan(&self.plan_file(), &self.machine, &Disk::default()) {
             return Some(findings);
         }
         match self.identify() {

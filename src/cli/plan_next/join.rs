@@ -2,8 +2,8 @@
 
 use super::{Answer, Args, Io};
 use crate::diag::Result;
+use crate::workflow::Loaded;
 use crate::workflow::join::{Join, join as join_run};
-use crate::workflow::{Disk, Loaded};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub(super) fn plan_of(log: &Path, out: &Path) -> Option<PathBuf> {
 /// Puts the log of the program into the study.
 pub(super) fn join(args: &Args, loaded: &Loaded, plan: &Path, log: &Path, io: &Io) -> Result<Answer> {
     let run = Join { plan, log, controller: &args.controller, moved: args.moved };
-    let touches = io.remarked(|remarks| join_run(loaded, &run, &Disk, remarks))?;
+    let touches = join_run(loaded, &run, io)?;
     let runs = loaded.runs.len() + 1;
     io.say(format!("{}: run {runs} with {touches} touches", args.study.display()));
     io.answer(&json!({ "study": args.study.display().to_string(), "runs": runs, "touches": touches }));

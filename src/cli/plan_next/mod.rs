@@ -3,18 +3,16 @@
 mod join;
 mod write_program;
 
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
 use crate::post::Postprocessor;
-use crate::workflow::Disk;
+use crate::workflow::load_study;
 use crate::workflow::plan_next::{Advice, Next, NoProgram, Request, plan_next};
 use join::{join, plan_of};
 use serde_json::json;
 use std::path::PathBuf;
 use write_program::write;
 
-/// Arguments of `plan-next`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -39,8 +37,6 @@ pub struct Args {
     pub join: Option<PathBuf>,
 }
 
-/// Runs `plan-next`.
-///
 /// # Errors
 /// When the study is unusable, an effect is unknown, or nothing can be reached.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -55,7 +51,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
     io.report(&findings);
     let request = Request { minutes: args.minutes, effects: &args.effects, moved: args.moved, name: &name };
-    match io.remarked(|remarks| plan_next(&loaded, &request, &Disk, remarks))? {
+    match plan_next(&loaded, &request, io)? {
         Next::NothingConfounded => {
             io.say("the touches of this study tell every effect from every other: no further program is needed");
             io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": "nothing is confounded" }));

@@ -32,7 +32,7 @@ pub(super) fn write(
     let program_file = args.out.join(format!("{}.{}", plan.program, nc.extension));
     let form_file = args.out.join(format!("{}.toml", plan.program));
     let name = format!("{}.{}", plan.program, nc.extension);
-    let proof = io.remarked(|remarks| prove(&loaded.machine, post, plan, &name, &nc, remarks))?;
+    let proof = prove(&loaded.machine, post, plan, &name, &nc, io)?;
     let mut proven = plan.clone();
     proven.blocks_anew = chosen.label.is_none();
     proven.programs.extend(proof.map(|(p, _)| (post.name.clone(), p)));

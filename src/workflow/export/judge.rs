@@ -1,6 +1,6 @@
 //! What a model that lacks something means for the values that are exported.
 
-use crate::diag::{Finding, Findings, Result, Severity};
+use crate::diag::{Finding, Result, Severity};
 use crate::diagnose::consequence::Consequence;
 use crate::diagnose::{Diagnosis, Verdict};
 use crate::fit::Fit;
@@ -8,8 +8,8 @@ use crate::report::fit::significant;
 use crate::tables::correction::left_um;
 use crate::tables::place::{Meaning, meaning};
 use crate::units::Plain;
-use crate::workflow::Loaded;
 use crate::workflow::examine::VERDICT;
+use crate::workflow::{Environment, Loaded};
 use serde::Serialize;
 
 /// What the diagnosis says of an export.
@@ -75,7 +75,7 @@ fn doubts(loaded: &Loaded, found: &Diagnosis) -> Vec<Doubt> {
 
 /// What a model lacks stands in part in its parameters. That is a remark where no exported value could be wrong by more than its
 /// tolerance, and else refuses the export.
-pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, remarks: &mut Findings) -> Result<Judged> {
+pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, env: &dyn Environment) -> Result<Judged> {
     let found = loaded.diagnose(&loaded.settings(), fit, &VERDICT)?;
     let word = match found.verdict {
         Verdict::Adequate => return Ok(Judged::default()),
@@ -99,7 +99,7 @@ pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, remarks: &mut Find
             } else {
                 Finding::warning("export::verdict", says)
             };
-            remarks.push(remark.help("`axiscal diagnose` shows what is missing"));
+            env.remark(&[remark.help("`axiscal diagnose` shows what is missing")]);
             None
         }
     };
@@ -108,7 +108,7 @@ pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, remarks: &mut Find
         .help("`axiscal diagnose` shows it, `axiscal add` puts an effect into the study; --force exports all the same");
     if force {
         let says = finding.message.clone();
-        remarks.push(Finding { severity: Severity::Warning, help: None, ..finding });
+        env.remark(&[Finding { severity: Severity::Warning, help: None, ..finding }]);
         return Ok(Judged { forced: Some(says), doubts });
     }
     Err(finding.into())

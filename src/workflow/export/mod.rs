@@ -5,7 +5,7 @@ mod old_values;
 
 pub use judge::Doubt;
 
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::fit::Fit;
@@ -13,7 +13,7 @@ use crate::fit::outcome::Undetermined;
 use crate::post::tables::{LengthUnit, Tables};
 use crate::post::{Postprocessor, Release};
 use crate::tables::Correction;
-use crate::tables::compensation::Provenance;
+use crate::tables::compensation::{Compensation, Provenance};
 use crate::tables::control;
 use crate::tables::linuxcnc::{self, ini::UserIni};
 use crate::units::Plain;
@@ -69,9 +69,9 @@ impl<'a> Request<'a> {
     ///
     /// # Errors
     /// When the controller has no tables, or an option is not for it.
-    pub fn form(&self, remarks: &mut Findings) -> Result<Form> {
+    pub fn form(&self, env: &dyn Environment) -> Result<Form> {
         let (described, findings) = Postprocessor::load_built_in_or_file(self.controller)?;
-        remarks.0.extend(findings);
+        env.remark(&findings);
         if described.tables.is_none() && described.releases.is_empty() {
             let says = format!("controller {:?} has no [tables]: no tables are known for it", self.controller);
             return Err(Failure::new("export::controller", says).help(
@@ -113,12 +113,10 @@ impl<'a> Request<'a> {
 /// Which tables a controller has.
 #[derive(Debug, Clone)]
 pub struct Form {
-    /// The controller.
     pub name: String,
     pub kind: Kind,
 }
 
-/// The kinds of tables.
 #[derive(Debug, Clone)]
 pub enum Kind {
     /// As the postprocessor file describes them.
@@ -158,24 +156,20 @@ impl Exported<'_> {
 ///
 /// # Errors
 /// When the study cannot be fitted, the fit is not to be relied on, or a value is beyond the limits.
-pub fn export<'a>(
-    loaded: &Loaded,
-    form: &'a Form,
-    request: &Request,
-    files: &dyn Files,
-    remarks: &mut Findings,
-) -> Result<Exported<'a>> {
+pub fn export<'a>(loaded: &Loaded, form: &'a Form, request: &Request, env: &dyn Environment) -> Result<Exported<'a>> {
     let fit = loaded.fit(&loaded.settings())?;
-    let Judged { forced, doubts } = judged(loaded, &fit, request.force, remarks)?;
-    let date = request.date.map_or_else(|| newest_log(loaded, files), str::to_owned);
-    let correction = correction(loaded, &fit, &date, forced.into_iter().collect(), files, remarks)?;
+    let Judged { forced, doubts } = judged(loaded, &fit, request.force, env)?;
+    let date = request.date.map_or_else(|| newest_log(loaded, env), str::to_owned);
+    let (correction, remarks) =
+        correction(loaded, &fit, &date, forced.into_iter().collect(), loaded.active(env)?.as_ref())?;
+    env.remark(&remarks.0);
     let tables = match &form.kind {
         Kind::Control(tables) => {
-            let export = control_tables(loaded, form, tables, &correction, request, files, remarks)?;
+            let export = control_tables(loaded, form, tables, &correction, request, env)?;
             Exports::Control(Box::new(export), tables)
         }
         Kind::LinuxCnc(release) => {
-            let export = linuxcnc_tables(loaded, release, &correction, request, files, remarks)?;
+            let export = linuxcnc_tables(loaded, release, &correction, request, env)?;
             Exports::LinuxCnc(Box::new(export), release)
         }
     };
@@ -188,8 +182,7 @@ fn control_tables(
     tables: &Tables,
     correction: &Correction,
     request: &Request,
-    files: &dyn Files,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<control::Export> {
     if loaded.transformation().is_none() && (request.backup.is_some() || !request.old.is_empty()) {
         return Err(Failure::new(
@@ -203,11 +196,11 @@ fn control_tables(
         force: request.force,
         accept_unverified: request.accept_unverified,
         unit: request.unit,
-        old: old_values(&loaded.machine, tables, correction, request, files, remarks)?,
+        old: old_values(&loaded.machine, tables, correction, request, env)?,
         ..control::Options::default()
     };
     let (export, findings) = control::export(&loaded.machine, &form.name, tables, correction, &options)?;
-    remarks.0.extend(findings.0);
+    env.remark(&findings.0);
     Ok(export)
 }
 
@@ -216,11 +209,10 @@ fn linuxcnc_tables(
     release: &Release,
     correction: &Correction,
     request: &Request,
-    files: &dyn Files,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<linuxcnc::Export> {
     let ini = match request.ini {
-        Some(path) => Some(UserIni::read(&files.source(path)?)?),
+        Some(path) => Some(UserIni::read(&env.source(path)?)?),
         None => None,
     };
     let mm_per_unit = ini.as_ref().map_or(1.0, |i| i.mm_per_unit);
@@ -235,22 +227,21 @@ fn linuxcnc_tables(
         options.old_pins = old_pins(&loaded.machine, options.release.as_ref(), mm_per_unit, request)?;
     }
     let (export, findings) = linuxcnc::export(&loaded.machine, correction, &options)?;
-    remarks.0.extend(findings.0);
+    env.remark(&findings.0);
     Ok(export)
 }
 
 /// What a compensation carries. `forced`: what speaks against it, where it is made all the same.
 ///
 /// # Errors
-/// When the fit did not converge, or a compensation that was active is unusable.
+/// When the fit did not converge.
 pub(super) fn correction(
     loaded: &Loaded,
     fit: &Fit,
     data_date: &str,
     forced: Vec<String>,
-    files: &dyn Files,
-    remarks: &mut Findings,
-) -> Result<Correction> {
+    active: Option<&Compensation>,
+) -> Result<(Correction, Findings)> {
     if !fit.outcome.converged {
         return Err(Failure::new(
             "export::not_converged",
@@ -258,10 +249,9 @@ pub(super) fn correction(
         )
         .help("`axiscal identify` shows it; check plan and log"));
     }
-    let active = loaded.active(files)?;
-    let acts = loaded.transformation() == Some(true)
-        || active.as_ref().is_some_and(|a| a.idle_without_transformation(&loaded.machine) == 0);
-    if active.is_some() && acts {
+    let mut remarks = Findings::default();
+    let on = loaded.transformation() == Some(true);
+    if active.is_some_and(|a| on || a.idle_without_transformation(&loaded.machine) == 0) {
         remarks.push(Finding::info(
             "export::adds",
             "the identified errors are added to the compensation that was active during the measurement",
@@ -281,11 +271,11 @@ pub(super) fn correction(
         data_date: data_date.to_owned(),
         forced,
     };
-    let during = loaded.during(active.as_ref());
+    let during = loaded.during(active);
     let (correction, findings) =
         Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, during, provenance)?;
     remarks.0.extend(findings.0);
-    Ok(Correction { used: used(loaded), ..correction })
+    Ok((Correction { used: used(loaded), ..correction }, remarks))
 }
 
 /// From where to where the programs of the study move the rotary axes.
@@ -300,8 +290,8 @@ fn used(loaded: &Loaded) -> BTreeMap<AxisName, [f64; 2]> {
 }
 
 /// The day on which the newest log was written: the data's own date, not that of the export.
-pub(super) fn newest_log(loaded: &Loaded, files: &dyn Files) -> String {
-    let newest = loaded.study.data.iter().filter_map(|d| files.stamp(&loaded.folder().join(&d.log))?.1).max();
+pub(super) fn newest_log(loaded: &Loaded, env: &dyn Environment) -> String {
+    let newest = loaded.study.data.iter().filter_map(|d| env.stamp(&loaded.folder().join(&d.log))?.1).max();
     newest.map_or_else(|| "unknown".to_owned(), |t| time::OffsetDateTime::from(t).date().to_string())
 }
 

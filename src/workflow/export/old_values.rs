@@ -1,7 +1,7 @@
 //! Old values of the control, to which the identified errors are added: from its backup, and as given by hand.
 
 use super::Request;
-use crate::diag::{Failure, Finding, Findings, Result, Source, source};
+use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::files::text_of;
 use crate::machine::Machine;
 use crate::post::Release;
@@ -9,7 +9,7 @@ use crate::post::tables::Tables;
 use crate::tables::Correction;
 use crate::tables::control::{self, backup, backup::Old};
 use crate::tables::linuxcnc;
-use crate::workflow::Files;
+use crate::workflow::Environment;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -49,15 +49,14 @@ pub(super) fn old_values(
     tables: &Tables,
     correction: &Correction,
     request: &Request,
-    files: &dyn Files,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<Old> {
     let names = control::names(machine, tables);
     let mut old = match request.backup {
         Some(path) => {
-            let text = source(path.display().to_string(), read_backup(path, files)?);
+            let text = source(path.display().to_string(), read_backup(path, env)?);
             not_its_own(&text, correction)?;
-            remarks.0.extend(written_by_an_export(&text, correction));
+            env.remark(written_by_an_export(&text, correction).as_slice());
             let such_as = control::example(machine, tables).unwrap_or_default();
             let old = backup::read_such_as(&text, &tables.backup, &names, &such_as)?;
             backup::within_reach(&old, Some(&text), machine)?;
@@ -125,8 +124,8 @@ fn written_by_an_export(backup: &Source, correction: &Correction) -> Option<Find
 }
 
 /// A backup's text: controls write remarks in code pages of their own, and names and numbers in ASCII.
-fn read_backup(path: &Path, files: &dyn Files) -> Result<String> {
-    let bytes = files.read(path)?;
+fn read_backup(path: &Path, env: &dyn Environment) -> Result<String> {
+    let bytes = env.read(path)?;
     let single = std::str::from_utf8(&bytes).is_err() && !bytes.contains(&0);
     if single { Ok(bytes.iter().map(|b| char::from(*b)).collect()) } else { text_of(path, bytes) }
 }

@@ -5,10 +5,10 @@ mod choose;
 pub use choose::{Chosen, SAFELY};
 
 use super::history::read_history;
-use super::{Files, Loaded};
+use super::{Environment, Loaded};
 use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{self, LinearisedPlan, Room};
-use crate::diag::{Failure, Finding, Findings, Result, source};
+use crate::diag::{Failure, Finding, Result, source};
 use crate::diagnose::{Diagnosis, Options, Verdict, sketch::sketch};
 use crate::fit::{Fit, Settings, effects_of};
 use crate::model::catalogue::{Catalogue, Effect};
@@ -31,7 +31,6 @@ pub struct Request<'a> {
     pub effects: &'a [String],
     /// The blocks are put up anew: their set-up is unknown again.
     pub moved: bool,
-    /// What the program is called.
     pub name: &'a str,
 }
 
@@ -71,19 +70,19 @@ impl NoProgram {
     }
 }
 
-fn warn<'a>(said: impl Iterator<Item = &'a String>, remarks: &mut Findings) {
-    remarks.0.extend(said.map(|w| Finding::warning("next::left_out", w.clone())));
+fn warn<'a>(said: impl Iterator<Item = &'a String>, env: &dyn Environment) {
+    env.remark(&said.map(|w| Finding::warning("next::left_out", w.clone())).collect::<Vec<_>>());
 }
 
 /// Chooses the touches that separate most of what the study leaves open, and proves that they can be reached.
 ///
 /// # Errors
 /// When the study cannot be fitted, an effect is unknown, or nothing can be reached.
-pub fn plan_next(loaded: &Loaded, request: &Request, files: &dyn Files, remarks: &mut Findings) -> Result<Next> {
+pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> Result<Next> {
     if !(request.minutes.is_finite() && request.minutes > 0.0 && request.minutes < 1e5) {
         return Err(Failure::new("next::minutes", "the time is no usable number").help("write --minutes more than 0"));
     }
-    let open = match Open::of(loaded, request, files)? {
+    let open = match Open::of(loaded, request, env)? {
         Ok(open) => open,
         Err(no_program) => return Ok(Next::NoProgram(no_program)),
     };
@@ -92,7 +91,7 @@ pub fn plan_next(loaded: &Loaded, request: &Request, files: &dyn Files, remarks:
         return Ok(Next::NoProgram(no_program));
     }
     let mut setting = Setting::new(loaded, &open.settings.effects, &open.fit)?;
-    let questions = open.questions(&mut setting, sketched.as_ref(), request, remarks)?;
+    let questions = open.questions(&mut setting, sketched.as_ref(), request, env)?;
     if questions.pairs.is_empty() {
         return Ok(Next::NothingConfounded);
     }
@@ -102,8 +101,8 @@ pub fn plan_next(loaded: &Loaded, request: &Request, files: &dyn Files, remarks:
         return Err(Failure::new("next::no_value", says.clone())
             .help("write its formula so that it holds at every touch, or ask for other effects"));
     }
-    let best = best(loaded, &mut setting, &effects, &questions, request, remarks)?;
-    warn(setting.holes.borrow().iter(), remarks);
+    let best = best(loaded, &mut setting, &effects, &questions, request, env)?;
+    warn(setting.holes.borrow().iter(), env);
     let never = setting.never(&questions);
     if never.len() == questions.pairs.len() {
         let says = format!(
@@ -137,7 +136,7 @@ struct Open {
 }
 
 impl Open {
-    fn of(loaded: &Loaded, request: &Request, files: &dyn Files) -> Result<Asked<Self>> {
+    fn of(loaded: &Loaded, request: &Request, env: &dyn Environment) -> Result<Asked<Self>> {
         let mut settings = loaded.quick_settings();
         settings.effects.retain(|e| !request.effects.contains(e));
         effects_of(request.effects, &loaded.catalogue, &loaded.machine)?;
@@ -157,7 +156,7 @@ impl Open {
         }
         if request.effects.is_empty() && !open.found.leaves_open() {
             // what was added last may stand for others that the same touches could not tell from it: still an open question
-            let added = last_added(loaded, files)?;
+            let added = last_added(loaded, env)?;
             let mut before = open.settings.clone();
             before.effects.retain(|e| !added.contains(e));
             if before.effects.len() < open.settings.effects.len() {
@@ -205,7 +204,7 @@ impl Open {
         setting: &mut Setting,
         sketched: Option<&Sketched>,
         request: &Request,
-        remarks: &mut Findings,
+        env: &dyn Environment,
     ) -> Result<Questions> {
         let found = &self.found;
         if let Some(s) = sketched {
@@ -218,7 +217,7 @@ impl Open {
         if !request.effects.is_empty() {
             return Ok(Questions::named(request.effects));
         }
-        warn(found.warnings.iter(), remarks);
+        warn(found.warnings.iter(), env);
         if found.leaves_open() {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
@@ -226,7 +225,7 @@ impl Open {
         }
         let view = LinearisedPlan::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
         let left_out = view.left_out.iter().map(|(_, says)| says);
-        warn(left_out.filter(|says| !found.warnings.contains(says)), remarks);
+        warn(left_out.filter(|says| !found.warnings.contains(says)), env);
         let asked = Questions::of_plan(&view);
         Ok(match found.verdict {
             Verdict::TooLittleData => Questions {
@@ -268,7 +267,7 @@ fn best(
     effects: &[(&Effect, Option<f64>)],
     questions: &Questions,
     request: &Request,
-    remarks: &mut Findings,
+    env: &dyn Environment,
 ) -> Result<Option<Chosen>> {
     let (budget_s, name) = (60.0 * request.minutes, request.name);
     let stands = setting.stands(&loaded.machine, request.moved);
@@ -302,18 +301,16 @@ fn best(
         return Ok(Some(other));
     }
     if other.told() > best.as_ref().map_or(0, Chosen::told) {
-        remarks.push(
-            Finding::info(
-                "next::other_blocks",
-                format!(
-                    "with mounting {:?} put up anew {} of {} pairs would be told apart",
-                    other.generated.plan.mounting,
-                    other.told(),
-                    other.separations.len()
-                ),
-            )
-            .help("add --moved for that program"),
-        );
+        env.remark(&[Finding::info(
+            "next::other_blocks",
+            format!(
+                "with mounting {:?} put up anew {} of {} pairs would be told apart",
+                other.generated.plan.mounting,
+                other.told(),
+                other.separations.len()
+            ),
+        )
+        .help("add --moved for that program")]);
     }
     Ok(best)
 }
@@ -369,8 +366,8 @@ impl Sketched {
 }
 
 /// Effects of the study's model that the last step of its history put there.
-fn last_added(loaded: &Loaded, files: &dyn Files) -> Result<Vec<String>> {
-    let history = read_history(&loaded.path, files)?.unwrap_or_default();
+fn last_added(loaded: &Loaded, env: &dyn Environment) -> Result<Vec<String>> {
+    let history = read_history(&loaded.path, env)?.unwrap_or_default();
     let last = history.steps.last().filter(|s| s.effects == loaded.study.effects);
     Ok(last.map_or_else(Vec::new, |s| s.added.clone()))
 }
