@@ -11,11 +11,11 @@ fn main() -> Result<()> {
 pub fn run() -> Result<Vec<f64>> {
     let files = InMemory::default();
     let machine = load_machine("swivel-head", None, &files)?;
-    let (control, _) = Controller::load_built_in_or_file("linuxcnc")?;
+    let control = load_controller("linuxcnc", &files)?;
 
     // a probing program for the control
     let program = load_program("full", &machine, &files)?;
-    let made = generate(&machine, &program, &control, &ProgramOptions::default())?;
+    let made = generate(&machine, &program, &control, &ProgramOptions::default(), &files)?;
     let plan = &made.generated.plan;
     println!("{} touches in {:.0} min", plan.touches.len(), made.seconds / 60.0);
 

@@ -3,7 +3,7 @@
 //! | step | call |
 //! |---|---|
 //! | load a machine | [`load_machine`]: built in, or from a machines file |
-//! | make a plan and its NC program | [`load_program`], [`generate`] |
+//! | make a plan and its NC program | [`load_controller`], [`load_program`], [`generate`] |
 //! | touch without a machine | [`simulate`], [`simulated_log`] |
 //! | parse a log | [`LogFile::read`] |
 //! | write a study, load it | [`NewStudy::text`], [`load_study`] |
@@ -13,9 +13,9 @@
 //! | choose further touches | [`plan_next`] |
 //! | export | [`export`] |
 //!
-//! Files are read and written through [`Files`]: [`Disk`], [`InMemory`], or a type of your own. What is to be noticed on the
-//! way is pushed to a list of [`Findings`]; a [`Failure`] says what is wrong, where, and what to do. Lengths are in mm, angles
-//! in degrees, unless a name says otherwise (`_um`, `_rad`, `_s`).
+//! Files are read and written through an [`Environment`], which also hears remarks: [`Disk`], [`InMemory`], or a type of your
+//! own. A [`Failure`] says what is wrong, where, and what to do. Lengths are in mm and angles in degrees, unless a name says
+//! otherwise (`_um`, `_rad`, `_s`).
 //!
 //! # A program for a control
 //!
@@ -24,10 +24,10 @@
 //!
 //! let files = InMemory::default();
 //! let machine = load_machine("swivel-head", None, &files)?;
-//! let (control, _) = Controller::load_built_in_or_file("linuxcnc")?;
+//! let control = load_controller("linuxcnc", &files)?;
 //! let program = load_program("head", &machine, &files)?;
 //! // every move is checked against limits and collisions, and the NC text is read back
-//! let made = generate(&machine, &program, &control, &ProgramOptions::default())?;
+//! let made = generate(&machine, &program, &control, &ProgramOptions::default(), &files)?;
 //! assert_eq!(made.generated.plan.touches.len(), 202);
 //! assert!(made.nc.text.contains("G38.3"));
 //! # Ok::<(), Failure>(())
@@ -40,23 +40,23 @@
 //! # use std::path::Path;
 //! # let files = InMemory::default();
 //! # let machine = load_machine("swivel-head", None, &files)?;
-//! # let (control, _) = Controller::load_built_in_or_file("linuxcnc")?;
-//! # let program = load_program("head", &machine, &files)?;
-//! # let plan = generate(&machine, &program, &control, &ProgramOptions::default())?.generated.plan;
+//! # let control = load_controller("linuxcnc", &files)?;
+//! # let program = load_program("full", &machine, &files)?;
+//! # let plan = generate(&machine, &program, &control, &ProgramOptions::default(), &files)?.generated.plan;
 //! # let scenario = Scenario::flawless().with_noise(0.5e-3, 0.0, 1);
-//! # let scenario = scenario.with(&machine, "location-b", &[("EX0B", 0.021)])?.with(&machine, "zero-b", &[("EB0B", 0.02)])?;
+//! # let scenario = scenario.with(&machine, "location-b", &[("EX0B", 0.021)])?.with(&machine, "zero-b", &[("EB0B", 0.004)])?;
 //! # let touches = simulate(&machine, &plan, &scenario, None)?.0;
 //! # let log = simulated_log(&machine, &plan, &touches, Some(&control));
 //! // what a control has written, matched to the plan
-//! let log_file = LogFile { bytes: log.as_bytes(), path: Path::new("head.log"), controller: "linuxcnc", run: None };
-//! assert_eq!(log_file.read(&machine, &plan, &files)?.touches.len(), 202);
+//! let log_file = LogFile { bytes: log.as_bytes(), path: Path::new("full.log"), controller: "linuxcnc", run: None };
+//! assert_eq!(log_file.read(&machine, &plan, &files)?.touches.len(), plan.touches.len());
 //!
 //! // a study: what was measured, and what the model holds
-//! files.write(Path::new("head.plan.json"), Some(plan.to_json().as_bytes()))?;
-//! files.write(Path::new("head.log"), Some(log.as_bytes()))?;
+//! files.write(Path::new("full.plan.json"), Some(plan.to_json().as_bytes()))?;
+//! files.write(Path::new("full.log"), Some(log.as_bytes()))?;
 //! let run = NewRun {
-//!     plan: "head.plan.json".into(),
-//!     log: "head.log".into(),
+//!     plan: "full.plan.json".into(),
+//!     log: "full.log".into(),
 //!     controller: "linuxcnc".into(),
 //!     compensation: None,
 //! };
@@ -81,7 +81,7 @@
 //! # Ok::<(), Failure>(())
 //! ```
 
-pub use crate::diag::{Failure, Finding, Findings, Result, Severity};
+pub use crate::diag::{Failure, Finding, Result, Severity};
 pub use crate::diagnose::{Diagnosis, Options as DiagnosisOptions, Verdict};
 pub use crate::fit::{Fit, Settings};
 pub use crate::machine::Machine;
@@ -94,4 +94,6 @@ pub use crate::workflow::generate::{ForControl, generate, load_program};
 pub use crate::workflow::new::{NewRun, NewStudy, default_effects};
 pub use crate::workflow::plan_next::{Next, Request as PlanNextRequest, plan_next};
 pub use crate::workflow::simulated_log::simulated_log;
-pub use crate::workflow::{Disk, Environment, InMemory, Loaded, LogFile, load_machine, load_plan, load_study};
+pub use crate::workflow::{
+    Disk, Environment, InMemory, Loaded, LogFile, load_controller, load_machine, load_plan, load_study,
+};

@@ -11,8 +11,8 @@ use crate::program::path::{Step, Stop};
 use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
-use crate::workflow::Environment;
 use crate::workflow::generate::{ForControl, generate, load_program};
+use crate::workflow::{Environment, load_controller};
 use comfy_table::Cell;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -55,8 +55,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             return Err(Failure::new("cli::controller", "no controller is named").help("add --controller NAME"));
         }
     };
-    let (post, findings) = Postprocessor::load_built_in_or_file(&word)?;
-    io.report(&findings);
+    let post = load_controller(&word, io)?;
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;
     let options = Options { strict: args.strict, tcp: args.tcp };

@@ -6,10 +6,9 @@ use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
 use crate::log::{RawTouch, Status};
 use crate::machine::Machine;
-use crate::post::Postprocessor;
 use crate::simulate::{self, Compensation, Scenario};
-use crate::workflow::load_plan;
 use crate::workflow::simulated_log::simulated_log;
+use crate::workflow::{load_controller, load_plan};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -65,11 +64,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     // an unknown controller is said before the work, not after
     let post = match args.controller.as_str() {
         "csv" => None,
-        word => {
-            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
-            io.report(&findings);
-            Some(post)
-        }
+        word => Some(load_controller(word, io)?),
     };
     keep_existing(args)?;
     let bar = progress(plan.touches.len(), io);

@@ -164,9 +164,7 @@ pub struct Study {
 /// One run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataEntry {
-    /// The plan.
     pub plan: String,
-    /// The log.
     pub log: String,
     /// A controller, a postprocessor file, or `csv`.
     pub controller: String,

@@ -11,6 +11,7 @@ use crate::log::Touch;
 use crate::machine::{self, Machine};
 use crate::model::catalogue::Catalogue;
 use crate::model::data::Run;
+use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::study::Study;
 use sha2::{Digest, Sha256};
@@ -161,6 +162,16 @@ pub fn load_machines(path: Option<&Path>, env: &dyn Environment) -> Result<Vec<M
     let (machines, Findings(said)) = machine::load(&text)?;
     env.remark(&said);
     Ok(machines)
+}
+
+/// A controller by name, or of a postprocessor file.
+///
+/// # Errors
+/// When there is none of that name, or the file is unusable.
+pub fn load_controller(word: &str, env: &dyn Environment) -> Result<Postprocessor> {
+    let (post, findings) = Postprocessor::load(word, |path| env.text(path))?;
+    env.remark(&findings);
+    Ok(post)
 }
 
 /// The built-in effects with those of files.

@@ -21,5 +21,5 @@ pub mod verify;
 pub mod view;
 
 pub use environment::{Disk, Environment, InMemory};
-pub use load::{Loaded, LoadedRun, load_effects, load_machine, load_machines, load_study};
+pub use load::{Loaded, LoadedRun, load_controller, load_effects, load_machine, load_machines, load_study};
 pub use read_run::{LogFile, controller_path, load_plan, load_plan_and_machine};

@@ -5,9 +5,8 @@ mod write_program;
 
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::post::Postprocessor;
-use crate::workflow::load_study;
 use crate::workflow::plan_next::{Advice, Next, NoProgram, Request, plan_next};
+use crate::workflow::{load_controller, load_study};
 use join::{join, plan_of};
 use serde_json::json;
 use std::path::PathBuf;
@@ -48,8 +47,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(log) = &args.join {
         return join(args, &loaded, &plan_of(log, &args.out).unwrap_or(plan_file), log, io);
     }
-    let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
-    io.report(&findings);
+    let post = load_controller(&args.controller, io)?;
     let request = Request { minutes: args.minutes, effects: &args.effects, moved: args.moved, name: &name };
     match plan_next(&loaded, &request, io)? {
         Next::NothingConfounded => {

@@ -5,13 +5,13 @@ mod old_values;
 
 pub use judge::Doubt;
 
-use super::{Environment, Loaded};
+use super::{Environment, Loaded, load_controller};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::fit::Fit;
 use crate::fit::outcome::Undetermined;
+use crate::post::Release;
 use crate::post::tables::{LengthUnit, Tables};
-use crate::post::{Postprocessor, Release};
 use crate::tables::Correction;
 use crate::tables::compensation::{Compensation, Provenance};
 use crate::tables::control;
@@ -70,8 +70,7 @@ impl<'a> Request<'a> {
     /// # Errors
     /// When the controller has no tables, or an option is not for it.
     pub fn form(&self, env: &dyn Environment) -> Result<Form> {
-        let (described, findings) = Postprocessor::load_built_in_or_file(self.controller)?;
-        env.remark(&findings);
+        let described = load_controller(self.controller, env)?;
         if described.tables.is_none() && described.releases.is_empty() {
             let says = format!("controller {:?} has no [tables]: no tables are known for it", self.controller);
             return Err(Failure::new("export::controller", says).help(
