@@ -41,21 +41,21 @@ pub fn generate(
     if options.tcp
         && post.check.as_ref().is_some_and(|rule| rule.dialect == DialectName::Ngc)
         && !post.releases.is_empty()
-        && let Err(why) = linuxcnc::stock::module_of(&machine, post.release(None)?)
+        && let Err(why) = linuxcnc::stock::module_of(machine, post.release(None)?)
     {
         return Err(Failure::new("generate::no_transformation", format!("{} cannot run under a transformation of LinuxCNC's own: {why}", machine.name))
             .help("generate without --tcp: under the kinematics component that `export` writes, coordinates stay axis positions. Is it another version of LinuxCNC, name it under [settings] of a postprocessor file of your own"));
     }
-    let (mut generated, findings) = program::generate(&machine, &spec, options)?;
+    let (mut generated, findings) = program::generate(machine, spec, options)?;
     if !generated.plan.skipped.is_empty() {
-        let lost = lost_parameters(&machine, &spec, &generated.plan)?;
+        let lost = lost_parameters(machine, spec, &generated.plan)?;
         if !lost.is_empty() {
             let note = format!("without the touches that were left out these cannot be told: {}", lost.join(", "));
             generated.path.head.push(format!("  {note}"));
             generated.plan.notes.push(note);
         }
     }
-    let nc = post.program(&machine, &generated.plan, &generated.path)?;
+    let nc = post.program(machine, &generated.plan, &generated.path)?;
     env.remark(&findings.0);
     env.remark(&nc.findings.0);
     let name = format!("{}.{}", spec.name, nc.extension);

@@ -3,7 +3,7 @@
 
 use crate::common;
 
-use axiscal::diag::{Failure, Finding, Findings};
+use axiscal::diag::{Failure, Finding};
 use axiscal::log::Status;
 use axiscal::machine::Machine;
 use axiscal::post::{LogRecord, Postprocessor};
