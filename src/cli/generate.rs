@@ -31,7 +31,7 @@ pub struct Args {
     /// A postprocessor file of your own, instead of --controller
     #[arg(long, value_name = "FILE", conflicts_with = "controller")]
     postprocessor: Option<PathBuf>,
-    /// Folder for the two files, PROGRAM.<ext> and PROGRAM.plan.json
+    /// Folder for the program and its plan, PROGRAM.plan.json
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// The same touches under the control's own transformation, to see a loaded compensation at work
