@@ -1,4 +1,4 @@
-//! Reading whole files and writing them so that nobody ever sees half of one. Called from `cli` and `study` only.
+//! Reading whole files and writing them so that nobody ever sees half of one. Called from `cli` and `workflow` only.
 //!
 //! What is read is remembered, and no output takes its place ([`check_outputs`]); a verb that changes a file of its own on
 //! purpose says so with [`rewrite`].
@@ -48,7 +48,15 @@ pub fn read_own(path: &Path) -> Result<Vec<u8>> {
 /// # Errors
 /// When it cannot be read or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
-    let mut text = read_text_as_it_is(path)?;
+    text_of(path, read_bytes(path)?)
+}
+
+/// The bytes of a file as text, without a byte order mark.
+///
+/// # Errors
+/// When they are not UTF-8.
+pub fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
+    let mut text = utf8(path, bytes)?;
     if text.starts_with('\u{feff}') {
         text.remove(0);
     }
@@ -60,7 +68,11 @@ pub fn read_text(path: &Path) -> Result<String> {
 /// # Errors
 /// When it cannot be read or is not UTF-8.
 pub fn read_text_as_it_is(path: &Path) -> Result<String> {
-    String::from_utf8(read_bytes(path)?).map_err(|e| {
+    utf8(path, read_bytes(path)?)
+}
+
+fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
+    String::from_utf8(bytes).map_err(|e| {
         Failure::new(
             "file::not_text",
             format!("{} is not text: byte {} is not UTF-8", path.display(), e.utf8_error().valid_up_to() + 1),

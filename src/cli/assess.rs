@@ -1,23 +1,20 @@
 //! `axiscal assess`: what a plan will be able to tell, before the first touch.
 
 use super::common::MachineArgs;
-use super::generate::load_program;
 use super::identify::reference;
-use super::load::load_plan;
-use super::new::default_effects;
 use super::{Answer, Io};
 use crate::design::{Noise, Planned, Request, Task, assess};
-use crate::diag::{Failure, Result, source};
-use crate::files;
+use crate::diag::{Failure, Result};
 use crate::fit::effects_of;
 use crate::machine::Machine;
-use crate::model::catalogue::Catalogue;
 use crate::program::plan::Plan;
 use crate::program::{self, Options};
 use crate::units::mm_from_um;
+use crate::workflow::generate::load_program;
+use crate::workflow::new::default_effects;
+use crate::workflow::{load_effects, load_plan};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `assess`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -50,16 +47,11 @@ pub struct Args {
     pub no_temperature: bool,
 }
 
-/// Runs `assess`.
-///
 /// # Errors
 /// When machine, plan or effects are unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machine = args.machine.load(io)?;
-    let mut catalogue = Catalogue::built_in()?;
-    for file in &args.effects_file {
-        io.report(&catalogue.add_file(&source(file.display().to_string(), files::read_text(file)?))?.0);
-    }
+    let catalogue = load_effects(&args.effects_file, io)?;
     let ids = if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
     let noise_um = args.noise_um.unwrap_or(machine.probe.repeatability_um);
     let unusable = |word: &str, um: f64, least: &str| {

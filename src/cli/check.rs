@@ -1,7 +1,6 @@
 //! `axiscal check`: an NC program read back, run on the virtual machine, and judged.
 
 use super::common::{MachineArgs, finding_record};
-use super::load::load_plan;
 use super::{Answer, Io};
 use crate::check::{self, Against, Checked};
 use crate::diag::{Finding, Result, Severity, Source, source};
@@ -10,11 +9,11 @@ use crate::machine::Machine;
 use crate::post::{DialectName, Postprocessor};
 use crate::program;
 use crate::program::plan::Plan;
+use crate::workflow::{load_controller, load_plan};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `check`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The NC program
@@ -35,14 +34,11 @@ pub struct Args {
     from: u32,
 }
 
-/// Runs `check`.
-///
 /// # Errors
 /// When an input is unusable, or the program holds something that axiscal does not know.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machine = args.machine.load(io)?;
-    let (post, findings) = Postprocessor::load_built_in_or_file(&args.controller)?;
-    io.report(&findings);
+    let post = load_controller(&args.controller, io)?;
     let plan = args.plan.as_ref().map(|file| load_plan(file, &machine, io)).transpose()?;
     let text = source(args.file.display().to_string(), files::read_text_as_it_is(&args.file)?);
     let beside = beside(&check::wanted_beside(&post, &text), &args.file)?;

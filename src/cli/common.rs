@@ -1,16 +1,15 @@
-//! What every verb shares: printing, exit codes, and finding machines.
+//! What every verb shares: printing, exit codes, and the machine that is named.
 
-use crate::diag::{Failure, Finding, Findings, Result, Severity, shown, source};
-use crate::files;
+use crate::diag::{Failure, Finding, Result, Severity, shown};
 use crate::fit::outcome::Outcome;
-use crate::machine::{self, Machine};
+use crate::machine::Machine;
 use crate::report::plot::Paper;
+use crate::workflow::{Environment, load_machine};
 use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a verb answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// Exit code 0.
@@ -71,22 +70,19 @@ fn columns() -> Option<usize> {
     stated.or_else(|| measured().filter(|_| terminal)).map(|c| c.clamp(40, 400))
 }
 
-/// How to print.
 #[derive(Debug, Clone, Copy)]
 pub struct Io {
     /// One JSON object on stdout, messages on stderr.
     pub json: bool,
     /// A verb that another one calls: it says and answers nothing, findings go to stderr all the same.
     pub within: bool,
-    /// Findings go here instead of to stderr: a page shows them.
-    pub heard: Option<&'static std::sync::Mutex<Vec<Finding>>>,
 }
 
 impl Io {
     /// For a call with or without `--json`.
     #[must_use]
     pub fn new(json: bool) -> Self {
-        Self { json, within: false, heard: None }
+        Self { json, within: false }
     }
 
     /// For a verb that this one calls: the caller answers.
@@ -134,10 +130,6 @@ impl Io {
     /// Findings to stderr, each with its place and remedy; of very many the first ones.
     pub fn report(&self, findings: &[Finding]) {
         let findings = shown(findings);
-        if let Some(heard) = self.heard {
-            heard.lock().unwrap_or_else(std::sync::PoisonError::into_inner).extend(findings);
-            return;
-        }
         for finding in &findings {
             let place = finding.place().map(|p| format!("{p}: ")).unwrap_or_default();
             let word = match finding.severity {
@@ -213,36 +205,10 @@ impl miette::Diagnostic for Bare<'_> {
     }
 }
 
-/// The machines of a file, or the built-in ones; warnings are printed.
-///
-/// # Errors
-/// When the file is unusable.
-pub fn load_machines(path: Option<&Path>, io: &Io) -> Result<Vec<Machine>> {
-    let src = match path {
-        Some(path) => source(path.display().to_string(), files::read_text(path)?),
-        None => source("machines.toml (built in)", machine::BUILT_IN),
-    };
-    let (machines, Findings(findings)) = machine::load(&src)?;
-    io.report(&findings);
-    Ok(machines)
-}
-
-/// One machine by name.
-///
-/// # Errors
-/// When there is none of that name; the message lists those that exist.
-pub fn load_machine(name: &str, path: Option<&Path>, io: &Io) -> Result<Machine> {
-    if let (None, Some(machine)) = (path, machine::built_in(name)?) {
-        return Ok(machine);
+impl Environment for Io {
+    fn remark(&self, findings: &[Finding]) {
+        self.report(findings);
     }
-    let machines = load_machines(path, io)?;
-    let names: Vec<String> = machines.iter().map(|m| m.name.clone()).collect();
-    machines.into_iter().find(|m| m.name == name).ok_or_else(|| {
-        Finding::error("machine::unknown", format!("no machine is called {name:?}"))
-            .about(name)
-            .help(format!("there are: {}; a file of your own goes with --machines FILE", names.join(", ")))
-            .into()
-    })
 }
 
 /// `--machines FILE`, shared by every verb that names a machine.

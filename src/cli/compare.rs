@@ -1,15 +1,12 @@
 //! `axiscal compare`: model against measurement, where it fails.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
-use crate::compare::Lead;
 use crate::diag::Result;
-use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
-use crate::{compare, files, report};
+use crate::workflow::load_study;
+use crate::{files, report};
 use std::path::PathBuf;
 
-/// Arguments of `compare`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -25,32 +22,12 @@ pub struct Args {
     pub ascii: bool,
 }
 
-/// What a diagnosis found, as a comparison names it: best first.
-pub(super) fn leads(found: &Diagnosis) -> Vec<Lead> {
-    found.depends.iter().map(|w| Lead { by: w.by.clone(), share: w.share, says: w.says.clone() }).collect()
-}
-
-/// Runs `compare`.
-///
 /// # Errors
 /// When the study or a file that it names is unusable, or the CSV cannot be written.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
     let fit = loaded.fit(&loaded.settings())?;
-    let mut settings = loaded.settings();
-    settings.quick = true;
-    let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let missed = fit.data.mostly_missed();
-    let planned = if missed { loaded.planned() } else { Vec::new() };
-    let found = diagnose(
-        subject,
-        &Options { at_most: 1, refit: false, power: false, planned: missed.then_some(&planned[..]) },
-    )?;
-    let leads = leads(&found);
-    let mut comparison = compare::compare(&fit).led_by(&leads);
-    if found.most_missed {
-        comparison.says.clone_from(&found.says);
-    }
+    let (comparison, found) = loaded.compare(&fit)?;
     if let Some(path) = &args.csv {
         files::write_whole(path, report::compare::csv(&comparison).as_bytes())?;
     }
@@ -58,7 +35,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for u in &fit.outcome.undetermined {
         io.say(format!("not told by this data: {}", u.says));
     }
-    if !comparison.explained_by_noise || !leads.is_empty() {
+    if !comparison.explained_by_noise || !found.depends.is_empty() {
         io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
     }
     io.answer(&comparison);

@@ -7,7 +7,6 @@ use clap::CommandFactory;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `completions`.
 #[derive(Debug, clap::Args)]
 pub struct CompletionArgs {
     /// The shell
@@ -15,7 +14,6 @@ pub struct CompletionArgs {
     pub shell: clap_complete::Shell,
 }
 
-/// Arguments of `man`.
 #[derive(Debug, clap::Args)]
 pub struct ManArgs {
     /// Folder for the pages: one for the program, one for each verb

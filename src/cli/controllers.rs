@@ -5,8 +5,8 @@ use crate::diag::Result;
 use crate::log::Reader;
 use crate::log::points::PointsForm;
 use crate::post::Postprocessor;
+use crate::workflow::load_controller;
 
-/// Arguments of `controllers`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -22,8 +22,6 @@ enum What {
     },
 }
 
-/// Runs `controllers`.
-///
 /// # Errors
 /// When there is none of that name, or the user's own file is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -60,8 +58,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 io.answer(&form_facts(&form));
                 return Ok(Answer::Done);
             }
-            let (post, findings) = Postprocessor::load_built_in_or_file(name)?;
-            io.report(&findings);
+            let post = load_controller(name, io)?;
             io.say(post.text.trim_end());
             io.answer(&facts(&post));
         }

@@ -1,16 +1,15 @@
 //! `axiscal demo`: the whole loop on built-in data, in seconds, with every file left behind to look at. It calls the very
 //! verbs that a user calls, one after the other, and prints each call.
 
-use super::load::load_study;
 use super::{Answer, Io, call};
 use crate::diag::{Failure, Result};
 use crate::files;
 use crate::fit::{self, Fit};
 use crate::report::fit::significant;
+use crate::workflow::load_study;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder to write to
@@ -81,8 +80,6 @@ const STEPS: [(&str, &str); 17] = [
     ("before and after, side by side", "verify OUT/check-before.toml OUT/check-after.toml"),
 ];
 
-/// Runs `demo`.
-///
 /// # Errors
 /// When the folder cannot be written, or holds something else.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

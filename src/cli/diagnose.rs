@@ -1,13 +1,12 @@
 //! `axiscal diagnose`: which physical effect is missing.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::diagnose::{Options, Subject, Verdict, diagnose};
+use crate::diagnose::{Options, Verdict};
+use crate::workflow::load_study;
 use std::path::PathBuf;
 
-/// Arguments of `diagnose`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -26,13 +25,9 @@ pub struct Args {
 /// When the study or a file that it names is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
-    let mut settings = loaded.settings();
-    settings.quick = true;
+    let settings = loaded.quick_settings();
     let fit = loaded.fit(&settings)?;
-    let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
-    let planned = loaded.planned();
-    let options = Options { at_most: args.at_most.max(1), planned: Some(&planned), ..Options::default() };
-    let found = diagnose(subject, &options)?;
+    let found = loaded.diagnose(&settings, &fit, &Options { at_most: args.at_most.max(1), ..Options::default() })?;
     io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii)).trim_end());
     super::next::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
     io.answer(&found);

@@ -1,16 +1,14 @@
 //! `axiscal effects`: what is built in or found, one line each; `effects show ID` prints one.
 
-use super::common::{load_machine, load_machines};
 use super::{Answer, Io};
 use crate::axes::AxisName;
-use crate::diag::{Failure, Result, source};
-use crate::files;
+use crate::diag::{Failure, Result};
 use crate::machine::{Machine, Side};
 use crate::model::catalogue::{Catalogue, Effect, Parameter, Place, Term};
+use crate::workflow::{load_effects, load_machine, load_machines};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `effects`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// `show ID` prints one effect
@@ -37,15 +35,10 @@ pub enum What {
     },
 }
 
-/// Runs `effects`.
-///
 /// # Errors
 /// When a file is unusable or there is no such effect.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let mut catalogue = Catalogue::built_in()?;
-    for file in &args.effects_file {
-        io.report(&catalogue.add_file(&source(file.display().to_string(), files::read_text(file)?))?.0);
-    }
+    let catalogue = load_effects(&args.effects_file, io)?;
     let machine = match &args.machine {
         Some(name) => Some(load_machine(name, args.machines.as_deref(), io)?),
         None => None,

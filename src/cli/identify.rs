@@ -1,16 +1,14 @@
 //! `axiscal identify`: the fit of a study.
 
 use super::common::of_fit;
-use super::load::load_study;
 use super::{Answer, Io};
-use crate::design;
 use crate::diag::{Failure, Result};
-use crate::fit;
 use crate::machine::Machine;
+use crate::workflow::examine::put_covariance;
+use crate::workflow::load_study;
 use nalgebra::Vector3;
 use std::path::PathBuf;
 
-/// Arguments of `identify`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -29,8 +27,6 @@ pub struct Args {
     pub quick: bool,
 }
 
-/// Runs `identify`.
-///
 /// # Errors
 /// When the study or a file that it names is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -38,30 +34,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let mut settings = loaded.settings();
     settings.reference = Some(reference(&args.reference, &loaded.machine)?);
     settings.bare = args.quick;
-    let mut fit = loaded.fit(&settings)?;
-    if !args.quick {
-        design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
-    }
+    let mut fit = loaded.identify(&settings, io)?;
     if args.covariance {
-        fit.outcome.covariance = Some(fit::uncertainty::full_covariance(&fit));
-        fit.outcome.covariance_type_a = (!fit.type_b.is_empty()).then(|| fit::uncertainty::results_covariance(&fit));
+        put_covariance(&mut fit);
     }
-    let mut outcome = std::mem::take(&mut fit.outcome);
-    if let Some(active) = loaded.active()? {
-        let idle =
-            if loaded.transformation() == Some(true) { 0 } else { active.idle_without_transformation(&loaded.machine) };
-        let acts = active.terms.len().saturating_sub(idle);
-        if acts > 0 || idle == 0 {
-            outcome.warnings.push(format!(
-                "a compensation with {acts} terms was active: the values are what it leaves, not the machine's whole errors"
-            ));
-        }
-        if idle > 0 {
-            outcome.warnings.push(format!(
-                "a compensation with {idle} terms that do not act on axis positions was loaded: the values are the machine's whole errors there"
-            ));
-        }
-    }
+    let mut outcome = fit.outcome;
     if !args.residuals {
         outcome.residuals = None;
     }

@@ -1,16 +1,15 @@
 //! `axiscal machines`: what is built in or found, one line each; `machines show NAME` prints one.
 
-use super::common::{load_machine, load_machines};
 use super::{Answer, Io};
 use crate::diag::Result;
 use crate::machine::{Axis, Carrier, Machine, Side};
 use crate::report::fit::{number, table};
 use crate::units::um_from_mm;
+use crate::workflow::{load_machine, load_machines};
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `machines`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// `show NAME` prints one machine
@@ -31,8 +30,6 @@ pub enum What {
     },
 }
 
-/// Runs `machines`.
-///
 /// # Errors
 /// When the file is unusable or there is no such machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

@@ -1,6 +1,6 @@
-//! The verbs: arguments as typed → records → the rooms' functions → what is printed. A file per verb.
+//! The verbs: arguments as typed → records → functions of `workflow` → what is printed. A file per verb.
 //!
-//! Only this room touches files, the clock and the environment. Exit codes: 0 done (warnings included), 1 the answer is
+//! Only this room writes outputs and reads the clock and the environment's variables. Exit codes: 0 done (warnings included), 1 the answer is
 //! "no", 2 the input or the call was unusable.
 
 mod add;
@@ -17,7 +17,6 @@ mod export;
 mod generate;
 mod guard;
 mod identify;
-pub mod load;
 mod machines;
 mod new;
 mod next;
@@ -31,7 +30,6 @@ mod simulate;
 mod sketch_effect;
 mod solve;
 mod verify;
-pub mod view;
 mod workbench;
 
 pub use common::{Answer, Io};

@@ -1,12 +1,13 @@
 //! What to do after a diagnosis. A command is named only where its verb will do something: the same findings decide here
 //! and there.
 
-use super::load::{Loaded, controller_path};
 use crate::diagnose::answer::Diagnosis;
 use crate::diagnose::next_step::NextStep;
 use crate::post::Postprocessor;
+use crate::program;
 use crate::words::diagnose as words;
-use std::path::{Path, PathBuf};
+use crate::workflow::{Disk, Loaded, controller_path};
+use std::path::Path;
 
 /// A path as a shell takes it: in quotes where it has signs that a shell reads.
 #[must_use]
@@ -20,10 +21,18 @@ pub fn quoted(path: &Path) -> String {
 /// written for.
 #[must_use]
 pub fn controller(loaded: &Loaded) -> Option<String> {
-    let folder = loaded.path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, &folder));
+    let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, loaded.folder(), &Disk::default()));
     let mut each = each.filter(|c| c != "csv");
     each.find(|c| Postprocessor::load_built_in_or_file(c).is_ok())
+}
+
+/// A call with the study's own control.
+fn with_control(loaded: &Loaded, call: impl Fn(&str) -> String) -> String {
+    match controller(loaded) {
+        Some(name) => call(&quoted(Path::new(&name))),
+        // touches in a file of another origin: nobody knows the control
+        None => call("NAME") + " (for NAME one of those that `axiscal controllers` lists)",
+    }
 }
 
 /// The call of `plan-next`, with the study's own control.
@@ -37,12 +46,17 @@ pub fn plan_next(loaded: &Loaded) -> String {
 pub fn plan_next_for(loaded: &Loaded, effects: &[&str]) -> String {
     let which = if effects.is_empty() { String::new() } else { format!(" --effects {}", effects.join(",")) };
     let study = quoted(&loaded.path);
-    let call = |name: &str| format!("axiscal plan-next {study} --out next --controller {name}{which}");
-    match controller(loaded) {
-        Some(name) => call(&quoted(&PathBuf::from(name))),
-        // touches in a file of another origin: nobody knows the control
-        None => call("NAME") + " (for NAME one of those that `axiscal controllers` lists)",
-    }
+    with_control(loaded, |name| format!("axiscal plan-next {study} --out next --controller {name}{which}"))
+}
+
+/// The call that writes the program in whose poses every known effect shows, where this machine has one.
+fn richer_program(loaded: &Loaded) -> Option<String> {
+    program::choose(program::built_in().ok()?, "full", &loaded.machine).ok()?;
+    let machines = loaded.study.machines.as_ref().map(|m| format!(" --machines {}", quoted(&loaded.folder().join(m))));
+    let machine = quoted(Path::new(&loaded.machine.name)) + &machines.unwrap_or_default();
+    Some(with_control(loaded, |name| {
+        format!("axiscal generate --machine {machine} --program full --controller {name} --out next")
+    }))
 }
 
 /// The call of `sketch-effect`.
@@ -89,7 +103,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                 format!("  with one of {some}{more} in place of EFFECT"),
             ]
         }
-        NextStep::MeasureMore => {
+        NextStep::MeasureMore(_) => {
             let sketch = found.sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
             std::iter::once(format!("next: {}", plan_next(loaded))).chain(sketch).collect()
         }
@@ -99,6 +113,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             let what = format!("next: {}", words::machine_check(check));
             std::iter::once(what).chain(found.sketchable.then(sketch)).collect()
         }
+        NextStep::RicherProgram => richer_program(loaded).map(|call| format!("next: {call}")).into_iter().collect(),
         NextStep::Nothing => Vec::new(),
     }
 }

@@ -1,7 +1,6 @@
 //! `axiscal parse`: a controller's log → the touches CSV.
 
 use super::common::finding_record;
-use super::load::load_plan_and_machine;
 use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::Result;
@@ -9,11 +8,11 @@ use crate::files;
 use crate::log::{self, Ending, MatchedLog, RunFound, Status, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
+use crate::workflow::load_plan_and_machine;
 use comfy_table::CellAlignment;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Arguments of `parse`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The log that the probing program wrote
@@ -58,12 +57,11 @@ struct Parsed<'a> {
     findings: Vec<serde_json::Value>,
 }
 
-/// Runs `parse`.
-///
 /// # Errors
 /// When the plan, the machine or the log is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let (plan, machine) = load_plan_and_machine(&args.plan, args.machines.as_deref(), io)?;
+    let machines = args.machines.as_deref();
+    let (plan, machine) = load_plan_and_machine(&args.plan, machines, io)?;
     let (reader, findings) = log::Reader::load(&args.controller, files::read_text)?;
     io.report(&findings);
     let bytes = files::read_bytes(&args.log)?;

@@ -1,18 +1,17 @@
 //! `axiscal programs`: what is built in, one line each; `programs show NAME` prints the set-ups of one.
 
-use super::common::load_machine;
-use super::generate::is_file;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result, source};
 use crate::files;
 use crate::program::layout::{Layout, lay_out};
 use crate::program::{self, ProgramSpec, pose_says};
 use crate::report::fit::{number, table};
+use crate::workflow::generate::is_file;
+use crate::workflow::load_machine;
 use comfy_table::Cell;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `programs`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// `show NAME` prints one program
@@ -39,8 +38,6 @@ pub enum What {
     },
 }
 
-/// Runs `programs`.
-///
 /// # Errors
 /// When there is no such program, or a file is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

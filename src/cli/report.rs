@@ -1,15 +1,15 @@
 //! `axiscal report`: one page with everything that a study says.
 
 use super::common::of_fit;
-use super::load::load_study;
-use super::view::{history_of, view_of, work_out};
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Result};
 use crate::files;
+use crate::workflow::history::read_history;
+use crate::workflow::load_study;
+use crate::workflow::view::{view_of, work_out};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Arguments of `report`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study
@@ -25,16 +25,13 @@ pub struct Args {
     pub view: Option<PathBuf>,
 }
 
-/// Runs `report`.
-///
 /// # Errors
 /// When the study or a file that it names is unusable, or a file cannot be written.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
-    let history = history_of(&loaded)?;
-    let worked = work_out(&loaded, history.as_ref())?;
-    let name = args.study.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let view = view_of(&loaded, &worked, &name);
+    let history = read_history(&args.study, io)?;
+    let worked = work_out(&loaded, history.as_ref(), io)?;
+    let view = view_of(&loaded, &worked);
     io.report(&view.ladder_notes.iter().map(|n| Finding::info("report::ladder", n.clone())).collect::<Vec<_>>());
     let mut outputs: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     if let Some(path) = &args.view {

@@ -1,6 +1,5 @@
 //! `axiscal reproduce`: the paper's tables and its statements of rank.
 
-use super::common::load_machines;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;
@@ -10,10 +9,10 @@ use crate::paper::tables::{self, Bench, Table};
 use crate::program;
 use crate::program::plan::Plan;
 use crate::report::fit::{number, table};
+use crate::workflow::load_machines;
 use comfy_table::Cell;
 use serde_json::json;
 
-/// Arguments of `reproduce`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Distance from the B pivot to the ball's centre, mm (the paper prints none)
@@ -21,8 +20,6 @@ pub struct Args {
     pub z_b: f64,
 }
 
-/// Runs `reproduce`.
-///
 /// # Errors
 /// When `--z-b` is no length.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {

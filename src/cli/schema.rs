@@ -3,7 +3,6 @@
 use super::{Answer, Io};
 use crate::diag::Result;
 
-/// Arguments of `schema`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Which file
@@ -26,8 +25,6 @@ pub enum What {
     Effects,
 }
 
-/// Runs `schema`.
-///
 /// # Errors
 /// Never: the schemas are built in.
 pub fn run(args: &Args, _io: &Io) -> Result<Answer> {

@@ -1,20 +1,18 @@
 //! `axiscal simulate`: the virtual machine writes the log that the controller would have written.
 
 use super::common::MachineArgs;
-use super::load::load_plan;
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Findings, Result, source};
 use crate::files;
-use crate::log::{self, RawTouch, Status, Touch};
+use crate::log::{RawTouch, Status};
 use crate::machine::Machine;
-use crate::post::{LogRecord, Postprocessor};
-use crate::program::plan::Plan;
 use crate::simulate::{self, Compensation, Scenario};
+use crate::workflow::simulated_log::simulated_log;
+use crate::workflow::{load_controller, load_plan};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `simulate`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
@@ -42,8 +40,6 @@ pub struct Args {
 /// A plan of fewer touches is done before a person sees a bar.
 const LONG: usize = 50_000;
 
-/// Runs `simulate`.
-///
 /// # Errors
 /// When an input is unusable or does not fit the machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
@@ -68,11 +64,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     // an unknown controller is said before the work, not after
     let post = match args.controller.as_str() {
         "csv" => None,
-        word => {
-            let (post, findings) = Postprocessor::load_built_in_or_file(word)?;
-            io.report(&findings);
-            Some(post)
-        }
+        word => Some(load_controller(word, io)?),
     };
     keep_existing(args)?;
     let bar = progress(plan.touches.len(), io);
@@ -81,10 +73,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     });
     bar.finish_and_clear();
     let touches = reported(touches?, io);
-    let text = match &post {
-        None => log::csv::write(&machine, &numbered(&touches)),
-        Some(post) => log_text(post, &machine, &plan, &touches),
-    };
+    let text = simulated_log(&machine, &plan, &touches, post.as_ref());
     files::write_whole(&args.out, text.as_bytes())?;
     if post.is_some() && touches.iter().any(|t| t.temperature_deg_c.is_some()) {
         io.report(&[Finding::info(
@@ -142,21 +131,6 @@ fn load_compensation(path: &Path, machine: &Machine) -> Result<(Compensation, Fi
     })?;
     findings.0.extend(said.0);
     Ok((loaded, findings))
-}
-
-/// The touches as a CSV holds them; every simulated touch has its number.
-fn numbered(touches: &[RawTouch]) -> Vec<Touch> {
-    let touch = |t: &RawTouch| {
-        let RawTouch { position, status, time_s, temperature_deg_c, line, .. } = *t;
-        Some(Touch { id: t.id?, position, status, time_s, digit_mm: None, temperature_deg_c, line })
-    };
-    touches.iter().filter_map(touch).collect()
-}
-
-fn log_text(post: &Postprocessor, machine: &Machine, plan: &Plan, touches: &[RawTouch]) -> String {
-    let record = |t: &RawTouch| Some(LogRecord { id: t.id?, status: t.status, position: t.position, time_s: t.time_s });
-    let records: Vec<LogRecord> = touches.iter().filter_map(record).collect();
-    post.log_text(machine, plan, &records)
 }
 
 fn missed(touches: &[RawTouch]) -> Vec<u64> {

@@ -2,24 +2,24 @@
 //! `--yes`; the loop never goes past what the test with all candidates counted in and the held-out touches allow.
 
 use super::common::of_fit;
-use super::load::{Loaded, load_study};
 use super::{Answer, Io, add};
 use crate::compare::parameter_combinations;
 use crate::diag::{Failure, Result};
+use crate::diagnose::Verdict;
 use crate::diagnose::answer::{Candidate, Diagnosis};
-use crate::diagnose::solving::{self, Added, Change, Host, Refusal, Request, State, Stop, Visited, Why};
-use crate::diagnose::{Options, Verdict};
+use crate::diagnose::solving::{Added, Change, Ending, Host, Refusal, State, Stop, Visited, Why};
 use crate::fit::Fit;
 use crate::fit::outcome::{Outcome, Parameter};
 use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
 use crate::search::groups::PLAUSIBLE;
 use crate::words::diagnose::{list, one_of};
+use crate::workflow::change::Edit;
+use crate::workflow::{Loaded, load_study};
 use serde::Serialize;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 
-/// Arguments of `solve`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The study; effects that you agree to are added in place
@@ -32,7 +32,6 @@ pub struct Args {
     pub at_most: usize,
 }
 
-/// What was done.
 #[derive(Debug, Serialize)]
 struct Solution {
     format: &'static str,
@@ -59,7 +58,6 @@ struct Solution {
     effects: Vec<String>,
 }
 
-/// One step of the loop.
 #[derive(Debug, Serialize)]
 struct Step {
     added: String,
@@ -131,7 +129,8 @@ impl Host for Terminal<'_> {
         let of = |effects: Vec<String>| add::Args { study: self.args.study.clone(), effects, dry_run: false };
         match change {
             Change::Add(id, nested_rms_um) => {
-                add::add_chosen(&of(vec![id.clone()]), &self.io.inner(), *nested_rms_um)?;
+                let args = of(vec![id.clone()]);
+                add::run(&args, Edit::Add(&args.effects), *nested_rms_um, &self.io.inner())?;
             }
             Change::Remove(ids, why) => {
                 self.io.say(leaves(ids, why, added));
@@ -148,17 +147,8 @@ impl Host for Terminal<'_> {
 /// When the study is unusable, or nobody is there to agree.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, &io.inner())?;
-    let (settings, planned) = (loaded.settings(), loaded.planned());
-    let request = Request {
-        machine: &loaded.machine,
-        catalogue: &loaded.catalogue,
-        settings: &settings,
-        fit: &|settings| loaded.fit(settings),
-        options: Options { planned: Some(&planned), ..Options::default() },
-        at_most: args.at_most,
-    };
-    let ending = solving::solve(request, &mut Terminal { args, io })?;
-    let solving::Ending { state: State { fit, found }, models, added, dropped, taken_back, stop } = ending;
+    let ending = loaded.solve(args.at_most, &mut Terminal { args, io })?;
+    let Ending { state: State { fit, found }, models, added, dropped, taken_back, stop } = ending;
     if load_study(&args.study, &io.inner())?.study.effects != fit.outcome.effects {
         return Err(Failure::new("study::changed", format!("{} was changed meanwhile", args.study.display()))
             .help("its model is not the one that was fitted last: call `axiscal solve` again"));
@@ -269,7 +259,6 @@ fn leaves(ids: &[String], why: &Why, added: &[Added]) -> String {
     }
 }
 
-/// The proposal and its reason.
 fn propose(first: &Candidate, io: &Io) {
     let mut sizes: Vec<String> = first
         .parameters

@@ -2,6 +2,7 @@
 
 use super::answer::{Candidate, Diagnosis};
 use super::{Verdict, scatter_leads};
+use crate::search::multiplicity::FAMILY_LEVEL;
 
 /// What to do next.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,14 +17,27 @@ pub enum NextStep<'d> {
     CheckWhich(&'d Candidate),
     /// Measure the touches that separate the effects of the group.
     Separate(&'d Candidate),
-    /// Measure further touches: they tell whether a weak pattern is there, or whether the effect in question acts.
-    MeasureMore,
+    /// Measure further touches, which answer the question.
+    MeasureMore(OpenQuestion),
     /// Correct what no formula describes at the machine.
     CorrectAtMachine(MachineCheck<'d>),
     /// Write what is seen as a formula.
     Sketch,
+    /// Measure with a program of more poses: these touches are too few to judge.
+    RicherProgram,
     /// Nothing that a diagnosis asks for.
     Nothing,
+}
+
+/// What further touches tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OpenQuestion {
+    /// Whether a weak pattern is there at all.
+    WeakPattern,
+    /// Which of several effects it is, none of which could be tried on unused touches.
+    UntriedEffects,
+    /// Whether the effect in question acts.
+    EffectInQuestion,
 }
 
 /// What to check at the machine.
@@ -70,13 +84,35 @@ impl Diagnosis {
                 Some(first) if first.never_parted => NextStep::CheckWhich(first),
                 Some(first) => NextStep::Separate(first),
             },
-            Verdict::Unexplained if self.leaves_open() || (self.faint && self.touches_would_tell()) => {
-                NextStep::MeasureMore
+            Verdict::Unexplained if self.faint && (self.leaves_open() || self.touches_would_tell()) => {
+                NextStep::MeasureMore(OpenQuestion::WeakPattern)
             }
+            Verdict::Unexplained if !self.untried().is_empty() => NextStep::MeasureMore(OpenQuestion::UntriedEffects),
+            Verdict::Unexplained if self.leaves_open() => NextStep::MeasureMore(OpenQuestion::EffectInQuestion),
             Verdict::Unexplained if self.sketchable && self.moved_block.is_none() => NextStep::Sketch,
             Verdict::Unexplained => NextStep::CorrectAtMachine(self.machine_check()),
-            Verdict::Adequate | Verdict::TooLittleData => NextStep::Nothing,
+            Verdict::TooLittleData => NextStep::RicherProgram,
+            Verdict::Adequate => NextStep::Nothing,
         }
+    }
+
+    /// The effects that pass the test with all of them counted in, where nothing is proposed only because these poses leave
+    /// no touches to try the choice on: ids, the first one first.
+    #[must_use]
+    pub fn untried(&self) -> Vec<&str> {
+        let passes = |c: &&Candidate| c.p_adjusted < FAMILY_LEVEL;
+        let leads = self.candidates.first().is_some_and(|c| passes(&c) && !c.proposed && !tried(c));
+        if self.verdict != Verdict::Unexplained || !leads {
+            return Vec::new();
+        }
+        let each = self.candidates.iter().filter(passes).filter(|c| !tried(c));
+        let mut out: Vec<&str> = Vec::new();
+        for id in each.flat_map(|c| std::iter::once(&c.effect).chain(&c.same_as)) {
+            if !out.contains(&id.as_str()) {
+                out.push(id);
+            }
+        }
+        out
     }
 
     /// What to check at the machine about a finding that no formula describes.
@@ -101,5 +137,13 @@ impl Diagnosis {
             Some(_) => MachineCheck::NoFormula,
             None => MachineCheck::NoPattern,
         }
+    }
+}
+
+/// Could a candidate be tried on touches that had no part in choosing it? With few poses none can be predicted.
+fn tried(c: &Candidate) -> bool {
+    match (c.held_out_before_um, c.held_out_after_um) {
+        (Some(before), Some(after)) => before.is_finite() && after.is_finite() && (before > 0.0 || after > 0.0),
+        _ => false,
     }
 }

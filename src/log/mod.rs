@@ -1,6 +1,6 @@
 //! A controller's log → [`RawTouch`] records with their line numbers → touches matched to the plan.
 //!
-//! [`parse`] reads the bytes, driven by the postprocessor's file; [`to_axes`] makes axis positions of a control's own
+//! `parse` reads the bytes, driven by the postprocessor's file; [`to_axes`] makes axis positions of a control's own
 //! coordinates; [`match_to_plan`] finds the touch of the plan that each one is; [`read`] does all three, [`csv`] reads
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 

@@ -20,7 +20,7 @@ pub enum Reader {
 impl Reader {
     /// `csv`, the name of a controller or a form that is built in, or the path of a file of the user's own.
     ///
-    /// `read` fetches the text of a file: only `cli` touches files.
+    /// `read` fetches the text of a file.
     ///
     /// # Errors
     /// When there is none of that name, or the file is unusable; the message lists what there is.

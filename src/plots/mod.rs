@@ -1,6 +1,6 @@
 //! The plots of the report without a browser: SVG and PNG for people who write reports, and the numbers behind each as CSV.
 //!
-//! [`charts`] picks from a view what is drawn, [`chart`] is the record of it, `render` puts it on paper.
+//! `charts` picks from a view what is drawn, `chart` is the record of it, `render` puts it on paper.
 
 pub mod chart;
 mod charts;

@@ -259,7 +259,7 @@ impl Postprocessor {
 
     /// The postprocessor of a name, or of a file of the user's own when the word ends in `.toml` or holds a `/`.
     ///
-    /// `read` fetches the text of a file: only `cli` touches files.
+    /// `read` fetches the text of a file.
     ///
     /// # Errors
     /// When there is none of that name, or the file is unusable; the message lists what there is.

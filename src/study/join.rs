@@ -7,9 +7,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 /// A run that joins a study. Paths as the study sees them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Joined {
-    /// The plan.
     pub plan: String,
-    /// The log.
     pub log: String,
     /// A controller, a postprocessor file, or `csv`.
     pub controller: String,

@@ -1,7 +1,7 @@
 //! `study.toml`: what was measured and what the model holds (docs/formats.md).
 //!
 //! Reading gives checked records with the findings' places; writing edits the text in place, so that the user's comments
-//! and order stay. Nothing here opens the files that a study names: `cli` does.
+//! and order stay. Nothing here opens the files that a study names: `workflow` does.
 
 mod join;
 pub mod mask;
@@ -164,9 +164,7 @@ pub struct Study {
 /// One run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataEntry {
-    /// The plan.
     pub plan: String,
-    /// The log.
     pub log: String,
     /// A controller, a postprocessor file, or `csv`.
     pub controller: String,

@@ -29,7 +29,6 @@ pub struct AsWritten {
     pub parameters: BTreeMap<String, Spanned<f64>>,
 }
 
-/// The tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tolerance {
     /// What one error may do to a point at `radius_mm`, µm.

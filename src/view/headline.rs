@@ -3,10 +3,9 @@
 use super::Material;
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
-use crate::diagnose::answer::{Candidate, Diagnosis};
+use crate::diagnose::answer::Candidate;
 use crate::fit::outcome::Status;
 use crate::model::catalogue::Place;
-use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::units::um_from_mm;
 use serde::Serialize;
 
@@ -22,12 +21,10 @@ pub enum Level {
     Unknown,
 }
 
-/// The verdict.
 #[derive(Debug, Clone, Serialize)]
 pub struct Headline {
     /// Good, act, unknown.
     pub level: Level,
-    /// One sentence.
     pub sentence: String,
     /// What stands behind it, in a second one.
     pub detail: String,
@@ -80,7 +77,7 @@ pub(super) fn size(p: &ParameterRecord, m: &Material) -> String {
 pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> Headline {
     let d = m.diagnosis;
     let first = d.candidates.first().filter(|c| c.proposed || d.verdict == Verdict::MissingEffect);
-    let open = untried(d);
+    let open = d.untried();
     let (level, sentence) = match d.verdict {
         Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
         // a gross mistake that made touches miss: there is nothing to compare its error with
@@ -128,32 +125,6 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
     // the rooms write um in plain letters
     let plain = |text: String| text.replace(" um ", " µm ");
     Headline { level, sentence: plain(sentence), detail: plain(detail) }
-}
-
-/// Could a candidate be tried on touches that had no part in choosing it? With few poses none can be predicted.
-fn tried(c: &Candidate) -> bool {
-    match (c.held_out_before_um, c.held_out_after_um) {
-        (Some(before), Some(after)) => before.is_finite() && after.is_finite() && (before > 0.0 || after > 0.0),
-        _ => false,
-    }
-}
-
-/// The effects that pass the test with all of them counted in, where nothing is proposed only because these poses leave
-/// no touches to try the choice on: ids, the first one first.
-pub(super) fn untried(d: &Diagnosis) -> Vec<&str> {
-    let passes = |c: &&Candidate| c.p_adjusted < FAMILY_LEVEL;
-    let leads = d.candidates.first().is_some_and(|c| passes(&c) && !c.proposed && !tried(c));
-    if d.verdict != Verdict::Unexplained || !leads {
-        return Vec::new();
-    }
-    let each = d.candidates.iter().filter(passes).filter(|c| !tried(c));
-    let mut out: Vec<&str> = Vec::new();
-    for id in each.flat_map(|c| std::iter::once(&c.effect).chain(&c.same_as)) {
-        if !out.contains(&id.as_str()) {
-            out.push(id);
-        }
-    }
-    out
 }
 
 /// The name of an effect.
@@ -320,6 +291,7 @@ pub(super) fn capital(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::answer::Diagnosis;
     use crate::diagnose::unresolved_pairs::Open;
 
     fn candidate(effect: &str, p_adjusted: f64, held_out: Option<f64>, same_as: &[&str]) -> Candidate {
@@ -418,12 +390,12 @@ mod tests {
                 candidate("e", 0.4, held_out, &[]),
             ];
             let mut d = diagnosis(all);
-            assert_eq!(untried(&d), ["a", "b", "c", "d"]);
+            assert_eq!(d.untried(), ["a", "b", "c", "d"]);
             d.verdict = Verdict::MissingEffect;
-            assert!(untried(&d).is_empty());
+            assert!(d.untried().is_empty());
         }
         // tried and not borne out: no known effect explains it
-        assert!(untried(&diagnosis(vec![candidate("a", 1e-9, Some(2.0), &[])])).is_empty());
-        assert!(untried(&diagnosis(vec![candidate("a", 0.2, None, &[])])).is_empty());
+        assert!(diagnosis(vec![candidate("a", 1e-9, Some(2.0), &[])]).untried().is_empty());
+        assert!(diagnosis(vec![candidate("a", 0.2, None, &[])]).untried().is_empty());
     }
 }

@@ -38,7 +38,6 @@ pub struct RunFiles<'a> {
     pub plan: &'a str,
     /// The log's file, as the study names it.
     pub log: &'a str,
-    /// The controller.
     pub controller: &'a str,
     /// The plan itself.
     pub touches: &'a Plan,
@@ -53,11 +52,9 @@ pub struct Material<'a> {
     pub sha256: &'a str,
     /// Day of the data, YYYY-MM-DD.
     pub date: &'a str,
-    /// The machine.
     pub machine: &'a Machine,
     /// The effects that exist.
     pub catalogue: &'a Catalogue,
-    /// The runs.
     pub runs: &'a [RunFiles<'a>],
     /// The study's tolerance.
     pub tolerance: &'a Tolerance,

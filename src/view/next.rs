@@ -1,12 +1,12 @@
 //! What to do next, the first thing first.
 
 use super::Material;
-use super::headline::{Headline, Level, capital, in_question, named, size, um, untried};
+use super::headline::{Headline, Level, capital, in_question, named, size, um};
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::diagnose::consequence::Consequence;
-use crate::diagnose::next_step::NextStep;
+use crate::diagnose::next_step::{NextStep, OpenQuestion};
 use crate::post::Postprocessor;
 use crate::tables::control;
 use crate::units::um_from_mm;
@@ -15,7 +15,6 @@ use serde::Serialize;
 /// A thing to do.
 #[derive(Debug, Clone, Serialize)]
 pub struct Next {
-    /// What to do.
     pub what: String,
     /// How, or why.
     pub how: String,
@@ -36,18 +35,22 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
     let controller = m.runs.iter().map(|r| r.controller).find(|c| *c != "csv").unwrap_or("YOUR-CONTROLLER");
     let plan_next = format!("axiscal plan-next {study} --controller {controller} --out next");
     let d = m.diagnosis;
-    match d.verdict {
-        Verdict::TooLittleData => out.push(Next::new(
+    match d.next_step() {
+        NextStep::RicherProgram => out.push(Next::new(
             "Measure more touches",
             "A richer program sees what this one cannot. First make sure that the log belongs to the plan and that the blocks stand where it says.",
             format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
         )),
-        Verdict::MissingEffect => {
-            if let Some(first) = d.candidates.first() {
-                found(m, first, &plan_next, c, &mut out);
-            }
+        NextStep::CorrectSetupMistake => {
+            let look = d.candidates.first().map(|c| c.look.clone()).filter(|look| !look.is_empty());
+            let how = look.or_else(|| d.mistake()).unwrap_or_default();
+            out.push(Next::new("Put the mistake right and measure again", capital(&how), ""));
         }
-        Verdict::Unexplained if d.faint && d.next_step() == NextStep::MeasureMore => {
+        NextStep::Add(first)
+        | NextStep::AddOrCheck(first, _)
+        | NextStep::CheckWhich(first)
+        | NextStep::Separate(first) => found(m, first, &plan_next, c, &mut out),
+        NextStep::MeasureMore(OpenQuestion::WeakPattern) => {
             out.push(Next::new(
                 "Measure more touches",
                 "Repeats and further poses say whether the weak pattern is there at all.",
@@ -59,16 +62,17 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 compensate(m, parameters, c, &mut out);
             }
         }
-        Verdict::Unexplained if !untried(d).is_empty() => {
-            which(m, &untried(d), &plan_next, controller, &mut out);
-        }
-        Verdict::Unexplained if d.next_step() == NextStep::MeasureMore => {
+        NextStep::MeasureMore(OpenQuestion::UntriedEffects) => which(m, &d.untried(), &plan_next, controller, &mut out),
+        NextStep::MeasureMore(OpenQuestion::EffectInQuestion) => {
             let what = d.in_question().map_or_else(|| "one of these effects".to_owned(), |c| in_question(m, c));
             let how = format!("Whether it is {what}, touches at further poses tell.");
             out.push(Next::new("Measure more index visits", how, plan_next.clone()));
         }
-        Verdict::Unexplained => unexplained(m, &mut out),
-        Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
+        NextStep::Sketch | NextStep::CorrectAtMachine(_) => unexplained(m, &mut out),
+        NextStep::Nothing if d.verdict == Verdict::Adequate => {
+            settled(m, headline, parameters, c, controller, &mut out);
+        }
+        NextStep::Nothing => {}
     }
     if d.verdict != Verdict::TooLittleData
         && !m.fit.outcome.undetermined.is_empty()
@@ -102,10 +106,6 @@ fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &m
 }
 
 fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out: &mut Vec<Next>) {
-    if m.diagnosis.next_step() == NextStep::CorrectSetupMistake {
-        out.push(Next::new("Put the mistake right and measure again", first.look.clone(), ""));
-        return;
-    }
     let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
     // an effect of a person's own may not say where
     if !first.look.is_empty() {

@@ -33,7 +33,6 @@ pub struct View {
     pub parameters: Vec<ParameterRecord>,
     /// The same with what the diagnosis proposes in the model; empty where it proposes nothing.
     pub proposed: Vec<ParameterRecord>,
-    /// The tolerance.
     pub tolerance: Tolerance,
     /// The models on these touches.
     pub ladder: Vec<RungRecord>,
@@ -78,11 +77,9 @@ pub struct StudyRecord {
     pub date: String,
     /// Ids of the effects in the model.
     pub effects: Vec<String>,
-    /// The runs.
     pub runs: Vec<RunRecord>,
 }
 
-/// A run.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunRecord {
     /// File of the plan.
@@ -91,7 +88,6 @@ pub struct RunRecord {
     pub program: String,
     /// File of the log.
     pub log: String,
-    /// The controller.
     pub controller: String,
     /// Touches of the plan.
     pub touches: usize,
@@ -151,13 +147,10 @@ pub struct ParameterRecord {
     pub says: String,
     /// Id of its effect.
     pub effect: String,
-    /// Name of its effect.
     pub effect_name: String,
     /// What mends it.
     pub mends: String,
-    /// Value.
     pub value: f64,
-    /// Its unit.
     pub unit: String,
     /// Standard uncertainty.
     pub sigma: Option<f64>,
@@ -260,7 +253,6 @@ pub struct ShapeRecord {
     pub parameter: String,
     /// Id of its effect.
     pub effect: String,
-    /// The axis.
     pub axis: String,
 }
 
@@ -271,13 +263,10 @@ pub struct LeftRecord {
     pub parameter: String,
     /// Id of its effect.
     pub effect: String,
-    /// Value.
     pub value: f64,
-    /// Its unit.
     pub unit: String,
     /// What it leaves at the tolerance's radius, µm.
     pub left_um: Option<f64>,
-    /// Why.
     pub why: String,
     /// A known error of the machine, so that leaving it out leaves that error.
     pub known: bool,
@@ -304,7 +293,6 @@ pub struct MachineRecord {
     pub blocks: Vec<BlockRecord>,
 }
 
-/// An axis.
 #[derive(Debug, Clone, Serialize)]
 pub struct AxisRecord {
     /// Its letter.
@@ -313,7 +301,6 @@ pub struct AxisRecord {
     pub rotary: bool,
     /// `workpiece` or `tool`.
     pub side: &'static str,
-    /// Its direction.
     pub direction: [f64; 3],
     /// A point of a rotary axis.
     pub point: [f64; 3],
@@ -324,7 +311,6 @@ pub struct AxisRecord {
 /// A solid; a cylinder where it has a radius.
 #[derive(Debug, Clone, Serialize)]
 pub struct SolidRecord {
-    /// Its name.
     pub name: String,
     /// What bears it.
     pub carrier: String,
@@ -338,14 +324,11 @@ pub struct SolidRecord {
     pub radius_height: Option<[f64; 2]>,
 }
 
-/// A block.
 #[derive(Debug, Clone, Serialize)]
 pub struct BlockRecord {
-    /// Its name.
     pub name: String,
     /// What bears it.
     pub carrier: String,
-    /// Its centre.
     pub centre: [f64; 3],
     /// Its full edges.
     pub size: [f64; 3],
@@ -370,7 +353,6 @@ pub struct Touches {
     pub stage: Vec<usize>,
     /// The block as it stood.
     pub block: Vec<usize>,
-    /// Its face.
     pub face: Vec<usize>,
     /// Index visit.
     pub visit: Vec<usize>,

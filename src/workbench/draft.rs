@@ -59,7 +59,6 @@ pub struct DraftTerm {
 pub struct DraftShape {
     /// Its name in the formulas.
     pub parameter: String,
-    /// Its unit.
     pub unit: String,
     /// Where the search begins.
     pub start: f64,

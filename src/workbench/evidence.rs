@@ -5,14 +5,13 @@ use super::session::Snapshot;
 use crate::diag::Result;
 use crate::diagnose::candidate_effects::Named;
 use crate::diagnose::evidence::Evidence;
-use crate::diagnose::{Diagnosis, Options, Subject, diagnose};
+use crate::diagnose::{Diagnosis, Options};
 use crate::search::Search;
 use serde::Serialize;
 
 /// What the touches say of one effect that is not in the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scored {
-    /// Its id.
     pub effect: String,
     /// Does it leave a trace in these touches?
     pub visible: bool,
@@ -26,20 +25,14 @@ pub struct Scored {
     pub passes: bool,
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
-    /// Expected sizes.
     pub parameters: Vec<Size>,
 }
 
-/// An expected size.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Size {
-    /// Parameter.
     pub name: String,
-    /// Expected value.
     pub value: f64,
-    /// Its unit.
     pub unit: String,
-    /// Standard uncertainty.
     pub sigma: f64,
 }
 
@@ -84,12 +77,5 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
 /// # Errors
 /// When a refit is impossible.
 pub fn diagnosis(state: &Snapshot) -> Result<Diagnosis> {
-    let settings = super::shelf::settings(&state.opened);
-    let subject = Subject {
-        machine: &state.opened.machine,
-        catalogue: &state.opened.catalogue,
-        settings: &settings,
-        fit: &state.fit,
-    };
-    diagnose(subject, &Options::default())
+    state.opened.diagnose(&state.opened.quick_settings(), &state.fit, &Options::default())
 }

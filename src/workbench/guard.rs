@@ -31,7 +31,6 @@ pub struct Denied {
 }
 
 impl Guard {
-    /// For a port, with a token.
     #[must_use]
     pub fn new(port: u16, token: String) -> Self {
         Self { hosts: [format!("127.0.0.1:{port}"), format!("localhost:{port}")], token }

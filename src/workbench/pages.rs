@@ -2,7 +2,6 @@
 
 use axum::http::HeaderName;
 
-/// The page.
 pub const PAGE: &str = include_str!("../../web/workbench.html");
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";

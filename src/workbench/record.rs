@@ -4,11 +4,12 @@
 //! *live* (what a step changes). Touches stand column by column. Lengths mm and angles deg, µm where a name ends in
 //! `_um`, hours in `_h`.
 
+use super::Answered;
+use super::desk::Desk;
 use super::draft::{self, Draft, MEANING};
 use super::evidence::Scored;
 use super::session::{Refused, Snapshot};
-use super::shelf::{self, Shelf};
-use super::{Answered, Host};
+use super::shelf::Shelf;
 use crate::diag::{Failure, Finding, Severity};
 use crate::diagnose::Diagnosis;
 use crate::fit;
@@ -22,10 +23,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The format line.
 pub const FORMAT: &str = "axiscal-workbench/1";
 
-/// A finding for the page.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Message {
     severity: &'static str,
@@ -38,7 +37,6 @@ pub struct Message {
     place: Option<String>,
 }
 
-/// Findings for the page.
 #[must_use]
 pub fn messages(findings: &[Finding]) -> Vec<Message> {
     let each = findings.iter().map(|f| Message {
@@ -58,19 +56,14 @@ pub fn messages(findings: &[Finding]) -> Vec<Message> {
 /// What is worked out behind a state.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Behind {
-    /// Of which state.
     pub version: u64,
-    /// Is everything there?
     pub complete: bool,
-    /// The score tests.
     pub scores: Option<Vec<Scored>>,
-    /// The diagnosis.
     pub diagnosis: Option<Diagnosis>,
     /// RMS on index visits left out.
     pub held_out_rms_um: Option<f64>,
     /// RMS on the last run left out.
     pub later_run_rms_um: Option<f64>,
-    /// Milliseconds that it took.
     pub ms: f64,
     /// Why there is none.
     pub failed: Vec<Message>,
@@ -81,7 +74,6 @@ pub struct Behind {
 pub struct Job {
     /// `plan-next` or `export`.
     pub verb: &'static str,
-    /// The state that it was called on.
     pub version: u64,
     /// Its answer, once it is there.
     pub answered: Option<Answered>,
@@ -143,7 +135,7 @@ fn bytes(record: &impl Serialize) -> Vec<u8> {
 
 /// What a step changes.
 #[must_use]
-pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
+pub fn live(now: &Snapshot, job: Option<&Job>) -> Vec<u8> {
     let (fit, o) = (&*now.fit, &now.fit.outcome);
     let masks = &now.opened.study.masked;
     let masked: std::collections::HashSet<(usize, u64)> = masks.iter().map(|m| (m.run, m.id)).collect();
@@ -152,7 +144,7 @@ pub fn live(now: &Snapshot, name: &str, job: Option<&Job>) -> Vec<u8> {
         format: FORMAT,
         version: now.version,
         inputs: now.inputs,
-        study: name,
+        study: &now.opened.name(),
         machine: &o.machine,
         effects: &o.effects,
         undo: &now.undo,
@@ -318,7 +310,7 @@ struct Variable {
 
 /// What stays the same until other data are read.
 #[must_use]
-pub fn inputs(now: &Snapshot, host: &dyn Host) -> Vec<u8> {
+pub fn inputs(now: &Snapshot) -> Vec<u8> {
     let opened = &*now.opened;
     let machine = &*opened.machine;
     let applying = opened.catalogue.iter().filter(|e| e.applies_to(machine) && !e.discrete);
@@ -326,7 +318,7 @@ pub fn inputs(now: &Snapshot, host: &dyn Host) -> Vec<u8> {
     bytes(&Inputs {
         format: FORMAT,
         inputs: now.inputs,
-        study: host.name(),
+        study: opened.name(),
         remarks: messages(&opened.remarks),
         runs: opened
             .study
@@ -349,8 +341,8 @@ pub fn inputs(now: &Snapshot, host: &dyn Host) -> Vec<u8> {
             })
             .collect(),
         words: words(now),
-        controllers: host.controllers(),
-        effects_file: host.effects_file(&opened.study),
+        controllers: Desk::controllers(),
+        effects_file: Desk::effects_file(&opened.study),
         variables: variables(machine, &touches),
         machine: machine_record(now),
         touches,
@@ -515,7 +507,7 @@ pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<
     let id = typed.as_ref().map(|t| t.id.as_str()).or(effect).ok_or_else(|| {
         Refused::Unusable(Failure::new("workbench::nothing", "no effect is named").help("choose one of the list"))
     })?;
-    let mut settings = shelf::settings(opened);
+    let mut settings = opened.quick_settings();
     if settings.effects.iter().any(|e| e == id) {
         let says = format!("effect {id:?} is in the model already");
         return Err(Refused::Unusable(Failure::new("study::in_model", says)));

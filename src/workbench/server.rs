@@ -3,12 +3,13 @@
 //! Every answer but the page itself and its scripts needs the token. Bodies, heads, connections and times are limited; a
 //! panic in a handler is the answer 500 and leaves the session as it was, because a step puts its result in place last.
 
+use super::desk::Desk;
 use super::draft::Draft;
 use super::guard::{Denied, Guard};
 use super::record::{self, Behind, Job};
 use super::session::{Ask, Refused, Session, Snapshot};
 use super::shelf::Shelf;
-use super::{Host, Verb, evidence, pages};
+use super::{Verb, evidence, pages};
 use crate::diag::{Failure, Result};
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -28,13 +29,10 @@ use tokio::sync::{Semaphore, broadcast};
 
 /// Longest body of a request, bytes: 30 000 touches chosen at once are 300 kB.
 const LONGEST_BODY: usize = 512 * 1024;
-/// Connections at a time.
 const MOST_CONNECTIONS: usize = 64;
 /// Streams of events at a time: the other connections stay free for requests. The tabs of a browser share one.
 const MOST_STREAMS: usize = 24;
-/// Time for the head of a request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
-/// Time for an answer.
 const ANSWER_TIME: Duration = Duration::from_secs(120);
 /// How often the disk is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(300);
@@ -52,7 +50,7 @@ pub struct Shared {
     events: broadcast::Sender<String>,
     streams: Arc<Semaphore>,
     guard: Guard,
-    host: Arc<dyn Host>,
+    desk: Arc<Desk>,
 }
 
 /// A panic elsewhere has left what the lock guards as it was before: see the head of this file.
@@ -85,8 +83,9 @@ impl Server {
     ///
     /// # Errors
     /// When the study is unusable or the port is taken.
-    pub fn new(host: Arc<dyn Host>, port: u16) -> Result<Self> {
-        let session = Session::open(host.clone())?;
+    pub fn new(desk: Desk, port: u16) -> Result<Self> {
+        let desk = Arc::new(desk);
+        let session = Session::open(desk.clone())?;
         let taken = |e: std::io::Error| {
             Failure::new("workbench::port", format!("port {port} of 127.0.0.1 cannot be used: {e}"))
                 .help("name another one with --port, or none: then a free one is taken")
@@ -105,7 +104,7 @@ impl Server {
             events: broadcast::channel(64).0,
             streams: Arc::new(Semaphore::new(MOST_STREAMS)),
             guard: Guard::new(port, super::guard::token()?),
-            host,
+            desk,
         });
         Ok(Self { listener, shared, woken })
     }
@@ -162,7 +161,6 @@ async fn serve(listener: std::net::TcpListener, router: Router) -> std::io::Resu
     }
 }
 
-/// The routes.
 pub fn router(shared: Arc<Shared>) -> Router {
     let api = Router::new()
         .route("/api/state", get(state))
@@ -280,13 +278,13 @@ async fn state(State(shared): State<Arc<Shared>>) -> Response {
     aside(shared, |shared| {
         let now = snapshot(shared);
         let job = lock(&shared.job).clone();
-        answer_json(record::live(&now, &shared.host.name(), job.as_ref()))
+        answer_json(record::live(&now, job.as_ref()))
     })
     .await
 }
 
 async fn inputs(State(shared): State<Arc<Shared>>) -> Response {
-    aside(shared, |shared| answer_json(record::inputs(&snapshot(shared), &*shared.host))).await
+    aside(shared, |shared| answer_json(record::inputs(&snapshot(shared)))).await
 }
 
 async fn evidence_of(State(shared): State<Arc<Shared>>) -> Response {
@@ -353,7 +351,6 @@ impl AskAsWritten {
     }
 }
 
-/// What the body asks for.
 fn read<'a, T: Deserialize<'a>>(body: &'a Bytes) -> std::result::Result<T, Box<Response>> {
     serde_json::from_slice(body).map_err(|e| {
         Box::new(refusal(StatusCode::BAD_REQUEST, "json", &format!("the request cannot be read: {e}"), None))
@@ -381,7 +378,7 @@ async fn step(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
         match made {
             Ok(now) => {
                 let job = lock(&shared.job).clone();
-                answer_json(record::live(&now, &shared.host.name(), job.as_ref()))
+                answer_json(record::live(&now, job.as_ref()))
             }
             Err(why) => refused(why),
         }
@@ -445,7 +442,7 @@ async fn call(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
     let unusable =
         |says: &str, help: &str| refused(Refused::Unusable(Failure::new("workbench::call", says).help(help)));
     // a word of the table, and never a path
-    if !shared.host.controllers().contains(&asked.controller) {
+    if !Desk::controllers().contains(&asked.controller) {
         return unusable("no controller has that name", "choose one of the list");
     }
     let minutes = asked.minutes.unwrap_or(10.0);
@@ -468,7 +465,7 @@ async fn call(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
     *lock(&shared.job) = Some(began.clone());
     shared.tell("job", now.version);
     tokio::task::spawn_blocking(move || {
-        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| shared.host.call(&verb)));
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| shared.desk.call(&verb)));
         let done = match result {
             Ok(Ok(answered)) => Job { answered: Some(answered), ..began },
             Ok(Err(failure)) => Job { failed: record::messages(&failure.0), ..began },

@@ -4,19 +4,20 @@
 //! files written (the effects file before the study that names it) and the copy put in the place of the old state. A
 //! step that fails leaves everything as it was; a process that is killed leaves whole files of before or after the step.
 
+use super::desk::Desk;
 use super::draft::{self, Draft, Mistake};
-use super::shelf::{self, Shelf};
-use super::{Host, Opened, Place};
+use super::shelf::Shelf;
+use super::{Opened, Place};
 use crate::diag::{Failure, Result, source};
-use crate::fit::{self, Fit};
+use crate::fit::Fit;
 use crate::study::history::{History, Step as Rung};
-use crate::study::{Study, edit, mask};
+use crate::study::{edit, mask};
+use crate::workflow::change::Edit;
+use crate::workflow::history::step_without_validation;
 use std::sync::Arc;
 
-/// Most steps that can be undone.
 const MOST_STEPS: usize = 500;
 
-/// Why something is not done.
 #[derive(Debug)]
 pub enum Refused {
     /// It was asked of an older state; the number of the present one.
@@ -40,7 +41,6 @@ struct Files {
     effects: Option<Option<Vec<u8>>>,
 }
 
-/// A step that was made.
 #[derive(Debug, Clone)]
 struct Made {
     says: String,
@@ -48,21 +48,17 @@ struct Made {
     after: Files,
 }
 
-/// What is asked for.
 #[derive(Debug, Clone)]
 pub enum Ask {
     /// An effect into the model, or out of it.
     Switch {
-        /// Its id.
         effect: String,
-        /// In or out.
         on: bool,
     },
     /// Touches taken out.
     Mask {
         /// Run (from 0) and number of each.
         touches: Vec<(usize, u64)>,
-        /// Why.
         reason: String,
     },
     /// Touches taken back in.
@@ -72,12 +68,10 @@ pub enum Ask {
     },
     /// An effect of the user's own into the effects file, and into the model if so wanted.
     Save {
-        /// The effect.
         draft: Box<Draft>,
         /// Into the model, too?
         on: bool,
     },
-    /// The last step taken back.
     Undo,
     /// The step that was taken back made again.
     Redo,
@@ -86,11 +80,9 @@ pub enum Ask {
 /// A state as others see it: nothing in it changes any more.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
-    /// Number of the state.
     pub version: u64,
     /// Number of the reading: touches and effects are the same while it is.
     pub inputs: u64,
-    /// The study.
     pub opened: Arc<Opened>,
     /// Its fit, without the figures that need the whole catalogue.
     pub fit: Arc<Fit>,
@@ -104,9 +96,8 @@ pub struct Snapshot {
     pub fit_ms: f64,
 }
 
-/// The study that is being worked on.
 pub struct Session {
-    host: Arc<dyn Host>,
+    desk: Arc<Desk>,
     shelf: Arc<Shelf>,
     state: Snapshot,
     past: Vec<Made>,
@@ -121,14 +112,14 @@ impl Session {
     ///
     /// # Errors
     /// When it cannot be read or fitted.
-    pub fn open(host: Arc<dyn Host>) -> Result<Self> {
-        let opened = host.open()?;
-        let mark = host.mark(&opened.study);
+    pub fn open(desk: Arc<Desk>) -> Result<Self> {
+        let opened = desk.open()?;
+        let mark = desk.mark(&opened.study);
         let shelf = Arc::new(Shelf::default());
-        let (fit, fit_ms) = shelf.fit(&opened, 1, shelf::settings(&opened))?;
+        let (fit, fit_ms) = shelf.fit(&opened, 1, opened.quick_settings())?;
         let mut opened = opened;
         let ladder = opened.history.clone();
-        opened.history.push(rung(&opened, &fit));
+        opened.history.push(step_without_validation(&opened, &fit));
         let state = Snapshot {
             version: 1,
             inputs: 1,
@@ -139,7 +130,7 @@ impl Session {
             fault: None,
             fit_ms,
         };
-        Ok(Self { host, shelf, state, past: Vec::new(), future: Vec::new(), mark, ladder })
+        Ok(Self { desk, shelf, state, past: Vec::new(), future: Vec::new(), mark, ladder })
     }
 
     /// The models that were fitted already.
@@ -148,7 +139,6 @@ impl Session {
         self.shelf.clone()
     }
 
-    /// The present state.
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
@@ -176,7 +166,7 @@ impl Session {
             Ask::Save { draft, on } => self.save(&draft, on)?,
             Ask::Switch { .. } | Ask::Mask { .. } | Ask::Unmask { .. } => {
                 let (text, says) = self.edited(&ask)?;
-                let after = Files { study: self.with_mark(&text), effects: None };
+                let after = Files { study: self.state.opened.with_text(&text)?.bytes, effects: None };
                 self.make(says, after)?;
             }
         }
@@ -185,7 +175,7 @@ impl Session {
 
     /// Looks at the disk: has somebody else changed the study? True when the state has changed.
     pub fn follow(&mut self) -> bool {
-        let mark = self.host.mark(&self.state.opened.study);
+        let mark = self.desk.mark(&self.state.opened.study);
         if mark == self.mark {
             return false;
         }
@@ -196,7 +186,7 @@ impl Session {
             Ok((mut opened, fit, fit_ms)) => {
                 self.state.fault = None;
                 // the files may name others than before
-                self.mark = self.host.mark(&opened.study);
+                self.mark = self.desk.mark(&opened.study);
                 if opened.bytes != self.state.opened.bytes {
                     let made = Made {
                         says: "change of the study's file".into(),
@@ -206,7 +196,7 @@ impl Session {
                     self.remember(made);
                 }
                 self.ladder = opened.history.clone();
-                opened.history.push(rung(&opened, &fit));
+                opened.history.push(step_without_validation(&opened, &fit));
                 self.state.inputs += 1;
                 self.state.opened = Arc::new(opened);
                 self.state.fit = fit;
@@ -223,7 +213,11 @@ impl Session {
             return;
         }
         let mut opened = Opened::clone(&self.state.opened);
-        let step = Rung { held_out_rms_um: by_visit, later_run_rms_um: later_run, ..rung(&opened, &self.state.fit) };
+        let step = Rung {
+            held_out_rms_um: by_visit,
+            later_run_rms_um: later_run,
+            ..step_without_validation(&opened, &self.state.fit)
+        };
         opened.history.push(step);
         self.state.opened = Arc::new(opened);
         self.write_ladder(version);
@@ -242,8 +236,8 @@ impl Session {
 
     /// Puts the models that were tried here behind those that others have written meanwhile.
     fn merge_ladder(&mut self) -> Result<()> {
-        let _alone = self.host.alone()?;
-        let there = match self.host.read(Place::History)? {
+        let _alone = self.desk.alone()?;
+        let there = match self.desk.read(Place::History)? {
             Some(bytes) => {
                 let text = String::from_utf8_lossy(&bytes).into_owned();
                 History::parse(&source("the history of the study", text))?
@@ -252,7 +246,7 @@ impl Session {
         };
         let own = &self.state.opened.history;
         let merged = if there == self.ladder { own.clone() } else { there.followed_by(own, &self.ladder) };
-        self.host.write(Place::History, Some(merged.to_json()?.as_bytes()))?;
+        self.desk.write(Place::History, Some(merged.to_json()?.as_bytes()))?;
         let mut opened = Opened::clone(&self.state.opened);
         opened.history.clone_from(&merged);
         self.state.opened = Arc::new(opened);
@@ -260,31 +254,17 @@ impl Session {
         Ok(())
     }
 
-    fn text(&self) -> Result<String> {
-        let bytes = &self.state.opened.bytes;
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        String::from_utf8(bytes.to_vec()).map_err(|_| Failure::new("study::not_text", "the study is not text"))
-    }
-
-    /// A mark at the beginning of the file is no part of the text, but of the file.
-    fn with_mark(&self, text: &str) -> Vec<u8> {
-        let mark: &[u8] = if self.state.opened.bytes.starts_with(b"\xef\xbb\xbf") { b"\xef\xbb\xbf" } else { b"" };
-        [mark, text.as_bytes()].concat()
-    }
-
     /// The text of the study with what is asked for, and what that is in words.
     fn edited(&self, ask: &Ask) -> Result<(String, String)> {
-        let text = self.text()?;
+        let text = self.state.opened.text();
         let opened = &self.state.opened;
         let count = |n: usize| if n == 1 { "1 touch".to_owned() } else { format!("{n} touches") };
         match ask {
             Ask::Switch { effect, on: true } => {
-                applies(opened, effect)?;
-                Ok((edit::add(&text, std::slice::from_ref(effect))?, format!("{effect} on")))
+                Ok((Edit::Add(std::slice::from_ref(effect)).text(opened)?, format!("{effect} on")))
             }
             Ask::Switch { effect, on: false } => {
-                nothing_said_of(opened, effect)?;
-                Ok((edit::remove(&text, std::slice::from_ref(effect))?, format!("{effect} off")))
+                Ok((Edit::Remove(std::slice::from_ref(effect)).text(opened)?, format!("{effect} off")))
             }
             Ask::Mask { touches, reason } => {
                 every_touch_exists(opened, touches)?;
@@ -307,8 +287,8 @@ impl Session {
     fn save(&mut self, draft: &Draft, on: bool) -> std::result::Result<(), Refused> {
         let opened = &self.state.opened;
         let typed = draft::check(draft, &opened.catalogue, &opened.study.effects).map_err(Refused::Mistakes)?;
-        let file = self.host.effects_file(&opened.study);
-        let before = self.host.read(Place::Effects)?;
+        let file = Desk::effects_file(&opened.study);
+        let before = self.desk.read(Place::Effects)?;
         let old = String::from_utf8(before.clone().unwrap_or_default())
             .map_err(|_| Failure::new("workbench::effects", format!("{file} is not text")).help("save it as UTF-8"))?;
         let new = if typed.replaces {
@@ -318,11 +298,11 @@ impl Session {
         };
         // the file as a whole must be readable, or the study that names it is not
         crate::model::catalogue::Catalogue::built_in()?.add_file(&source(&file, new.clone()))?;
-        let mut text = mask::name_effects_file(&self.text()?, &file)?;
+        let mut text = mask::name_effects_file(&opened.text(), &file)?;
         if on {
             text = edit::add(&text, std::slice::from_ref(&draft.id))?;
         }
-        let after = Files { study: self.with_mark(&text), effects: Some(Some(new.into_bytes())) };
+        let after = Files { study: self.state.opened.with_text(&text)?.bytes, effects: Some(Some(new.into_bytes())) };
         let before = Files { study: opened.bytes.clone(), effects: Some(before) };
         let says = format!("{} saved in {file}{}", draft.id, if on { ", and on" } else { "" });
         let made = Made { says, before, after };
@@ -372,33 +352,30 @@ impl Session {
     /// Puts files in the place of those that are there, and the state that belongs to them in the place of the old one.
     fn put(&mut self, from: &Files, to: &Files) -> Result<()> {
         // from what is compared to what is written nobody else changes the study
-        let _alone = self.host.alone()?;
+        let _alone = self.desk.alone()?;
         let changed = || {
             Failure::new("workbench::changed", "a file of the study was changed meanwhile")
                 .help("nothing was written: look at the new state and try again")
         };
-        if self.host.read(Place::Study)?.as_deref() != Some(&from.study[..]) {
+        if self.desk.read(Place::Study)?.as_deref() != Some(&from.study[..]) {
             return Err(changed());
         }
         if let Some(effects) = &from.effects
-            && self.host.read(Place::Effects)? != *effects
+            && self.desk.read(Place::Effects)? != *effects
         {
             return Err(changed());
         }
         let effects_change = to.effects.as_ref().filter(|_| to.effects != from.effects);
         let mut opened = Opened::clone(&self.state.opened);
-        opened.bytes = to.study.clone();
-        let text = String::from_utf8(to.study.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&to.study).to_vec())
-            .map_err(|_| Failure::new("study::not_text", "the study is not text"))?;
-        opened.study = Study::parse(&source(self.host.name(), text))?.0;
+        opened.loaded = opened.with_bytes(to.study.clone())?;
         let same_inputs = opened.study.data == self.state.opened.study.data
             && opened.study.machine == self.state.opened.study.machine
             && opened.study.machines == self.state.opened.study.machines
             && opened.study.effects_files == self.state.opened.study.effects_files
             && effects_change.is_none();
-        let putting = Putting { host: &*self.host, from, to, effects: effects_change };
+        let putting = Putting { desk: &self.desk, from, to, effects: effects_change };
         let (fit, fit_ms) = if same_inputs {
-            let fitted = self.shelf.fit(&opened, self.state.inputs, shelf::settings(&opened))?;
+            let fitted = self.shelf.fit(&opened, self.state.inputs, opened.quick_settings())?;
             putting.write()?;
             fitted
         } else {
@@ -416,8 +393,8 @@ impl Session {
                 }
             }
         };
-        opened.history.push(rung(&opened, &fit));
-        self.mark = self.host.mark(&opened.study);
+        opened.history.push(step_without_validation(&opened, &fit));
+        self.mark = self.desk.mark(&opened.study);
         self.state = Snapshot {
             version: self.state.version + 1,
             inputs: self.state.inputs + u64::from(!same_inputs),
@@ -433,15 +410,15 @@ impl Session {
 
     /// The study as it lies on the disk, with its fit.
     fn read_anew(&self) -> Result<(Opened, Arc<Fit>, f64)> {
-        let opened = self.host.open()?;
-        let (fit, ms) = self.shelf.fit(&opened, self.state.inputs + 1, shelf::settings(&opened))?;
+        let opened = self.desk.open()?;
+        let (fit, ms) = self.shelf.fit(&opened, self.state.inputs + 1, opened.quick_settings())?;
         Ok((opened, fit, ms))
     }
 }
 
 /// Files on their way to the disk, in an order in which the study never names what is not there.
 struct Putting<'a> {
-    host: &'a dyn Host,
+    desk: &'a Desk,
     from: &'a Files,
     to: &'a Files,
     effects: Option<&'a Option<Vec<u8>>>,
@@ -461,51 +438,19 @@ impl Putting<'_> {
         match effects {
             // a longer file goes before the study that uses it, a shorter one behind the study that no longer does
             Some(Some(bytes)) if bytes.len() >= self.size_there() => {
-                self.host.write(Place::Effects, Some(bytes))?;
-                self.host.write(Place::Study, Some(&files.study))
+                self.desk.write(Place::Effects, Some(bytes))?;
+                self.desk.write(Place::Study, Some(&files.study))
             }
             Some(effects) => {
-                self.host.write(Place::Study, Some(&files.study))?;
-                self.host.write(Place::Effects, effects)
+                self.desk.write(Place::Study, Some(&files.study))?;
+                self.desk.write(Place::Effects, effects)
             }
-            None => self.host.write(Place::Study, Some(&files.study)),
+            None => self.desk.write(Place::Study, Some(&files.study)),
         }
     }
 
     fn size_there(&self) -> usize {
-        self.host.read(Place::Effects).ok().flatten().map_or(0, |b| b.len())
-    }
-}
-
-/// A fit as a step of the ladder; the errors on touches left out follow.
-fn rung(opened: &Opened, fit: &Fit) -> Rung {
-    Rung {
-        effects: opened.study.effects.clone(),
-        rms_um: fit.outcome.rms_um,
-        held_out_rms_um: None,
-        later_run_rms_um: None,
-        chi2_per_dof: fit.outcome.chi2_per_dof,
-        unknowns: fit.outcome.unknowns,
-        data_sha256: opened.data_sha256.clone(),
-        ..Rung::default()
-    }
-}
-
-fn applies(opened: &Opened, id: &str) -> Result<()> {
-    if opened.study.effects.iter().any(|e| e == id) {
-        return Err(Failure::new("study::in_model", format!("effect {id:?} is in the model already")));
-    }
-    fit::effects_of(&[id.to_owned()], &opened.catalogue, &opened.machine).map(|_| ())
-}
-
-/// What the study says of a parameter would be said of nothing.
-fn nothing_said_of(opened: &Opened, id: &str) -> Result<()> {
-    let Some(effect) = opened.catalogue.get(id, &opened.machine) else { return Ok(()) };
-    let gone = |name: &String| effect.parameters.iter().any(|p| crate::symbols::same(&p.name, name));
-    match opened.study.knowledge.keys().find(|k| gone(k)) {
-        None => Ok(()),
-        Some(name) => Err(Failure::new("study::still_said", format!("the study says something of {name}"))
-            .help(format!("take [model.parameters.{name}] out of the study first"))),
+        self.desk.read(Place::Effects).ok().flatten().map_or(0, |b| b.len())
     }
 }
 

@@ -13,14 +13,12 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-/// Fits that are kept.
 const MOST_FITS: usize = 32;
 /// Touches of all fits that are kept: some hundred megabytes.
 const MOST_TOUCHES: usize = 160_000;
 /// Candidates that are fitted before anybody asks.
 const AHEAD: usize = 3;
 
-/// A model that was fitted.
 struct Kept {
     /// Number of the reading.
     inputs: u64,
@@ -33,12 +31,6 @@ struct Kept {
 #[derive(Default)]
 pub struct Shelf {
     kept: Mutex<VecDeque<Kept>>,
-}
-
-/// The settings of a study without the figures that need the whole catalogue.
-#[must_use]
-pub fn settings(opened: &Opened) -> Settings {
-    Settings { quick: true, ..opened.study.settings() }
 }
 
 impl Shelf {
@@ -74,19 +66,18 @@ impl Shelf {
     /// What the touches say beside a state, where it was worked out before.
     #[must_use]
     pub fn behind(&self, now: &Snapshot) -> Option<Behind> {
-        let found = self.with(now.inputs, &settings(&now.opened), |kept| kept.behind.clone())??;
+        let found = self.with(now.inputs, &now.opened.quick_settings(), |kept| kept.behind.clone())??;
         Some(Behind { version: now.version, ms: 0.0, ..found })
     }
 
-    /// Keeps it.
     pub fn keep_behind(&self, now: &Snapshot, behind: &Behind) {
-        self.with(now.inputs, &settings(&now.opened), |kept| kept.behind = Some(behind.clone()));
+        self.with(now.inputs, &now.opened.quick_settings(), |kept| kept.behind = Some(behind.clone()));
     }
 
     /// Fits what is likely to be clicked next: the first candidates switched on, then each effect switched off, the last
     /// one first. Ends as soon as `wanted` says so.
     pub fn ahead(&self, now: &Snapshot, behind: &Behind, wanted: impl Fn() -> bool) {
-        let base = settings(&now.opened);
+        let base = now.opened.quick_settings();
         let with = behind.diagnosis.iter().flat_map(|d| &d.candidates).take(AHEAD).map(|c| {
             let mut effects = base.effects.clone();
             effects.push(c.effect.clone());

@@ -3,8 +3,6 @@
 
 use crate::common;
 
-use axiscal::cli::Io;
-use axiscal::cli::load::{load_plan, load_study};
 use axiscal::diag::{Failure, Finding};
 use axiscal::log::Status;
 use axiscal::machine::Machine;
@@ -12,11 +10,11 @@ use axiscal::post::{LogRecord, Postprocessor};
 use axiscal::program::plan::Plan;
 use axiscal::program::plan_digest;
 use axiscal::simulate::{self, Scenario};
+use axiscal::workflow::{Disk, load_plan, load_study};
 use common::{machine, plan, verbs};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Mutex;
 
 /// A run with its study in a folder.
 struct Job {
@@ -71,7 +69,7 @@ impl Job {
 
     /// As `identify --quick --json` does it.
     fn identify(&self) -> Result<String, Failure> {
-        let loaded = load_study(&self.folder.path().join("study.toml"), &silent())?;
+        let loaded = load_study(&self.folder.path().join("study.toml"), &Disk::default())?;
         let fit = loaded.fit(&axiscal::fit::Settings { bare: true, ..loaded.settings() })?;
         Ok(serde_json::to_string(&fit.outcome).unwrap())
     }
@@ -95,7 +93,7 @@ impl Job {
     fn refusal(&self, text: &str) -> Option<Vec<Finding>> {
         std::fs::write(self.plan_file(), text).unwrap();
         // the study reads its plans in the same way, and much besides: most edits end here
-        if let Err(Failure(findings)) = load_plan(&self.plan_file(), &self.machine, &silent()) {
+        if let Err(Failure(findings)) = load_plan(&self.plan_file(), &self.machine, &Disk::default()) {
             return Some(findings);
         }
         match self.identify() {
@@ -153,11 +151,6 @@ fn numbers(value: &Value, pointer: &str, out: &mut Vec<String>) {
         Value::Object(fields) => fields.iter().for_each(|(key, v)| numbers(v, &format!("{pointer}/{key}"), out)),
         _ => {}
     }
-}
-
-/// Findings are not printed.
-fn silent() -> Io {
-    Io { heard: Some(Box::leak(Box::new(Mutex::new(Vec::new())))), ..Io::new(true) }
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod bad_input;
 mod common;
 mod dependencies;
 mod files;
+mod library;
 mod many_findings;
 mod report;
 mod rooms;

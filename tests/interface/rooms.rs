@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 const ORDER: &str = "units diag probability geometry symbols axes keys files machine program post log model search simulate \
-                     fit tables paper study compare design diagnose check report view plots page workflow workbench cli";
+                     fit tables paper study compare design diagnose check report view plots page workflow prelude workbench cli";
 
 /// Rooms that may import these rooms and no others.
 const ONLY: [(&str, &str); 3] = [

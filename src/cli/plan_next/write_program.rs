@@ -1,13 +1,15 @@
 //! What was chosen, for the person who waits: the files, and what they will tell.
 
-use super::choose::{Chosen, SAFELY};
-use super::{Answer, Args, Io, Loaded, relative};
-use crate::design::questions::Questions;
+use super::{Answer, Args, Io};
 use crate::diag::Result;
 use crate::files;
 use crate::post::Postprocessor;
 use crate::program;
 use crate::report::fit::{number, significant};
+use crate::workflow::Loaded;
+use crate::workflow::generate::prove;
+use crate::workflow::new::relative;
+use crate::workflow::plan_next::{Program, SAFELY};
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::Path;
@@ -21,8 +23,7 @@ pub(super) fn write(
     loaded: &Loaded,
     post: &Postprocessor,
     plan_file: &Path,
-    questions: &Questions,
-    chosen: &Chosen,
+    Program { questions, chosen }: &Program,
     io: &Io,
 ) -> Result<Answer> {
     let plan = &chosen.generated.plan;
@@ -31,7 +32,7 @@ pub(super) fn write(
     let program_file = args.out.join(format!("{}.{}", plan.program, nc.extension));
     let form_file = args.out.join(format!("{}.toml", plan.program));
     let name = format!("{}.{}", plan.program, nc.extension);
-    let proof = crate::cli::generate::prove(&loaded.machine, post, plan, &name, &nc, io)?;
+    let proof = prove(&loaded.machine, post, plan, &name, &nc, io)?;
     let mut proven = plan.clone();
     proven.blocks_anew = chosen.label.is_none();
     proven.programs.extend(proof.map(|(p, _)| (post.name.clone(), p)));
@@ -91,7 +92,6 @@ pub(super) fn write(
     for pair in &chosen.never {
         io.say(format!("no touches of this machine tell {pair} apart: look at the machine which it is"));
     }
-    let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let log = args.out.join(format!("{}.log", plan.program));
     io.say(format!(
         "written: {}\n         {}\n         {}",
@@ -106,7 +106,12 @@ pub(super) fn write(
         args.controller,
         if args.moved { "--moved " } else { "" },
         log.display(),
-        entry(&relative(plan_file, &folder), &relative(&log, &folder), &args.controller, chosen.label.as_deref())
+        entry(
+            &relative(plan_file, loaded.folder()),
+            &relative(&log, loaded.folder()),
+            &args.controller,
+            chosen.label.as_deref()
+        )
     ));
     io.answer(&json!({
         "format": "axiscal-next/1",

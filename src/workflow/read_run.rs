@@ -1,10 +1,8 @@
 //! A run's plan and log, read: what is to be said of them is kept for who says it in the order of the study.
 
-use super::controller_path;
-use crate::cli::common::{Io, load_machine};
-use crate::diag::{Failure, Finding, Findings, Result, source};
-use crate::files;
-use crate::log::{self, Touch};
+use super::{Environment, load_machine};
+use crate::diag::{Failure, Finding, Findings, Result};
+use crate::log::{self, MatchedLog, Touch};
 use crate::machine::Machine;
 use crate::program::plan::Plan;
 use crate::program::{plan_check, plan_digest};
@@ -16,10 +14,9 @@ use std::path::Path;
 ///
 /// # Errors
 /// When it is unusable or for another machine.
-pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
-    let mut read = ReadPlan::read(path)?;
-    read.check_belongs(path, machine)?;
-    io.report(&read.findings);
+pub fn load_plan(path: &Path, machine: &Machine, env: &dyn Environment) -> Result<Plan> {
+    let mut read = ReadPlan::read(path, env)?;
+    read.check_belongs(path, machine, env)?;
     Ok(read.plan)
 }
 
@@ -27,20 +24,16 @@ pub fn load_plan(path: &Path, machine: &Machine, io: &Io) -> Result<Plan> {
 ///
 /// # Errors
 /// When one of them is unusable.
-pub fn load_plan_and_machine(path: &Path, machines: Option<&Path>, io: &Io) -> Result<(Plan, Machine)> {
-    let mut read = ReadPlan::read(path)?;
-    let machine = load_machine(&read.plan.machine, machines, io)?;
-    read.check_belongs(path, &machine)?;
-    io.report(&read.findings);
+pub fn load_plan_and_machine(path: &Path, machines: Option<&Path>, env: &dyn Environment) -> Result<(Plan, Machine)> {
+    let mut read = ReadPlan::read(path, env)?;
+    let machine = load_machine(&read.plan.machine, machines, env)?;
+    read.check_belongs(path, &machine, env)?;
     Ok((read.plan, machine))
 }
 
 /// A plan as it was read.
 pub(super) struct ReadPlan {
-    /// What is to be touched.
     pub plan: Plan,
-    /// What is to be said of it.
-    pub findings: Vec<Finding>,
     /// The error where it is not as it was written.
     changed: Option<Finding>,
     /// SHA-256 of the file.
@@ -52,16 +45,17 @@ impl ReadPlan {
     ///
     /// # Errors
     /// When it is unusable.
-    pub fn read(path: &Path) -> Result<Self> {
-        let src = source(path.display().to_string(), files::read_text(path)?);
+    pub fn read(path: &Path, env: &dyn Environment) -> Result<Self> {
+        let src = env.source(path)?;
         let ((plan, written), Findings(findings)) = Plan::read(&src)?;
+        env.remark(&findings);
         let fields = plan_digest::field_digests(&plan);
         let changed = plan_digest::changed(&written, &fields, &src);
         let digest = Sha256::digest(src.inner().as_bytes()).to_vec();
-        Ok(Self { plan, findings, changed, digest })
+        Ok(Self { plan, changed, digest })
     }
 
-    fn check_belongs(&mut self, path: &Path, machine: &Machine) -> Result<()> {
+    pub fn check_belongs(&mut self, path: &Path, machine: &Machine, env: &dyn Environment) -> Result<()> {
         let plan = &self.plan;
         if plan.machine != machine.name {
             return Err(Failure::new(
@@ -71,68 +65,42 @@ impl ReadPlan {
             .help("name the machine that the plan was made for, or make the plan again"));
         }
         if !plan.machine_sha256.is_empty() && plan.machine_sha256 != machine.sha256 {
-            self.findings.push(
-                Finding::warning(
-                    "plan::machine_changed",
-                    format!("the description of {:?} has changed since {} was made", machine.name, path.display()),
-                )
-                .help("if the change moves the chain, the blocks or the probe, generate the plan again"),
-            );
+            env.remark(&[Finding::warning(
+                "plan::machine_changed",
+                format!("the description of {:?} has changed since {} was made", machine.name, path.display()),
+            )
+            .help("if the change moves the chain, the blocks or the probe, generate the plan again")]);
         }
         // which field was changed, and at which touch that can be seen
         let mut wrong: Vec<Finding> = self.changed.take().into_iter().collect();
         let faults = plan_check::on_machine(plan, machine);
         if !faults.is_empty() {
             // the text was not kept: it is read once more for the places
-            let src = source(path.display().to_string(), files::read_text(path)?);
+            let src = env.source(path)?;
             wrong.extend(faults.findings(plan, &src).0);
         }
         let ((), said) = Findings(wrong).finish(())?;
-        self.findings.extend(said.0);
+        env.remark(&said.0);
         Ok(())
     }
 }
 
-/// A log as it was read.
-pub(super) struct ReadLog {
-    /// What is to be said of it, usable or not.
-    pub findings: Vec<Finding>,
-    /// Matched to its plan.
-    pub touches: Result<Vec<Touch>>,
-    /// SHA-256 of the file.
-    pub digest: Vec<u8>,
-}
-
-/// Plan and log of a run as they were read.
-pub(super) struct ReadRun {
-    /// Its plan, which is for the study's machine.
-    pub plan: ReadPlan,
-    /// Its log.
-    pub log: Result<ReadLog>,
-}
-
-impl ReadRun {
-    /// Plan and log of an entry of a study.
-    ///
-    /// # Errors
-    /// When the plan is unusable or for another machine.
-    pub fn read(entry: &DataEntry, folder: &Path, machine: &Machine) -> Result<Self> {
-        let plan_path = folder.join(&entry.plan);
-        let mut plan = ReadPlan::read(&plan_path)?;
-        plan.check_belongs(&plan_path, machine)?;
-        let path = folder.join(&entry.log);
-        let log = files::read_bytes(&path).map(|bytes| {
-            let controller = controller_path(&entry.controller, folder);
-            let (findings, mut touches) = matched(&bytes, &path, &controller, entry.run, machine, &plan.plan);
-            if let Ok(touches) = &mut touches
-                && controller != "csv"
-            {
-                on_the_study_clock(touches, &plan.plan, entry.started_s);
-            }
-            ReadLog { findings, touches, digest: Sha256::digest(&bytes).to_vec() }
-        });
-        Ok(Self { plan, log })
+/// The touches of a run of a study, on the study's clock.
+///
+/// # Errors
+/// When nothing in the log can be used.
+pub(super) fn touches_of_run(
+    entry: &DataEntry,
+    log: LogFile,
+    machine: &Machine,
+    plan: &Plan,
+    env: &dyn Environment,
+) -> Result<Vec<Touch>> {
+    let mut touches = log.read(machine, plan, env)?.touches;
+    if log.controller != "csv" {
+        on_the_study_clock(&mut touches, plan, entry.started_s);
     }
+    Ok(touches)
 }
 
 /// Times of a control's own clock, whose zero nobody knows → the study's clock: the first touch is where the plan has it.
@@ -156,43 +124,37 @@ fn on_the_study_clock(touches: &mut [Touch], plan: &Plan, started_s: Option<f64>
     }
 }
 
-/// Reads a log (or touches CSV), of several runs the last complete one, and matches it to its plan.
-///
-/// # Errors
-/// When nothing in it can be used.
-pub fn read_log(
-    bytes: &[u8],
-    path: &Path,
-    controller: &str,
-    machine: &Machine,
-    plan: &Plan,
-    io: &Io,
-) -> Result<Vec<Touch>> {
-    let (findings, touches) = matched(bytes, path, controller, None, machine, plan);
-    io.report(&findings);
-    touches
+/// A controller's log, a touches CSV or an inspection result, and what it is.
+#[derive(Debug, Clone, Copy)]
+pub struct LogFile<'a> {
+    pub bytes: &'a [u8],
+    pub path: &'a Path,
+    /// Name of a controller, a postprocessor file, or `csv`.
+    pub controller: &'a str,
+    /// Which run, from 1; `None`: the last complete one.
+    pub run: Option<usize>,
 }
 
-/// What is to be said of a log, and its touches: of the run of this number, or of the last complete one.
-fn matched(
-    bytes: &[u8],
-    path: &Path,
-    controller: &str,
-    run: Option<usize>,
-    machine: &Machine,
-    plan: &Plan,
-) -> (Vec<Finding>, Result<Vec<Touch>>) {
-    let mut findings = Vec::new();
-    let mut read = || {
-        let (reader, said) = log::Reader::load(controller, files::read_text)?;
-        findings.extend(said);
-        let name = path.display().to_string();
-        let (read, said) = log::read_run(bytes, &name, reader.writer(), machine, plan, run)?;
-        findings.extend(said.0);
-        Ok(read.touches)
-    };
-    let touches = read();
-    (findings, touches)
+impl LogFile<'_> {
+    /// Reads it and matches it to its plan.
+    ///
+    /// # Errors
+    /// When nothing in it can be used.
+    pub fn read(&self, machine: &Machine, plan: &Plan, env: &dyn Environment) -> Result<MatchedLog> {
+        let (reader, said) = log::Reader::load(self.controller, |path| env.text(path))?;
+        env.remark(&said);
+        let name = self.path.display().to_string();
+        let (read, said) = log::read_run(self.bytes, &name, reader.writer(), machine, plan, self.run)?;
+        env.remark(&said.0);
+        Ok(read)
+    }
+}
+
+/// A controller is a name, or a postprocessor file relative to the study.
+#[must_use]
+pub fn controller_path(word: &str, folder: &Path, env: &dyn Environment) -> String {
+    let file = folder.join(word);
+    if word.ends_with(".toml") && env.exists(&file) { file.display().to_string() } else { word.to_owned() }
 }
 
 #[cfg(test)]

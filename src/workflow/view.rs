@@ -1,18 +1,17 @@
-//! From a study to what is looked at: the report and the workbench begin here.
+//! From a study to everything that a person sees of it.
 
-use super::add::{history_path, read_history};
-use super::compare::leads;
-use super::export::newest_log;
-use super::load::Loaded;
+use super::examine::leads;
+use super::export::{correction, newest_log};
+use super::{Environment, Loaded};
 use crate::compare::model_ladder::{Kind, Ladder, Rung, climb};
 use crate::compare::{Comparison, compare};
+use crate::design;
 use crate::diag::Result;
-use crate::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose, with_effects};
-use crate::fit::{Fit, Settings};
+use crate::diagnose::{Diagnosis, Options, Verdict, with_effects};
+use crate::fit::Fit;
+use crate::study::history::History;
 use crate::tables::Correction;
-use crate::tables::compensation::{Compensation, Provenance};
 use crate::view::{Material, RunFiles, View, gather};
-use crate::{design, study::history::History};
 
 /// Everything that was worked out for a view; what it borrows is in [`Loaded`].
 pub struct Worked {
@@ -20,7 +19,6 @@ pub struct Worked {
     pub fit: Fit,
     /// The fit with what the diagnosis proposes.
     pub proposed: Option<Fit>,
-    /// Where it fails.
     pub comparison: Comparison,
     /// What is missing.
     pub diagnosis: Diagnosis,
@@ -36,16 +34,11 @@ pub struct Worked {
 ///
 /// # Errors
 /// When the study cannot be fitted.
-pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
+pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environment) -> Result<Worked> {
     let settings = loaded.settings();
     let mut fit = loaded.fit(&settings)?;
     design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
-    let diagnosis = {
-        let quick = Settings { quick: true, ..settings.clone() };
-        let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &quick, fit: &fit };
-        let planned = loaded.planned();
-        diagnose(subject, &Options { planned: Some(&planned), ..Options::default() })?
-    };
+    let diagnosis = loaded.diagnose(&settings, &fit, &Options::default())?;
     let tried: Vec<Vec<String>> =
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();
     let mut ladder = climb(&loaded.machine, &loaded.catalogue, &settings, &fit, &tried);
@@ -53,10 +46,8 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
     if diagnosis.verdict == Verdict::MissingEffect
         && let Some(first) = diagnosis.candidates.first().filter(|c| c.proposed)
     {
-        let subject =
-            Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit: &fit };
         // a candidate that cannot be fitted beside the others is still a candidate
-        match with_effects(subject, &[first.effect.as_str()]) {
+        match with_effects(loaded.subject(&settings, &fit), &[first.effect.as_str()]) {
             Ok(with) => {
                 ladder.push(Rung::of(&with, Kind::Proposed));
                 proposed = Some(with);
@@ -64,36 +55,18 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
             Err(failure) => ladder.notes.push(format!("{} cannot be put beside the model: {failure}", first.effect)),
         }
     }
-    let date = newest_log(loaded);
-    let correction = correction(loaded, &fit, &date);
+    let date = newest_log(loaded, env);
+    let correction = loaded
+        .active(env)
+        .and_then(|active| correction(loaded, &fit, &date, Vec::new(), active.as_ref()))
+        .map(|(correction, _)| correction)
+        .map_err(|failure| failure.to_string());
     let comparison = compare(&fit).led_by(&leads(&diagnosis));
     Ok(Worked { comparison, proposed, diagnosis, ladder, correction, date, fit })
 }
 
-fn correction(loaded: &Loaded, fit: &Fit, date: &str) -> std::result::Result<Correction, String> {
-    let study = loaded.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let provenance =
-        Provenance { study, study_sha256: loaded.sha256.clone(), data_date: date.to_owned(), forced: Vec::new() };
-    if !fit.outcome.converged {
-        return Err(format!("the fit did not converge: {}", fit.outcome.stopped));
-    }
-    let active: Option<Compensation> = loaded.active().map_err(|f| f.to_string())?;
-    Correction::collect(&loaded.machine, &loaded.catalogue, &fit.outcome, loaded.during(active.as_ref()), provenance)
-        .map(|(correction, _)| correction)
-        .map_err(|f| f.to_string())
-}
-
-/// The history beside a study, where there is one.
-///
-/// # Errors
-/// When it is there and cannot be read.
-pub fn history_of(loaded: &Loaded) -> Result<Option<History>> {
-    read_history(&history_path(&loaded.path))
-}
-
-/// The view of what was worked out. `study` is how a user types it.
 #[must_use]
-pub fn view_of(loaded: &Loaded, worked: &Worked, study: &str) -> View {
+pub fn view_of(loaded: &Loaded, worked: &Worked) -> View {
     let runs: Vec<RunFiles> = loaded
         .runs
         .iter()
@@ -106,7 +79,7 @@ pub fn view_of(loaded: &Loaded, worked: &Worked, study: &str) -> View {
         })
         .collect();
     gather(&Material {
-        study,
+        study: &loaded.name(),
         sha256: &loaded.sha256,
         date: &worked.date,
         machine: &loaded.machine,

@@ -1,6 +1,5 @@
 //! Which touches of which blocks: chosen, proven to be reachable, and what they will tell.
 
-use super::Loaded;
 use crate::design::bundle::{Bundle, Manner, as_plan, bundles, program_text, without};
 use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
@@ -12,6 +11,7 @@ use crate::model::catalogue::Effect;
 use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
 use crate::search::distinguishability::SEEN;
+use crate::workflow::Loaded;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -22,7 +22,7 @@ const MOST_ROUNDS: usize = 5;
 const OVER: f64 = 1.02;
 
 /// A pair is promised to be told apart from this probability on.
-pub(super) const SAFELY: f64 = 0.95;
+pub const SAFELY: f64 = 0.95;
 
 /// A pair that all touches at once leave no further apart than this is one that they cannot part.
 const NOTHING: f64 = 0.1;
@@ -31,7 +31,7 @@ const NOTHING: f64 = 0.1;
 const MOST_SAID: usize = 6;
 
 /// A program that was chosen and proven.
-pub(super) struct Chosen {
+pub struct Chosen {
     pub text: String,
     pub generated: Generated,
     pub separations: Vec<Separation>,
