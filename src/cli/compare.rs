@@ -48,7 +48,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     )?;
     let leads = leads(&found);
     let mut comparison = compare::compare(&fit).led_by(&leads);
-    if found.most_missed {
+    if found.verdict.most_touches_unusable() {
         comparison.says.clone_from(&found.says);
     }
     if let Some(path) = &args.csv {

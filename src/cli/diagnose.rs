@@ -4,7 +4,7 @@ use super::common::of_fit;
 use super::load::load_study;
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::diagnose::{Options, Subject, Verdict, diagnose};
+use crate::diagnose::{Options, Subject, diagnose};
 use std::path::PathBuf;
 
 /// Arguments of `diagnose`.
@@ -36,6 +36,5 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii)).trim_end());
     super::next::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
     io.answer(&found);
-    let no = matches!(found.verdict, Verdict::MissingEffect | Verdict::Unexplained) || found.most_missed;
-    Ok(of_fit(&fit.outcome, if no { Answer::No } else { Answer::Done }, io))
+    Ok(of_fit(&fit.outcome, if found.verdict.is_no() { Answer::No } else { Answer::Done }, io))
 }

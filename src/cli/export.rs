@@ -5,7 +5,7 @@ use super::{Answer, Io};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Result, Source, source};
 use crate::diagnose::consequence::Consequence;
-use crate::diagnose::{self, Diagnosis, Subject, Verdict};
+use crate::diagnose::{self, Diagnosis, Subject};
 use crate::files;
 use crate::fit::outcome::Undetermined;
 use crate::fit::{Fit, Settings};
@@ -221,15 +221,12 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
     let subject = Subject { machine: &loaded.machine, catalogue: &loaded.catalogue, settings: &settings, fit };
     let options = diagnose::Options { at_most: 1, refit: false, power: false, ..diagnose::Options::default() };
     let found = diagnose::diagnose(subject, &options)?;
-    let word = match found.verdict {
-        Verdict::Adequate => return Ok(Judged::default()),
-        Verdict::TooLittleData if !found.most_missed => return Ok(Judged::default()),
-        Verdict::TooLittleData => "too-little-data",
-        Verdict::MissingEffect => "missing-effect",
-        Verdict::Unexplained => "unexplained",
-    };
+    if !found.verdict.is_no() {
+        return Ok(Judged::default());
+    }
+    let word = found.verdict.as_str();
     let doubts = doubts(loaded, &found);
-    let named = found.candidates.first().filter(|_| found.verdict == Verdict::MissingEffect);
+    let named = found.candidates.first().filter(|_| found.verdict.is_missing_effect());
     let named = named.map_or_else(String::new, |c| format!(" ({})", c.effect));
     let radius_mm = loaded.study.tolerance.radius_mm;
     let refused = match (found.mistake(), doubts.first()) {
@@ -238,7 +235,7 @@ fn judged(loaded: &Loaded, fit: &Fit, settings: &Settings, args: &Args, io: &Io)
         (None, worst) => {
             let most = worst.map_or_else(|| "no exported value depends on it".to_owned(), |d| d.says(radius_mm));
             let says = format!("the diagnosis is {word}{named}; the largest consequence: {most}");
-            let remark = if found.faint {
+            let remark = if found.verdict.is_weak_pattern() {
                 Finding::info("export::verdict", says)
             } else {
                 Finding::warning("export::verdict", says)

@@ -60,6 +60,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
     let study = quoted(&loaded.path);
     let add =
         |effect: &str| format!("  either way this takes it out of the other errors: axiscal add {study} {effect}");
+    let sketchable = found.verdict.unexplained().is_some_and(|u| u.sketchable);
     match found.next_step() {
         NextStep::CorrectSetupMistake => {
             vec!["next: put that right and measure again; smaller errors can be spoken of afterwards".to_owned()]
@@ -69,10 +70,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             vec![format!("next: look at the machine whether it is that, or whether {other}"), add(&first.effect)]
         }
         NextStep::CheckWhich(first) => {
-            let how = match first.tell_apart.as_str() {
-                crate::diagnose::NEVER_PARTED => "look at the machine which of them it is: no touches tell",
-                other => other,
-            };
+            let how = "check at the machine which of them it is: no touches separate them";
             vec![format!("next: {how}"), add(&first.effect)]
         }
         // which of them it is, is for touches or a person to say
@@ -90,14 +88,14 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             ]
         }
         NextStep::MeasureMore => {
-            let sketch = found.sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
+            let sketch = sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
             std::iter::once(format!("next: {}", plan_next(loaded))).chain(sketch).collect()
         }
         NextStep::Sketch => vec![format!("next: {}", sketch_effect(loaded))],
         NextStep::CorrectAtMachine(check) => {
             let sketch = || format!("  or, to take it out of the other errors: {}", sketch_effect(loaded));
             let what = format!("next: {}", words::machine_check(check));
-            std::iter::once(what).chain(found.sketchable.then(sketch)).collect()
+            std::iter::once(what).chain(sketchable.then(sketch)).collect()
         }
         NextStep::Nothing => Vec::new(),
     }

@@ -14,7 +14,7 @@ use crate::fit::outcome::{Outcome, Parameter};
 use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, significant};
 use crate::search::groups::PLAUSIBLE;
-use crate::words::diagnose::{list, one_of};
+use crate::words::diagnose::{list, machine_check, one_of};
 use serde::Serialize;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
@@ -41,6 +41,7 @@ struct Solution {
     /// Why the loop ended.
     stopped: String,
     /// Verdict of the last model, which is the study's.
+    #[serde(flatten)]
     verdict: Verdict,
     /// The same in a sentence.
     says: String,
@@ -173,7 +174,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let solution = Solution {
         format: "axiscal-solution/1",
         open: open(&steps, &found, &fit.outcome),
-        verdict: found.verdict,
+        verdict: found.verdict.clone(),
         says: found.says.clone(),
         models,
         stopped,
@@ -188,8 +189,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     tell(&solution, &fit, &loaded, found.mistake().is_some(), io);
     io.answer(&solution);
-    let no = matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) || found.most_missed;
-    Ok(of_fit(&fit.outcome, if no { Answer::No } else { Answer::Done }, io))
+    Ok(of_fit(&fit.outcome, if found.verdict.is_no() { Answer::No } else { Answer::Done }, io))
 }
 
 /// The model's cross-validated error, in words.
@@ -225,7 +225,7 @@ fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
             "no known effect explains what is left{beside}: {add}`{}` writes its curve as a formula",
             super::next::sketch_effect(loaded)
         ),
-        Stop::Unexplained(check) => format!("no known effect explains what is left{beside}: {check}"),
+        Stop::Unexplained(check) => format!("no known effect explains what is left{beside}: {}", machine_check(check)),
         Stop::TooLittleData => "too few touches to judge".to_owned(),
         Stop::NotConfirmed => "what is missing is not borne out".to_owned(),
         Stop::Nothing => "nothing is left that these touches can show".to_owned(),

@@ -76,12 +76,8 @@ fn still_missing(after: &Loaded, fit: &Fit) -> Result<Option<String>> {
     let settings = Settings { quick: true, ..after.settings() };
     let subject = Subject { machine: &after.machine, catalogue: &after.catalogue, settings: &settings, fit };
     let found = diagnose(subject, &Options { at_most: 1, refit: false, power: false, planned: None })?;
-    let fails = match found.verdict {
-        diagnose::Verdict::MissingEffect => true,
-        diagnose::Verdict::Unexplained => !found.faint,
-        _ => false,
-    };
-    let missing = fails || found.mistake().is_some();
+    let fails = matches!(found.verdict, diagnose::Verdict::MissingEffect(_) | diagnose::Verdict::Unexplained(_));
+    let missing = (fails && !found.verdict.is_weak_pattern()) || found.mistake().is_some();
     Ok(missing.then(|| format!("`axiscal diagnose` says of the study after: {}", found.says)))
 }
 

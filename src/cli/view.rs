@@ -7,7 +7,7 @@ use super::load::Loaded;
 use crate::compare::model_ladder::{Kind, Ladder, Rung, climb};
 use crate::compare::{Comparison, compare};
 use crate::diag::Result;
-use crate::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose, with_effects};
+use crate::diagnose::{Diagnosis, Options, Subject, diagnose, with_effects};
 use crate::fit::{Fit, Settings};
 use crate::tables::Correction;
 use crate::tables::compensation::{Compensation, Provenance};
@@ -50,7 +50,7 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();
     let mut ladder = climb(&loaded.machine, &loaded.catalogue, &settings, &fit, &tried);
     let mut proposed = None;
-    if diagnosis.verdict == Verdict::MissingEffect
+    if diagnosis.verdict.is_missing_effect()
         && let Some(first) = diagnosis.candidates.first().filter(|c| c.proposed)
     {
         let subject =

@@ -94,12 +94,12 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         })
         .collect::<Result<_>>()?;
     let remedies: Vec<Remedy> = tried.iter().filter_map(|t| t.remedy.clone()).collect();
-    let parted_together = part(&results.directions(&observability), &remedies, &mut undetermined);
+    let together = part(&results.directions(&observability), &remedies, &mut undetermined);
     let absorbed = Absorbed::new(&view);
     let mut effects: Vec<Seen> = Vec::new();
     let warm = |e: &Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
     let blind = |id: &str| !task.temperature && task.catalogue.get(id, task.machine).is_some_and(warm);
-    let left_out = |id: &str| view.left_out.iter().any(|(left, _)| left == id);
+    let left_out = |id: &str| view.left_out.iter().any(|left| left.effect == id);
     for (c, candidate) in view.library.candidates().iter().enumerate().filter(|(_, x)| !left_out(&x.id)) {
         let name = task.catalogue.get(&candidate.id, task.machine).map_or_else(String::new, |e| e.name.clone());
         let id = |other: usize| view.library.candidates()[other].id.clone();
@@ -151,14 +151,15 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         unknowns: alone.free.len(),
         rank: observability.rank,
         undetermined,
-        parted_together,
+        parted_together: together.variations,
+        never_determined: together.left,
         parameters,
         effects,
         alias_groups: groups,
         alias_pairs: pairs.len(),
         advice,
         compared: Vec::new(),
-        warnings: view.left_out.iter().map(|(_, says)| says.clone()).chain(of_shapes).collect(),
+        warnings: view.left_out.iter().map(crate::fit::candidates::NoValue::left_out).chain(of_shapes).collect(),
     };
     (out.score, out.says) = score::score(&out, task);
     Ok(out)

@@ -442,11 +442,9 @@ impl Pool<'_> {
                 .filter(|k| k.sum.iter().all(|(name, _)| named(name)))
                 .collect();
             if !rows.is_empty() {
-                let says = format!(
-                    "indicate the edges of block {} along the linear axes at C = 0 (a calibrated direction)",
-                    s.label
-                );
-                let says = if self.machine.axis(AxisName::C).is_some() { says } else { says.replace(" at C = 0", "") };
+                let at = if self.machine.axis(AxisName::C).is_some() { " at C = 0" } else { "" };
+                let says =
+                    format!("indicate the edges of block {} along the linear axes{at} (a calibrated direction)", s.label);
                 known.push(("calibrated-direction", says, rows));
             }
         }

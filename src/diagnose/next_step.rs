@@ -1,7 +1,7 @@
 //! What to do after a diagnosis. The terminal, the page and the workbench say the same decision.
 
-use super::answer::{Candidate, Diagnosis};
-use super::{Verdict, scatter_leads};
+use super::answer::{Candidate, Diagnosis, Finding, Where};
+use super::verdict::{NotNamed, Verdict};
 
 /// What to do next.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,7 @@ pub enum NextStep<'d> {
     /// Measure further touches: they tell whether a weak pattern is there, or whether the effect in question acts.
     MeasureMore,
     /// Correct what no formula describes at the machine.
-    CorrectAtMachine(MachineCheck<'d>),
+    CorrectAtMachine(&'d MachineCheck),
     /// Write what is seen as a formula.
     Sketch,
     /// Nothing that a diagnosis asks for.
@@ -27,14 +27,14 @@ pub enum NextStep<'d> {
 }
 
 /// What to check at the machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MachineCheck<'d> {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MachineCheck {
     /// These faces are dirty, or their block has another size.
-    NamedFaces(&'d [String]),
-    /// This block is dirty, loose or has another size.
-    NamedBlock(&'d str),
+    NamedFaces(Vec<String>),
+    /// These blocks are dirty, loose or have another size, the worst first.
+    NamedBlocks(Vec<String>),
     /// This block moved.
-    MovedBlock(&'d str),
+    MovedBlock(String),
     /// Some faces are dirty.
     Faces,
     /// Some block is dirty or loose.
@@ -60,8 +60,8 @@ impl Diagnosis {
         if self.mistake().is_some() {
             return NextStep::CorrectSetupMistake;
         }
-        match self.verdict {
-            Verdict::MissingEffect => match self.candidates.first().filter(|c| c.proposed) {
+        match &self.verdict {
+            Verdict::MissingEffect(_) => match self.candidates.first().filter(|c| c.proposed) {
                 None => NextStep::Nothing,
                 Some(first) if first.same_as.is_empty() => match &first.or_else {
                     None => NextStep::Add(first),
@@ -70,36 +70,31 @@ impl Diagnosis {
                 Some(first) if first.never_parted => NextStep::CheckWhich(first),
                 Some(first) => NextStep::Separate(first),
             },
-            Verdict::Unexplained if self.leaves_open() || (self.faint && self.touches_would_tell()) => {
-                NextStep::MeasureMore
+            Verdict::Unexplained(found) => {
+                let formula = found.sketchable && self.verdict.moved_block().is_none();
+                match found.why {
+                    _ if self.leaves_open() => NextStep::MeasureMore,
+                    NotNamed::WeakPattern if formula => NextStep::MeasureMore,
+                    _ if formula => NextStep::Sketch,
+                    _ => NextStep::CorrectAtMachine(&found.check),
+                }
             }
-            Verdict::Unexplained if self.sketchable && self.moved_block.is_none() => NextStep::Sketch,
-            Verdict::Unexplained => NextStep::CorrectAtMachine(self.machine_check()),
-            Verdict::Adequate | Verdict::TooLittleData => NextStep::Nothing,
+            Verdict::Adequate | Verdict::TooLittleData(_) => NextStep::Nothing,
         }
     }
+}
 
-    /// What to check at the machine about a finding that no formula describes.
-    #[must_use]
-    pub fn machine_check(&self) -> MachineCheck<'_> {
-        if !self.faces.is_empty() {
-            return MachineCheck::NamedFaces(&self.faces);
-        }
-        if let Some(block) = self.blocks.first() {
-            return MachineCheck::NamedBlock(block);
-        }
-        if let Some(block) = &self.moved_block {
-            return MachineCheck::MovedBlock(block);
-        }
-        match self.depends.first().map(|w| w.by.as_str()) {
-            Some("face") => MachineCheck::Faces,
-            Some("block") => MachineCheck::Blocks,
-            Some("visit") if self.visits_come_back && !scatter_leads(self) => MachineCheck::PosesComeBack,
-            Some("run") => MachineCheck::Runs,
-            Some("visit") => MachineCheck::Clamping,
-            Some(_) if self.faint => MachineCheck::WeakPattern,
-            Some(_) => MachineCheck::NoFormula,
-            None => MachineCheck::NoPattern,
+impl MachineCheck {
+    /// What to check about the first finding that no formula describes.
+    pub(super) fn of(first: Option<&Where>, visits_come_back: bool) -> Self {
+        let Some(first) = first else { return Self::NoPattern };
+        match first.by.as_str() {
+            "face" => Self::Faces,
+            "block" => Self::Blocks,
+            "visit" if visits_come_back && first.finding != Finding::Scatter => Self::PosesComeBack,
+            "run" => Self::Runs,
+            "visit" => Self::Clamping,
+            _ => Self::NoFormula,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What the user said about a model: which effects, which parameters are held or known, and whether that makes sense.
 
 use super::Knowledge;
-use super::candidates::without_value;
+use super::candidates::{NO_VALUE_HELP, without_value};
 use crate::diag::{Failure, Finding, Result, enough};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -64,9 +64,7 @@ pub fn every_formula_has_a_value<'e>(
 ) -> Result<()> {
     let mut findings = Vec::new();
     for bad in effects.into_iter().flat_map(|e| without_value(e, observations)) {
-        findings.push(Finding::error("model::no_value", bad.says()).about(&bad.effect.id).help(
-            "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
-        ));
+        findings.push(Finding::error("model::no_value", bad.says()).about(&bad.effect).help(NO_VALUE_HELP));
     }
     if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
 }

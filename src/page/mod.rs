@@ -42,7 +42,7 @@ pub fn page(view: &View) -> Result<String> {
     let title = format!("{} – {}", view.machine.name, view.study.name);
     // where the sentence says the figures, they are not said twice
     let detail = match view.diagnosis.answer.verdict {
-        Verdict::MissingEffect | Verdict::Unexplained if view.headline.detail != view.headline.sentence => {
+        Verdict::MissingEffect(_) | Verdict::Unexplained(_) if view.headline.detail != view.headline.sentence => {
             view.headline.detail.as_str()
         }
         _ => "",

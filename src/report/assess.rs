@@ -66,7 +66,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
         *out += &format!("cannot be told: {}\n", u.says);
     }
     if !a.parted_together.is_empty() {
-        *out += &super::fit::together(&a.parted_together);
+        *out += &super::fit::together(&a.parted_together, a.never_determined);
     }
     let visible = a.effects.iter().filter(|e| e.visible).count();
     *out += &format!("\neffects that are not in the model: {visible} of {} leave a trace\n", a.effects.len());

@@ -4,8 +4,8 @@ use super::fit::{digits, number, significant, table, with_unit};
 use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
-use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape, Verdict};
-use crate::diagnose::setup_mistakes;
+use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape};
+use crate::diagnose::{Verdict, setup_mistakes};
 use crate::words::diagnose::plain;
 use comfy_table::Cell;
 
@@ -68,9 +68,9 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
         };
     }
     // the touches of a block that moved are one finding, and not so many chips
-    let moved = |o: &&Outlier| d.moved_block.as_ref().is_some_and(|b| *b == o.block);
+    let moved = |o: &&Outlier| d.verdict.moved_block().is_some_and(|b| b == o.block);
     let of_block: Vec<&Outlier> = d.outliers.iter().filter(moved).collect();
-    if let (Some(block), Some(first)) = (&d.moved_block, of_block.first()) {
+    if let (Some(block), Some(first)) = (d.verdict.moved_block(), of_block.first()) {
         let ids: Vec<String> = of_block.iter().map(|o| o.id.to_string()).collect();
         out += &match ids.len() {
             1 => wrapped(&format!("not used: touch {} of run {}, of block {block} that moved", first.id, first.run), 2),
@@ -178,7 +178,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         }
     }
     // what nothing speaks for is not explained, and nobody is sent to look for it
-    if let Some(first) = d.candidates.first().filter(|c| missing && (c.proposed || d.most_missed)) {
+    if let Some(first) = d.candidates.first().filter(|c| missing && (c.proposed || d.verdict.most_touches_unusable())) {
         let which = if first.same_as.is_empty() { String::new() } else { format!("if it is {}: ", first.effect) };
         // an effect of a person's own may say nothing of either
         let says = if first.says.is_empty() { String::new() } else { format!(": {}", first.says) };

@@ -53,11 +53,15 @@ pub fn with_unit(amount: impl std::fmt::Display, unit: &str) -> String {
     if unit == "1" { amount.to_string() } else { format!("{amount} {unit}") }
 }
 
-/// The variations that tell what no single one parts; the last part may say that something is left.
-pub(super) fn together(parts: &[String]) -> String {
-    let all = parts.last().is_none_or(|last| !last.contains("left that no variation"));
-    let which = if all { "what tells all of it together" } else { "what tells a part of it" };
-    format!("{which}: {}\n", parts.join("; and "))
+/// The variations that together determine what the touches cannot, and how many combinations they leave.
+pub(super) fn together(variations: &[String], left: usize) -> String {
+    let what = if left == 0 { "to determine all of them" } else { "to determine some of them" };
+    let rest = match left {
+        0 => String::new(),
+        1 => ". No variation of these touches determines 1 combination".to_owned(),
+        n => format!(". No variation of these touches determines {n} combinations"),
+    };
+    format!("{what}: {}{rest}\n", variations.join("; and "))
 }
 
 /// The whole answer.
@@ -169,7 +173,7 @@ pub fn outcome(o: &Outcome, paper: Paper) -> String {
         out += &format!("not told by this data: {}\n", u.says);
     }
     if !o.parted_together.is_empty() {
-        out += &together(&o.parted_together);
+        out += &together(&o.parted_together, o.never_determined);
     }
     // a column of the other sign puts hundreds of them elsewhere: one line says so
     let far = |r: &&Rejected| r.is_far;

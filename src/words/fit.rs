@@ -1,9 +1,11 @@
 //! Sentences of a fit: its remarks, why a touch is not used, where the noise comes from, what cannot be determined.
 
+use crate::fit::candidates::NoValue;
 use crate::fit::noise::Noise;
 use crate::fit::null_space::{Combined, Kind, NullDirection};
 use crate::fit::outliers::MOST_SHARE;
 use crate::fit::{Contradiction, Found, NoiseSource, Reason, Remark, VisitSource};
+use crate::model::temperatures::{NEAR_H, TemperatureGap};
 use crate::units::{mm_from_um, significant, um_from_mm};
 
 /// Other values of a shape parameter that are named.
@@ -36,7 +38,8 @@ pub(crate) fn remark(remark: &Remark) -> String {
         Remark::NoTemperature { effect } => {
             format!("Effect {effect} depends on the temperature T, and no touch has one. Log the temperature.")
         }
-        Remark::OfTemperatures(says) | Remark::LeftOut(says) => says.clone(),
+        Remark::TemperatureGap(gap) => temperature_gap(*gap),
+        Remark::NotCounted(bad) => format!("The effect is not counted among those outside of the model: {}.", no_value(bad)),
         Remark::NotCredible { name, times } => format!(
             "{name} is more than {times} times its usual size; no machine is like that. Check the plan, units and signs; a combination of parameters may hardly be determined."
         ),
@@ -50,8 +53,9 @@ pub(crate) fn remark(remark: &Remark) -> String {
         Remark::UnmodelledNotCounted { most_touches } => {
             format!("What effects outside of the model may add is computed for up to {most_touches} touches only.")
         }
-        Remark::SetUpMistake { far, of, right, says } => format!(
-            "{far} of {of} touches are far from their nominal positions; {right} would be right if {says}. Correct that first: these values come only from the touches that happen to fit."
+        Remark::SetUpMistake { far, of, right, mistake } => format!(
+            "{far} of {of} touches are far from their planned positions; {right} would be right if {}. Correct that first: these values come only from the touches that happen to fit.",
+            mistake.says()
         ),
         Remark::OutliersBeyond { found, of, excluded } => format!(
             "a robust fit finds {found} outliers among {of} touches ({:.1} %), and the others still do not agree without them. {} excluded (exclusion stops at {:.0} %). Do not trust the values and their uncertainties; look for dirt, a loose block or stylus, or an effect that the model lacks.",
@@ -145,6 +149,46 @@ pub(crate) fn remark(remark: &Remark) -> String {
         Remark::UnknownMask { id, run } => {
             format!("There is no touch {id} in run {}: its mask has no effect.", run + 1)
         }
+    }
+}
+
+/// A formula without a usable value at some touches.
+pub(crate) fn no_value(bad: &NoValue) -> String {
+    let NoValue { effect, formula, .. } = bad;
+    format!("formula {formula:?} of effect {effect} has {}", where_no_value(bad))
+}
+
+/// The same beside the formula itself.
+pub(crate) fn no_value_of_formula(bad: &NoValue) -> String {
+    format!("formula {:?} has {}", bad.formula, where_no_value(bad))
+}
+
+/// The same for an effect that is only a candidate.
+pub(crate) fn not_a_candidate(bad: &NoValue) -> String {
+    format!("effect {} is not tested: {}", bad.effect, no_value(bad))
+}
+
+fn where_no_value(bad: &NoValue) -> String {
+    let NoValue { n_touches, first, too_large, .. } = bad;
+    let which = match n_touches {
+        1 => format!("1 touch: touch {first}"),
+        n => format!("{n} touches: the first is touch {first}"),
+    };
+    match too_large {
+        true => format!("no usable value at {which}, more than a kilometre at its usual size"),
+        false => format!("no value at {which}"),
+    }
+}
+
+fn temperature_gap(gap: TemperatureGap) -> String {
+    let TemperatureGap { missing, of, far } = gap;
+    match far {
+        0 => format!("{missing} of {of} touches have no temperature. It is taken from the readings before and after them."),
+        far => format!(
+            "{missing} of {of} touches have no temperature, and {far} of them have no reading within {:.0} min. No temperature is \
+             used, and no effect of the temperature can be determined. Log one for every touch, or exclude the touches without one.",
+            60.0 * NEAR_H
+        ),
     }
 }
 

@@ -80,7 +80,7 @@ fn the_held_out_error_is_that_of_real_refits() {
             }
         }
     }
-    println!("{compared} touches compared, {}, {:.3} um", held.says(), held.rms_um);
+    println!("{compared} touches compared, {} predicted, {:.3} um", held.scored, held.rms_um);
     assert!(compared > 20, "{compared}");
     assert!(held.rms_um > all.outcome.rms_um);
     // nothing but the last run knows the errors of C

@@ -72,7 +72,7 @@ fn what_would_help_after_an_aborted_run_is_asked_of_the_touches_made() {
 fn a_model_of_which_nothing_is_told_is_not_adequate() {
     let touches = clean(1.0);
     let few = diagnosed(&touches[..39], None);
-    assert_eq!(few.verdict, Verdict::TooLittleData, "{}", few.says);
+    assert!(matches!(few.verdict, Verdict::TooLittleData(_)), "{}", few.says);
     assert!(few.says.contains("EX0B") && few.says.contains("EB0C") && !few.says.contains("pretravel"), "{}", few.says);
     assert!(few.candidates.is_empty());
     let all = diagnosed(&touches, None);
@@ -196,7 +196,7 @@ fn what_no_touches_part_is_said() {
     let found = diagnose(subject, &options).unwrap();
     let first = &found.candidates[0];
     assert_eq!((first.effect.as_str(), &first.same_as[..]), ("warm-up", &["spindle-growth".to_owned()][..]));
-    assert_eq!(first.tell_apart, axiscal::diagnose::NEVER_PARTED);
+    assert!(first.never_parted, "{}", first.tell_apart);
     assert!(first.never_parted);
 }
 

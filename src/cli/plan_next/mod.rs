@@ -11,7 +11,9 @@ use crate::design;
 use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{LinearisedPlan, Room};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::verdict::{NotNamed, TooLittle};
 use crate::diagnose::{self, Subject, Verdict, diagnose};
+use crate::fit::candidates::NoValue;
 use crate::fit::{Fit, Settings, effects_of};
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::post::Postprocessor;
@@ -54,8 +56,8 @@ pub struct Args {
     pub join: Option<PathBuf>,
 }
 
-fn warn<'a>(said: impl Iterator<Item = &'a String>, io: &Io) {
-    io.report(&said.map(|w| Finding::warning("next::left_out", w.clone())).collect::<Vec<_>>());
+fn warn(said: impl Iterator<Item = String>, io: &Io) {
+    io.report(&said.map(|w| Finding::warning("next::left_out", w)).collect::<Vec<_>>());
 }
 
 /// Runs `plan-next`.
@@ -95,7 +97,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         let says = format!("a gross mistake must be put right first, and the touches made again: {mistake}");
         return Ok(refuse(&says, &found.says, io));
     }
-    if named.is_empty() && found.untold {
+    let nothing_determined = matches!(found.verdict, Verdict::TooLittleData(TooLittle::NothingDetermined(_)));
+    if named.is_empty() && nothing_determined {
         design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
         let help = match &fit.outcome.parted_together[..] {
             [] => "run the program to its end, or touch in more poses, and ask again".to_owned(),
@@ -122,14 +125,18 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         }
     }
     let mut setting = Setting::new(&loaded, &settings.effects, &fit)?;
-    let unexplained = named.is_empty() && !open(&found) && found.verdict == Verdict::Unexplained;
-    let sketched =
-        if unexplained && found.touches_would_tell() { Sketched::of(&loaded, &settings, &fit) } else { None };
-    // a faint pattern is there or is not: touches tell. A clear one is there, and no known effect stands against another
-    if unexplained && !(found.faint && sketched.is_some()) {
-        let help = match found.sketchable {
+    let unexplained = found.verdict.unexplained().filter(|_| named.is_empty() && !open(&found));
+    // further touches show whether a weak pattern is there. A clear one is there, and no known effects have to be separated
+    let weak = unexplained.is_some_and(|u| u.why == NotNamed::WeakPattern && u.sketchable);
+    let sketched = if weak && found.verdict.moved_block().is_none() {
+        Sketched::of(&loaded, &settings, &fit)
+    } else {
+        None
+    };
+    if let (Some(unexplained), None) = (unexplained, &sketched) {
+        let help = match unexplained.sketchable {
             true => format!("{} writes what is seen as a formula", super::next::sketch_effect(&loaded)),
-            false => crate::words::diagnose::machine_check(found.machine_check()),
+            false => crate::words::diagnose::machine_check(&unexplained.check),
         };
         return Ok(refuse(
             &format!("nothing here to part: no known effect explains what is left. {}", found.says),
@@ -144,17 +151,17 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             says: format!("is this faint pattern there at all? {}", s.says),
         }
     } else if named.is_empty() {
-        warn(found.warnings.iter(), io);
+        warn(found.warnings.iter().cloned(), io);
         if open(&found) {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
             Questions::left_open(found.open.suspects, &found.open.pairs)
         } else {
             let view = LinearisedPlan::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
-            warn(view.left_out.iter().map(|(_, says)| says).filter(|says| !found.warnings.contains(says)), io);
+            warn(view.left_out.iter().map(NoValue::left_out).filter(|says| !found.warnings.contains(says)), io);
             let asked = Questions::of_plan(&view);
             match found.verdict {
-                Verdict::TooLittleData => Questions {
+                Verdict::TooLittleData(_) => Questions {
                     says: format!("{} These effects would be confounded if one of them acted", found.says),
                     ..asked
                 },
@@ -180,8 +187,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects.extend(effect.filter(|_| !known).map(|e| (e, shape)));
     }
     let asked_of = LinearisedPlan::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
-    if let Some((_, says)) = asked_of.left_out.first() {
-        return Err(Failure::new("next::no_value", says.clone())
+    if let Some(bad) = asked_of.left_out.first() {
+        return Err(Failure::new("next::no_value", bad.left_out())
             .help("write its formula so that it holds at every touch, or ask for other effects"));
     }
     let budget_s = 60.0 * args.minutes;
@@ -233,7 +240,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             }
         }
     }
-    warn(setting.holes.borrow().iter(), io);
+    warn(setting.holes.borrow().iter().cloned(), io);
     let never = setting.never(&questions);
     if never.len() == questions.pairs.len() {
         let says = format!(

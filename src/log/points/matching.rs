@@ -7,7 +7,7 @@ use crate::diag::{Failure, Finding, Findings, Result};
 use crate::log::finding_places::{Capped, Places};
 use crate::log::matching::ranges;
 use crate::log::origin_shift::common_shift;
-use crate::log::setup_mistakes::shift_says;
+use crate::log::LogMistake;
 use crate::log::touch::{RawTouch, Status};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Plan, PlanTouch};
@@ -158,8 +158,9 @@ fn none_fits(plan: &Plan, points: &[Point], form: &PointsForm, places: &Places<'
         );
         return places.at_line(Finding::error("log::swapped", message).help(help), line);
     }
-    if let Some(by) = shift(plan, points) {
-        let message = format!("no point of the file is one of the plan; most would be if {}", shift_says(&by));
+    if let Some(by_mm) = shift(plan, points) {
+        let shift = LogMistake::Shift { by_mm, inches: false };
+        let message = format!("no point of the file is one of the plan; most would be if {}", shift.says());
         return places.at_line(Finding::error("log::swapped", message).help(OTHER_ZERO), line);
     }
     let distance = |p: &Point, t: &PlanTouch| (p.in_part(&p.nominal) - Vector3::from(t.point)).norm();
