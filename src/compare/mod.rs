@@ -11,7 +11,7 @@ pub mod verify;
 
 pub use share::Share;
 
-use crate::fit::{self, Fit, noise};
+use crate::fit::{self, Fit, VisitSource, noise};
 use crate::model::formula::slot;
 use crate::units::um_from_mm;
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,7 @@ pub struct Comparison {
     pub visit_um: f64,
     /// Where that comes from: `revisits`, `declared`, `study`, `one pose`.
     #[serde(default)]
-    pub visit_source: String,
+    pub visit_source: VisitSource,
     /// Both in a sentence.
     #[serde(default)]
     pub noise_says: String,
@@ -243,7 +243,7 @@ pub fn compare(fit: &Fit) -> Comparison {
         noise_um,
         noise_source: fit.noise.source.as_str().into(),
         visit_um: fit.outcome.visit_um,
-        visit_source: fit.noise.visit_source.as_str().into(),
+        visit_source: fit.noise.visit_source,
         noise_says: fit.noise.says(),
         chi2_per_dof,
         dof: fit.dof,
@@ -308,7 +308,7 @@ impl Comparison {
         }
         front.append(&mut self.splits);
         self.splits = front;
-        let noise_words = noise_words(self.noise_um, if self.visit_source == "declared" { 0.0 } else { self.visit_um });
+        let noise_words = noise_words(self.noise_um, if self.visit_source == VisitSource::Declared { 0.0 } else { self.visit_um });
         self.says = if self.explained_by_noise && first.by == "visit" {
             // the scatter of visits is the finding, and the model has no part in it
             format!("what is left, {:.2} um, is what {noise_words} leaves. {}", self.rms_um, first.says)

@@ -1,6 +1,7 @@
 //! What a diagnosis says (`axiscal-diagnosis/1`).
 
 use super::verdict::{NotNamed, Verdict};
+use crate::fit::VisitSource;
 use serde::Serialize;
 
 /// The format line of a diagnosis.
@@ -26,8 +27,8 @@ pub struct Diagnosis {
     pub noise_um: f64,
     /// Scatter of index visits that the tests allow for, µm.
     pub visit_um: f64,
-    /// Where the scatter of visits of the fit comes from: `revisits`, `declared`, `study`, `one pose`.
-    pub visit_source: String,
+    /// Where the scatter of index positions comes from.
+    pub visit_source: VisitSource,
     /// Noise and scatter of visits with their sources, in a sentence.
     pub noise_says: String,
     /// Probability of so much misfit where the model holds.
@@ -342,7 +343,7 @@ pub(crate) mod tests {
             held_out_se_um: None,
             noise_um: 1.0,
             visit_um: 0.0,
-            visit_source: String::new(),
+            visit_source: VisitSource::Declared,
             noise_says: String::new(),
             lack_of_fit_p: 0.0,
             depends: Vec::new(),

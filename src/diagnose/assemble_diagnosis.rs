@@ -237,7 +237,7 @@ pub(super) fn put_together(
         held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
-        visit_source: fit.noise.visit_source.as_str().to_owned(),
+        visit_source: fit.noise.visit_source,
         noise_says: noise_says(seen, fit),
         lack_of_fit_p: seen.lack_of_fit.p,
         depends,

@@ -19,7 +19,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         held_out_se_um: None,
         noise_um: noise_um(fit),
         visit_um: 0.0,
-        visit_source: fit.noise.visit_source.as_str().to_owned(),
+        visit_source: fit.noise.visit_source,
         noise_says: fit.noise.says(),
         lack_of_fit_p: 1.0,
         depends: Vec::new(),
