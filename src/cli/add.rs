@@ -155,7 +155,7 @@ fn run(
     let brackets: Vec<parameter_combinations::Bracket> =
         changes.new.iter().filter_map(|p| parameter_combinations::bracket(&after, &loaded.catalogue, p)).collect();
     for t in &together {
-        io.say(format!("{}: what has no value here cannot be told alone; {}", t.effect, t.says()));
+        io.say(format!("{}: parameters without a value cannot be determined alone; {}", t.effect, t.says()));
     }
     for b in &brackets {
         io.say(format!("{}: no touch lies in between", b.says()));
@@ -197,7 +197,7 @@ pub fn history(args: &HistoryArgs, io: &Io) -> Result<Answer> {
             "history::other_data",
             format!("the plans or logs have changed since step {}: its figures are of other touches", steps.join(", ")),
         )
-        .help("delete the history beside the study to begin a new ladder")]);
+        .help("delete the history file next to the study to begin a new one")]);
     }
     io.say(report::ladder::history(&history, io.paper(args.ascii)));
     io.answer(&history);

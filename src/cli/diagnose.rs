@@ -18,6 +18,9 @@ pub struct Args {
     /// Plots of plain ASCII signs (as in a pipe)
     #[arg(long)]
     pub ascii: bool,
+    /// All remarks, all sizes, and the curve of the residual
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 /// Runs `diagnose`. The answer is "no" when the model does not fit.
@@ -33,7 +36,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let planned = loaded.planned();
     let options = Options { at_most: args.at_most.max(1), planned: Some(&planned), ..Options::default() };
     let found = diagnose(subject, &options)?;
-    io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii)).trim_end());
+    io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii), args.verbose).trim_end());
     super::next::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
     io.answer(&found);
     Ok(of_fit(&fit.outcome, if found.verdict.is_no() { Answer::No } else { Answer::Done }, io))

@@ -182,12 +182,12 @@ impl Doubt {
     fn says(&self, radius_mm: f64) -> String {
         let Consequence { parameter, unit, off, because, .. } = &self.what;
         let size = match self.off_um {
-            Some(um) => format!("{} um at {} mm", significant(um), Plain(radius_mm)),
+            Some(um) => format!("{} µm at {} mm", significant(um), Plain(radius_mm)),
             None => format!("{} {unit}", significant(*off)),
         };
         // in the same unit, so that the two can be compared
         let limit = match self.off_um.filter(|_| self.ratio() > 0.0) {
-            Some(um) => format!("{} um", significant(um / self.ratio())),
+            Some(um) => format!("{} µm", significant(um / self.ratio())),
             None => format!("{} {unit}", significant(self.tolerance)),
         };
         format!("{parameter} could be wrong by {size}; its tolerance is {limit} (cause: {because})")
@@ -412,7 +412,7 @@ fn written_by_an_export(backup: &Source, correction: &Correction) -> Option<Find
     (new_values && correction.active.is_none() && correction.transformation).then(|| {
         Finding::warning(
             "export::written_before",
-            format!("{} holds the new values of an export, and the study names no compensation", backup.name()),
+            format!("{} has the new values of an export, and the study names no compensation", backup.name()),
         )
         .help("if they were loaded when these touches were made, name that export as `compensation` in the study; if not, give what the control held then")
     })
@@ -481,7 +481,7 @@ fn control(
     }
     say_left("which leaves", (&export.left, &export.table_errors), args, io);
     io.say(format!(
-        "rounding to the control's resolution leaves up to {} um; all constant errors that were identified together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
+        "rounding to the control's resolution leaves up to {} µm; all constant errors that were identified together up to {} µm; a tool 100 mm longer or shorter is off by up to {} µm",
         significant(export.rounding_um), significant(export.rest_um), significant(export.longer_tool_um)
     ));
     say_not_told(not_told, io);
@@ -577,7 +577,7 @@ fn free_folder(out: &Path, files: &files::Folder, loaded: &Loaded) -> Result<()>
     if used && !files.was_written() {
         return Err(Failure::new(
             "export::folder",
-            format!("{} is not empty and holds no earlier export", out.display()),
+            format!("{} is not empty and has no earlier export", out.display()),
         )
         .help("name an empty folder: an export is a set of files that belong together"));
     }
@@ -619,7 +619,7 @@ fn say(export: &Export, args: &Args, io: &Io) {
 /// What has no value of its own is in no table: "nothing is left" speaks of the rest.
 fn say_not_told(not_told: &[Undetermined], io: &Io) {
     for u in not_told {
-        io.say(format!("not corrected, because this data cannot tell it: {}", u.says));
+        io.say(format!("not corrected, because it cannot be determined: {}", u.says));
     }
 }
 

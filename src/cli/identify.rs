@@ -24,9 +24,12 @@ pub struct Args {
     /// With the covariance matrix of the results (--json)
     #[arg(long)]
     pub covariance: bool,
-    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, held-out errors
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, cross-validated error
     #[arg(long)]
     pub quick: bool,
+    /// All remarks, all columns and the details of the fit
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 /// Runs `identify`.
@@ -69,7 +72,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.answer(&outcome);
         return Ok(of_fit(&outcome, Answer::Done, io));
     }
-    io.say(crate::report::fit::outcome(&outcome, io.paper(false)));
+    io.say(crate::report::fit::outcome(&outcome, io.paper(false), args.verbose));
     if let Some(residuals) = &outcome.residuals {
         let mut t = crate::report::fit::table(&["run", "touch", "residual um", "standardised"]);
         for r in residuals {

@@ -61,7 +61,7 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>) -> Result<Worked> {
                 ladder.push(Rung::of(&with, Kind::Proposed));
                 proposed = Some(with);
             }
-            Err(failure) => ladder.notes.push(format!("{} cannot be put beside the model: {failure}", first.effect)),
+            Err(failure) => ladder.notes.push(format!("{} cannot be added to the model: {failure}", first.effect)),
         }
     }
     let date = newest_log(loaded);

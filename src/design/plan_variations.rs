@@ -272,7 +272,7 @@ impl Pool<'_> {
         }
         if !where_at.is_empty() {
             let list: Vec<String> = where_at.into_iter().take(4).collect();
-            self.push("all-faces", format!("touch the faces that were left out ({})", list.join(", ")), added, 0.0);
+            self.push("all-faces", format!("touch the faces that are not touched yet ({})", list.join(", ")), added, 0.0);
         }
     }
 
@@ -404,7 +404,7 @@ impl Pool<'_> {
                 added.push((run, again));
             }
         }
-        self.push("revisit", "come back to the first set-up and to a middle one at the end".into(), added, 0.0);
+        self.push("revisit", "come back to the first index position and to a middle one at the end".into(), added, 0.0);
     }
 
     /// What is known without a touch of this program.

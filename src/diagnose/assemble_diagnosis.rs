@@ -133,7 +133,7 @@ pub(super) fn put_together(
                 share,
                 p_adjusted: first.p_adjusted,
                 says: format!(
-                    "{:.0} % of what is left changes with {} as {} would make it",
+                    "{:.0} % of the residual changes with {} like {}",
                     100.0 * share,
                     words::plain(&by(on)),
                     match &first.same_as[..] {
@@ -350,8 +350,8 @@ fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (be
             share: tau2 / (sigma2 + tau2),
             p_adjusted: 0.0,
             says: format!(
-                "Each time an axis is clamped anew it stands elsewhere: looseness or indexing scatter of {:.1} um for each visit \
-                 (from revisited poses; the machine file declares {:.1} um)",
+                "The rotary axes do not come back exactly: index positions scatter by {:.1} µm (from revisited poses; the machine file \
+                 declares {:.1} µm). Check clamping and looseness",
                 um_from_mm(tau_mm),
                 um_from_mm(declared_mm)
             ),
@@ -392,7 +392,7 @@ fn noise_says(seen: &Examination, fit: &Fit) -> String {
     let mut out = fit.noise.says();
     if seen.evidence.tau_mm < fit.noise.tau_mm {
         out += &format!(
-            "; what is found explains that, and the tests allow for the declared {:.2} um",
+            "; what is found explains this, and the tests use the declared {:.2} µm",
             um_from_mm(seen.evidence.tau_mm)
         );
     }
@@ -454,7 +454,7 @@ fn candidate(
         [] => effect.says.clone(),
         some => {
             let says = effect.says.trim_end_matches('.');
-            format!("{says}. Its {} cannot be told by this plan", words::list(some))
+            format!("{says}. Its {} cannot be determined with this plan", words::list(some))
         }
     };
     if let Some(scanned) = &seen.named.scanned[chosen] {

@@ -129,6 +129,7 @@ pub(super) fn assemble_result(
     remarks.extend(type_b.iter().filter_map(|b| b.remark.clone()));
     remarks.extend(evidence.unmodelled.iter().flat_map(|all| all.left_out.clone()).map(Remark::NotCounted));
     remarks.extend(not_mentioned(&outcome, &remarks));
+    remarks.sort_by_key(Remark::rank);
     outcome.warnings = remarks.iter().map(words::remark).collect();
     Assembled { outcome, remarks, other_values: evidence.other_values }
 }

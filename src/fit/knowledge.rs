@@ -18,13 +18,13 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
     for id in ids {
         match catalogue.get(id, machine) {
             Some(effect) if effects.iter().any(|e| e.id == effect.id) => {
-                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} stands twice in the model")).about(id).help("name each effect once"));
+                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} is twice in the model")).about(id).help("name each effect once"));
             }
             Some(effect) => effects.push(effect),
             None if catalogue.knows(id) => findings.push(
                 Finding::error("model::effect_not_here", format!("effect {id:?} does not apply to machine {:?}", machine.name))
                     .about(id)
-                    .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` tells which"),
+                    .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` says which"),
             ),
             None => {
                 let mut finding = Finding::error("model::unknown_effect", format!("no effect is called {id:?}")).about(id);

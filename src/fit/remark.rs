@@ -183,6 +183,32 @@ pub enum Remark {
 }
 
 impl Remark {
+    /// Order in which a reader needs them, the most important first: what makes all values wrong, what makes some of them wrong,
+    /// what makes their uncertainties wrong, what is only to be known.
+    #[must_use]
+    pub fn rank(&self) -> u8 {
+        match self {
+            Self::NotConverged { .. } | Self::SetUpMistake { .. } => 0,
+            Self::OutliersBeyond { .. } | Self::NotCredible { .. } => 1,
+            Self::Misfit { .. } | Self::ManyOutliers { .. } | Self::NoRedundancy => 2,
+            Self::Contradiction(_) | Self::NoiseContradicted { .. } | Self::VisitsContradicted { .. } => 3,
+            Self::OutOfRange { .. }
+            | Self::OtherValues { .. }
+            | Self::SizesBesideOneValue { .. }
+            | Self::LostBesideShapes { .. }
+            | Self::NotDetermined { .. }
+            | Self::FollowsUnseen { .. }
+            | Self::NoTemperature { .. } => 4,
+            Self::VisitsBeyond { .. } | Self::CoarseLog { .. } | Self::NoiseTooLarge { .. } => 5,
+            Self::TemperatureGap(_)
+            | Self::UnmodelledNotCounted { .. }
+            | Self::TypeBPerKelvin { .. }
+            | Self::TypeBWithoutEffect { .. }
+            | Self::NotCounted(_)
+            | Self::UnknownMask { .. } => 6,
+        }
+    }
+
     /// Parameters that it says not to be determined.
     pub fn names(&self) -> Vec<&str> {
         match self {

@@ -36,8 +36,8 @@ pub fn page(view: &View) -> Result<String> {
     );
     let (level, word) = match view.headline.level {
         Level::Good => ("good", "✓ In order"),
-        Level::Act => ("act", "▲ Something is to be done"),
-        Level::Unknown => ("unknown", "? Not told yet"),
+        Level::Act => ("act", "▲ Action needed"),
+        Level::Unknown => ("unknown", "? Not determined yet"),
     };
     let title = format!("{} – {}", view.machine.name, view.study.name);
     // where the sentence says the figures, they are not said twice

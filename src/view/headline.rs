@@ -127,11 +127,11 @@ pub(super) fn named(m: &Material, id: &str) -> String {
 fn one_of(m: &Material, open: &[String]) -> String {
     match open {
         [one] => format!(
-            "Something is missing in the model, and one known effect explains it ({}), but these poses cannot tell whether it is the right one.",
+            "An effect is missing in the model. One known effect explains it ({}), but there are too few poses to confirm it.",
             named(m, one)
         ),
         _ => format!(
-            "Something is missing in the model: one of {} known effects explains it; these poses cannot tell which.",
+            "An effect is missing in the model. One of {} known effects explains it, but there are too few poses to decide which.",
             open.len()
         ),
     }
@@ -151,9 +151,9 @@ fn falls(m: &Material, c: &Candidate) -> String {
     let d = m.diagnosis;
     let moves = if is_one_size(c) { None } else { most_moved_um(m) };
     let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
-    let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
+    let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
     format!(
-        "The touches miss by {}, and by {} once it is in the model; the probe's noise is {}.{moves}{rest}",
+        "The residual is {}, and {} with this effect in the model; the probe noise is {}.{moves}{rest}",
         um(d.rms_um),
         um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         um(d.noise_um)
@@ -184,7 +184,7 @@ fn missing(m: &Material, c: &Candidate) -> String {
         several => Some(format!("one of {} others", several.len())),
     };
     let or: String = others.iter().chain(&c.or_else).map(|other| format!(", or {other}")).collect();
-    let which = if or.is_empty() { "" } else { ": these touches cannot tell which" };
+    let which = if or.is_empty() { "" } else { ": these touches cannot separate them" };
     let what = format!("{}{size}{or}{which}", c.name);
     let (whose, has) = whose(m, &c.effect);
     format!("{whose} {has} an error that is not in the model yet: {what}.")
@@ -223,15 +223,15 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     };
     let untold = match lost {
         0 => String::new(),
-        n => format!(" {n} more {} not told by these touches.", if n == 1 { "error is" } else { "errors are" }),
+        n => format!(" {n} more {} be determined with these touches.", if n == 1 { "error cannot" } else { "errors cannot" }),
     };
     let with = if c.active { "With the compensation that was active, " } else { "" };
     let start = |text: &str| if with.is_empty() { capital(text) } else { format!("{with}{text}") };
     if let Some(worst) = largest(parameters, Judgement::Beyond) {
         let sentence = format!(
-            "{} {} larger than the tolerance ({limit}), the largest {} ({}): {}. Nothing else is missing that these touches can show.{untold}",
+            "{} {} the tolerance ({limit}), the largest is {} ({}): {}. The model is complete as far as these touches can measure.{untold}",
             start(&of(beyond, judged)),
-            verb(beyond),
+            if beyond == 1 { "exceeds" } else { "exceed" },
             worst.says,
             worst.name,
             size(worst, m)
@@ -240,9 +240,8 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     }
     if let Some(worst) = largest(parameters, Judgement::Open) {
         let sentence = format!(
-            "{} too uncertain to say whether {} within the tolerance ({limit}): {} ({}) is the worst; no error is certainly larger.{untold}",
+            "{} too uncertain to compare with the tolerance ({limit}): {} ({}) is the worst. No error is certainly larger.{untold}",
             start(&format!("{} {}", of(open, judged), verb(open))),
-            if open == 1 { "it is" } else { "they are" },
             worst.says,
             worst.name
         );
@@ -251,11 +250,11 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     if judged == 0 {
         return (
             Level::Unknown,
-            format!("The model fits, and none of its errors can be held against a tolerance.{untold}"),
+            format!("The model fits, but none of its errors has a tolerance.{untold}"),
         );
     }
     let level = if lost == 0 { Level::Good } else { Level::Unknown };
-    let nothing = "nothing else is missing that these touches can show";
+    let nothing = "the model is complete as far as these touches can measure";
     (
         level,
         format!(
@@ -267,9 +266,9 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
 
 fn all(n: usize) -> String {
     if n == 1 {
-        "the one error that these touches tell".to_owned()
+        "the one error that is determined".to_owned()
     } else {
-        format!("all {n} errors that these touches tell")
+        format!("all {n} errors that are determined")
     }
 }
 

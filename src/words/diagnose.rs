@@ -61,8 +61,8 @@ pub fn plain(by: &str) -> String {
     match by.split_once('.') {
         Some(("pose", axis)) => axis.to_owned(),
         Some(("axis", axis)) => of("the position of", axis),
-        Some(("before", axis)) => format!("where {axis} stood before"),
-        Some(("sense", axis)) => format!("the sense of {axis}'s last motion"),
+        Some(("before", axis)) => format!("where {axis} was before"),
+        Some(("sense", axis)) => format!("the direction of {axis}'s last motion"),
         _ => match by {
             "time*block" => "time and block".to_owned(),
             "length" => "the length of the stylus".to_owned(),
@@ -123,7 +123,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
     let rotary = machine.rotary().any(|a| a.name.to_string() == d.on) || d.on == "S";
     let direction = direction_words(&d.direction, machine);
     if d.on == CONSTANT {
-        return format!("{percent} % of what is left is the same at every touch, {direction}");
+        return format!("{percent} % of the residual is the same at every touch, {direction}");
     }
     let (on, how) = match d.on.as_str() {
         "t" => (
@@ -137,12 +137,12 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
         ),
         "t*block" => {
             let block = moved_block(d, fit).unwrap_or("");
-            (format!("block {block}"), format!("it stands elsewhere from {:.2} h after the first touch on", d.scanned))
+            (format!("block {block}"), format!("it moved {:.2} h after the first touch", d.scanned))
         }
         "T" => ("the temperature".to_owned(), "smoothly".to_owned()),
         "block" => ("the block".to_owned(), "blocks disagree".to_owned()),
         "face" => ("the face".to_owned(), "faces disagree".to_owned()),
-        "visit" => ("the index visit".to_owned(), "visits disagree".to_owned()),
+        "visit" => ("the index position".to_owned(), "index positions disagree".to_owned()),
         "run" => ("the run".to_owned(), "runs disagree".to_owned()),
         "S" => ("the orientation of the spindle".to_owned(), harmonic(d)),
         "L" => ("the length of the stylus".to_owned(), "longer against shorter".to_owned()),
@@ -150,9 +150,9 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
         "approach" => ("the direction of approach".to_owned(), "around the probe".to_owned()),
         on if on.contains('*') => (factors(on), "both together".to_owned()),
         on => match (on.strip_suffix(" before"), on.strip_prefix('s')) {
-            (Some(axis), _) => (format!("where {axis} stood before"), "the way it came from".to_owned()),
+            (Some(axis), _) => (format!("where {axis} was before"), "the way it came from".to_owned()),
             (_, Some(axis)) if axis.len() == 1 => {
-                (format!("the sense of {axis}'s last motion"), "up against down".to_owned())
+                (format!("the direction of {axis}'s last motion"), "up against down".to_owned())
             }
             _ => (
                 on.to_owned(),
@@ -165,7 +165,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
             ),
         },
     };
-    format!("{percent} % of what is left goes with {on} ({how}), {direction}")
+    format!("{percent} % of the residual depends on {on} ({how}), {direction}")
 }
 
 /// The block that stands elsewhere from some moment on.
@@ -412,8 +412,8 @@ pub fn machine_check(check: &MachineCheck) -> String {
              [[data]]), give a run whose blocks were moved a `mounting` of its own, and diagnose again"
         }
         MachineCheck::Clamping => "check the clamping and indexing of the rotary axes for play or dirt, and measure again",
-        MachineCheck::WeakPattern => "measure again: further touches tell whether the pattern is there at all",
-        MachineCheck::NoFormula => "look for it at the machine: no formula describes it",
+        MachineCheck::WeakPattern => "measure again: further touches show whether the pattern is real",
+        MachineCheck::NoFormula => "check at the machine: no formula describes it",
         MachineCheck::NoPattern => "measure again with more touches: the residual depends on nothing that these touches show",
     }
     .to_owned()
@@ -440,11 +440,11 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
         ("t", "exponential") => "warming up: it moves fast at first and comes to rest",
         ("t", _) => "slow change: temperature, creep of a clamp",
         ("t*block", _) => "a block was knocked or slid: a loose clamp, dirt under it, a collision",
-        (CONSTANT, _) => "an offset that the model does not hold: a zero point, a length, a position error of an axis",
-        ("block", _) => "a block that stands or measures otherwise than the rest: loose, tilted, another size",
-        ("face", _) => "single faces that lie elsewhere: chips, burrs, coolant",
+        (CONSTANT, _) => "an offset that the model lacks: a zero point, a length, a position error of an axis",
+        ("block", _) => "a block that differs from the others: loose, tilted, another size",
+        ("face", _) => "single faces that are offset: chips, burrs, coolant",
         ("visit", _) if comes_back => {
-            "poses that each have an error of their own, and come back with it: a pattern that no shape here has"
+            "poses that each have an error of their own, and come back with it: a pattern that no listed effect explains"
         }
         ("run", _) => "something that changed between two runs: the machine's temperature, a stylus, a block, a knock",
         ("visit", _) => "poses that do not come back: clamping or indexing scatter",
@@ -464,8 +464,8 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
             );
         }
         (_, "order") => "an eccentric or wobbling bearing, or an encoder ring mounted off its centre",
-        (_, "step") => "looseness that lets go at one place: a stop, a clamp, a worn spot",
-        (_, "kink") => "contact that changes at one place: a counterweight, a guideway joint, slack that is taken up",
+        (_, "step") => "looseness that gives way at one position: a stop, a clamp, a worn spot",
+        (_, "kink") => "contact that changes at one position: a counterweight, a guideway joint, slack that is taken up",
         _ => "a guideway or scale that is bent, or weight that shifts",
     };
     text.to_owned()
@@ -478,12 +478,12 @@ mod tests {
     #[test]
     fn variables_and_groups_have_names() {
         let rotary = |name: &str| name == "C";
-        assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C stood before");
-        assert_eq!(plain(&by("C before", &rotary)), "where C stood before");
+        assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C was before");
+        assert_eq!(plain(&by("C before", &rotary)), "where C was before");
         let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
         assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
         assert_eq!(one_of("backlash-x", &[]), "backlash-x");
-        assert_eq!(plain("sX*C"), "the product of the sense of X's last motion and C");
+        assert_eq!(plain("sX*C"), "the product of the direction of X's last motion and C");
         assert_eq!(plain("time*block"), "time and block");
     }
 }

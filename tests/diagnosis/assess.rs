@@ -509,7 +509,7 @@ fn full_leaves_only_what_no_touch_can_show() {
         // a value that holds another effect with any touches is no fault of the plan, but it is named
         for p in a.parameters.iter().filter(|p| !p.holds.is_empty()) {
             let poor = p.sigma_with_unmodelled.is_none_or(|s| s > if p.unit == "mm" { 0.016 } else { 0.0018 });
-            let said = a.says.contains(&format!("{} holds {} as well", p.name, p.holds.join(", ")));
+            let said = a.says.contains(&format!("{} includes {}", p.name, p.holds.join(", ")));
             assert_eq!(said, poor, "{name} {}: {}", p.name, a.says);
         }
     }

@@ -9,6 +9,7 @@ mod files;
 mod many_findings;
 mod report;
 mod rooms;
+mod screens;
 mod shell;
 mod terminal;
 mod torture;

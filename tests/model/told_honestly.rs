@@ -79,8 +79,9 @@ fn a_value_that_holds_another_effect_says_so() {
     let text = axiscal::report::fit::outcome(
         &fit.outcome,
         axiscal::report::plot::Paper { width: 120, ascii: true, colour: false },
+        true,
     );
-    assert!(text.contains("EZ0A holds"), "{text}");
+    assert!(text.contains("EZ0A includes"), "{text}");
     // with the effect in the model it is the model's own matter
     let with = fitted(&machine, &plan, &touches, &settings(&machine, &["tool-length"]));
     assert!(with.outcome.parameters.iter().all(|p| !p.holds.contains(&"tool-length".to_owned())));

@@ -86,12 +86,12 @@ fn a_noise_that_the_repeats_contradict_is_said_and_not_judged_by() {
     for stated in [0.3, 0.7, 20.0] {
         let found = diagnosed(&touches, Some(stated));
         assert_eq!(found.verdict, Verdict::Adequate, "{stated}: {}", found.says);
-        assert!(found.noise_says.contains(&format!("{stated:.2} um that the study states")), "{}", found.noise_says);
+        assert!(found.noise_says.contains(&format!("{stated:.2} µm that the study states")), "{}", found.noise_says);
         let fit = fitted(&touches, Some(stated));
         assert!((fit.outcome.noise_um - 1.0).abs() < 0.2, "{}", fit.outcome.noise_um);
         let warned = fit.outcome.warnings.join("\n");
-        assert!(warned.contains(&format!("states a noise of {stated:.2} um")), "{warned}");
-        assert!(!warned.contains("miss the model"), "{warned}");
+        assert!(warned.contains(&format!("states a noise of {stated:.2} µm")), "{warned}");
+        assert!(!warned.contains("something is missing in the model"), "{warned}");
         // a bound on the visits of nothing at all would be the stated noise's, not theirs
         assert!(fit.noise.tau_test_mm > 0.1e-3, "{}", fit.noise.tau_test_mm);
     }
@@ -119,7 +119,7 @@ fn hardly_any_degrees_of_freedom_are_not_called_none() {
             (axiscal::fit::VisitSource::Revisits, Some(dof), 0.3e-3);
         said.push(noise.says());
     }
-    assert!(said[0].contains("less than 0.1 degrees of freedom, at most 0.30 um"), "{said:?}");
+    assert!(said[0].contains("less than 0.1 degrees of freedom, at most 0.30 µm"), "{said:?}");
     assert!(said[1].contains("0.4 degrees of freedom") && said[2].contains("10 degrees of freedom"), "{said:?}");
     noise.tau_test_mm = 0.0;
     assert!(!noise.says().contains("at most") && noise.says().contains("own noise"), "{}", noise.says());

@@ -42,16 +42,16 @@ pub struct Args {
     /// Name of the controller, or a postprocessor file
     #[arg(long, short)]
     pub controller: String,
-    /// How long the program may take, minutes (putting up other blocks not counted)
+    /// How long the program may take, minutes (without mounting other blocks)
     #[arg(long, default_value_t = 10.0)]
     pub minutes: f64,
-    /// The effects that are to be told apart (default: what the data leave open)
+    /// The effects to separate (default: those that the data leave open)
     #[arg(long, value_delimiter = ',')]
     pub effects: Vec<String>,
-    /// The blocks were put up anew since the last run, or will be: their set-up is unknown again
+    /// The blocks were mounted again since the last run, or will be: their positions are unknown again
     #[arg(long)]
     pub moved: bool,
-    /// Put this log of the program into the study as its next run, instead of writing a program
+    /// Add this log of the program to the study as its next run, instead of writing a program
     #[arg(long, value_name = "LOG")]
     pub join: Option<PathBuf>,
 }
@@ -94,7 +94,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     let (mut fit, mut found) = look(&settings)?;
     if let Some(mistake) = found.mistake() {
-        let says = format!("a gross mistake must be put right first, and the touches made again: {mistake}");
+        let says = format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}");
         return Ok(refuse(&says, &found.says, io));
     }
     let nothing_determined = matches!(found.verdict, Verdict::TooLittleData(TooLittle::NothingDetermined(_)));
@@ -102,10 +102,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
         let help = match &fit.outcome.parted_together[..] {
             [] => "run the program to its end, or touch in more poses, and ask again".to_owned(),
-            remedies => format!("run the program to its end; or what tells them: {}", remedies.join("; and ")),
+            remedies => format!("run the program to its end; or add touches that determine them: {}", remedies.join("; and ")),
         };
         return Ok(refuse(
-            &format!("nothing to part before the model's own errors are told. {}", found.says),
+            &format!("the model's own errors must be determined first. {}", found.says),
             &help,
             io,
         ));
@@ -139,7 +139,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             false => crate::words::diagnose::machine_check(&unexplained.check),
         };
         return Ok(refuse(
-            &format!("nothing here to part: no known effect explains what is left. {}", found.says),
+            &format!("no known effect explains the residual, so there are no effects to separate. {}", found.says),
             &help,
             io,
         ));
@@ -148,7 +148,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         Questions {
             pairs: vec![Pair { one: s.effect.id.clone(), other: None }],
             suspects: vec![Suspect { id: s.effect.id.clone(), size: s.size.clone(), shape: None }],
-            says: format!("is this faint pattern there at all? {}", s.says),
+            says: format!("is this weak pattern real? {}", s.says),
         }
     } else if named.is_empty() {
         warn(found.warnings.iter().cloned(), io);
@@ -172,7 +172,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         Questions::named(&args.effects)
     };
     if questions.pairs.is_empty() {
-        io.say("the touches of this study tell every effect from every other: no further program is needed");
+        io.say("the touches of this study separate all effects: no further program is needed");
         io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": "nothing is confounded" }));
         return Ok(Answer::Done);
     }
@@ -189,7 +189,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let asked_of = LinearisedPlan::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
     if let Some(bad) = asked_of.left_out.first() {
         return Err(Failure::new("next::no_value", bad.left_out())
-            .help("write its formula so that it holds at every touch, or ask for other effects"));
+            .help("write its formula so that it has a value at every touch, or ask for other effects"));
     }
     let budget_s = 60.0 * args.minutes;
     let stands = setting.stands(&loaded.machine, args.moved);
@@ -230,7 +230,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 io.report(&[Finding::info(
                     "next::other_blocks",
                     format!(
-                        "with mounting {:?} put up anew {} of {} pairs would be told apart",
+                        "with mounting {:?} mounted again, {} of {} pairs would be separated",
                         other.generated.plan.mounting,
                         other.told(),
                         other.separations.len()
@@ -253,7 +253,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         return Ok(refuse(&says, &format!("look at the machine which it is. {}", looks.join(". ")), io));
     }
     let Some(mut chosen) = best else {
-        return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time").help(
+        return Err(Failure::new("next::nothing", "no reachable touch separates these effects within the time").help(
             "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
         ));
     };
@@ -261,7 +261,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     // a program that parts nothing further is not worth a person's walk to the machine
     if chosen.separations.iter().all(|s| s.most() <= GAIN * s.before) {
         let says = format!(
-            "{}: these touches tell it as well as any program of {:.0} minutes would",
+            "{}: these touches determine it as well as any program of {:.0} minutes would",
             says(&questions),
             args.minutes
         );
@@ -274,7 +274,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     if chosen.separations.iter().all(|s| s.told < SAFELY && s.told_if_room_turns.is_none_or(|t| t < SAFELY)) {
         let says = format!(
-            "no program of {:.0} minutes that this machine can run would tell any of these effects apart: {}",
+            "no program of {:.0} minutes on this machine would separate any of these effects: {}",
             args.minutes,
             says(&questions)
         );

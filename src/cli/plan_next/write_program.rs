@@ -51,7 +51,7 @@ pub(super) fn write(
         Some(_) => io.say("leave the blocks as the last run left them"),
         None => io.say("put the blocks up first; the time for it is not counted"),
     }
-    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "told apart"]);
+    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "separated"]);
     for s in chosen.separations.iter().take(MOST_LISTED) {
         t.add_row(vec![
             Cell::new(&s.one),
@@ -89,7 +89,7 @@ pub(super) fn write(
     };
     turns.iter().for_each(|says| io.say(says));
     for pair in &chosen.never {
-        io.say(format!("no touches of this machine tell {pair} apart: look at the machine which it is"));
+        io.say(format!("no touches of this machine separate {pair}: check at the machine which it is"));
     }
     let folder = args.study.parent().map(Path::to_path_buf).unwrap_or_default();
     let log = args.out.join(format!("{}.log", plan.program));

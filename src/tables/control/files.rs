@@ -4,7 +4,7 @@ use super::backup::Old;
 use super::changes::{Division, SHEET};
 use super::fill::{Filled, Value as Entry};
 use super::{Export, Options};
-use crate::diag::{Failure, Findings, Result};
+use crate::diag::{Failure, Result};
 use crate::machine::Machine;
 use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, compile};
 use crate::tables::compensation::Grid;

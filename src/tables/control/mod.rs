@@ -386,7 +386,7 @@ pub fn export(
             .help("`axiscal identify` says what the data cannot tell"),
         );
     }
-    let ((), mut findings) = findings.finish(())?;
+    let ((), findings) = findings.finish(())?;
     let pieces = left::Pieces {
         machine,
         correction,
@@ -465,7 +465,7 @@ pub fn export(
         table_errors,
     };
     let tables_of = (&filled, &others, &division);
-    files::write(machine, tables, kind, &noted, options, tables_of, &mut export, &mut findings)?;
+    files::write(machine, tables, kind, &noted, options, tables_of, &mut export)?;
     Ok((export, findings))
 }
 

@@ -46,7 +46,7 @@ fn what_is_expected_of_a_time_constant_is_what_the_fit_says() {
         assert!((then / said - 1.0).abs() < 0.02, "{}: {said} expected, {then} found", p.name);
     }
     assert!(
-        expected.warnings.iter().any(|w| w.starts_with("tau (Warm-up) is looked at where it is 0.5 h")),
+        expected.warnings.iter().any(|w| w.starts_with("tau (Warm-up) is examined where it is 0.5 h")),
         "{:?}",
         expected.warnings
     );
@@ -149,7 +149,7 @@ fn what_each_block_does_by_itself_is_expected_too() {
     for block in ["a", "b", "c", "f"] {
         let says = format!("st@full/{block} (");
         assert!(
-            expected.warnings.iter().any(|w| w.starts_with(&says) && w.contains("is looked at where it is 0.5 h")),
+            expected.warnings.iter().any(|w| w.starts_with(&says) && w.contains("is examined where it is 0.5 h")),
             "{block}: {:?}",
             expected.warnings
         );
