@@ -72,7 +72,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.answer(&outcome);
         return Ok(of_fit(&outcome, Answer::Done, io));
     }
-    io.say(crate::report::fit::outcome(&outcome, io.paper(false), args.verbose));
+    io.say(crate::report::fit::outcome(&outcome, io.paper(false), args.verbose).trim_end());
     if let Some(residuals) = &outcome.residuals {
         let mut t = crate::report::fit::table(&["run", "touch", "residual um", "standardised"]);
         for r in residuals {
@@ -86,6 +86,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
+    io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
     Ok(of_fit(&outcome, Answer::Done, io))
 }
 

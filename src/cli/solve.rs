@@ -237,9 +237,9 @@ fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
 /// Why an effect was not kept, in words.
 fn not_credible(refusal: &Refusal) -> String {
     match refusal {
-        Refusal::TooLarge { effect, parameter, times } => format!(
-            "{effect} is removed again: its {parameter} would be {times:.0} times its usual size"
-        ),
+        Refusal::TooLarge { effect, parameter, times } => {
+            format!("{effect} is removed again: its {parameter} would be {times:.0} times its usual size")
+        }
         Refusal::Together { effect, other, parameters: [a, b], r } => format!(
             "{effect} is removed again: these touches cannot separate it from {other} (correlation of {a} and {b}: {r:.3}), so the two may \
              cancel"
@@ -387,7 +387,8 @@ fn found_as(added: &str, same_as: &[String], or_else: Option<&str>, in_doubt: bo
         },
         others => format!("{} (these touches cannot separate them; {added} is in the model)", one_of(added, others)),
     };
-    let doubt = if in_doubt { " (the name may be wrong: a pattern that no listed effect explains fits better)" } else { "" };
+    let doubt =
+        if in_doubt { " (the name may be wrong: a pattern that no listed effect explains fits better)" } else { "" };
     found + doubt
 }
 

@@ -308,7 +308,8 @@ impl Comparison {
         }
         front.append(&mut self.splits);
         self.splits = front;
-        let noise_words = noise_words(self.noise_um, if self.visit_source == VisitSource::Declared { 0.0 } else { self.visit_um });
+        let noise_words =
+            noise_words(self.noise_um, if self.visit_source == VisitSource::Declared { 0.0 } else { self.visit_um });
         self.says = if self.explained_by_noise && first.by == "visit" {
             // the scatter of visits is the finding, and the model has no part in it
             format!("the residual of {:.2} µm is explained by {noise_words}. {}", self.rms_um, first.says)

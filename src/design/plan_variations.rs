@@ -272,7 +272,12 @@ impl Pool<'_> {
         }
         if !where_at.is_empty() {
             let list: Vec<String> = where_at.into_iter().take(4).collect();
-            self.push("all-faces", format!("touch the faces that are not touched yet ({})", list.join(", ")), added, 0.0);
+            self.push(
+                "all-faces",
+                format!("touch the faces that are not touched yet ({})", list.join(", ")),
+                added,
+                0.0,
+            );
         }
     }
 
@@ -443,8 +448,10 @@ impl Pool<'_> {
                 .collect();
             if !rows.is_empty() {
                 let at = if self.machine.axis(AxisName::C).is_some() { " at C = 0" } else { "" };
-                let says =
-                    format!("indicate the edges of block {} along the linear axes{at} (a calibrated direction)", s.label);
+                let says = format!(
+                    "indicate the edges of block {} along the linear axes{at} (a calibrated direction)",
+                    s.label
+                );
                 known.push(("calibrated-direction", says, rows));
             }
         }

@@ -120,7 +120,10 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
         );
         return (Score::Good, format!("{says}{not_for}"));
     }
-    (Score::Enough, format!("it determines {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")))
+    (
+        Score::Enough,
+        format!("it determines {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")),
+    )
 }
 
 /// How many effects leave no trace, as the list of effects counts them, and which of them no touches would show.

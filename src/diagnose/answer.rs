@@ -77,9 +77,10 @@ impl Diagnosis {
     /// The effect that passes the test with all candidates counted in and that unused measurements do not confirm.
     #[must_use]
     pub fn in_question(&self) -> Option<&Candidate> {
-        let not_confirmed = self.verdict.unexplained().is_some_and(|u| {
-            matches!(u.why, NotNamed::NotConfirmed | NotNamed::CannotBeConfirmed(_))
-        });
+        let not_confirmed = self
+            .verdict
+            .unexplained()
+            .is_some_and(|u| matches!(u.why, NotNamed::NotConfirmed | NotNamed::CannotBeConfirmed(_)));
         let asked = not_confirmed && self.leaves_open() && self.mistake().is_none();
         let passes = |c: &&Candidate| !c.proposed && c.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL;
         self.candidates.first().filter(|_| asked).filter(passes)

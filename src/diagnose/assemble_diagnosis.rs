@@ -1,8 +1,6 @@
 //! From tests to the answer: candidates with sizes in their units, what was not found, touches that come back.
 
-use super::answer::{
-    Candidate, Diagnosis, FORMAT, Finding, Gross, Outlier, Parameter, Power, Shape, Weakened, Where,
-};
+use super::answer::{Candidate, Diagnosis, FORMAT, Finding, Gross, Outlier, Parameter, Power, Shape, Weakened, Where};
 use super::decide::{Decision, Findings, Kind as Decided, OtherEvidence};
 use super::evidence::Evidence;
 use super::first_order::FirstOrder;

@@ -219,8 +219,7 @@ pub(super) fn where_most_touches_are_unusable(out: &mut Diagnosis, subject: Subj
     if let Some((s, first)) = data.supposed.as_ref().zip(out.gross.first()) {
         let mistake = first.says.clone();
         out.candidates.extend(setup_mistakes::of_misses(subject, &[first]));
-        out.verdict =
-            Verdict::MissingEffect(Missing::TouchesFarOff { far: s.far, of: s.of, right: s.right, mistake });
+        out.verdict = Verdict::MissingEffect(Missing::TouchesFarOff { far: s.far, of: s.of, right: s.right, mistake });
         return;
     }
     let named: Vec<&Gross> = out.gross.iter().filter(|g| g.agrees.is_some()).collect();

@@ -166,9 +166,7 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
         let told_by_room = |c: usize| seen.named.effects[c].terms.iter().any(|t| t.formula.variables().contains(&"T"));
         let of_room = group.members.iter().any(|m| told_by_room(m.candidate));
         let says = match never {
-            true if of_room => {
-                "measure again while the temperature of the room changes in another way"
-            }
+            true if of_room => "measure again while the temperature of the room changes in another way",
             true => NEVER,
             false => LOOKED_FOR,
         };
@@ -182,7 +180,8 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
         (false, n) if n <= MOST_NAMED => format!("from {}, and leaves the others", from.join(", ")),
         (false, n) => format!("from {n} of the {}", rivals.len()),
     };
-    let says = format!("{} (+{:.0} min): this separates {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen));
+    let says =
+        format!("{} (+{:.0} min): this separates {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen));
     Separating { says, never }
 }
 

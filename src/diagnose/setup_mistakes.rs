@@ -68,24 +68,21 @@ fn signs_and_swaps(subject: Subject) -> Vec<Gross> {
 
 /// Lengths in the other unit.
 fn units(subject: Subject) -> Vec<Gross> {
-    [
-        (LogMistake::Inches, mm_from_inch(1.0)),
-        (LogMistake::Millimetres, 1.0 / mm_from_inch(1.0)),
-    ]
-    .into_par_iter()
-    .filter_map(|(mistake, factor)| {
-        let data = scaled(&subject.fit.data, factor);
-        let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
-        let rms_um = fair(fit.outcome.rms_um, factor, subject.fit.outcome.rms_um);
-        Some(Gross {
-            hypothesis: mistake.name(),
-            says: words::log_mistake(&mistake),
-            rms_um,
-            agrees: None,
-            in_place: None,
+    [(LogMistake::Inches, mm_from_inch(1.0)), (LogMistake::Millimetres, 1.0 / mm_from_inch(1.0))]
+        .into_par_iter()
+        .filter_map(|(mistake, factor)| {
+            let data = scaled(&subject.fit.data, factor);
+            let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
+            let rms_um = fair(fit.outcome.rms_um, factor, subject.fit.outcome.rms_um);
+            Some(Gross {
+                hypothesis: mistake.name(),
+                says: words::log_mistake(&mistake),
+                rms_um,
+                agrees: None,
+                in_place: None,
+            })
         })
-    })
-    .collect()
+        .collect()
 }
 
 /// Dividing all lengths by 25.4 divides every error by 25.4, whatever is wrong. What is left is therefore measured in the

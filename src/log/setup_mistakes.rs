@@ -110,7 +110,8 @@ pub(super) fn hint(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)]) -> Optio
         pairs.iter().map(|(planned, raw)| (*planned, whole(raw, planned), raw.present)).collect();
     let Supposed { mistake, help, far, right, of } = suppose(machine, &touches)?;
     let says = mistake.says();
-    let message = format!("{far} of {of} touches are far from their planned positions; {right} would be right if {says}");
+    let message =
+        format!("{far} of {of} touches are far from their planned positions; {right} would be right if {says}");
     Some(Finding::warning("log::swapped", message).help(help))
 }
 
@@ -166,10 +167,8 @@ pub(super) fn suppose_rows(plan: &Plan, lines: &Lines<'_>, rows: &[RawTouch], on
         rows.iter().filter(|row| !lines.at(&undo(row.position), row.present).is_empty()).count()
     };
     let simple = mistakes(lines.machine()).into_iter();
-    let shifts = [
-        (false, Box::new(|p: Position| p) as Box<dyn Fn(Position) -> Position>),
-        (true, Box::new(inches_undone)),
-    ];
+    let shifts =
+        [(false, Box::new(|p: Position| p) as Box<dyn Fn(Position) -> Position>), (true, Box::new(inches_undone))];
     let shifted = shifts.into_iter().filter_map(|(inches, first)| {
         let by = shift_of_rows(plan, lines, rows, &first)?;
         Some(Mistake {

@@ -79,8 +79,7 @@ fn errors(view: &View) -> Chart {
     let names: Vec<String> = rungs.iter().map(|r| format!("{}: {} µm", r.label, significant(r.rms_um))).collect();
     let y = Axis::named(names);
     let ends = y.range;
-    let mut c =
-        chart("error", "The error before and after", Axis::new("residual (RMS), µm", (0.0, top)), y);
+    let mut c = chart("error", "The error before and after", Axis::new("residual (RMS), µm", (0.0, top)), y);
     c.downwards = true;
     c.aspect = 0.35;
     for (i, rung) in rungs.iter().enumerate() {
@@ -296,12 +295,7 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
     let title = if along { "residual along the face, µm" } else { "residual, µm" };
     let name = format!("residual-{}", variable.id.to_lowercase());
     let x = Axis::new(variable.title.clone(), (low - room, high + room));
-    let mut c = chart(
-        &name,
-        format!("Residual against the {}", variable.title),
-        x,
-        Axis::new(title, (-reach, reach)),
-    );
+    let mut c = chart(&name, format!("Residual against the {}", variable.title), x, Axis::new(title, (-reach, reach)));
     c.marks.push(Mark::Area {
         series: "twice the noise".to_owned(),
         colour: BLUE,

@@ -69,7 +69,10 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
         *out += &super::fit::together(&a.parted_together, a.never_determined);
     }
     let visible = a.effects.iter().filter(|e| e.visible).count();
-    *out += &format!("\neffects that are not in the model: {visible} of {} have an effect on the touches\n", a.effects.len());
+    *out += &format!(
+        "\neffects that are not in the model: {visible} of {} have an effect on the touches\n",
+        a.effects.len()
+    );
     let mut t = table(&["effect", "found from, µm", "usual, µm", "cannot be separated from"]);
     for e in a.effects.iter().filter(|e| e.visible) {
         t.add_row(vec![
@@ -133,9 +136,7 @@ fn side_by_side(first: &Assessment, paper: Paper, out: &mut String) {
     row("touches", &|a| a.touches.to_string());
     row("time", &|a| time(a.time_s));
     row("combinations not determined", &|a| a.undetermined.len().to_string());
-    row("effects that show", &|a| {
-        format!("{} of {}", a.effects.iter().filter(|e| e.visible).count(), a.effects.len())
-    });
+    row("effects that show", &|a| format!("{} of {}", a.effects.iter().filter(|e| e.visible).count(), a.effects.len()));
     row("pairs not separated", &|a| a.alias_pairs.to_string());
     for p in &first.parameters {
         let of = |a: &Assessment| a.parameters.iter().find(|q| q.name == p.name).cloned();

@@ -49,8 +49,7 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper, verbose: bool) -> String {
             out += &wrapped(&format!("possible cause: {}", shape.kind), 2);
         }
     }
-    let remarks: Vec<String> =
-        remarks(d, verbose).iter().map(|r| wrapped(r, 2).trim_end().to_owned()).collect();
+    let remarks: Vec<String> = remarks(d, verbose).iter().map(|r| wrapped(r, 2).trim_end().to_owned()).collect();
     out += &first_remarks(&remarks, verbose);
     paper.plain(out)
 }
@@ -89,12 +88,12 @@ fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
         out.push(format!("too small to be found with these touches: {}", small.join(", ")));
     }
     if verbose && let Some(first) = d.depends.first() {
-        out.push(format!("the residual depends on: {}", first.says));
+        out.push(first.says.clone());
         // they share much of it with the first, and with each other
         let others: Vec<String> =
             d.depends[1..].iter().map(|w| format!("{} ({:.0} %)", plain(&w.by), 100.0 * w.share)).collect();
         if !others.is_empty() {
-            out.push(format!("each taken alone, also on: {}", others.join(", ")));
+            out.push(format!("each taken alone, the residual also depends on: {}", others.join(", ")));
         }
     }
     out
@@ -221,9 +220,7 @@ fn candidates(d: &Diagnosis, paper: Paper, verbose: bool) -> String {
 /// What the first candidate is, and what to check at the machine. What is not named sends nobody to the machine.
 fn to_check(d: &Diagnosis, paper: Paper) -> String {
     let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
-    let named = |c: &&Candidate| {
-        d.verdict != Verdict::Adequate && (c.proposed || d.verdict.most_touches_unusable())
-    };
+    let named = |c: &&Candidate| d.verdict != Verdict::Adequate && (c.proposed || d.verdict.most_touches_unusable());
     let Some(first) = d.candidates.first().filter(named) else { return String::new() };
     let which = if first.same_as.is_empty() { String::new() } else { format!("if it is {}: ", first.effect) };
     // an effect of a person's own may say nothing of either

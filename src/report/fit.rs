@@ -129,7 +129,7 @@ fn answer(o: &Outcome, results: &[&Parameter]) -> String {
         String::new()
     };
     let mut out = format!(
-        "{}: {determined}.\nThe residual is {} µm RMS{times}, over {} touches.\n",
+        "{determined} ({}).\nThe residual is {} µm RMS{times}, over {} touches.\n",
         o.machine,
         significant(o.rms_um),
         o.touches

@@ -108,7 +108,7 @@ pub fn change(
             t.add_row(vec![
                 Cell::new(&p.name),
                 number(if p.sigma.is_some() { digits(p.value, p.sigma) } else { "?".into() }),
-                Cell::new(&p.unit),
+                Cell::new(super::fit::unit(&p.unit)),
                 number(or_dash(p.sigma)),
                 number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
             ]);

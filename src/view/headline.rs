@@ -223,7 +223,10 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     };
     let untold = match lost {
         0 => String::new(),
-        n => format!(" {n} more {} be determined with these touches.", if n == 1 { "error cannot" } else { "errors cannot" }),
+        n => format!(
+            " {n} more {} be determined with these touches.",
+            if n == 1 { "error cannot" } else { "errors cannot" }
+        ),
     };
     let with = if c.active { "With the compensation that was active, " } else { "" };
     let start = |text: &str| if with.is_empty() { capital(text) } else { format!("{with}{text}") };
@@ -248,10 +251,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
         return (Level::Unknown, sentence);
     }
     if judged == 0 {
-        return (
-            Level::Unknown,
-            format!("The model fits, but none of its errors has a tolerance.{untold}"),
-        );
+        return (Level::Unknown, format!("The model fits, but none of its errors has a tolerance.{untold}"));
     }
     let level = if lost == 0 { Level::Good } else { Level::Unknown };
     let nothing = "the model is complete as far as these touches can measure";
@@ -265,11 +265,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
 }
 
 fn all(n: usize) -> String {
-    if n == 1 {
-        "the one error that is determined".to_owned()
-    } else {
-        format!("all {n} errors that are determined")
-    }
+    if n == 1 { "the one error that is determined".to_owned() } else { format!("all {n} errors that are determined") }
 }
 
 /// With a capital letter.

@@ -293,7 +293,10 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
                     c.effect
                 ),
             };
-            format!("Missing: {what}.{which} It lowers the error from {} to {:.2} µm.{rest}{doubt}", against(d), c.rms_after_um)
+            format!(
+                "Missing: {what}.{which} With it the error falls from {:.2} to {:.2} µm RMS; the probe noise is {:.2} µm.{rest}{doubt}",
+                d.rms_um, c.rms_after_um, d.noise_um
+            )
         }
     }
 }
@@ -465,7 +468,9 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
         }
         (_, "order") => "an eccentric or wobbling bearing, or an encoder ring mounted off its centre",
         (_, "step") => "looseness that gives way at one position: a stop, a clamp, a worn spot",
-        (_, "kink") => "contact that changes at one position: a counterweight, a guideway joint, slack that is taken up",
+        (_, "kink") => {
+            "contact that changes at one position: a counterweight, a guideway joint, slack that is taken up"
+        }
         _ => "a guideway or scale that is bent, or weight that shifts",
     };
     text.to_owned()

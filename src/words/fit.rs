@@ -39,7 +39,9 @@ pub(crate) fn remark(remark: &Remark) -> String {
             format!("Effect {effect} depends on the temperature T, and no touch has one. Log the temperature.")
         }
         Remark::TemperatureGap(gap) => temperature_gap(*gap),
-        Remark::NotCounted(bad) => format!("The effect is not counted among those outside of the model: {}.", no_value(bad)),
+        Remark::NotCounted(bad) => {
+            format!("The effect is not counted among those outside of the model: {}.", no_value(bad))
+        }
         Remark::NotCredible { name, times } => format!(
             "{name} is more than {times} times its usual size; no machine is like that. Check the plan, units and signs; a combination of parameters may hardly be determined."
         ),
@@ -183,7 +185,9 @@ fn where_no_value(bad: &NoValue) -> String {
 fn temperature_gap(gap: TemperatureGap) -> String {
     let TemperatureGap { missing, of, far } = gap;
     match far {
-        0 => format!("{missing} of {of} touches have no temperature. It is taken from the readings before and after them."),
+        0 => format!(
+            "{missing} of {of} touches have no temperature. It is taken from the readings before and after them."
+        ),
         far => format!(
             "{missing} of {of} touches have no temperature, and {far} of them have no reading within {:.0} min. No temperature is \
              used, and no effect of the temperature can be determined. Log one for every touch, or exclude the touches without one.",
@@ -301,7 +305,10 @@ pub(crate) fn or_the_probe(noise: &Noise, times: f64) -> Option<String> {
     let source = noise.unconfirmed()?;
     let with_visits = noise.tau_mm > 0.0 && noise.visit_source == VisitSource::Declared;
     let (axes, how) = if with_visits {
-        (" or the axes index less exactly than declared", "Touch a point several times in a row, and come back to poses")
+        (
+            " or the axes index less exactly than declared",
+            "Touch a point several times in a row, and come back to poses",
+        )
     } else {
         ("", "Touch a point ten times in a row")
     };
@@ -333,7 +340,7 @@ pub(crate) fn undetermined(direction: &NullDirection) -> String {
             "{named} cannot be determined: the touches do not show its effect clearly. It is set to the usual value that fits best. Add touches where the effect changes, or set it to what is known of the machine"
         ),
         Kind::Single => {
-            format!("{named} has no effect on these touches and cannot be determined; it stays at its start value")
+            format!("{named} has no effect on these touches; it stays at its start value")
         }
         Kind::Pair => format!(
             "Only {} can be measured, not {named} separately. {}",

@@ -353,7 +353,7 @@ fn null_directions_are_sentences_with_a_remedy() {
     };
     let offset = about("ey");
     assert!(offset.says.contains("the tip's offset in Y (ey)"), "{}", offset.says);
-    assert!(offset.says.contains("the place of axis C in Y (EY0C)"), "{}", offset.says);
+    assert!(offset.says.contains("the position of axis C in Y (EY0C)"), "{}", offset.says);
     assert!(offset.says.contains("set to 0"), "{}", offset.says);
     assert!(offset.says.contains("+1 mm of EY0C with +1 mm of ey"), "{}", offset.says);
     assert!(!fit.outcome.parted_together.is_empty());

@@ -69,7 +69,10 @@ fn a_missing_effect_is_no_and_a_clean_machine_is_done() {
     let out = axiscal(at, &["diagnose", "study.toml"]);
     let text = String::from_utf8(out.stdout).unwrap();
     assert_eq!(out.status.code(), Some(0), "{text}");
-    assert!(text.contains("The model is complete") && !text.contains("check at the machine") && !text.contains("next:"), "{text}");
+    assert!(
+        text.contains("The model is complete") && !text.contains("check at the machine") && !text.contains("next:"),
+        "{text}"
+    );
     let (c, code) = json(at, &["compare", "study.toml"]);
     assert!(code == 0 && c["explained_by_noise"] == true, "{c}");
 }

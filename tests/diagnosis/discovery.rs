@@ -117,7 +117,11 @@ fn what_chance_does_not_make_is_not_called_faint() {
     for urad in [45.0, 60.0] {
         let (_, _, d) = said(&Bench::full(), &format!("[effects.planted]\np = {urad:?}\n"), own, "");
         assert!(matches!(d.verdict, Verdict::Unexplained(_)), "{urad}: {}", d.says);
-        assert!(!d.verdict.is_weak_pattern() && d.depends[0].by == "pose.C" && d.depends[0].p_adjusted < 1e-6, "{urad}: {}", d.says);
+        assert!(
+            !d.verdict.is_weak_pattern() && d.depends[0].by == "pose.C" && d.depends[0].p_adjusted < 1e-6,
+            "{urad}: {}",
+            d.says
+        );
     }
 }
 
@@ -228,7 +232,8 @@ fn the_faces_of_one_block_of_another_size_are_named_alone() {
     }
     let d = said_of_a_block("[[block]]\nmounting = \"full\"\nname = \"b\"\nsize_um = [6.0, 6.0, 6.0]\n");
     assert!(
-        d.verdict.blocks() == ["full/b"] || (!d.verdict.faces().is_empty() && d.verdict.faces().iter().all(|f| f.starts_with("full/b "))),
+        d.verdict.blocks() == ["full/b"]
+            || (!d.verdict.faces().is_empty() && d.verdict.faces().iter().all(|f| f.starts_with("full/b "))),
         "{}",
         d.says
     );

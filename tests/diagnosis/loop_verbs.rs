@@ -138,7 +138,8 @@ fn a_hidden_effect_is_compared_added_taken_out_and_kept_in_the_ladder() {
         let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
         let most: usize = columns.parse().unwrap();
         // sentences may be longer than a line: tables and plots may not
-        let lines = text.lines().filter(|l| !l.starts_with("the residual is") && !l.starts_with("cannot be determined"));
+        let lines =
+            text.lines().filter(|l| !l.starts_with("the residual is") && !l.starts_with("cannot be determined"));
         assert!(lines.clone().all(|l| l.chars().count() <= most.max(110)), "{text}");
         assert!(!text.contains('\u{1b}') && text.contains("residual, µm, against C, deg"), "{text}");
     }

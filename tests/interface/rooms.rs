@@ -58,8 +58,16 @@ const READS_FOREIGN_TEXT: [(&str, &str); 7] = [
     ("diagnose/sketch.rs", "writes a sentence into a TOML file: quotes must go"),
 ];
 
-const TAKES_APART: [&str; 9] = [
-    ".starts_with(", ".ends_with(", ".contains(", ".split(", ".split_once(", ".strip_prefix(", ".strip_suffix(", ".replace(",
+const TAKES_APART: [&str; 10] = [
+    ".starts_with(",
+    ".ends_with(",
+    ".contains(",
+    ".split(",
+    ".split_once(",
+    ".rsplit_once(",
+    ".strip_prefix(",
+    ".strip_suffix(",
+    ".replace(",
     ".find(",
 ];
 
@@ -94,9 +102,9 @@ fn takes_a_sentence_apart(line: &str) -> bool {
                 .iter()
                 .any(|name| before.ends_with(name) || before.ends_with(&format!("{name}()")));
             let quoted = after.trim_start_matches("&format!(").trim_start_matches('&').strip_prefix('"');
-            let words = quoted.and_then(|text| text.split('"').next()).is_some_and(|text| {
-                text.contains(' ') && text.chars().any(char::is_alphabetic)
-            });
+            let words = quoted
+                .and_then(|text| text.split('"').next())
+                .is_some_and(|text| text.contains(' ') && text.chars().any(char::is_alphabetic));
             (of_message && !after.starts_with('|')) || words
         })
     })

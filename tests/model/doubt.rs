@@ -408,7 +408,7 @@ fn nothing_falls_between_weak_and_unseen() {
         println!("{share}: {weak:?} {unseen}");
         let weak = weak.unwrap_or_else(|| panic!("{share}: {:?} {:?}", o.weak, o.undetermined));
         assert!(weak.times_typical > 100.0 && !unseen);
-        assert!(weak.says.contains("the place of axis C in X (EX0C)"), "{}", weak.says);
+        assert!(weak.says.contains("the position of axis C in X (EX0C)"), "{}", weak.says);
     }
 }
 

@@ -102,13 +102,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut fit)?;
         let help = match &fit.outcome.parted_together[..] {
             [] => "run the program to its end, or touch in more poses, and ask again".to_owned(),
-            remedies => format!("run the program to its end; or add touches that determine them: {}", remedies.join("; and ")),
+            remedies => {
+                format!("run the program to its end; or add touches that determine them: {}", remedies.join("; and "))
+            }
         };
-        return Ok(refuse(
-            &format!("the model's own errors must be determined first. {}", found.says),
-            &help,
-            io,
-        ));
+        return Ok(refuse(&format!("the model's own errors must be determined first. {}", found.says), &help, io));
     }
     let open = diagnose::Diagnosis::leaves_open;
     if named.is_empty() && !open(&found) {
@@ -128,11 +126,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let unexplained = found.verdict.unexplained().filter(|_| named.is_empty() && !open(&found));
     // further touches show whether a weak pattern is there. A clear one is there, and no known effects have to be separated
     let weak = unexplained.is_some_and(|u| u.why == NotNamed::WeakPattern && u.sketchable);
-    let sketched = if weak && found.verdict.moved_block().is_none() {
-        Sketched::of(&loaded, &settings, &fit)
-    } else {
-        None
-    };
+    let sketched =
+        if weak && found.verdict.moved_block().is_none() { Sketched::of(&loaded, &settings, &fit) } else { None };
     if let (Some(unexplained), None) = (unexplained, &sketched) {
         let help = match unexplained.sketchable {
             true => format!("{} writes what is seen as a formula", super::next::sketch_effect(&loaded)),

@@ -70,8 +70,8 @@ pub(super) fn write(
     io.say(io.paper(false).plain(t.to_string()));
     let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
     io.say(format!(
-        "{} of {} pairs will be told apart by `diagnose` (with 95 % or more, whichever of the two acts); 25 and more of \
-         separation tells a pair apart nearly always",
+        "{} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts); a separation of 25 or \
+         more is nearly always enough",
         told(SAFELY),
         chosen.separations.len()
     ));

@@ -342,8 +342,7 @@ pub fn export(
     }
     let division =
         Division::of(tables, (&filled, &others), &grid_list, active.and_then(|a| a.tables.as_ref()), &options.old);
-    let unverified =
-        say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
+    let unverified = say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
     let lacking = filled.lacking(&options.old, spellings.first().copied());
     let instead = format!("no file with values is written, {SHEET} says by how much each value changes");
     if division.values_known || filled.values.is_empty() {
