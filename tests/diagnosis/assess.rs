@@ -531,7 +531,7 @@ fn remedies_are_chosen_together() {
     let a = assess(&request).unwrap();
     assert_eq!(a.undetermined.len(), 4, "{:#?}", a.undetermined);
     for u in &a.undetermined {
-        assert!(!u.parted_by.is_empty() && u.says.contains("what parts them"), "{u:?}");
+        assert!(!u.parted_by.is_empty() && u.says.contains("what separates them"), "{u:?}");
     }
     println!("{:#?}", a.parted_together);
     for part in ["turn the spindle by", "looks down", "times the feed"] {

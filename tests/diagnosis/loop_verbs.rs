@@ -180,7 +180,7 @@ fn a_hidden_effect_is_compared_added_taken_out_and_kept_in_the_ladder() {
     let fall_of = |i: usize| steps[i]["held_out_se_um"].as_f64().unwrap();
     assert!(fall_of(0) > 0.0 && fall_of(1) > 0.0 && steps[1]["nested_rms_um"].is_null(), "{}", steps[1]);
     let fall = axiscal(at).args(["history", "study.toml"]).assert().success();
-    fall.stdout(predicate::str::contains("+radial-c-2").and(predicate::str::contains("held out")));
+    fall.stdout(predicate::str::contains("+radial-c-2").and(predicate::str::contains("cross-validated")));
 
     axiscal(at).args(["remove", "study.toml", "radial-c-2"]).assert().success();
     assert_eq!(study(), lines, "the very same bytes");
@@ -306,7 +306,7 @@ fn a_harmonic_of_the_table_is_named_by_its_order() {
         "{:?}",
         c.splits.iter().map(|s| (&s.by, s.share, s.evidence)).collect::<Vec<_>>()
     );
-    assert!(c.says.contains("goes with C, twice per turn"), "{}", c.says);
+    assert!(c.says.contains("depends on C, twice per turn"), "{}", c.says);
     assert!(c.splits[0].share > 0.8);
 }
 

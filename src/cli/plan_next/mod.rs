@@ -249,7 +249,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     let Some(mut chosen) = best else {
         return Err(Failure::new("next::nothing", "no reachable touch separates these effects within the time").help(
-            "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
+            "give more time (--minutes), mount the blocks again (--moved), or name other effects (--effects)",
         ));
     };
     chosen.never = never;
@@ -260,7 +260,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             says(&questions),
             args.minutes
         );
-        let moved = if chosen.label.is_none() { " with the blocks put up anew" } else { "" };
+        let moved = if chosen.label.is_none() { " with the blocks mounted again" } else { "" };
         return Ok(refuse(
             &says,
             &format!("no program{moved} brings more: confirm it at the machine, or give more time (--minutes)"),
@@ -278,7 +278,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             io.say("  what goes with the temperature and what goes with time stay one while the room goes on as it did: measure \
                     again when its temperature has turned");
         }
-        io.say("  nothing is written: give more time (--minutes), let the blocks be put up anew (--moved), or confirm one of \
+        io.say("  nothing is written: give more time (--minutes), mount the blocks again (--moved), or confirm one of \
                 them at the machine");
         io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": says }));
         return Ok(Answer::No);
