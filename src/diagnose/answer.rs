@@ -371,8 +371,11 @@ pub(crate) mod tests {
             shape: None,
         });
         assert!(d.in_question().is_some_and(|c| c.effect == "a"));
-        let of = |why| Verdict::Unexplained(Unexplained { why, check: MachineCheck::NoFormula, sketchable: true });
-        d.verdict = of(NotNamed::WeakPattern);
+        d.verdict = Verdict::Unexplained(Unexplained {
+            why: NotNamed::WeakPattern,
+            check: MachineCheck::NoFormula,
+            sketchable: true,
+        });
         assert!(d.in_question().is_none());
     }
 }

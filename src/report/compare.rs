@@ -40,7 +40,7 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
         ]);
     }
     lay(&mut t, paper.width.min(160), &[]);
-    out += &format!("{t}\nshare: part of the residual beyond the noise; each split is taken alone, so they overlap\n");
+    out += &format!("{t}\nshare: part of the residual beyond the noise; the splits overlap\n");
     let shown = |s: &&Split| !s.groups.is_empty() && (all || s.share >= WORTH_SHOWING);
     for s in c.splits.iter().filter(shown).take(if all { usize::MAX } else { LISTED }) {
         out += &format!("\n{}\n{}\n", s.by, groups(s, paper));

@@ -89,7 +89,11 @@ fn scatter_of_visits_far_above_the_declared_one_is_a_finding() {
     for d in &found {
         assert!(matches!(d.verdict, Verdict::Unexplained(_)), "{}", d.says);
         assert_eq!(d.depends[0].by, "visit", "{}", d.says);
-        assert!(d.says.contains("do not come back exactly") && d.noise_says.contains("from revisited poses"), "{}", d.says);
+        assert!(
+            d.says.contains("do not come back exactly") && d.noise_says.contains("from revisited poses"),
+            "{}",
+            d.says
+        );
     }
     // what the machine file declares is no finding
     let usual = diagnosis(&machine, &plans, &Scenario::flawless().with_noise(5e-4, 5e-4, 410));

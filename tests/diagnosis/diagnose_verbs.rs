@@ -188,9 +188,9 @@ fn a_users_effect_is_a_candidate_and_its_touches_come_back() {
 #[test]
 fn a_mistake_is_named_where_most_touches_miss() {
     for (parameter, programs, says) in [
-        ("flip_Y", &["head", "table"][..], "axis Y is counted the wrong way round"),
-        ("flip_B", &["head", "table"], "axis B is counted the wrong way round"),
-        ("swap_XY", &["full"], "axes X and Y are taken for each other"),
+        ("flip_Y", &["head", "table"][..], "axis Y counts the wrong way round"),
+        ("flip_B", &["head", "table"], "axis B counts the wrong way round"),
+        ("swap_XY", &["full"], "axes X and Y are exchanged"),
     ] {
         let wrong = format!("seed = 2\n[effects.sign-or-axis-swap]\n{parameter} = 1.0\n[noise]\ntouch_um = 1.0\n");
         let folder = folder(programs, &wrong, None);

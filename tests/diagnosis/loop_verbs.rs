@@ -141,7 +141,7 @@ fn a_hidden_effect_is_compared_added_taken_out_and_kept_in_the_ladder() {
         let lines =
             text.lines().filter(|l| !l.starts_with("the residual is") && !l.starts_with("cannot be determined"));
         assert!(lines.clone().all(|l| l.chars().count() <= most.max(110)), "{text}");
-        assert!(!text.contains('\u{1b}') && text.contains("residual, µm, against C, deg"), "{text}");
+        assert!(!text.contains('\u{1b}') && text.contains("residual, um, against C, deg"), "{text}");
     }
 
     // a list over several lines, with remarks

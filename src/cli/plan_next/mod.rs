@@ -248,9 +248,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         return Ok(refuse(&says, &format!("look at the machine which it is. {}", looks.join(". ")), io));
     }
     let Some(mut chosen) = best else {
-        return Err(Failure::new("next::nothing", "no reachable touch separates these effects within the time").help(
-            "give more time (--minutes), mount the blocks again (--moved), or name other effects (--effects)",
-        ));
+        return Err(Failure::new("next::nothing", "no reachable touch separates these effects within the time")
+            .help("give more time (--minutes), mount the blocks again (--moved), or name other effects (--effects)"));
     };
     chosen.never = never;
     // a program that parts nothing further is not worth a person's walk to the machine
@@ -278,8 +277,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             io.say("  what goes with the temperature and what goes with time stay one while the room goes on as it did: measure \
                     again when its temperature has turned");
         }
-        io.say("  nothing is written: give more time (--minutes), mount the blocks again (--moved), or confirm one of \
-                them at the machine");
+        io.say(
+            "  nothing is written: give more time (--minutes), mount the blocks again (--moved), or confirm one of \
+                them at the machine",
+        );
         io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": says }));
         return Ok(Answer::No);
     }
