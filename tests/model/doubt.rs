@@ -60,7 +60,7 @@ fn a_chip_is_rejected_with_its_size_and_the_rest_is_left_alone() {
     for (run, index) in [(0, 17), (0, 18), (1, 60), (1, 100)] {
         let id = runs[run].1[index].id;
         let found = o.rejected.iter().find(|r| r.run == run + 1 && r.id == id);
-        assert!(found.is_some_and(|r| r.reason.contains("um off")), "{id} of run {run}: {:?}", o.rejected);
+        assert!(found.is_some_and(|r| r.reason.contains("µm off")), "{id} of run {run}: {:?}", o.rejected);
     }
     assert!(o.rejected.len() <= 5, "{:?}", o.rejected);
     assert!(o.rms_um < 1.1 && (o.chi2_per_dof - 1.0).abs() < 0.25, "{} {}", o.rms_um, o.chi2_per_dof);

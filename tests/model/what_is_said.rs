@@ -253,7 +253,7 @@ fn a_joined_log_finds_its_plan_by_its_name() {
 
     // an effect of which these touches see nothing changes nothing, and no digits of the arithmetic are shown
     let said = verbs::ok(at, &["add", "study.toml", "zero-b", "--dry-run"]);
-    assert!(said.contains("it stays as it is") && !said.contains("0.00000000"), "{said}");
+    assert!(said.contains("the cross-validated error stays the same") && !said.contains("0.00000000"), "{said}");
     assert!(said.contains("± in this table: one standard uncertainty"), "{said}");
 
     // a file that is not there has its line in the study
