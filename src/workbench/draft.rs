@@ -451,7 +451,7 @@ mod tests {
     fn a_formula_without_a_value_has_its_field() {
         let machine = crate::machine::built_in("swivel-head").unwrap().unwrap();
         let mut d = draft("1");
-        d.terms.push(DraftTerm { formula: " 1 / 0 ".into(), ..d.terms[0].clone() });
+        d.terms.push(DraftTerm { formula: " 1 / C ".into(), ..d.terms[0].clone() });
         let typed = check(&d, &Catalogue::built_in().unwrap(), &[]).unwrap();
         let touch = Observation {
             run: 0,

@@ -554,10 +554,12 @@ fn the_verb_answers_in_json_and_side_by_side() {
     assert!(a.time_s > 1800.0 && a.compared.len() == 1 && a.compared[0].alias_pairs < a.alias_pairs);
     // the sentence and the list count alike
     let without = a.effects.iter().filter(|e| !e.visible).count();
-    let says = format!("{without} effects leave no trace (not counted against it: tool-length, which EZ0B holds)");
+    let says = format!(
+        "{without} effects have no effect on the touches (not counted against it: tool-length, which EZ0B includes)"
+    );
     assert!(a.says.contains(&says), "{}", a.says);
     let text = run(&["assess", "--machine", "swivel-head", "--plan", "head,table"]);
-    let with = format!("{} of {} leave a trace", a.effects.len() - without, a.effects.len());
+    let with = format!("{} of {} have an effect on the touches", a.effects.len() - without, a.effects.len());
     assert!(text.contains(&with), "{with}: {text}");
     let text = run(&["assess", "--machine", "trunnion", "--plan", "basic", "--json"]);
     let b: Assessment = serde_json::from_str(&text).unwrap();

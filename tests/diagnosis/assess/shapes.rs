@@ -73,15 +73,19 @@ fn a_shape_that_touches_would_not_tell_is_said_before() {
     let says = |a: &Assessment, word: &str| a.warnings.iter().any(|w| w.contains(word));
     let told = with("full", "pitch-x");
     assert!(
-        row(&told, "pitch_X").unwrap().sigma.is_some_and(|s| s < 0.1) && !says(&told, "may not tell it from"),
+        row(&told, "pitch_X").unwrap().sigma.is_some_and(|s| s < 0.1) && !says(&told, "may not separate it from"),
         "{:?}",
         told.warnings
     );
     let not = with("head", "pitch-x");
-    assert!(row(&not, "pitch_X").unwrap().sigma.is_none() && says(&not, "may not tell it from"), "{:?}", not.warnings);
+    assert!(
+        row(&not, "pitch_X").unwrap().sigma.is_none() && says(&not, "may not separate it from"),
+        "{:?}",
+        not.warnings
+    );
     let slip = with("full", "block-slip");
     assert!(row(&slip, "from_h").is_none() && row(&slip, "dx").unwrap().sigma.is_some(), "{:?}", slip.parameters);
-    assert!(says(&slip, "from_h") && says(&slip, "trying every place"), "{:?}", slip.warnings);
+    assert!(says(&slip, "from_h") && says(&slip, "trying every position"), "{:?}", slip.warnings);
 }
 
 /// A slip is looked at among the touches: behind the last one, where its range of hours begins, it moved nothing.
