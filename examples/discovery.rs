@@ -29,7 +29,7 @@ fn report_planted(name: &str, outcomes: &[Outcome]) {
     println!(
         "  proposed {}  missing-effect {}",
         share(outcomes, |o| o.proposed),
-        share(outcomes, |o| o.verdict == Verdict::MissingEffect)
+        share(outcomes, |o| o.verdict.is_missing_effect())
     );
     println!(
         "  by name {}  first group {} (mean size {:.1})  first three {}",
@@ -56,7 +56,7 @@ fn report_planted(name: &str, outcomes: &[Outcome]) {
         share(outcomes, |o| o.held_out_falls)
     );
     let mut verdicts: BTreeMap<String, usize> = BTreeMap::new();
-    outcomes.iter().for_each(|o| *verdicts.entry(format!("{:?}", o.verdict)).or_default() += 1);
+    outcomes.iter().for_each(|o| *verdicts.entry(o.verdict.as_str().to_owned()).or_default() += 1);
     println!("  verdicts {verdicts:?}");
     for o in outcomes.iter().filter(|o| !o.first_group || !o.by_name) {
         println!(
@@ -72,13 +72,13 @@ fn report_planted(name: &str, outcomes: &[Outcome]) {
 }
 
 fn report_clean(name: &str, verdicts: &[Clean]) {
-    let count = |v: Verdict| verdicts.iter().filter(|x| x.verdict == v).count();
+    let count = |v: &str| verdicts.iter().filter(|x| x.verdict.as_str() == v).count();
     println!(
         "clean, {name}: {} runs, not adequate {} (missing-effect {}, unexplained {})",
         verdicts.len(),
-        percent(verdicts.len() - count(Verdict::Adequate), verdicts.len()),
-        count(Verdict::MissingEffect),
-        count(Verdict::Unexplained)
+        percent(verdicts.len() - count("adequate"), verdicts.len()),
+        count("missing-effect"),
+        count("unexplained")
     );
     for c in verdicts.iter().filter(|c| c.verdict != Verdict::Adequate) {
         println!("  - {}", c.because);

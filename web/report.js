@@ -134,7 +134,7 @@
   const d = view.diagnosis;
   if (d.candidates.length || d.where.length) {
     const s = section('candidates', d.verdict === 'adequate' ? 'What was looked for' : 'What may be missing', d.verdict === 'adequate'
-      ? `${d.tested} known effects were tried on what is left over, and none of them is there. These would be the next best; they do not pass.`
+      ? `${d.tested} known effects were tested on the residual, and none is found. These would be the next best; they do not pass.`
       : view.headline.detail || d.says);
     if (d.where.length && !view.headline.detail.includes(d.where[0].says)) s.append(make('p', {}, d.where[0].says));
     if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it goes with (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
@@ -150,7 +150,7 @@
         const fact = (name, value) => [make('dt', {}, name), make('dd', {}, value)];
         const mends = d.effects[c.effect]?.mends;
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
-          make('dl.facts', {}, ...fact('id', c.effect), ...fact('error left', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
+          make('dl.facts', {}, ...fact('id', c.effect), ...fact('remaining error', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
             ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
             ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),

@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args, edit: Edit, nested_rms_um: Option<f64>, io: &Io) 
     let (later, doubt) = (changed.later_run_rms_um, &changed.held_out);
     io.say(report::ladder::change((before, after), &changed.parameters, later, doubt, io.paper(false)));
     for t in &changed.together {
-        io.say(format!("{}: what has no value here cannot be told alone; {}", t.effect, t.says()));
+        io.say(format!("{}: parameters without a value cannot be determined alone; {}", t.effect, t.says()));
     }
     for b in &changed.between {
         io.say(format!("{}: no touch lies in between", b.says()));
@@ -85,7 +85,7 @@ pub fn history(args: &HistoryArgs, io: &Io) -> Result<Answer> {
             "history::other_data",
             format!("the plans or logs have changed since step {}: its figures are of other touches", steps.join(", ")),
         )
-        .help("delete the history beside the study to begin a new ladder")]);
+        .help("delete the history file next to the study to begin a new one")]);
     }
     io.say(report::ladder::history(&history, io.paper(args.ascii)));
     io.answer(&history);

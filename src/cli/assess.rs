@@ -26,7 +26,7 @@ pub struct Args {
     /// Effects of the model (default: what `axiscal new` writes)
     #[arg(long, value_delimiter = ',')]
     pub effects: Vec<String>,
-    /// The blocks stand exactly where the plan says: their set-up is not solved for
+    /// The blocks are exactly where the plan says: their positions are not solved for
     #[arg(long)]
     pub known_blocks: bool,
     /// A file with effects of your own

@@ -33,7 +33,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     }
     io.say(report::compare::comparison(&comparison, io.paper(args.ascii), args.all));
     for u in &fit.outcome.undetermined {
-        io.say(format!("not told by this data: {}", u.says));
+        io.say(format!("cannot be determined: {}", u.says));
     }
     if !comparison.explained_by_noise || !found.depends.is_empty() {
         io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));

@@ -3,7 +3,7 @@
 use super::common::of_fit;
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::diagnose::{Options, Verdict};
+use crate::diagnose::Options;
 use crate::workflow::load_study;
 use std::path::PathBuf;
 
@@ -17,6 +17,9 @@ pub struct Args {
     /// Plots of plain ASCII signs (as in a pipe)
     #[arg(long)]
     pub ascii: bool,
+    /// All remarks, all sizes, and the curve of the residual
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 /// Runs `diagnose`. The answer is "no" when the model does not fit.
@@ -28,9 +31,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let settings = loaded.quick_settings();
     let fit = loaded.fit(&settings)?;
     let found = loaded.diagnose(&settings, &fit, &Options { at_most: args.at_most.max(1), ..Options::default() })?;
-    io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii)).trim_end());
+    io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii), args.verbose).trim_end());
     super::next::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
     io.answer(&found);
-    let no = matches!(found.verdict, Verdict::MissingEffect | Verdict::Unexplained) || found.most_missed;
-    Ok(of_fit(&fit.outcome, if no { Answer::No } else { Answer::Done }, io))
+    Ok(of_fit(&fit.outcome, if found.verdict.is_no() { Answer::No } else { Answer::Done }, io))
 }

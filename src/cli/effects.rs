@@ -223,7 +223,7 @@ fn show(e: &Effect, machines: &[Machine]) -> String {
     let mut kinds = vec![e.family.as_str()];
     kinds.extend(e.nuisance.then_some("solved for, but no result"));
     kinds.extend(e.per_block.then_some("one set of parameters for each block"));
-    kinds.extend(e.discrete.then_some("a supposition, 0 or 1, tried where the error is gross"));
+    kinds.extend(e.discrete.then_some("a set-up mistake, 0 or 1, tried where the error is very large"));
     out += &entry("family", &kinds.join("; "));
     for (i, p) in e.parameters.iter().enumerate() {
         let other = [("ISO", p.iso.as_ref().filter(|iso| **iso != p.name)), ("paper", p.alias.as_ref())];

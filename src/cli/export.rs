@@ -114,7 +114,7 @@ fn say_control(export: &control::Export, tables: &Tables, exported: &Exported, a
     }
     say_left("which leaves", (&export.left, &export.table_errors), args, io);
     io.say(format!(
-        "rounding to the control's resolution leaves up to {} um; all constant errors that were identified together up to {} um; a tool 100 mm longer or shorter is off by up to {} um",
+        "rounding to the control's resolution leaves up to {} µm; all constant errors that were identified together up to {} µm; a tool 100 mm longer or shorter is off by up to {} µm",
         significant(export.rounding_um), significant(export.rest_um), significant(export.longer_tool_um)
     ));
     say_not_told(&exported.not_told, io);
@@ -198,7 +198,7 @@ fn free_folder(out: &Path, files: &files::Folder, loaded: &Loaded) -> Result<()>
     if used && !files.was_written() {
         return Err(Failure::new(
             "export::folder",
-            format!("{} is not empty and holds no earlier export", out.display()),
+            format!("{} is not empty and has no earlier export", out.display()),
         )
         .help("name an empty folder: an export is a set of files that belong together"));
     }
@@ -246,7 +246,7 @@ fn say_linuxcnc(export: &linuxcnc::Export, version: &str, exported: &Exported, a
 /// What has no value of its own is in no table: "nothing is left" speaks of the rest.
 fn say_not_told(not_told: &[Undetermined], io: &Io) {
     for u in not_told {
-        io.say(format!("not corrected, because this data cannot tell it: {}", u.says));
+        io.say(format!("not corrected, because it cannot be determined: {}", u.says));
     }
 }
 

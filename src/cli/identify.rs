@@ -22,9 +22,12 @@ pub struct Args {
     /// With the covariance matrix of the results (--json)
     #[arg(long)]
     pub covariance: bool,
-    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, held-out errors
+    /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, cross-validated error
     #[arg(long)]
     pub quick: bool,
+    /// All remarks, all columns and the details of the fit
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 /// # Errors
@@ -46,7 +49,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.answer(&outcome);
         return Ok(of_fit(&outcome, Answer::Done, io));
     }
-    io.say(crate::report::fit::outcome(&outcome, io.paper(false)));
+    io.say(crate::report::fit::outcome(&outcome, io.paper(false), args.verbose).trim_end());
     if let Some(residuals) = &outcome.residuals {
         let mut t = crate::report::fit::table(&["run", "touch", "residual um", "standardised"]);
         for r in residuals {
@@ -60,6 +63,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
+    io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
     Ok(of_fit(&outcome, Answer::Done, io))
 }
 

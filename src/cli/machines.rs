@@ -54,7 +54,7 @@ fn letters(m: &Machine, side: Side) -> String {
 
 fn show(m: &Machine, io: &Io) {
     io.say(format!("{}: {}\n", m.name, m.says));
-    let mut t = table(&["axis", "side", "direction", "point mm", "sense", "range (machine)", "indexing um"]);
+    let mut t = table(&["axis", "side", "direction", "point, mm", "direction of +", "range (machine)", "indexing, µm"]);
     for a in &m.axes {
         let d = a.direction;
         let [low, high] = machine_range(m, a);

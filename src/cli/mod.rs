@@ -37,7 +37,7 @@ pub use common::{Answer, Io};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// A five-axis machine measures itself with its own touch probe, learns what is wrong with it, and is put right.
+/// Measures the errors of a five-axis machine with its own touch probe, finds missing effects, and writes the compensation.
 #[derive(Debug, Parser)]
 #[command(name = "axiscal", version, about, propagate_version = true, arg_required_else_help = true)]
 struct Cli {
@@ -53,7 +53,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// The whole loop on built-in data: programs, virtual machine, logs, fit, tables
+    /// Run the whole loop on built-in data: programs, virtual machine, logs, fit, tables
     Demo(demo::Args),
     /// List the machines that are built in or found, or show one
     Machines(machines::Args),
@@ -63,45 +63,45 @@ enum Verb {
     Controllers(controllers::Args),
     /// List the probing programs that are built in or found, or show one
     Programs(programs::Args),
-    /// Before the first touch: what a plan will be able to tell, and what it cannot
+    /// Before the first touch: what a plan can determine, and what it cannot
     Assess(assess::Args),
     /// Write an NC probing program and its plan
     Generate(generate::Args),
     /// Read an NC program back, run it on the virtual machine: limits, collisions, unguarded moves, touches, settings
     Check(check::Args),
-    /// The virtual machine: write the log that the controller would have written
+    /// Run the virtual machine: write the log that the controller would have written
     Simulate(simulate::Args),
     /// Read a controller's log into a touches CSV
     Parse(parse::Args),
-    /// The paper's tables: given, identified, deviation
+    /// Print the paper's tables: given, identified, deviation
     Reproduce(reproduce::Args),
-    /// Write a study: which runs were measured and what the model holds
+    /// Write a study: the measured runs and the effects of the model
     New(new::Args),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
-    /// Which physical effect is missing: verdict, candidates, and what these touches cannot tell apart
+    /// Find the physical effect that is missing: verdict, candidates, and what these touches cannot separate
     Diagnose(diagnose::Args),
-    /// The loop, step by step: diagnose, add, look again, until nothing is left to find
+    /// Diagnose, add the missing effect, fit again, until the model is complete
     Solve(solve::Args),
     /// Write a starting formula for what no known effect explains
     SketchEffect(sketch_effect::Args),
-    /// Model against measurement: where it fails, and on what that depends
+    /// Compare model and measurement: where it fails, and on what that depends
     Compare(compare::Args),
-    /// The probing program that best separates what the data cannot tell apart
+    /// Write the probing program that best separates what the data cannot
     PlanNext(plan_next::Args),
-    /// Put effects into the study's model, refit, and say what that changed
+    /// Add effects to the study's model, fit again, and print what changed
     Add(add::Args),
-    /// Take effects out of the study's model, refit, and say what that changed
+    /// Remove effects from the study's model, fit again, and print what changed
     Remove(add::Args),
-    /// The ladder: every model tried, with its error on the touches and on touches left out
+    /// All models tried so far, with their residual and their cross-validated error
     History(add::HistoryArgs),
-    /// Two studies side by side: did the compensation work, has the machine changed?
+    /// Compare two studies: did the compensation work, has the machine changed?
     Verify(verify::Args),
     /// Write the compensation as the controller's own tables
     Export(export::Args),
-    /// A study live in the browser: switch effects on and off and watch the error
+    /// Open a study in the browser: switch effects on and off and watch the error
     Workbench(workbench::Args),
-    /// One page with the verdict, the plots and every touch: opens with no network
+    /// Write one page with the verdict, the plots and every touch; it needs no network
     Report(report::Args),
     /// Print the JSON schema of a file, for editors
     Schema(schema::Args),

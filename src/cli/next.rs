@@ -73,20 +73,18 @@ const MOST_IDS: usize = 3;
 pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
     let study = quoted(&loaded.path);
     let add =
-        |effect: &str| format!("  either way this takes it out of the other errors: axiscal add {study} {effect}");
+        |effect: &str| format!("  in either case, this removes it from the other errors: axiscal add {study} {effect}");
+    let sketchable = found.verdict.unexplained().is_some_and(|u| u.sketchable);
     match found.next_step() {
         NextStep::CorrectSetupMistake => {
-            vec!["next: put that right and measure again; smaller errors can be spoken of afterwards".to_owned()]
+            vec!["next: correct that and measure again; smaller errors can be judged afterwards".to_owned()]
         }
         NextStep::Add(first) => vec![format!("next: axiscal add {study} {}", first.effect)],
         NextStep::AddOrCheck(first, other) => {
-            vec![format!("next: look at the machine whether it is that, or whether {other}"), add(&first.effect)]
+            vec![format!("next: check at the machine whether it is that, or {other}"), add(&first.effect)]
         }
         NextStep::CheckWhich(first) => {
-            let how = match first.tell_apart.as_str() {
-                crate::diagnose::NEVER_PARTED => "look at the machine which of them it is: no touches tell",
-                other => other,
-            };
+            let how = "check at the machine which of them it is: no touches separate them";
             vec![format!("next: {how}"), add(&first.effect)]
         }
         // which of them it is, is for touches or a person to say
@@ -103,15 +101,15 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
                 format!("  with one of {some}{more} in place of EFFECT"),
             ]
         }
-        NextStep::MeasureMore(_) => {
-            let sketch = found.sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
+        NextStep::MeasureMore => {
+            let sketch = sketchable.then(|| format!("  or: {}", sketch_effect(loaded)));
             std::iter::once(format!("next: {}", plan_next(loaded))).chain(sketch).collect()
         }
         NextStep::Sketch => vec![format!("next: {}", sketch_effect(loaded))],
         NextStep::CorrectAtMachine(check) => {
-            let sketch = || format!("  or, to take it out of the other errors: {}", sketch_effect(loaded));
+            let sketch = || format!("  or, to remove it from the other errors: {}", sketch_effect(loaded));
             let what = format!("next: {}", words::machine_check(check));
-            std::iter::once(what).chain(found.sketchable.then(sketch)).collect()
+            std::iter::once(what).chain(sketchable.then(sketch)).collect()
         }
         NextStep::RicherProgram => richer_program(loaded).map(|call| format!("next: {call}")).into_iter().collect(),
         NextStep::Nothing => Vec::new(),

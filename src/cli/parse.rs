@@ -26,7 +26,7 @@ pub struct Args {
     /// A machines.toml of your own (default: the one built in)
     #[arg(long, value_name = "FILE")]
     pub machines: Option<PathBuf>,
-    /// Which run, where the log holds several (default: the last complete one)
+    /// Which run, where the log has several (default: the last complete one)
     #[arg(long, value_name = "N")]
     pub run: Option<usize>,
     /// Where to write the touches (CSV)

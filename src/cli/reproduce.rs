@@ -51,7 +51,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         ]);
     }
     io.say("\"deviation\" is closed form less given, \"least squ.\" the deviation of the least squares, \"print\" whether both equal the\nprinted line at four decimals\n");
-    io.say(format!("What poses can tell (x, y, z of the ball at each):\n{r}"));
+    io.say(format!("What poses can determine (x, y, z of the ball at each):\n{r}"));
     let n_rows = tables.iter().map(|t| t.rows.len()).sum::<usize>();
     let n_equal = tables.iter().flat_map(|t| &t.rows).filter(|r| r.equals_print()).count();
     io.say(format!(

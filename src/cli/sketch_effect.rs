@@ -46,7 +46,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     for (i, t) in made.tried.iter().take(6).enumerate() {
         let which = match i {
             0 => ": this one is written",
-            _ if t.as_good_as(&made.tried[0]) => ": these touches cannot tell it from the first",
+            _ if t.as_good_as(&made.tried[0]) => ": these touches cannot separate it from the first",
             _ => "",
         };
         io.say(format!("  at {} ({}) it would leave {:.2} um{which}", t.at, t.dofs().join(", "), t.left_um));

@@ -11,9 +11,9 @@ use crate::diagnose::solving::{Added, Change, Ending, Host, Refusal, State, Stop
 use crate::fit::Fit;
 use crate::fit::outcome::{Outcome, Parameter};
 use crate::report::diagnosis::wrong_sign;
-use crate::report::fit::{digits, significant};
+use crate::report::fit::{digits, first_remarks, significant, with_unit};
 use crate::search::groups::PLAUSIBLE;
-use crate::words::diagnose::{list, one_of};
+use crate::words::diagnose::{list, machine_check, one_of};
 use crate::workflow::change::Edit;
 use crate::workflow::{Loaded, load_study};
 use serde::Serialize;
@@ -22,14 +22,17 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The study; effects that you agree to are added in place
+    /// The study; effects that you accept are added to it
     pub study: PathBuf,
-    /// Agree to everything that is proposed
+    /// Accept everything that is proposed
     #[arg(long)]
     pub yes: bool,
     /// Most effects that are added
     #[arg(long, value_name = "N", default_value_t = 6)]
     pub at_most: usize,
+    /// All that stays open, not the first three only
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -40,6 +43,7 @@ struct Solution {
     /// Why the loop ended.
     stopped: String,
     /// Verdict of the last model, which is the study's.
+    #[serde(flatten)]
     verdict: Verdict,
     /// The same in a sentence.
     says: String,
@@ -109,7 +113,7 @@ impl Host for Terminal<'_> {
     fn looked(&mut self, state: &State, added: &[Added]) -> Result<()> {
         let (o, found) = (&state.fit.outcome, &state.found);
         self.io.say(format!(
-            "--- step {}: {} um RMS left, noise {} um, chi2/dof {:.2}{}",
+            "--- step {}: residual {} µm RMS, noise {} µm, chi2/dof {:.2}{}",
             added.len() + 1,
             significant(o.rms_um),
             significant(o.noise_um),
@@ -163,7 +167,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let solution = Solution {
         format: "axiscal-solution/1",
         open: open(&steps, &found, &fit.outcome),
-        verdict: found.verdict,
+        verdict: found.verdict.clone(),
         says: found.says.clone(),
         models,
         stopped,
@@ -176,10 +180,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         effects: fit.outcome.effects.clone(),
         steps,
     };
-    tell(&solution, &fit, &loaded, found.mistake().is_some(), io);
+    tell(&solution, &fit, &loaded, (found.mistake().is_some(), args.verbose), io);
     io.answer(&solution);
-    let no = matches!(found.verdict, Verdict::Unexplained | Verdict::MissingEffect) || found.most_missed;
-    Ok(of_fit(&fit.outcome, if no { Answer::No } else { Answer::Done }, io))
+    Ok(of_fit(&fit.outcome, if found.verdict.is_no() { Answer::No } else { Answer::Done }, io))
 }
 
 /// The model's cross-validated error, in words.
@@ -187,7 +190,7 @@ fn cross_validated(found: &Diagnosis) -> String {
     let Some(rms_um) = found.held_out_rms_um else { return String::new() };
     let se = found.held_out_se_um;
     let doubt = se.map_or_else(String::new, |se| format!(" ± {} (one standard error)", digits(se, Some(se))));
-    format!(", {}{doubt} um on index visits left out", digits(rms_um, se))
+    format!(", cross-validated {}{doubt} µm", digits(rms_um, se))
 }
 
 /// Why the loop ended, in words.
@@ -195,42 +198,41 @@ fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
     let (beside, add) = beside(added, loaded);
     match stop {
         Stop::Mistake(mistake) => {
-            format!("a gross mistake must be put right first, and the touches made again: {mistake}")
+            format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}")
         }
         Stop::TooLarge(effect) => format!(
-            "the first proposal ({effect}) would need more than {PLAUSIBLE:.0} times its usual size: it may be a name for something \
-             else. `axiscal add` puts it in if you know better"
+            "the first proposal ({effect}) would be more than {PLAUSIBLE:.0} times its usual size: another effect may look like it. \
+             `axiscal add` adds it all the same"
         ),
         Stop::AtMost(n) => format!("{n} effects were added, as many as --at-most allows"),
         Stop::Refused(refusal) => not_credible(refusal),
         Stop::ByUser => "you stopped it".to_owned(),
-        Stop::Faint => "what is left is as small as the noise, but for a pattern too faint to name".to_owned(),
+        Stop::Faint => "the residual is as small as the noise, except for a pattern too weak to name".to_owned(),
         Stop::InQuestion(first) => format!(
-            "{} passes the test{beside}, but touches that had no part in choosing it are not predicted better with it: \
-             {add}`{}` looks for touches that tell",
+            "{} passes the test{beside}, but unused measurements do not confirm it: {add}`{}` looks for touches that decide",
             one_of(&first.effect, &first.same_as),
             super::next::plan_next(loaded)
         ),
         Stop::Sketchable => format!(
-            "no known effect explains what is left{beside}: {add}`{}` writes its curve as a formula",
+            "no known effect explains the rest{beside}: {add}`{}` writes its curve as a formula",
             super::next::sketch_effect(loaded)
         ),
-        Stop::Unexplained(check) => format!("no known effect explains what is left{beside}: {check}"),
+        Stop::Unexplained(check) => format!("no known effect explains the rest{beside}: {}", machine_check(check)),
         Stop::TooLittleData => "too few touches to judge".to_owned(),
-        Stop::NotConfirmed => "what is missing is not borne out".to_owned(),
-        Stop::Nothing => "nothing is left that these touches can show".to_owned(),
+        Stop::NotConfirmed => "what is missing is not confirmed".to_owned(),
+        Stop::Nothing => "the model is complete as far as these touches can measure".to_owned(),
     }
 }
 
 /// Why an effect was not kept, in words.
 fn not_credible(refusal: &Refusal) -> String {
     match refusal {
-        Refusal::TooLarge { effect, parameter, times } => format!(
-            "{effect} is taken back: its {parameter} would be {times:.0} times as large as such an effect usually is"
-        ),
+        Refusal::TooLarge { effect, parameter, times } => {
+            format!("{effect} is removed again: its {parameter} would be {times:.0} times its usual size")
+        }
         Refusal::Together { effect, other, parameters: [a, b], r } => format!(
-            "{effect} is taken back: these touches cannot tell its size from that of {other} ({a} and {b} go together with a \
-             correlation of {r:.3}), so that the two may cancel"
+            "{effect} is removed again: these touches cannot separate it from {other} (correlation of {a} and {b}: {r:.3}), so the two may \
+             cancel"
         ),
     }
 }
@@ -241,7 +243,7 @@ fn leaves(ids: &[String], why: &Why, added: &[Added]) -> String {
         Why::Refused(refusal) => not_credible(refusal),
         Why::Worse => {
             let each =
-                |a: &Added| format!("{}: {} > {} um RMS", a.id, significant(a.rms_um.0), significant(a.rms_um.1));
+                |a: &Added| format!("{}: {} > {} µm RMS", a.id, significant(a.rms_um.0), significant(a.rms_um.1));
             let all: Vec<String> = added.iter().map(each).collect();
             format!("The added effects ({}) do not explain all of the error. They are removed again.", all.join("; "))
         }
@@ -249,7 +251,7 @@ fn leaves(ids: &[String], why: &Why, added: &[Added]) -> String {
             let (fall, se) = as_good.fall_um;
             format!(
                 "{} is no longer needed and is removed: the model without it fits as well (p = {:.2}), and its cross-validated \
-                 error changes by {} ± {} um.",
+                 error changes by {} ± {} µm.",
                 ids.join(", "),
                 as_good.p,
                 digits(fall, Some(se)),
@@ -264,17 +266,20 @@ fn propose(first: &Candidate, io: &Io) {
         .parameters
         .iter()
         .map(|p| match p.sigma {
-            Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, Some(sigma)), significant(sigma), p.unit),
-            None => format!("{} {} {}", p.name, significant(p.value), p.unit),
+            Some(sigma) => {
+                let size = format!("{} ± {}", digits(p.value, Some(sigma)), significant(sigma));
+                format!("{} {}", p.name, with_unit(size, &p.unit))
+            }
+            None => format!("{} {}", p.name, with_unit(significant(p.value), &p.unit)),
         })
         .collect();
-    sizes.extend(first.not_told.iter().map(|name| format!("{name} ? (cannot be told by this plan)")));
+    sizes.extend(first.not_told.iter().map(|name| format!("{name} ? (cannot be determined with this plan)")));
     if let (false, Some(most)) = (first.not_told.is_empty(), first.moves_um) {
-        sizes.push(format!("together up to {} um at a touch", significant(most)));
+        sizes.push(format!("together up to {} µm at a touch", significant(most)));
     }
     let what = match &first.same_as[..] {
         [] => match &first.or_else {
-            Some(other) => format!("{} ({}, or {other}: these touches cannot tell)", first.effect, first.name),
+            Some(other) => format!("{} ({}, or {other}: these touches cannot separate them)", first.effect, first.name),
             None => format!("{} ({})", first.effect, first.name),
         },
         others => format!("{}; if it is {}", one_of(&first.effect, others), first.effect),
@@ -284,23 +289,23 @@ fn propose(first: &Candidate, io: &Io) {
         io.say(format!("  {}", wrong_sign(first)));
     }
     io.say(format!("  {}", first.says));
-    io.say(format!("  to confirm it: {}", first.look));
+    io.say(format!("  check at the machine: {}", first.look));
     if let (Some(before), Some(after)) = (first.held_out_before_um, first.held_out_after_um) {
         let se = first.held_out_se_um.map_or_else(String::new, |se| format!(" ± {}", digits(se, Some(se))));
-        let how = if first.nested { "the choice redone for each" } else { "the effect given" };
+        let how = if first.nested { "choice repeated for each" } else { "effect given" };
         let fall = digits(before - after, first.held_out_se_um);
         io.say(format!(
-            "  on index visits left out ({how}): {} um before, {} um with it: {fall}{se} um less",
+            "  cross-validated error ({how}): {} µm before, {} µm with it: {fall}{se} µm less",
             significant(before),
             significant(after)
         ));
     }
     if !first.same_as.is_empty() {
-        io.say(format!("  these touches cannot tell it from: {}", first.same_as.join(", ")));
-        io.say(format!("  to tell them apart: {}", first.tell_apart));
+        io.say(format!("  these touches cannot separate it from: {}", first.same_as.join(", ")));
+        io.say(format!("  to separate them: {}", first.tell_apart));
     }
     for w in &first.weakens {
-        io.say(format!("  it makes {} more than three times less certain", w.name));
+        io.say(format!("  {} becomes more than three times less certain", w.name));
     }
 }
 
@@ -310,7 +315,7 @@ fn ask(first: &Candidate, yes: bool) -> Result<Option<String>> {
         return Ok(Some(first.effect.clone()));
     }
     if !std::io::stdin().is_terminal() {
-        return Err(Failure::new("solve::nobody", "nobody is there to agree: the input is no terminal")
+        return Err(Failure::new("solve::nobody", "the input is not a terminal: no one can agree to the proposal")
             .help("call with --yes to agree to everything that is proposed"));
     }
     let members: Vec<&String> = std::iter::once(&first.effect).chain(&first.same_as).collect();
@@ -352,12 +357,12 @@ fn beside(added: &[&str], loaded: &Loaded) -> (String, String) {
 fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
     let mut out = Vec::new();
     for s in steps.iter().filter(|s| !s.same_as.is_empty()) {
-        out.push(format!("{} stands in the model and could as well be {}", s.added, list(&s.same_as)));
+        out.push(format!("{} is in the model; it could also be {}", s.added, list(&s.same_as)));
     }
     out.extend(outcome.undetermined.iter().map(|u| u.says.clone()));
     out.extend(outcome.weak.iter().map(|w| w.says.clone()));
     if !found.not_seen.is_empty() {
-        out.push(format!("these touches cannot see: {}", found.not_seen.join(", ")));
+        out.push(format!("no effect on these touches: {}", found.not_seen.join(", ")));
     }
     out
 }
@@ -366,26 +371,30 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
 fn found_as(added: &str, same_as: &[String], or_else: Option<&str>, in_doubt: bool) -> String {
     let found = match same_as {
         [] => match or_else {
-            Some(other) => format!("{added}, or {other}: these touches cannot tell"),
+            Some(other) => format!("{added}, or {other}: these touches cannot separate them"),
             None => added.to_owned(),
         },
-        others => format!("{} (these touches cannot tell which; {added} stands in the model)", one_of(added, others)),
+        others => format!("{} (these touches cannot separate them; {added} is in the model)", one_of(added, others)),
     };
-    let doubt = if in_doubt { " (the name may be wrong: a shape without a name described it better)" } else { "" };
+    let doubt =
+        if in_doubt { " (the name may be wrong: a pattern that no listed effect explains fits better)" } else { "" };
     found + doubt
 }
 
-fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
+fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, (mistaken, verbose): (bool, bool), io: &Io) {
     let outcome = &fit.outcome;
     io.say(format!("\n--- the end: {}", s.stopped));
     let sizes = |id: &str| -> String {
         let of = outcome.parameters.iter().filter(|p: &&Parameter| p.effect == id);
         let words: Vec<String> = of
             .map(|p| match p.sigma {
-                Some(sigma) => format!("{} {} ± {} {}", p.name, digits(p.value, p.sigma), significant(sigma), p.unit),
+                Some(sigma) => {
+                    let size = format!("{} ± {}", digits(p.value, p.sigma), significant(sigma));
+                    format!("{} {}", p.name, with_unit(size, &p.unit))
+                }
                 None => match parameter_combinations::bracket(fit, &loaded.catalogue, p) {
                     Some(b) => b.says(),
-                    None => format!("{} not told alone", p.name),
+                    None => format!("{} cannot be determined alone", p.name),
                 },
             })
             .collect();
@@ -397,7 +406,7 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
     }
     for step in &s.steps {
         io.say(format!(
-            "found: {}: {} > {} um RMS: {}",
+            "found: {}: {} > {} µm RMS: {}",
             step.found,
             significant(step.rms_before_um),
             significant(step.rms_after_um),
@@ -409,16 +418,17 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, mistaken: bool, io: &Io) {
         return;
     }
     io.say(format!(
-        "left: {} um RMS of a noise of {} um{}",
+        "residual: {} µm RMS, noise {} µm{}",
         significant(s.rms_um),
         significant(s.noise_um),
-        s.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on index visits left out", significant(h)))
+        s.held_out_rms_um.map_or_else(String::new, |h| format!("; cross-validated {} µm", significant(h)))
     ));
     for id in &s.taken_back {
-        io.say(format!("taken back: {id}"));
+        io.say(format!("removed again: {id}"));
     }
-    for line in &s.open {
-        io.say(format!("open: {line}"));
+    let open: Vec<String> = s.open.iter().map(|line| format!("open: {line}")).collect();
+    if !open.is_empty() {
+        io.say(first_remarks(&open, verbose).trim_end());
     }
     // a further program is asked for the names themselves: the study holds one of them by now
     for step in s.steps.iter().filter(|step| !step.same_as.is_empty() && !step.never_parted) {

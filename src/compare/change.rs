@@ -65,16 +65,16 @@ pub fn change(before: &Outcome, after: &Outcome, fall: Option<(f64, f64)>) -> Ch
             (Some(times), ..) if times > MUCH_WORSE => {
                 remarks.push(format!("{lead}{} is now known {times:.1} times worse", p.name));
             }
-            (None, Some(_), None) => remarks.push(format!("{lead}{} can no longer be told", p.name)),
+            (None, Some(_), None) => remarks.push(format!("{lead}{} can no longer be determined", p.name)),
             _ => {}
         }
     }
     if let Some((fall, se)) = fall.filter(|f| f.0 < -WORTH_SAYING * after.rms_um) {
         let much = if -fall > se { "" } else { ", which may be chance" };
-        remarks.push(format!("touches that were left out are predicted worse by {:.3} ± {se:.3} um{much}", -fall));
+        remarks.push(format!("the cross-validated error rises by {:.3} ± {se:.3} µm{much}", -fall));
     }
     for u in after.undetermined.iter().filter(|u| !before.undetermined.iter().any(|b| b.says == u.says)) {
-        remarks.push(format!("new, not told by this data: {}", u.says));
+        remarks.push(format!("new, cannot be determined: {}", u.says));
     }
     let gone: Vec<&Parameter> = new.iter().filter(|p| p.status == Status::Identified).collect();
     for p in gone {

@@ -261,7 +261,7 @@ fn groups(fit: &Fit, points: &[Point], levels: &Levels) -> Vec<Group> {
 fn says(what: &str, share: f64, harmonics: &[Harmonic], groups: &[Group], common: Common) -> String {
     let percent = |s: f64| format!("{:.0} %", 100.0 * s);
     if share < WORTH_NAMING {
-        return format!("what is left does not go with {what}");
+        return format!("does not depend on {what}");
     }
     let leading = harmonics.iter().max_by(|a, b| a.share.total_cmp(&b.share));
     if let Some(h) = leading.filter(|h| h.share >= 0.6 * share) {
@@ -278,7 +278,7 @@ fn says(what: &str, share: f64, harmonics: &[Harmonic], groups: &[Group], common
             .map(|(c, _)| c)
             .collect();
         return format!(
-            "{} of what is left goes with {what}, {times} per turn, along {}",
+            "{} of the residual depends on {what}, {times} per turn, along {}",
             percent(share),
             along.join(" and ")
         );
@@ -286,12 +286,12 @@ fn says(what: &str, share: f64, harmonics: &[Harmonic], groups: &[Group], common
     let size = |g: &&Group| if common == Common::Residual { g.mean_um.abs() } else { g.rms_um };
     match groups.iter().filter(|g| g.n > 0).max_by(|a, b| size(a).total_cmp(&size(b))) {
         Some(worst) => format!(
-            "{} of what is left goes with {what}; worst at {} (mean {:+.1} um, RMS {:.1} um)",
+            "{} of the residual depends on {what}; worst at {} (mean {:+.1} µm, RMS {:.1} µm)",
             percent(share),
             worst.value,
             worst.mean_um,
             worst.rms_um
         ),
-        None => format!("{} of what is left goes with {what}", percent(share)),
+        None => format!("{} of the residual depends on {what}", percent(share)),
     }
 }

@@ -11,7 +11,7 @@ pub mod verify;
 
 pub use share::Share;
 
-use crate::fit::{self, Fit, noise};
+use crate::fit::{self, Fit, VisitSource, noise};
 use crate::model::formula::slot;
 use crate::units::um_from_mm;
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,7 @@ pub struct Comparison {
     pub visit_um: f64,
     /// Where that comes from: `revisits`, `declared`, `study`, `one pose`.
     #[serde(default)]
-    pub visit_source: String,
+    pub visit_source: VisitSource,
     /// Both in a sentence.
     #[serde(default)]
     pub noise_says: String,
@@ -218,21 +218,21 @@ pub fn compare(fit: &Fit) -> Comparison {
     let visits_um = um_from_mm(fit.noise.tau_mm);
     let noise_words = noise_words(noise_um, visits_um);
     let first = splits.first().filter(|s| s.share >= factors::WORTH_NAMING);
-    let misses = format!("the model misses the touches by {}", fit.noise.times(chi2_per_dof.sqrt()));
+    let misses = format!("the residual is {}", fit.noise.times(chi2_per_dof.sqrt()));
     let says = match (fit.dof, explained_by_noise, first) {
         _ if no_sample => format!(
-            "{} of {} touches cannot be used: what is left over of the others says nothing of the machine",
+            "{} of {} touches cannot be used: the others say nothing about the machine",
             fit.data.unusable.len(),
             fit.data.made()
         ),
-        (0, _, _) => "as many unknowns as touches: nothing is left over to judge the model by".to_owned(),
+        (0, _, _) => "there are as many unknowns as touches: the model cannot be judged".to_owned(),
         (_, true, _) => {
-            format!("what is left, {rms_um:.2} um, is what {noise_words} leaves: the model does not fail")
+            format!("the residual of {rms_um:.2} µm is explained by {noise_words}: the model fits")
         }
         (_, false, Some(split)) => {
             format!("{misses}; {}", split.says)
         }
-        (_, false, None) => format!("{misses}, and what is left goes with nothing in particular"),
+        (_, false, None) => format!("{misses}, and depends on nothing in particular"),
     };
     Comparison {
         format: FORMAT.into(),
@@ -243,7 +243,7 @@ pub fn compare(fit: &Fit) -> Comparison {
         noise_um,
         noise_source: fit.noise.source.as_str().into(),
         visit_um: fit.outcome.visit_um,
-        visit_source: fit.noise.visit_source.as_str().into(),
+        visit_source: fit.noise.visit_source,
         noise_says: fit.noise.says(),
         chi2_per_dof,
         dof: fit.dof,
@@ -259,9 +259,9 @@ pub fn compare(fit: &Fit) -> Comparison {
 /// What the misfit is held against: the noise of a touch, and the scatter of index visits where it was measured.
 fn noise_words(noise_um: f64, visits_um: f64) -> String {
     if visits_um > 0.0 {
-        format!("a noise of {noise_um:.2} um with index visits that scatter by {visits_um:.2} um")
+        format!("a noise of {noise_um:.2} µm and a scatter of index positions of {visits_um:.2} µm")
     } else {
-        format!("a noise of {noise_um:.2} um")
+        format!("a noise of {noise_um:.2} µm")
     }
 }
 
@@ -308,19 +308,20 @@ impl Comparison {
         }
         front.append(&mut self.splits);
         self.splits = front;
-        let noise_words = noise_words(self.noise_um, if self.visit_source == "declared" { 0.0 } else { self.visit_um });
+        let noise_words =
+            noise_words(self.noise_um, if self.visit_source == VisitSource::Declared { 0.0 } else { self.visit_um });
         self.says = if self.explained_by_noise && first.by == "visit" {
             // the scatter of visits is the finding, and the model has no part in it
-            format!("what is left, {:.2} um, is what {noise_words} leaves. {}", self.rms_um, first.says)
+            format!("the residual of {:.2} µm is explained by {noise_words}. {}", self.rms_um, first.says)
         } else if std::mem::take(&mut self.explained_by_noise) {
             // the size alone would do, the way it is spread does not
             format!(
-                "as a whole what is left, {:.2} um, could be {noise_words}, but not the way it is spread: {}",
+                "the size of the residual, {:.2} µm, is explained by {noise_words}, but its pattern is not: {}",
                 self.rms_um, first.says
             )
         } else {
             let times = noise::times_in_words(self.chi2_per_dof.sqrt(), self.visit_um);
-            format!("the model misses the touches by {times}; {}", first.says)
+            format!("the residual is {times}; {}", first.says)
         };
         self
     }

@@ -43,7 +43,7 @@ impl Together {
     #[must_use]
     pub fn says(&self) -> String {
         let (size, doubt) = (digits(self.moves_um, self.sigma_um), digits(self.sigma_um, self.sigma_um));
-        format!("together they move a touch by up to {size} ± {doubt} um")
+        format!("together they move a touch by up to {size} ± {doubt} µm")
     }
 }
 

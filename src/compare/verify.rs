@@ -200,13 +200,13 @@ pub fn verify(
         Question::Change => Verdict::NotChanged,
     };
     let readings = format!(
-        "the readings were off by {:.2} um RMS and are off by {:.2} um now, with a noise of {:.2} um",
+        "the readings were off by {:.2} µm RMS and are off by {:.2} µm now, with a noise of {:.2} µm",
         first.readings_rms_um, second.readings_rms_um, second.noise_um
     );
     let says = match verdict {
         Verdict::Improved if second.explained => format!("the compensation works: {readings}"),
         // readings that are better by half may still be of blocks that the control takes for others
-        Verdict::Improved => format!("better, and something is left that the model after does not explain: {readings}"),
+        Verdict::Improved => format!("better, but the model after does not explain all: {readings}"),
         Verdict::NotImproved => format!("no improvement: {readings}"),
         Verdict::Changed => {
             format!(
@@ -238,7 +238,7 @@ pub fn verify(
         let names: Vec<&str> = not_compared.iter().filter(|a| a.told_by == word).map(|a| a.name.as_str()).collect();
         if !names.is_empty() {
             remarks.push(format!(
-                "not compared, because only the study {word} tells them and the one {other} does not: {}",
+                "not compared, because only the study {word} determines them, and not the one {other}: {}",
                 names.join(", ")
             ));
         }

@@ -72,7 +72,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         let only = free.iter().find(|f| f.shape && u.combination.len() == 1 && u.combination.contains_key(&f.name));
         if let Some(shape) = only {
             u.says = format!(
-                "{} leaves no trace in these touches where its effect has its usual size: they will not tell it",
+                "{} has no effect on these touches where its effect has its usual size: it cannot be determined",
                 null_space::meaning(shape, &task.effects)
             );
         }
@@ -94,12 +94,12 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         })
         .collect::<Result<_>>()?;
     let remedies: Vec<Remedy> = tried.iter().filter_map(|t| t.remedy.clone()).collect();
-    let parted_together = part(&results.directions(&observability), &remedies, &mut undetermined);
+    let together = part(&results.directions(&observability), &remedies, &mut undetermined);
     let absorbed = Absorbed::new(&view);
     let mut effects: Vec<Seen> = Vec::new();
     let warm = |e: &Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
     let blind = |id: &str| !task.temperature && task.catalogue.get(id, task.machine).is_some_and(warm);
-    let left_out = |id: &str| view.left_out.iter().any(|(left, _)| left == id);
+    let left_out = |id: &str| view.left_out.iter().any(|left| left.effect == id);
     for (c, candidate) in view.library.candidates().iter().enumerate().filter(|(_, x)| !left_out(&x.id)) {
         let name = task.catalogue.get(&candidate.id, task.machine).map_or_else(String::new, |e| e.name.clone());
         let id = |other: usize| view.library.candidates()[other].id.clone();
@@ -151,14 +151,15 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         unknowns: alone.free.len(),
         rank: observability.rank,
         undetermined,
-        parted_together,
+        parted_together: together.variations,
+        never_determined: together.left,
         parameters,
         effects,
         alias_groups: groups,
         alias_pairs: pairs.len(),
         advice,
         compared: Vec::new(),
-        warnings: view.left_out.iter().map(|(_, says)| says.clone()).chain(of_shapes).collect(),
+        warnings: view.left_out.iter().map(crate::fit::candidates::NoValue::left_out).chain(of_shapes).collect(),
     };
     (out.score, out.says) = score::score(&out, task);
     Ok(out)
@@ -252,7 +253,7 @@ impl Absorbed {
 }
 
 /// The blocks' set-up among the parameters that take an effect.
-const SET_UPS: &str = "the set-up of the blocks";
+const SET_UPS: &str = "the block positions";
 
 fn minutes(seconds: f64) -> String {
     // as the report says it of the same touches
@@ -283,7 +284,7 @@ fn to_show(
     } else if absorbed_by.is_empty() {
         "the model follows it".to_owned()
     } else {
-        format!("its trace is that of {}", absorbed_by.join(", "))
+        format!("it looks the same as {}", absorbed_by.join(", "))
     };
     match found.first() {
         Some(first) => {
@@ -331,7 +332,7 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &LinearisedPlan
     let mut found: Vec<(usize, &Tried, Vec<usize>)> =
         tried.iter().map(|t| (t, parted(t))).filter(|(_, p)| !p.is_empty()).map(|(t, p)| (p.len(), t, p)).collect();
     if found.is_empty() {
-        return ("no single variation of the touches parts them".into(), Vec::new());
+        return ("no single variation of the touches separates them".into(), Vec::new());
     }
     // the cheapest that parts it from all; else the one that parts it from most
     found.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.variation.seconds.total_cmp(&b.1.variation.seconds)));
@@ -345,7 +346,7 @@ fn to_part(c: usize, pairs: &[AliasPair], tried: &[Tried], view: &LinearisedPlan
     } else {
         format!("from {count} of {}", others.len())
     };
-    let says = format!("{} (+{}) tells the effect {whom}", best.variation.says, minutes(best.variation.seconds));
+    let says = format!("{} (+{}) separates the effect {whom}", best.variation.says, minutes(best.variation.seconds));
     (says, found.iter().map(|f| f.1.variation.id.clone()).collect())
 }
 

@@ -397,16 +397,16 @@ pub fn where_all_have_values(
     let mut said = Vec::new();
     for (effect, _) in effects.iter().filter(|(e, _)| !e.built_in) {
         let mut at = n_given;
-        let mut bad: Vec<(usize, &str)> = Vec::new();
+        let mut bad: Vec<(usize, String)> = Vec::new();
         for (i, bundle) in pool.iter().enumerate() {
             let end = (at + bundle.touches.len()).min(view.data.nominal.len());
             let found = without_value(effect, &view.data.nominal[at.min(end)..end]);
-            bad.extend(found.first().map(|b| (i, b.formula)));
+            bad.extend(found.first().map(|b| (i, b.formula.clone())));
             at = end;
         }
-        let Some(&(first, formula)) = bad.first() else { continue };
+        let Some((first, formula)) = bad.first() else { continue };
         bad.iter().for_each(|(i, _)| left[*i] = false);
-        let pose: Vec<String> = pool[first].manner.pose.iter().map(|(axis, deg)| format!("{axis} {deg}")).collect();
+        let pose: Vec<String> = pool[*first].manner.pose.iter().map(|(axis, deg)| format!("{axis} {deg}")).collect();
         said.push(format!(
             "formula {formula:?} of effect {} has no value at {} of the {} blocks and poses that could be touched, for instance at \
              {}: the program does not go there; write the formula so that it holds everywhere if the effect acts there too",

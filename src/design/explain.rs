@@ -72,15 +72,22 @@ impl Remedy {
     }
 }
 
-/// Adds to every null direction the variations that part it, cheapest first, and chooses those that together tell all.
+/// The variations that together determine what the touches cannot, and how many combinations no variation determines.
+#[derive(Debug, Default)]
+pub(super) struct Together {
+    pub variations: Vec<String>,
+    pub left: usize,
+}
+
+/// Adds to every null direction the variations that determine it, cheapest first, and chooses those that together determine all.
 pub(super) fn part(
     directions: &[Option<DVector<f64>>],
     remedies: &[Remedy],
     undetermined: &mut [Undetermined],
-) -> Vec<String> {
+) -> Together {
     let own: Vec<DVector<f64>> = directions.iter().flatten().map(|d| d / d.norm().max(f64::MIN_POSITIVE)).collect();
     if own.is_empty() {
-        return Vec::new();
+        return Together::default();
     }
     let all = DMatrix::from_columns(&own);
     let within = span(&all, 1e-6);
@@ -95,11 +102,11 @@ pub(super) fn part(
         said.parted_by = remedies.iter().zip(&still_in).filter_map(parts).take(MOST_NAMED).collect();
         place += 1;
         if !said.parted_by.is_empty() {
-            said.says = format!("{}; what parts them: {}", said.says, said.parted_by.join("; or "));
+            said.says = format!("{}; what separates them: {}", said.says, said.parted_by.join("; or "));
         }
     }
     if own.len() < 2 {
-        return Vec::new();
+        return Together::default();
     }
     // each further variation for what the ones before it leave, the most for its time first
     let mut open = within;
@@ -116,22 +123,17 @@ pub(super) fn part(
         open = left;
     }
     if out.is_empty() {
-        return out;
+        return Together::default();
     }
     // what no single one parts may be parted by several
     let left_in = shares(&all, &open);
     let named = undetermined.iter_mut().zip(directions).filter(|(_, direction)| direction.is_some());
     for (place, (said, _)) in named.enumerate() {
         if said.parted_by.is_empty() && left_in[place] < STANDS_IN {
-            said.says.push_str("; no single variation of the touches tells it, several together do");
+            said.says.push_str("; no single variation of the touches determines it, several together do");
         }
     }
-    match open.ncols() {
-        0 => {}
-        1 => out.push("one combination is left that no variation of these touches tells".into()),
-        n => out.push(format!("{n} combinations are left that no variation of these touches tells")),
-    }
-    out
+    Together { variations: out, left: open.ncols() }
 }
 
 /// The largest weight of each direction (unit columns) in the combinations that make up a space of theirs.
@@ -192,7 +194,9 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
             ))
         })
         .collect::<Result<_>>()?;
-    fit.outcome.parted_together = part(&directions, &remedies, &mut fit.outcome.undetermined);
+    let together = part(&directions, &remedies, &mut fit.outcome.undetermined);
+    fit.outcome.parted_together = together.variations;
+    fit.outcome.never_determined = together.left;
     Ok(())
 }
 

@@ -205,7 +205,7 @@ pub struct LinearisedPlan {
     pub shapes: Vec<Option<f64>>,
     /// Effects whose formula has no value at some of these touches, with what is said of them: they stand in the library with
     /// columns of nothing.
-    pub left_out: Vec<(String, String)>,
+    pub left_out: Vec<NoValue>,
     /// The noise.
     pub noise: Noise,
     /// When the last touch is made, s.
@@ -297,7 +297,7 @@ impl LinearisedPlan {
         for (effect, given) in effects {
             let bad = if effect.built_in { Vec::new() } else { without_value(effect, &self.data.nominal) };
             if let Some(bad) = bad.first() {
-                self.left_out.push((effect.id.clone(), NoValue::left_out(bad)));
+                self.left_out.push(bad.clone());
             }
             let own: Vec<usize> = (0..all.unknowns.len())
                 .filter(|&i| all.unknowns[i].effect == effect.id && !all.unknowns[i].shape)

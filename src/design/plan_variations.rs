@@ -296,7 +296,12 @@ impl Pool<'_> {
         }
         if !where_at.is_empty() {
             let list: Vec<String> = where_at.into_iter().take(4).collect();
-            self.push("all-faces", format!("touch the faces that were left out ({})", list.join(", ")), added, 0.0);
+            self.push(
+                "all-faces",
+                format!("touch the faces that are not touched yet ({})", list.join(", ")),
+                added,
+                0.0,
+            );
         }
     }
 
@@ -422,7 +427,7 @@ impl Pool<'_> {
                 added.push((run, again));
             }
         }
-        self.push("revisit", "come back to the first set-up and to a middle one at the end".into(), added, 0.0);
+        self.push("revisit", "come back to the first index position and to a middle one at the end".into(), added, 0.0);
     }
 
     /// What is known without a touch of this program.
@@ -460,11 +465,11 @@ impl Pool<'_> {
                 .filter(|k| k.sum.iter().all(|(name, _)| named(name)))
                 .collect();
             if !rows.is_empty() {
+                let at = if self.machine.axis(AxisName::C).is_some() { " at C = 0" } else { "" };
                 let says = format!(
-                    "indicate the edges of block {} along the linear axes at C = 0 (a calibrated direction)",
+                    "indicate the edges of block {} along the linear axes{at} (a calibrated direction)",
                     s.label
                 );
-                let says = if self.machine.axis(AxisName::C).is_some() { says } else { says.replace(" at C = 0", "") };
                 known.push(("calibrated-direction", says, rows));
             }
         }

@@ -63,6 +63,9 @@ pub struct Assessment {
     /// What would tell all of them together: variations of the touches, chosen one after the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parted_together: Vec<String>,
+    /// Combinations that no variation determines.
+    #[serde(skip)]
+    pub never_determined: usize,
     /// The parameters that are no set-up of blocks.
     pub parameters: Vec<Expected>,
     /// Every effect that the model leaves out.

@@ -45,10 +45,10 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     };
     let lost: Vec<&str> = judged.iter().filter(|p| p.sigma.is_none()).map(|p| p.name.as_str()).collect();
     if !lost.is_empty() {
-        return (Score::NotEnough, format!("it cannot tell {}{not_for}", lost.join(", ")));
+        return (Score::NotEnough, format!("it cannot determine {}{not_for}", lost.join(", ")));
     }
     if location.is_empty() {
-        return (Score::Enough, "the model holds no location error: there is nothing to score it by".into());
+        return (Score::Enough, "the model has no location error to score the plan by".into());
     }
     if judged.is_empty() {
         return (Score::NotEnough, "it sees no location error at all".into());
@@ -69,7 +69,7 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     let scattered = coarse(VISITS_SHARE, |p| p.sigma_with_visits);
     if !scattered.is_empty() {
         let says = format!(
-            "with the scatter of indexing {} {} uncertain by more than half of {}, so that a usual error could not be told from none",
+            "with the scatter of indexing {} {} uncertain by more than half of {}, so that a usual error could not be separated from none",
             scattered.join(", "),
             if scattered.len() == 1 { "is" } else { "are" },
             usual_size(&scattered)
@@ -95,7 +95,7 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
         let over = judged.iter().filter(|p| {
             !p.holds.is_empty() && p.sigma_with_unmodelled.is_none_or(|s| s > UNMODELLED_SHARE * typical(p))
         });
-        over.map(|p| format!("{} holds {} as well", p.name, p.holds.join(", "))).collect()
+        over.map(|p| format!("{} includes {}", p.name, p.holds.join(", "))).collect()
     };
     let not_for = if excused.is_empty() {
         not_for
@@ -108,19 +108,22 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
         reasons.push(traceless(a, &equal));
     }
     if a.alias_pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
-        reasons.push(format!("{} pairs of effects cannot be told apart", a.alias_pairs));
+        reasons.push(format!("{} pairs of effects cannot be separated", a.alias_pairs));
     }
     if reasons.is_empty() {
         // a trace is not enough: at its usual size an effect must be larger than what would just be found
         let of_usual_size = |e: &&super::record::Seen| e.noncentrality >= 25.0;
         let found = a.effects.iter().filter(of_usual_size).count();
         let says = format!(
-            "it tells {told} also while other errors act, and would find {found} of {} effects at their usual size",
+            "it determines {told} even if other errors act, and would find {found} of {} effects of their usual size",
             a.effects.len()
         );
         return (Score::Good, format!("{says}{not_for}"));
     }
-    (Score::Enough, format!("it tells {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")))
+    (
+        Score::Enough,
+        format!("it determines {told} of a machine without other errors, but {}{not_for}", reasons.join("; ")),
+    )
 }
 
 /// How many effects leave no trace, as the list of effects counts them, and which of them no touches would show.
@@ -129,7 +132,7 @@ fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
     let held = all.iter().filter_map(|e| {
         let by: Vec<&str> =
             a.parameters.iter().filter(|p| p.holds.contains(&e.effect)).map(|p| p.name.as_str()).collect();
-        let verb = if by.len() == 1 { "holds" } else { "hold" };
+        let verb = if by.len() == 1 { "includes" } else { "include" };
         (!by.is_empty()).then(|| format!("{}, which {} {verb}", e.effect, by.join(", ")))
     });
     let mut not_counted: Vec<String> = held.collect();
@@ -143,7 +146,7 @@ fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
     } else {
         format!(" (not counted against it: {})", not_counted.join("; "))
     };
-    format!("{} effects leave no trace{but}", all.len())
+    format!("{} effects have no effect on the touches{but}", all.len())
 }
 
 fn is_location(effect: &str) -> bool {

@@ -47,7 +47,7 @@ pub(super) fn shapes(task: &Task, view: &LinearisedPlan, expected: &mut [Expecte
         if !view.free.contains(&unknown) {
             if !task.held.iter().any(|h| crate::symbols::same(h, &p.name) || crate::symbols::same(h, name)) {
                 out.push(format!(
-                    "{} ({}) will be found by trying every place between the touches: how well it will be told depends on how large the jump is, and the rest is what is expected where it is known to be {}",
+                    "{} ({}) is found by trying every position between the touches. How well it is determined depends on the size of the jump; the other figures are for the value {}",
                     name,
                     effect.name,
                     with_unit(&significant(view.theta[unknown], DIGITS), &p.unit)
@@ -56,7 +56,7 @@ pub(super) fn shapes(task: &Task, view: &LinearisedPlan, expected: &mut [Expecte
             continue;
         }
         let looked_at = format!(
-            "{} ({}) is looked at where it is {} and {} has its typical sizes",
+            "{} ({}) is examined where it is {} and {} has its typical size",
             name,
             effect.name,
             with_unit(&significant(start, DIGITS), &p.unit),
@@ -66,17 +66,17 @@ pub(super) fn shapes(task: &Task, view: &LinearisedPlan, expected: &mut [Expecte
         let told = row.is_some_and(|r| expected[r].sigma.is_some());
         let others = if told { others(task, view, (effect, p, start), name) } else { Others::default() };
         let what = match (&others.values[..], others.open) {
-            _ if !told => "there it leaves no trace, and of other values nothing is said here".to_owned(),
-            ([], None) => "how well it will be told, and what goes with it, depends on both".to_owned(),
+            _ if !told => "there it has no effect on these touches; other values are not examined".to_owned(),
+            ([], None) => "how well it is determined depends on both".to_owned(),
             ([], Some(upwards)) => format!(
-                "there these touches may not tell it from any value {} {}",
+                "there these touches may not separate it from any value {} {}",
                 if upwards { "up to" } else { "down to" },
                 with_unit(&significant(if upwards { high } else { low }, DIGITS), &p.unit)
             ),
             (values, _) => {
                 let values: Vec<String> = values.iter().map(|v| significant(*v, DIGITS)).collect();
                 format!(
-                    "there these touches may not tell it from {}: touches at more positions would, or hold it at what is known of the machine",
+                    "there these touches may not separate it from {}: touch at more positions, or set it to what is known of the machine",
                     with_unit(&values.join(" or "), &p.unit)
                 )
             }

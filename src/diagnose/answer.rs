@@ -1,23 +1,11 @@
 //! What a diagnosis says (`axiscal-diagnosis/1`).
 
+use super::verdict::{NotNamed, Verdict};
+use crate::fit::VisitSource;
 use serde::Serialize;
 
 /// The format line of a diagnosis.
 pub const FORMAT: &str = "axiscal-diagnosis/1";
-
-/// Is something missing?
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Nothing is missing that these touches can show.
-    Adequate,
-    /// At least one effect passes Holm's test and the held-out touches.
-    MissingEffect,
-    /// The model fails, and no effect passes.
-    Unexplained,
-    /// Too few touches to judge.
-    TooLittleData,
-}
 
 /// The answer of `diagnose`.
 #[derive(Debug, Clone, Serialize)]
@@ -25,35 +13,10 @@ pub struct Diagnosis {
     /// `axiscal-diagnosis/1`
     pub format: &'static str,
     /// Is something missing?
+    #[serde(flatten)]
     pub verdict: Verdict,
     /// The verdict in a sentence.
     pub says: String,
-    /// Does `sketch-effect` have a formula for what is named first? What it cannot write is put right at the machine.
-    #[serde(skip)]
-    pub sketchable: bool,
-    /// Block that stands elsewhere from some moment on, where that is what is named first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub moved_block: Option<String>,
-    /// Faces that lie elsewhere: `full/a +X`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub faces: Vec<String>,
-    /// Blocks that stand or measure otherwise than the rest, the most conspicuous first.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub blocks: Vec<String>,
-    /// With `unexplained`: the noise explains all that is left but for a pattern too faint to name. No reason to take the
-    /// machine apart.
-    pub faint: bool,
-    /// So many touches found nothing that the rest is no sample of the machine: the answer is "no", whatever it is.
-    #[serde(skip)]
-    pub most_missed: bool,
-    /// The effect that is named first may be a wrong name: something without a name describes the touches better.
-    pub name_in_doubt: bool,
-    /// None of the errors that the model is there for is told.
-    #[serde(skip)]
-    pub untold: bool,
-    /// Revisits show that poses come back to better than a touch can tell.
-    #[serde(skip)]
-    pub visits_come_back: bool,
     /// √(Σr²/n) over the touches used, µm.
     pub rms_um: f64,
     /// Cross-validated error of the model (`fit::held_out::by_visit`), µm: the same figure as in every other answer.
@@ -64,8 +27,8 @@ pub struct Diagnosis {
     pub noise_um: f64,
     /// Scatter of index visits that the tests allow for, µm.
     pub visit_um: f64,
-    /// Where the scatter of visits of the fit comes from: `revisits`, `declared`, `study`, `one pose`.
-    pub visit_source: String,
+    /// Where the scatter of index positions comes from.
+    pub visit_source: VisitSource,
     /// Noise and scatter of visits with their sources, in a sentence.
     pub noise_says: String,
     /// Probability of so much misfit where the model holds.
@@ -105,33 +68,29 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Are there effects of which these touches cannot say which one acts, or whether it does? A further program tells.
+    /// Are there effects of which these touches cannot say which one acts, or whether it does? A further program shows it.
     #[must_use]
     pub fn leaves_open(&self) -> bool {
-        matches!(self.verdict, Verdict::MissingEffect | Verdict::Unexplained) && !self.open.suspects.is_empty()
+        matches!(self.verdict, Verdict::MissingEffect(_) | Verdict::Unexplained(_)) && !self.open.suspects.is_empty()
     }
 
-    /// The effect that passes the test with all candidates counted in and that touches left out do not bear out: neither a name
-    /// nor nothing that is known.
+    /// The effect that passes the test with all candidates counted in and that unused measurements do not confirm.
     #[must_use]
     pub fn in_question(&self) -> Option<&Candidate> {
-        let asked =
-            self.verdict == Verdict::Unexplained && !self.faint && self.leaves_open() && self.mistake().is_none();
+        let not_confirmed = self
+            .verdict
+            .unexplained()
+            .is_some_and(|u| matches!(u.why, NotNamed::NotConfirmed | NotNamed::CannotBeConfirmed(_)));
+        let asked = not_confirmed && self.leaves_open() && self.mistake().is_none();
         let passes = |c: &&Candidate| !c.proposed && c.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL;
         self.candidates.first().filter(|_| asked).filter(passes)
-    }
-
-    /// Would further touches tell whether a faint pattern is there? Those of a block that moved are made already.
-    #[must_use]
-    pub fn touches_would_tell(&self) -> bool {
-        self.sketchable && self.moved_block.is_none()
     }
 
     /// The gross mistake that must be put right before anything smaller can be spoken of: an axis that counts the wrong
     /// way round, other units, a log of something else, or touches most of which found nothing.
     #[must_use]
     pub fn mistake(&self) -> Option<String> {
-        if self.most_missed {
+        if self.verdict.most_touches_unusable() {
             let named = self.gross.iter().find(|g| g.in_place.is_some()).map(|g| g.says.clone());
             let none = || "most touches found nothing".to_owned();
             return Some(self.candidates.first().map(|c| c.name.clone()).or(named).unwrap_or_else(none));
@@ -159,6 +118,22 @@ pub struct Where {
     /// The same variable as shapes call it.
     #[serde(skip)]
     pub on: String,
+    /// What shows it.
+    #[serde(skip)]
+    pub finding: Finding,
+}
+
+/// What shows on what the residuals depend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finding {
+    /// The test of a pattern.
+    Pattern,
+    /// The formula of the first candidate.
+    Effect,
+    /// Index positions scatter by more than the axes declare.
+    Scatter,
+    /// Outliers that lie together.
+    Outliers,
 }
 
 /// The misfit against a variable: what of it the model cannot follow, about its mean over the touches. A level is no finding:
@@ -320,4 +295,87 @@ pub struct Power {
     pub effect: String,
     /// From this size on (peak over the touches, µm) it would have been found nearly always.
     pub minimal_detectable_um: f64,
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::super::next_step::MachineCheck;
+    use super::super::unresolved_pairs::Open;
+    use super::super::verdict::Unexplained;
+    use super::*;
+
+    pub(crate) fn candidate(effect: &str, p_adjusted: f64, held_out: Option<f64>, same_as: &[&str]) -> Candidate {
+        Candidate {
+            effect: effect.into(),
+            name: effect.into(),
+            p: p_adjusted,
+            p_adjusted,
+            proposed: false,
+            rms_after_um: 1.0,
+            held_out_before_um: held_out,
+            held_out_after_um: held_out,
+            held_out_se_um: None,
+            nested: true,
+            moves_um: None,
+            moves_sigma_um: None,
+            parameters: Vec::new(),
+            not_told: Vec::new(),
+            same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
+            or_else: None,
+            tell_apart: String::new(),
+            never_parted: false,
+            says: String::new(),
+            look: String::new(),
+            share: 0.9,
+            plausible: true,
+            wrong_sign: Vec::new(),
+            weakens: Vec::new(),
+            remains: None,
+        }
+    }
+    fn diagnosis(why: NotNamed, candidates: Vec<Candidate>) -> Diagnosis {
+        Diagnosis {
+            format: FORMAT,
+            verdict: Verdict::Unexplained(Unexplained { why, check: MachineCheck::NoFormula, sketchable: true }),
+            says: String::new(),
+            consequences: Vec::new(),
+            rms_um: 5.0,
+            held_out_rms_um: None,
+            held_out_se_um: None,
+            noise_um: 1.0,
+            visit_um: 0.0,
+            visit_source: VisitSource::Declared,
+            noise_says: String::new(),
+            lack_of_fit_p: 0.0,
+            depends: Vec::new(),
+            shape: None,
+            candidates,
+            gross: Vec::new(),
+            outliers: Vec::new(),
+            tested: 50,
+            power: Vec::new(),
+            not_seen: Vec::new(),
+            needs_temperature: Vec::new(),
+            open: Open::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_passes_and_is_not_confirmed_is_in_question() {
+        let mut d = diagnosis(NotNamed::NotConfirmed, vec![candidate("a", 1e-9, Some(2.0), &[])]);
+        assert!(d.in_question().is_none(), "nothing is open");
+        d.open.suspects.push(crate::design::questions::Suspect {
+            id: "a".into(),
+            size: nalgebra::DVector::from_element(1, 1.0),
+            shape: None,
+        });
+        assert!(d.in_question().is_some_and(|c| c.effect == "a"));
+        d.verdict = Verdict::Unexplained(Unexplained {
+            why: NotNamed::WeakPattern,
+            check: MachineCheck::NoFormula,
+            sketchable: true,
+        });
+        assert!(d.in_question().is_none());
+    }
 }

@@ -1,11 +1,13 @@
 //! From tests to the answer: candidates with sizes in their units, what was not found, touches that come back.
 
-use super::answer::{Candidate, Diagnosis, FORMAT, Gross, Outlier, Parameter, Power, Shape, Verdict, Weakened, Where};
+use super::answer::{Candidate, Diagnosis, FORMAT, Finding, Gross, Outlier, Parameter, Power, Shape, Weakened, Where};
+use super::decide::{Decision, Findings, Kind as Decided, OtherEvidence};
 use super::evidence::Evidence;
 use super::first_order::FirstOrder;
-use super::verdict::{Decision, OtherEvidence};
+use super::next_step::MachineCheck;
 use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes};
 use crate::fit::Fit;
+use crate::fit::candidates::NoValue;
 use crate::model::catalogue::Place;
 use crate::model::data::Origin;
 use crate::model::formula::slot;
@@ -36,25 +38,25 @@ pub(super) fn put_together(
     options: &super::Options,
 ) -> Diagnosis {
     let fit = subject.fit;
-    let mut verdict = decision.verdict;
-    // what passes the test and is not borne out stays a question, too
-    let asked = verdict == Verdict::MissingEffect || (decision.named && !beside.shapes_win);
+    let mut decided = decision.kind;
+    // what passes the test and is not confirmed stays a question, too
+    let asked = decided == Decided::MissingEffect || (decision.named && !beside.shapes_win);
     let open = if asked { super::unresolved_pairs::open(seen) } else { super::unresolved_pairs::Open::default() };
     let mut candidates: Vec<Candidate> = Vec::new();
     let gross_found = gross.first().is_some_and(|g| g.rms_um < setup_mistakes::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
         && let Some(candidate) = setup_mistakes::candidate(subject, first)
     {
-        verdict = Verdict::MissingEffect;
+        decided = Decided::MissingEffect;
         candidates.push(candidate);
     }
-    if verdict != Verdict::TooLittleData {
+    if decided != Decided::TooFewTouches {
         let first_order = FirstOrder::of(fit);
         let tell_apart = separating_touches::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
             tell_apart: told.says,
             never_parted: told.never,
-            ..candidate(fit, seen, &first_order, group, (i == 0, decision.borne_out))
+            ..candidate(fit, seen, &first_order, group, (i == 0, decision.confirmed))
         }));
     }
     candidates.truncate(options.at_most);
@@ -92,7 +94,7 @@ pub(super) fn put_together(
     let named_axes = |name: &str| subject.machine.axes.iter().any(|a| a.name.to_string() == name && a.name.is_rotary());
     let by = |on: &str| words::by(on, &named_axes);
     let mut own_curve = None;
-    let mut depends: Vec<Where> = if verdict == Verdict::Adequate {
+    let mut depends: Vec<Where> = if decided == Decided::Adequate {
         Vec::new()
     } else {
         significant()
@@ -106,6 +108,7 @@ pub(super) fn put_together(
                     says: words::says(d, share, fit, subject.machine),
                     id: d.id.clone(),
                     on: d.on.clone(),
+                    finding: Finding::Pattern,
                 }
             })
             .collect()
@@ -128,7 +131,7 @@ pub(super) fn put_together(
                 share,
                 p_adjusted: first.p_adjusted,
                 says: format!(
-                    "{:.0} % of what is left changes with {} as {} would make it",
+                    "{:.0} % of the residual changes with {} like {}",
                     100.0 * share,
                     words::plain(&by(on)),
                     match &first.same_as[..] {
@@ -138,10 +141,11 @@ pub(super) fn put_together(
                 ),
                 id: effect.id.clone(),
                 on: on.to_owned(),
+                finding: Finding::Effect,
             },
         );
     }
-    beside_the_tests(&mut depends, seen, fit, (beside, verdict == Verdict::MissingEffect));
+    beside_the_tests(&mut depends, seen, fit, (beside, decided == Decided::MissingEffect));
     // as the splits of `compare` and the sentences count: of what the noise does not explain
     let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
@@ -181,7 +185,7 @@ pub(super) fn put_together(
         let Origin { block, face, .. } = fit.data.origins[i].clone();
         Outlier { id: o.id, run: o.run + 1, reason: reason.says(), block, face, comes_back: false }
     });
-    let unexplained = verdict == Verdict::Unexplained;
+    let unexplained = decided == Decided::Unexplained;
     let first_by = depends.first().map_or("", |w| w.by.as_str());
     let faces = if unexplained && first_by == "face" { faces(fit, seen, features, drawn) } else { Vec::new() };
     let blocks: Vec<String> = match drawn.filter(|d| unexplained && first_by == "block" && d.on == "block") {
@@ -197,11 +201,27 @@ pub(super) fn put_together(
         first.says += &format!(": block {} is not like the rest", blocks.join(", then "));
     }
     // scatter and bad touches that lie together are put right at the machine, not by a formula
-    let at_the_machine = |id: &str| id.starts_with("scatter:") || id.starts_with("not-used:");
     let sketchable = unexplained
-        && depends.first().is_some_and(|w| !at_the_machine(&w.id))
+        && depends.first().is_some_and(|w| matches!(w.finding, Finding::Pattern | Finding::Effect))
         && super::sketch::best(&seen.dependences, fit).is_ok();
     let moved_block = drawn.filter(|_| unexplained).and_then(|d| words::moved_block(d, fit)).map(str::to_owned);
+    let check = match moved_block {
+        _ if !faces.is_empty() => MachineCheck::NamedFaces(faces),
+        _ if !blocks.is_empty() => MachineCheck::NamedBlocks(blocks),
+        Some(block) => MachineCheck::MovedBlock(block),
+        None => MachineCheck::of(depends.first(), words::visits_come_back(fit)),
+    };
+    let findings = Findings {
+        subject,
+        decision,
+        beside,
+        candidates: &candidates,
+        depends: &depends,
+        gross: &gross,
+        check,
+        sketchable,
+    };
+    let verdict = findings.verdict(decided);
     jump_of_what(seen, features, &mut candidates);
     let needs_temperature = without_temperature(fit, seen);
     room_or_time(fit, seen, &mut candidates);
@@ -209,22 +229,13 @@ pub(super) fn put_together(
         format: FORMAT,
         verdict,
         says: String::new(),
-        sketchable,
-        moved_block,
-        faces,
-        blocks,
-        faint: false,
-        most_missed: false,
         consequences: Vec::new(),
-        name_in_doubt: false,
-        untold: false,
-        visits_come_back: words::visits_come_back(fit),
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
         held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
-        visit_source: fit.noise.visit_source.as_str().to_owned(),
+        visit_source: fit.noise.visit_source,
         noise_says: noise_says(seen, fit),
         lack_of_fit_p: seen.lack_of_fit.p,
         depends,
@@ -242,7 +253,7 @@ pub(super) fn put_together(
             .filter(|s| !s.visible())
             .map(|s| seen.named.effects[s.candidate].id.clone())
             .collect(),
-        warnings: seen.named.left_out.clone(),
+        warnings: seen.named.left_out.iter().map(NoValue::left_out).collect(),
         open,
     }
 }
@@ -337,13 +348,14 @@ fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (be
             share: tau2 / (sigma2 + tau2),
             p_adjusted: 0.0,
             says: format!(
-                "Each time an axis is clamped anew it stands elsewhere: looseness or indexing scatter of {:.1} um for each visit \
-                 (from revisited poses; the machine file declares {:.1} um)",
+                "The rotary axes do not come back exactly: index positions scatter by {:.1} µm (from revisited poses; the machine file \
+                 declares {:.1} µm). Check clamping and looseness",
                 um_from_mm(tau_mm),
                 um_from_mm(declared_mm)
             ),
             id: "scatter:visit".to_owned(),
             on: "visit".to_owned(),
+            finding: Finding::Scatter,
         };
         depends.retain(|w| w.by != "visit");
         // what makes most of the misfit by itself makes the visits differ, too
@@ -362,6 +374,7 @@ fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (be
             says: format!("{} ({})", g.says(fit), g.kind()),
             id: format!("not-used:{}", g.by),
             on: g.by.to_owned(),
+            finding: Finding::Outliers,
         };
         let strong = depends.first().is_some_and(|w| w.p_adjusted < FAMILY_LEVEL);
         if strong && seen.dependences.first().is_some_and(|d| d.p_adjusted < g.p) {
@@ -377,7 +390,7 @@ fn noise_says(seen: &Examination, fit: &Fit) -> String {
     let mut out = fit.noise.says();
     if seen.evidence.tau_mm < fit.noise.tau_mm {
         out += &format!(
-            "; what is found explains that, and the tests allow for the declared {:.2} um",
+            "; what is found explains this, and the tests use the declared {:.2} µm",
             um_from_mm(seen.evidence.tau_mm)
         );
     }
@@ -439,7 +452,7 @@ fn candidate(
         [] => effect.says.clone(),
         some => {
             let says = effect.says.trim_end_matches('.');
-            format!("{says}. Its {} cannot be told by this plan", words::list(some))
+            format!("{says}. Its {} cannot be determined with this plan", words::list(some))
         }
     };
     if let Some(scanned) = &seen.named.scanned[chosen] {

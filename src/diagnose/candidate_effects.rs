@@ -1,7 +1,7 @@
 //! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
 
 use super::evidence::{Evidence, WhiteRows};
-use crate::fit::candidates::{Columns, Trials, Variant, with_values};
+use crate::fit::candidates::{Columns, NoValue, Trials, Variant, with_values};
 use crate::fit::{Fit, around, between, scan};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -50,7 +50,7 @@ pub struct Named<'c> {
     /// The scanned shape of each candidate.
     pub scanned: Vec<Option<Scanned>>,
     /// What is said of effects that could not be tested.
-    pub left_out: Vec<String>,
+    pub left_out: Vec<NoValue>,
     source: Arc<Source>,
     weight: Vec<f64>,
 }

@@ -83,10 +83,10 @@ impl Gathered {
         let place = match self.by {
             "face" => format!("face {} of block {}", origin.face, origin.block),
             "block" => format!("block {}", origin.block),
-            _ => format!("index visit {}", fit.data.visits[self.one] + 1),
+            _ => format!("index position {}", fit.data.visits[self.one] + 1),
         };
         format!(
-            "{} of the {} touches that were not used lie on {place} (of {} there): no chance, but something at this place",
+            "{} of the {} touches that are not used are on {place} (of {} there): check it",
             self.here, self.rejected, self.of
         )
     }
@@ -94,9 +94,9 @@ impl Gathered {
     /// What kind of thing does that.
     pub fn kind(&self) -> &'static str {
         match self.by {
-            "face" => "a face that lies elsewhere: chips, burrs, coolant",
+            "face" => "chips, burrs or coolant on the face",
             "block" => "a block that moved: loose, knocked, or dirt under it",
-            _ => "a pose that was not clamped as the others",
+            _ => "a pose that was not clamped like the others",
         }
     }
 }

@@ -42,10 +42,10 @@ pub(super) fn consequences(
     subject: Subject,
     seen: &Examination,
     generics: &Generics,
-    (verdict, gathered): (Verdict, bool),
+    (verdict, gathered): (&Verdict, bool),
 ) -> Result<Vec<Consequence>> {
     let fit = subject.fit;
-    if !matches!(verdict, Verdict::MissingEffect | Verdict::Unexplained) {
+    if !matches!(verdict, Verdict::MissingEffect(_) | Verdict::Unexplained(_)) {
         return Ok(Vec::new());
     }
     let moves = Moves::of(seen.evidence);

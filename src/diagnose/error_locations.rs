@@ -246,7 +246,7 @@ pub fn comment(tried: &[Tried]) -> String {
         first.left_um
     );
     for t in tried.iter().skip(1).take(MOST_LISTED) {
-        let same = if t.as_good_as(first) { ": these touches cannot tell it from the first" } else { "" };
+        let same = if t.as_good_as(first) { ": these touches cannot separate it from the first" } else { "" };
         let _ = writeln!(out, "#   {} ({}) leaves {:.2} um{same}", t.at, t.dofs().join(" "), t.left_um);
     }
     out

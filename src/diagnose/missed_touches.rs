@@ -6,7 +6,7 @@
 
 use super::Subject;
 use super::answer::Gross;
-use super::setup_mistakes::{EFFECT, in_words};
+use super::setup_mistakes::EFFECT;
 use crate::axes::{AxisName, Position};
 use crate::design::Planned;
 use crate::geometry::apply;
@@ -15,6 +15,7 @@ use crate::model::catalogue::Effect;
 use crate::model::formula::{VARIABLES, slot};
 use crate::program::plan::{Plan, PlanTouch};
 use crate::units::deg_from_rad;
+use crate::words::diagnose as words;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -55,7 +56,7 @@ pub(super) fn hypotheses(subject: Subject, planned: &[Planned]) -> Vec<Gross> {
         .filter(|(_, agrees)| *agrees >= AGREES && *agrees > right + CLEARLY)
         .map(|(name, agrees)| Gross {
             hypothesis: name.clone(),
-            says: in_words(name),
+            says: words::catalogue_mistake(name),
             rms_um: subject.fit.outcome.rms_um,
             agrees: Some(agrees),
             in_place: None,

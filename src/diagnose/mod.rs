@@ -10,6 +10,7 @@ mod assemble_diagnosis;
 pub mod candidate_effects;
 mod clustered_rejections;
 pub mod consequence;
+mod decide;
 mod effect_curve;
 mod effects_versus_patterns;
 pub mod error_locations;
@@ -27,7 +28,7 @@ pub mod setup_mistakes;
 pub mod sketch;
 pub mod solving;
 pub mod unresolved_pairs;
-mod verdict;
+pub mod verdict;
 
 use crate::design::Planned;
 use crate::diag::Result;
@@ -40,12 +41,12 @@ use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
 use crate::search::{LackOfFit, Question, Search, lack_of_fit};
 use crate::units::um_from_mm;
-pub use answer::{Diagnosis, Verdict};
+pub use answer::Diagnosis;
 use candidate_effects::Named;
 use evidence::Evidence;
 use nalgebra::DMatrix;
-pub use separating_touches::NEVER as NEVER_PARTED;
 use std::sync::Arc;
+pub use verdict::Verdict;
 
 /// What is diagnosed.
 #[derive(Debug, Clone, Copy)]
@@ -196,7 +197,7 @@ pub fn examine<'a>(
 fn borne_out_behind(groups: &mut [Group], search: &Search, visits: &[usize], nested: &HeldOut) -> Option<HeldOut> {
     /// What comes second by chance is never as sure.
     const SURE: f64 = 1e-4;
-    if search.leader().is_none() || verdict::bears_out(nested) {
+    if search.leader().is_none() || decide::bears_out(nested) {
         return None;
     }
     for place in 1..groups.len() {
@@ -283,14 +284,14 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first()),
         None => effects_versus_patterns::Weighed::default(),
     };
-    let beside = verdict::OtherEvidence {
+    let beside = decide::OtherEvidence {
         shapes_win: weighed.shapes_win,
         // a shape that goes with the first by probability says nothing against the one that is borne out behind it
         better: weighed.better.filter(|_| !seen.given).map(|shape| generics.shapes[shape].depends_on.clone()),
         gathered: clustered_rejections::gathered(fit, &features),
         scatter: scatter(fit, machine, &evidence),
     };
-    let verdict = verdict::decide(&seen, &beside);
+    let decision = decide::decide(&seen, &beside);
     let mut gross =
         if fit.outcome.rms_um > setup_mistakes::GROSS_UM { setup_mistakes::hypotheses(subject) } else { Vec::new() };
     if let Some(supposed) = setup_mistakes::of_log(subject) {
@@ -301,10 +302,10 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);
     }
-    let mut out = assemble_diagnosis::put_together(subject, &seen, &features, (verdict, &beside), gross, options);
+    let mut out = assemble_diagnosis::put_together(subject, &seen, &features, (decision, &beside), gross, options);
     if out.mistake().is_none() {
-        let of = (out.verdict, beside.gathered.is_some());
-        out.consequences = consequence::consequences(subject, &seen, &generics, of)?;
+        let gathered = beside.gathered.is_some();
+        out.consequences = consequence::consequences(subject, &seen, &generics, (&out.verdict, gathered))?;
     }
     if options.refit
         && let Some(first) = out.candidates.first_mut()
@@ -318,9 +319,9 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         }
         assemble_diagnosis::outliers_again(&mut out, fit, &again);
     }
-    verdict::says(&mut out, subject, verdict, &beside);
-    verdict::not_when_touches_are_missing(&mut out, subject);
-    not_identifiable::not_when_nothing_is_told(&mut out, subject);
+    decide::where_most_touches_are_unusable(&mut out, subject);
+    not_identifiable::where_nothing_is_determined(&mut out, subject);
+    out.says = crate::words::diagnose::verdict(&out, fit);
     Ok(out)
 }
 
@@ -348,12 +349,12 @@ fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     }
     let generics = features::shapes(&evidence, &features);
     dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
-        || lack_of_fit(&question).p < verdict::LACK_OF_FIT
+        || lack_of_fit(&question).p < decide::LACK_OF_FIT
 }
 
 /// Is the scatter of index positions named first?
-pub(crate) fn scatter_leads(found: &Diagnosis) -> bool {
-    found.depends.first().is_some_and(|w| w.id.starts_with("scatter:"))
+fn scatter_leads(depends: &[answer::Where]) -> bool {
+    depends.first().is_some_and(|w| w.finding == answer::Finding::Scatter)
 }
 
 /// Standard deviation of a touch in µm, for figures in units of the noise.

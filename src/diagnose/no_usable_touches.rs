@@ -1,37 +1,25 @@
 //! A study of which no touch is used: there is nothing to search in, and nothing to be said but that.
 
-use super::answer::{Diagnosis, FORMAT, Verdict};
+use super::answer::{Diagnosis, FORMAT};
 use super::unresolved_pairs::Open;
-use super::{Options, Subject, missed_touches, noise_um, setup_mistakes, verdict};
+use super::verdict::{TooLittle, Verdict};
+use super::{Options, Subject, decide, missed_touches, noise_um, setup_mistakes};
 
 /// The answer, before any search.
 pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
     let fit = subject.fit;
     let planned = options.planned.filter(|_| fit.data.mostly_missed());
-    let n = fit.data.observations.len();
     let mut out = Diagnosis {
         format: FORMAT,
-        verdict: Verdict::TooLittleData,
-        says: format!(
-            "Too few touches to judge: none is used{}. Take touches back in, or measure again.",
-            if n == 0 { String::new() } else { format!(", all {n} are taken out") }
-        ),
-        sketchable: false,
-        moved_block: None,
-        faces: Vec::new(),
-        blocks: Vec::new(),
-        faint: false,
-        most_missed: false,
+        verdict: Verdict::TooLittleData(TooLittle::NoneUsed { excluded: fit.data.observations.len() }),
+        says: String::new(),
         consequences: Vec::new(),
-        name_in_doubt: false,
-        untold: false,
-        visits_come_back: false,
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: None,
         held_out_se_um: None,
         noise_um: noise_um(fit),
         visit_um: 0.0,
-        visit_source: fit.noise.visit_source.as_str().to_owned(),
+        visit_source: fit.noise.visit_source,
         noise_says: fit.noise.says(),
         lack_of_fit_p: 1.0,
         depends: Vec::new(),
@@ -49,6 +37,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         open: Open::default(),
         warnings: Vec::new(),
     };
-    verdict::not_when_touches_are_missing(&mut out, subject);
+    decide::where_most_touches_are_unusable(&mut out, subject);
+    out.says = crate::words::diagnose::verdict(&out, fit);
     out
 }

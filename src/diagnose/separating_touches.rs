@@ -133,11 +133,10 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
 }
 
 /// What is said of effects that do the same wherever the machine touches.
-pub const NEVER: &str = "no touches that this machine can make do: they do the same wherever it touches, so look at the machine \
-                         which it is";
+pub const NEVER: &str = "no touches of this machine separate them: check at the machine which it is";
 
 /// What is said where the variations that were tried do not help, and a program of its own may.
-const LOOKED_FOR: &str = "no single change of these touches does: `axiscal plan-next` looks for a program that does";
+const LOOKED_FOR: &str = "no single change of these touches does; `axiscal plan-next` looks for a program that does";
 
 /// Does every variation that a program could make leave the first of a group and all others exactly as they are to each other?
 fn never_parted(group: &Group, tried: &[Tried]) -> bool {
@@ -167,9 +166,7 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
         let told_by_room = |c: usize| seen.named.effects[c].terms.iter().any(|t| t.formula.variables().contains(&"T"));
         let of_room = group.members.iter().any(|m| told_by_room(m.candidate));
         let says = match never {
-            true if of_room => {
-                "no change of these touches does while the room goes on as it did: measure again while its temperature turns"
-            }
+            true if of_room => "measure again while the temperature of the room changes in another way",
             true => NEVER,
             false => LOOKED_FOR,
         };
@@ -183,7 +180,8 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
         (false, n) if n <= MOST_NAMED => format!("from {}, and leaves the others", from.join(", ")),
         (false, n) => format!("from {n} of the {}", rivals.len()),
     };
-    let says = format!("{} (+{:.0} min): that tells {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen));
+    let says =
+        format!("{} (+{:.0} min): this separates {} {whom}", best.says, (best.seconds / 60.0).ceil(), id(chosen));
     Separating { says, never }
 }
 
@@ -208,7 +206,7 @@ fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String 
         .map(|a| format!("{} = {:.0}", a.name, deg_from_rad(o.state[slot::AXES + a.name.index()])))
         .collect();
     format!(
-        "more touches near {} on block {}, where {} and {} differ by {:.1} um before the rest of the model takes its part",
+        "more touches near {} on block {}, where {} and {} differ by up to {:.1} µm",
         pose.join(", "),
         subject.fit.data.set_ups[o.set_up].label,
         seen.named.effects[chosen].id,

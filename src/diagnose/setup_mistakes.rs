@@ -5,21 +5,20 @@ use super::Subject;
 use super::answer::{Candidate, Gross, Parameter};
 use crate::axes::AxisName;
 use crate::fit::{Knowledge, Settings, identify_data};
+use crate::log::LogMistake;
 use crate::model::data::Data;
 use crate::units::mm_from_inch;
+use crate::words::diagnose as words;
 use rayon::prelude::*;
 
 /// Above this RMS something is wrong that is no error of a machine, µm.
 pub const GROSS_UM: f64 = 50.0;
 
 /// A supposition that leaves less than this share of the error is right.
-pub(super) const RIGHT: f64 = 0.1;
+pub(crate) const RIGHT: f64 = 0.1;
 
 /// Effect of the catalogue whose parameters are the suppositions.
 pub const EFFECT: &str = "sign-or-axis-swap";
-
-/// The supposition that lengths are in the other unit, in words.
-const INCH: &str = "the log is in inches and was read as millimetres";
 
 /// The supposition that the log belongs to something else.
 pub(super) const ELSEWHERE: &str = "another-program";
@@ -58,7 +57,7 @@ fn signs_and_swaps(subject: Subject) -> Vec<Gross> {
             let fit = identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings).ok()?;
             Some(Gross {
                 hypothesis: supposed.name.clone(),
-                says: in_words(&supposed.name),
+                says: words::catalogue_mistake(&supposed.name),
                 rms_um: fit.outcome.rms_um,
                 agrees: None,
                 in_place: None,
@@ -67,32 +66,23 @@ fn signs_and_swaps(subject: Subject) -> Vec<Gross> {
         .collect()
 }
 
-/// A supposition of the catalogue: `flip_B`, `swap_XY`.
-pub(super) fn in_words(name: &str) -> String {
-    match name.split_once('_') {
-        Some(("flip", axis)) => format!("axis {axis} is counted the wrong way round"),
-        Some((_, axes)) => {
-            let (a, b) = axes.split_at(1.min(axes.len()));
-            format!("axes {a} and {b} are taken for each other")
-        }
-        None => name.to_owned(),
-    }
-}
-
 /// Lengths in the other unit.
 fn units(subject: Subject) -> Vec<Gross> {
-    [
-        ("inch", mm_from_inch(1.0), INCH),
-        ("mm", 1.0 / mm_from_inch(1.0), "the log is in millimetres and was read as inches"),
-    ]
-    .into_par_iter()
-    .filter_map(|(hypothesis, factor, says)| {
-        let data = scaled(&subject.fit.data, factor);
-        let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
-        let rms_um = fair(fit.outcome.rms_um, factor, subject.fit.outcome.rms_um);
-        Some(Gross { hypothesis: hypothesis.to_owned(), says: says.to_owned(), rms_um, agrees: None, in_place: None })
-    })
-    .collect()
+    [(LogMistake::Inches, mm_from_inch(1.0)), (LogMistake::Millimetres, 1.0 / mm_from_inch(1.0))]
+        .into_par_iter()
+        .filter_map(|(mistake, factor)| {
+            let data = scaled(&subject.fit.data, factor);
+            let fit = identify_data(subject.machine, subject.catalogue, data, &settings(subject)).ok()?;
+            let rms_um = fair(fit.outcome.rms_um, factor, subject.fit.outcome.rms_um);
+            Some(Gross {
+                hypothesis: mistake.name(),
+                says: words::log_mistake(&mistake),
+                rms_um,
+                agrees: None,
+                in_place: None,
+            })
+        })
+        .collect()
 }
 
 /// Dividing all lengths by 25.4 divides every error by 25.4, whatever is wrong. What is left is therefore measured in the
@@ -129,7 +119,8 @@ fn elsewhere(subject: Subject) -> Option<Gross> {
     (median > FAR_MM).then(|| Gross {
         hypothesis: ELSEWHERE.to_owned(),
         says: format!(
-            "half of the touches lie more than {median:.0} mm off where the plan has them: a log of another program or machine, or another origin"
+            "half of the touches are more than {median:.0} mm from their planned positions: the log belongs to another program or \
+             machine, or the origin is another one"
         ),
         rms_um: subject.fit.outcome.rms_um,
         agrees: None,
@@ -141,12 +132,8 @@ fn elsewhere(subject: Subject) -> Option<Gross> {
 pub(super) fn of_log(subject: Subject) -> Option<Gross> {
     let s = subject.fit.data.supposed.as_ref()?;
     Some(Gross {
-        hypothesis: s.name.clone(),
-        says: match s.name.as_str() {
-            "inch" => INCH.to_owned(),
-            "swap_XYZ" => "axes X, Y and Z are taken for each other".to_owned(),
-            names => names.split(' ').map(in_words).collect::<Vec<_>>().join(", and "),
-        },
+        hypothesis: s.mistake.name(),
+        says: words::log_mistake(&s.mistake),
         rms_um: subject.fit.outcome.rms_um,
         agrees: None,
         in_place: Some(s.right as f64 / s.of.max(1) as f64),

@@ -54,7 +54,7 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
 pub(super) fn best<'d>(all: &'d [Dependence], fit: &Fit) -> Result<&'d Dependence> {
     let level = crate::search::multiplicity::FAMILY_LEVEL;
     let Some(first) = all.iter().find(|d| d.p_adjusted < level) else {
-        return Err(Failure::new("sketch::nothing_left", "what is left over depends on nothing that can be seen")
+        return Err(Failure::new("sketch::nothing_left", "the residual depends on nothing that these touches show")
             .help("`axiscal diagnose` says whether the model fits; more touches at more poses show smaller errors"));
     };
     if first.on == words::MOVED_BLOCK || first.terms.iter().all(|t| t.formula.is_some()) {

@@ -3,7 +3,9 @@
 //!
 //! What a step does to the study, and who agrees to it, is up to the [`Host`].
 
-use super::answer::{Candidate, Diagnosis, Verdict};
+use super::answer::{Candidate, Diagnosis};
+use super::next_step::MachineCheck;
+use super::verdict::{NotNamed, Unexplained, Verdict};
 use super::{Options, Subject, diagnose};
 use crate::diag::Result;
 use crate::fit::outcome::{Parameter, Status};
@@ -12,7 +14,6 @@ use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::distributions::{ln_p_of_f, p_of_chi2};
 use crate::search::groups::PLAUSIBLE;
-use crate::words::diagnose as words;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -48,9 +49,8 @@ pub struct Visited {
     /// Ids of its effects.
     pub effects: Vec<String>,
     /// The verdict of its diagnosis.
+    #[serde(flatten)]
     pub verdict: Verdict,
-    /// True where that is `unexplained` and what is left is as small as the noise.
-    pub faint: bool,
     /// RMS of the residuals, µm.
     pub rms_um: f64,
     /// Reduced chi-square.
@@ -92,7 +92,7 @@ pub enum Stop {
     /// No known effect explains what is left; it can be sketched as a formula.
     Sketchable,
     /// No known effect explains what is left: what to check at the machine.
-    Unexplained(String),
+    Unexplained(MachineCheck),
     /// Too few touches to judge.
     TooLittleData,
     /// Something is missing, and no proposal is confirmed.
@@ -182,30 +182,16 @@ pub struct Ending {
     pub stop: Stop,
 }
 
-/// How bad a verdict is: something that no effect explains is worse than an effect that is missing and has a name, and a model with
-/// too many unknowns to judge is worst.
-#[must_use]
-pub fn badness(verdict: Verdict, faint: bool) -> u8 {
-    match verdict {
-        Verdict::Adequate => 0,
-        Verdict::Unexplained if faint => 1,
-        Verdict::MissingEffect => 2,
-        Verdict::Unexplained => 3,
-        Verdict::TooLittleData => 4,
-    }
-}
-
 impl State {
     fn badness(&self) -> u8 {
-        badness(self.found.verdict, self.found.faint)
+        self.found.verdict.badness()
     }
 
     fn visited(&self) -> Visited {
         let o = &self.fit.outcome;
         Visited {
             effects: o.effects.clone(),
-            verdict: self.found.verdict,
-            faint: self.found.faint,
+            verdict: self.found.verdict.clone(),
             rms_um: o.rms_um,
             chi2_per_dof: o.chi2_per_dof,
             held_out_rms_um: self.found.held_out_rms_um,
@@ -255,7 +241,7 @@ pub fn solve(request: Request, host: &mut dyn Host) -> Result<Ending> {
         added.push(Added {
             id,
             proposal,
-            name_in_doubt: state.found.name_in_doubt,
+            name_in_doubt: state.found.verdict.name_in_doubt(),
             rms_um: (state.fit.outcome.rms_um, after.outcome.rms_um),
         });
         effects = more;
@@ -295,8 +281,8 @@ fn proposed(found: &Diagnosis, added: usize, at_most: usize) -> std::result::Res
     if let Some(mistake) = found.mistake() {
         return Err(Stop::Mistake(mistake));
     }
-    match (found.verdict, found.candidates.first()) {
-        (Verdict::MissingEffect, Some(first)) if first.proposed => {
+    match (&found.verdict, found.candidates.first()) {
+        (Verdict::MissingEffect(_), Some(first)) if first.proposed => {
             if !first.plausible {
                 Err(Stop::TooLarge(first.effect.clone()))
             } else if added >= at_most {
@@ -305,14 +291,14 @@ fn proposed(found: &Diagnosis, added: usize, at_most: usize) -> std::result::Res
                 Ok(first)
             }
         }
-        (Verdict::MissingEffect, _) => Err(Stop::NotConfirmed),
-        (Verdict::Unexplained, _) if found.faint => Err(Stop::Faint),
-        (Verdict::Unexplained, Some(first)) if found.in_question().is_some() => {
+        (Verdict::MissingEffect(_), _) => Err(Stop::NotConfirmed),
+        (Verdict::Unexplained(Unexplained { why: NotNamed::WeakPattern, .. }), _) => Err(Stop::Faint),
+        (Verdict::Unexplained(_), Some(first)) if found.in_question().is_some() => {
             Err(Stop::InQuestion(Box::new(first.clone())))
         }
-        (Verdict::Unexplained, _) if found.sketchable => Err(Stop::Sketchable),
-        (Verdict::Unexplained, _) => Err(Stop::Unexplained(words::machine_check(found.machine_check()))),
-        (Verdict::TooLittleData, _) => Err(Stop::TooLittleData),
+        (Verdict::Unexplained(u), _) if u.sketchable => Err(Stop::Sketchable),
+        (Verdict::Unexplained(u), _) => Err(Stop::Unexplained(u.check.clone())),
+        (Verdict::TooLittleData(_), _) => Err(Stop::TooLittleData),
         (Verdict::Adequate, _) => Err(Stop::Nothing),
     }
 }

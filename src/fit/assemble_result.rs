@@ -109,6 +109,7 @@ pub(super) fn assemble_result(
         chi2_per_dof: if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN },
         undetermined,
         parted_together: Vec::new(),
+        never_determined: 0,
         weak,
         correlations: poorly_determined::correlations(fit, with_value),
         priors: uncertainty::priors(fit),
@@ -126,8 +127,9 @@ pub(super) fn assemble_result(
     remarks.extend(of_the_fit(fit, asked, solution));
     remarks.extend(of_shapes(&evidence, &status));
     remarks.extend(type_b.iter().filter_map(|b| b.remark.clone()));
-    remarks.extend(evidence.unmodelled.iter().flat_map(|all| all.left_out.clone()).map(Remark::LeftOut));
+    remarks.extend(evidence.unmodelled.iter().flat_map(|all| all.left_out.clone()).map(Remark::NotCounted));
     remarks.extend(not_mentioned(&outcome, &remarks));
+    remarks.sort_by_key(Remark::rank);
     outcome.warnings = remarks.iter().map(words::remark).collect();
     Assembled { outcome, remarks, other_values: evidence.other_values }
 }
@@ -422,7 +424,7 @@ fn of_the_fit(fit: &Fit, asked: &Asked, solution: &Solution) -> Vec<Remark> {
         let with_t = effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T")));
         out.extend(with_t.map(|e| Remark::NoTemperature { effect: e.id.clone() }));
     }
-    out.extend(fit.data.temperature_says.clone().map(Remark::OfTemperatures));
+    out.extend(fit.data.temperature_gap.map(Remark::TemperatureGap));
     let far = fit.free.iter().filter(|&&i| is_far(fit, i));
     out.extend(far.map(|&i| Remark::NotCredible { name: fit.model.unknowns[i].name.clone(), times: NOT_CREDIBLE }));
     let moves = uncertainty::moves_with_unseen(fit);
@@ -444,7 +446,7 @@ fn of_the_fit(fit: &Fit, asked: &Asked, solution: &Solution) -> Vec<Remark> {
         out.push(Remark::UnmodelledNotCounted { most_touches: uncertainty::MOST_UNMODELLED });
     }
     if let Some(s) = &fit.data.supposed {
-        out.push(Remark::SetUpMistake { far: s.far, of: s.of, right: s.right, says: s.says.clone() });
+        out.push(Remark::SetUpMistake { far: s.far, of: s.of, right: s.right, mistake: s.mistake.clone() });
     }
     let excluded = fit.rejected.values().filter(|r| r.is_outlier()).count();
     if let Some(found) = fit.outliers_beyond {

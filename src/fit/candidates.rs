@@ -104,43 +104,37 @@ impl<'a> Trials<'a> {
     }
 }
 
-/// A formula that gives no number somewhere.
-#[derive(Debug, Clone, Copy)]
-pub struct NoValue<'e> {
-    /// The effect.
-    pub effect: &'e Effect,
+/// What to do about a formula without a value at some touches.
+pub const NO_VALUE_HELP: &str = "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it has a value at every touch";
+
+/// A formula that has no usable value at some touches.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NoValue {
+    /// Id of the effect.
+    pub effect: String,
+    /// Number of the term.
+    pub term: usize,
     /// Its formula.
-    pub formula: &'e str,
+    pub formula: String,
     /// How many touches.
     pub n_touches: usize,
     /// Number of the first one in its plan.
     pub first: u64,
-    /// There is a number, and at its usual size the effect would displace the touch by more than a kilometre.
+    /// There is a value, and at its usual size the effect would displace the touch by more than a kilometre.
     pub too_large: bool,
 }
 
-impl NoValue<'_> {
+impl NoValue {
     /// In words.
     #[must_use]
     pub fn says(&self) -> String {
-        let Self { effect, formula, n_touches, first, too_large } = self;
-        let (touches, which) = if *n_touches == 1 {
-            ("1 touch", "touch")
-        } else {
-            (&*format!("{n_touches} touches"), "the first is touch")
-        };
-        let (no, why) = if *too_large {
-            ("no usable value", ", more than a kilometre at its usual size")
-        } else {
-            ("no value", "")
-        };
-        format!("formula {formula:?} of effect {} has {no} at {touches}: {which} {first}{why}", effect.id)
+        crate::words::fit::no_value(self)
     }
 
     /// In words, for an effect that is only a candidate.
     #[must_use]
     pub fn left_out(&self) -> String {
-        format!("effect {} is left out of the candidates: {}", self.effect.id, self.says())
+        crate::words::fit::not_a_candidate(self)
     }
 }
 
@@ -152,7 +146,7 @@ const LEVER_MM: f64 = 1e3;
 
 /// The formulas of an effect that have no usable value at some touch, at the shapes where it starts and at those that are tried.
 #[must_use]
-pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Vec<NoValue<'e>> {
+pub fn without_value(effect: &Effect, observations: &[Observation]) -> Vec<NoValue> {
     let starts: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |(start, _, _)| start)).collect();
     let mut shapes = vec![starts.clone()];
     for (i, p) in effect.parameters.iter().enumerate() {
@@ -162,7 +156,7 @@ pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Ve
             tried
         }));
     }
-    let of_term = |term: &'e Term| -> Option<NoValue<'e>> {
+    let of_term = |(number, term): (usize, &Term)| -> Option<NoValue> {
         let formula = &term.formula;
         let tried = if formula.has_shape() { &shapes[..] } else { &shapes[..1] };
         let p = &effect.parameters[term.parameter];
@@ -172,19 +166,26 @@ pub fn without_value<'e>(effect: &'e Effect, observations: &[Observation]) -> Ve
         let mut bad = observations.iter().filter(|o| !is_usable(o));
         let first = bad.next()?;
         let too_large = tried.iter().all(|s| formula.eval(&first.state, s).is_finite());
-        Some(NoValue { effect, formula: formula.text(), n_touches: 1 + bad.count(), first: first.id, too_large })
+        Some(NoValue {
+            effect: effect.id.clone(),
+            term: number,
+            formula: formula.text().to_owned(),
+            n_touches: 1 + bad.count(),
+            first: first.id,
+            too_large,
+        })
     };
-    effect.terms.iter().filter_map(of_term).collect()
+    effect.terms.iter().enumerate().filter_map(of_term).collect()
 }
 
-/// Candidates that have a value at every touch, and a sentence for each that is left out: its column would be no number, and
+/// Candidates that have a value at every touch, and those that are left out: its column would be no number, and
 /// would spoil what is said of all the others. The built-in ones have a value everywhere.
 #[must_use]
-pub fn with_values<'c>(effects: Vec<&'c Effect>, observations: &[Observation]) -> (Vec<&'c Effect>, Vec<String>) {
+pub fn with_values<'c>(effects: Vec<&'c Effect>, observations: &[Observation]) -> (Vec<&'c Effect>, Vec<NoValue>) {
     let mut left_out = Vec::new();
     let kept = effects.into_iter().filter(|e| {
         let bad = if e.built_in { Vec::new() } else { without_value(e, observations) };
-        left_out.extend(bad.first().map(NoValue::left_out));
+        left_out.extend(bad.first().cloned());
         bad.is_empty()
     });
     (kept.collect(), left_out)

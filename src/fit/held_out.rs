@@ -42,18 +42,6 @@ pub struct HeldOut {
     pub error_mm: Vec<Option<f64>>,
 }
 
-impl HeldOut {
-    /// In words.
-    #[must_use]
-    pub fn says(&self) -> String {
-        let lost = match self.unpredicted {
-            0 => String::new(),
-            n => format!("; {n} touches cannot be predicted without their own group"),
-        };
-        format!("{} groups of touches left out in turn, {} touches predicted{lost}", self.groups, self.scored)
-    }
-}
-
 /// Leaves out each index visit in turn; `None` where no touch can be predicted.
 #[must_use]
 pub fn by_visit(fit: &Fit) -> Option<HeldOut> {

@@ -1,7 +1,7 @@
 //! What the user said about a model: which effects, which parameters are held or known, and whether that makes sense.
 
 use super::Knowledge;
-use super::candidates::without_value;
+use super::candidates::{NO_VALUE_HELP, without_value};
 use crate::diag::{Failure, Finding, Result, enough};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -18,13 +18,13 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
     for id in ids {
         match catalogue.get(id, machine) {
             Some(effect) if effects.iter().any(|e| e.id == effect.id) => {
-                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} stands twice in the model")).about(id).help("name each effect once"));
+                findings.push(Finding::error("model::effect_twice", format!("effect {id:?} is twice in the model")).about(id).help("name each effect once"));
             }
             Some(effect) => effects.push(effect),
             None if catalogue.knows(id) => findings.push(
                 Finding::error("model::effect_not_here", format!("effect {id:?} does not apply to machine {:?}", machine.name))
                     .about(id)
-                    .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` tells which"),
+                    .help("it needs an axis that the machine lacks, or has on the other side of the chain: `axiscal effects show` says which"),
             ),
             None => {
                 let mut finding = Finding::error("model::unknown_effect", format!("no effect is called {id:?}")).about(id);
@@ -64,9 +64,7 @@ pub fn every_formula_has_a_value<'e>(
 ) -> Result<()> {
     let mut findings = Vec::new();
     for bad in effects.into_iter().flat_map(|e| without_value(e, observations)) {
-        findings.push(Finding::error("model::no_value", bad.says()).about(&bad.effect.id).help(
-            "a division by zero, a tangent at 90°, or a root or logarithm of a negative number: write the formula so that it holds at every touch",
-        ));
+        findings.push(Finding::error("model::no_value", bad.says()).about(&bad.effect).help(NO_VALUE_HELP));
     }
     if findings.is_empty() { Ok(()) } else { Err(Failure(findings)) }
 }

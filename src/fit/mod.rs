@@ -81,7 +81,7 @@ fn identify_from(
     let settings = &search.settings;
     if data.observations.is_empty() {
         return Err(Failure::new("fit::no_touches", "no touch can be used")
-            .help("does the log belong to this plan? `axiscal parse` lists what it holds"));
+            .help("does the log belong to this plan? `axiscal parse` lists its touches"));
     }
     let reference = settings.reference.unwrap_or(machine.reference.pivot);
     let model = Model::new(machine, effects, &data.set_ups, reference);

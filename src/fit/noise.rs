@@ -215,9 +215,9 @@ fn later(at_once: (f64, usize), later: (f64, usize)) -> Option<f64> {
 #[must_use]
 pub fn times_in_words(times: f64, visit_um: f64) -> String {
     if visit_um > 0.0 {
-        format!("{times:.1} times what touch noise and visit scatter make")
+        format!("{times:.1} times the noise with the scatter of index positions")
     } else {
-        format!("{times:.1} times their noise")
+        format!("{times:.1} times the noise")
     }
 }
 

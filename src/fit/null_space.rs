@@ -152,14 +152,23 @@ fn null_direction(
     NullDirection { kind, members, blocks, held: held.collect() }
 }
 
-/// What an unknown means at the machine, with its symbol: "the place of axis C in Y (EY0C)".
+/// What an unknown means at the machine, with its symbol: "the position of axis C in Y (EY0C)".
 #[must_use]
 pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
     let symbol = match &unknown.alias {
         Some(alias) => format!("{}, {alias}", unknown.name),
         None => unknown.name.clone(),
     };
-    let Some(effect) = effects.iter().find(|e| e.id == unknown.effect) else { return symbol };
+    match name_at_the_machine(unknown, effects) {
+        Some(name) => format!("{name} ({symbol})"),
+        None => symbol,
+    }
+}
+
+/// What an unknown means at the machine, without its symbol: "the position of axis C in Y".
+#[must_use]
+pub fn name_at_the_machine(unknown: &Unknown, effects: &[&Effect]) -> Option<String> {
+    let effect = effects.iter().find(|e| e.id == unknown.effect)?;
     let own = |t: &&Term| effect.parameters.get(t.parameter).is_some_and(|p| p.name == unknown.name);
     // a parameter that acts in several directions is called after the one in which it acts when everything stands at zero
     let shapes: Vec<f64> = effect.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
@@ -172,10 +181,10 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
         Some(b) if at_zero(b) >= at_zero(t) => best,
         _ => Some(t),
     });
-    let Some(term) = strongest else { return format!("{} ({symbol})", the(&effect.name)) };
+    let Some(term) = strongest else { return Some(the(&effect.name)) };
     let component = COMPONENTS.get(term.component).copied().unwrap_or("");
     let is_stand = effect.family == "location" || effect.paper;
-    let what = match term.place {
+    Some(match term.place {
         Place::Before(axis) | Place::After(axis) if is_stand && axis.is_rotary() => {
             let turns = term.component >= 3;
             if turns && term.component == axis.index() {
@@ -185,7 +194,7 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
             } else if matches!(term.place, Place::After(_)) {
                 format!("the tool's offset from axis {axis} {component}")
             } else {
-                format!("the place of axis {axis} {component}")
+                format!("the position of axis {axis} {component}")
             }
         }
         Place::Tool if effect.id == "tip-eccentricity" => format!("the tip's offset {component}"),
@@ -197,8 +206,7 @@ pub fn meaning(unknown: &Unknown, effects: &[&Effect]) -> String {
             format!("{} {component}", the(&effect.name))
         }
         _ => the(&effect.name),
-    };
-    format!("{what} ({symbol})")
+    })
 }
 
 /// Components of a displacement, in words.

@@ -64,6 +64,9 @@ pub struct Outcome {
     /// What would tell all of them together: variations of the touches, chosen one after the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parted_together: Vec<String>,
+    /// Combinations that no variation determines.
+    #[serde(skip)]
+    pub never_determined: usize,
     /// Combinations that the data determine no better than their typical sizes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weak: Vec<Combination>,

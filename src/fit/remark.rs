@@ -1,6 +1,9 @@
 //! What a fit remarks on: facts, of which `words::fit` makes sentences.
 
+use super::candidates::NoValue;
 use super::noise::Noise;
+use crate::log::LogMistake;
+use crate::model::temperatures::TemperatureGap;
 use serde::{Deserialize, Serialize};
 
 /// Where the standard deviation of a touch comes from.
@@ -127,8 +130,8 @@ pub struct Contradiction {
 pub enum Remark {
     /// An effect depends on the temperature, and no touch has one.
     NoTemperature { effect: String },
-    /// What is wrong with the temperatures of the logs, in the words of that room.
-    OfTemperatures(String),
+    /// Some touches have a temperature and others do not.
+    TemperatureGap(TemperatureGap),
     /// A size is larger than any machine's.
     NotCredible { name: String, times: f64 },
     /// A value follows combinations that cannot be determined by more than its own uncertainty.
@@ -140,7 +143,7 @@ pub enum Remark {
     /// Effects outside of the model are not counted with so many touches.
     UnmodelledNotCounted { most_touches: usize },
     /// Many touches are far from their nominal positions, and a sign, a unit or an axis explains it.
-    SetUpMistake { far: usize, of: usize, right: usize, says: String },
+    SetUpMistake { far: usize, of: usize, right: usize, mistake: LogMistake },
     /// More outliers than are excluded.
     OutliersBeyond { found: usize, of: usize, excluded: usize },
     /// So many outliers that they are a finding by themselves.
@@ -173,13 +176,39 @@ pub enum Remark {
     TypeBPerKelvin { name: String },
     /// A type B row has no effect on these touches.
     TypeBWithoutEffect { name: String },
-    /// An effect outside of the model could not be counted, in the words of `candidates`.
-    LeftOut(String),
+    /// An effect outside of the model could not be counted.
+    NotCounted(NoValue),
     /// A mask of a touch that does not exist.
     UnknownMask { id: u64, run: usize },
 }
 
 impl Remark {
+    /// Order in which a reader needs them, the most important first: what makes all values wrong, what makes some of them wrong,
+    /// what makes their uncertainties wrong, what is only to be known.
+    #[must_use]
+    pub fn rank(&self) -> u8 {
+        match self {
+            Self::NotConverged { .. } | Self::SetUpMistake { .. } => 0,
+            Self::OutliersBeyond { .. } | Self::NotCredible { .. } => 1,
+            Self::Misfit { .. } | Self::ManyOutliers { .. } | Self::NoRedundancy => 2,
+            Self::Contradiction(_) | Self::NoiseContradicted { .. } | Self::VisitsContradicted { .. } => 3,
+            Self::OutOfRange { .. }
+            | Self::OtherValues { .. }
+            | Self::SizesBesideOneValue { .. }
+            | Self::LostBesideShapes { .. }
+            | Self::NotDetermined { .. }
+            | Self::FollowsUnseen { .. }
+            | Self::NoTemperature { .. } => 4,
+            Self::VisitsBeyond { .. } | Self::CoarseLog { .. } | Self::NoiseTooLarge { .. } => 5,
+            Self::TemperatureGap(_)
+            | Self::UnmodelledNotCounted { .. }
+            | Self::TypeBPerKelvin { .. }
+            | Self::TypeBWithoutEffect { .. }
+            | Self::NotCounted(_)
+            | Self::UnknownMask { .. } => 6,
+        }
+    }
+
     /// Parameters that it says not to be determined.
     pub fn names(&self) -> Vec<&str> {
         match self {

@@ -323,7 +323,8 @@ pub fn minimise_from(
     if seen.rank == 0 {
         let chi2 = problem.normal(&theta, false).sum;
         let stopped =
-            if p == 0 { "nothing is left to solve for" } else { "no unknown leaves a trace in these touches" }.into();
+            if p == 0 { "there is no unknown to solve for" } else { "no unknown has an effect on these touches" }
+                .into();
         let covariance = DMatrix::zeros(p, p);
         return Solution { theta, chi2, converged: p == 0, iterations: 0, stopped, covariance };
     }

@@ -1,6 +1,6 @@
 //! Where the uncertainty of a parameter comes from, and what it becomes with everything that the model leaves out.
 
-use super::candidates::{columns_of, with_values};
+use super::candidates::{NoValue, columns_of, with_values};
 use super::normal::Touches;
 use super::outcome::Covariance;
 use super::solve::Problem as _;
@@ -131,8 +131,8 @@ pub fn unmodelled_by<'c>(unknowns: &[Unknown], machine: &Machine, catalogue: &'c
 /// Effects outside of a model (not the block positions) that may act on its touches.
 pub(super) struct LeftOut {
     model: Model,
-    /// What is said of effects that could not be counted.
-    says: Vec<String>,
+    /// Effects that could not be counted.
+    without_value: Vec<NoValue>,
 }
 
 impl LeftOut {
@@ -140,9 +140,9 @@ impl LeftOut {
     pub(super) fn of(model: &Model, machine: &Machine, catalogue: &Catalogue, data: &Data) -> Self {
         let mut effects = unmodelled_by(&model.unknowns, machine, catalogue);
         effects.retain(|e| !e.per_block);
-        let (effects, says) = with_values(effects, &data.observations);
+        let (effects, without_value) = with_values(effects, &data.observations);
         let model = Model::new(machine, &effects, &data.set_ups, model.reference);
-        Self { model, says }
+        Self { model, without_value }
     }
 }
 
@@ -160,7 +160,7 @@ fn typical_columns(model: &Model, observations: &[Observation]) -> DMatrix<f64> 
 /// counted.
 pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -> Unmodelled {
     let theta = fit.free_theta();
-    let LeftOut { model, says } = left_out;
+    let LeftOut { model, without_value } = left_out;
     let (p, q) = (fit.free.len(), model.n_unknowns());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
     let jacobian = |rows: &[usize]| {
@@ -197,7 +197,7 @@ pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -
             holds[c].push(u.effect.clone());
         }
     }
-    Unmodelled { sigma, holds, left_out: says }
+    Unmodelled { sigma, holds, left_out: without_value }
 }
 
 /// What effects outside of the model may do to a fit.
@@ -207,7 +207,7 @@ pub(super) struct Unmodelled {
     /// For each free unknown: effects of which it takes all that they do.
     pub holds: Vec<Vec<String>>,
     /// What is said of effects that could not be counted.
-    pub left_out: Vec<String>,
+    pub left_out: Vec<NoValue>,
 }
 
 /// The one result among the unknowns that take an effect, the set-ups of blocks aside. `taken`: what each takes, in noise.

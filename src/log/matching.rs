@@ -132,7 +132,7 @@ pub(super) fn match_at(
         let message = not_read(&missing, plan.touches.len(), &rejected);
         findings.push(
             Finding::warning("log::missing", message)
-                .help("the rest is used; what can no longer be told from it, the fit will say"),
+                .help("the rest is used; `axiscal identify` says what cannot be determined with it"),
         );
     }
     if touches.iter().all(|t| t.status == Status::Elsewhere) {

@@ -27,7 +27,7 @@ pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use reader::Reader;
 pub use record::LogHeader;
 pub use runs::RunFound;
-pub use setup_mistakes::{Supposed, suppose};
+pub use setup_mistakes::{LogMistake, Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
 
 use crate::axes::{AxisMap, AxisName};

@@ -383,7 +383,7 @@ fn shape(run: &Run, first: usize, places: &Places<'_>, findings: &mut Findings) 
         }
         (None, Some(_)) => {
             let finding = Finding::warning("log::no_head", "the run has no line H: the head of the log is missing")
-                .help("what is there is used; whether it belongs to this plan can only be told by its positions");
+                .help("what is there is used; only its positions show whether it belongs to this plan");
             findings.push(places.at_line(finding, first));
         }
         _ => {}

@@ -11,21 +11,62 @@ use crate::program::plan::{Plan, PlanTouch};
 use crate::units::{inch_from_mm, mm_from_inch};
 use nalgebra::Vector3;
 
-/// A mistake: its name, what it says, what undoes it.
+/// A simple mistake that puts touches elsewhere.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LogMistake {
+    /// The sign of these axes.
+    Sign(Vec<AxisName>),
+    /// The columns of two axes are exchanged.
+    Exchanged(AxisName, AxisName),
+    /// The columns of X, Y and Z are exchanged in a circle.
+    ExchangedXyz,
+    /// Inches were read as millimetres.
+    Inches,
+    /// Millimetres were read as inches.
+    Millimetres,
+    /// All positions are shifted.
+    Shift {
+        /// By so much.
+        by_mm: Vector3<f64>,
+        /// They are inches as well.
+        inches: bool,
+    },
+}
+
+impl LogMistake {
+    /// As the effect of set-up mistakes calls its parameters: `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Sign(axes) => axes.iter().map(|a| format!("flip_{a}")).collect::<Vec<_>>().join(" "),
+            Self::Exchanged(a, b) => format!("swap_{a}{b}"),
+            Self::ExchangedXyz => "swap_XYZ".to_owned(),
+            Self::Inches => "inch".to_owned(),
+            Self::Millimetres => "mm".to_owned(),
+            Self::Shift { inches: true, .. } => "inch shift".to_owned(),
+            Self::Shift { inches: false, .. } => "shift".to_owned(),
+        }
+    }
+
+    /// After "would be right if".
+    #[must_use]
+    pub fn says(&self) -> String {
+        crate::words::log::mistake(self)
+    }
+}
+
+/// A mistake with what to check and what undoes it.
 struct Mistake {
-    name: String,
-    says: String,
+    kind: LogMistake,
     help: &'static str,
     undo: Box<dyn Fn(Position) -> Position>,
 }
 
 /// What would put the touches that are far from their places where they belong.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Supposed {
-    /// `flip_B`, `flip_B flip_C`, `swap_XY`, `inch`, `mm`, of rows also `shift`, `inch shift`: as the effect of gross mistakes calls its parameters.
-    pub name: String,
-    /// In words: "the sign of B were the other one".
-    pub says: String,
+    /// The mistake.
+    pub mistake: LogMistake,
     /// What to look at.
     pub help: &'static str,
     /// So many touches are far from their places …
@@ -54,8 +95,7 @@ pub fn suppose(machine: &Machine, touches: &[(&PlanTouch, Position, [bool; 6])])
         let right = mended.iter().filter(|m| **m).count();
         let of_far = mended.iter().zip(&good).filter(|(m, g)| **m && !**g).count();
         (of_far * 10 >= far * 9 && right * 10 >= touches.len() * 9).then_some(Supposed {
-            name: mistake.name,
-            says: mistake.says,
+            mistake: mistake.kind,
             help: mistake.help,
             far,
             right,
@@ -68,8 +108,10 @@ pub fn suppose(machine: &Machine, touches: &[(&PlanTouch, Position, [bool; 6])])
 pub(super) fn hint(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)]) -> Option<Finding> {
     let touches: Vec<(&PlanTouch, Position, [bool; 6])> =
         pairs.iter().map(|(planned, raw)| (*planned, whole(raw, planned), raw.present)).collect();
-    let Supposed { says, help, far, right, of, .. } = suppose(machine, &touches)?;
-    let message = format!("{far} of {of} touches are far from their places; {right} would be right if {says}");
+    let Supposed { mistake, help, far, right, of } = suppose(machine, &touches)?;
+    let says = mistake.says();
+    let message =
+        format!("{far} of {of} touches are far from their planned positions; {right} would be right if {says}");
     Some(Finding::warning("log::swapped", message).help(help))
 }
 
@@ -89,9 +131,9 @@ pub(super) fn explain(machine: &Machine, pairs: &[(&PlanTouch, RawTouch)], bad: 
             .count();
         if good * 10 >= pairs.len() * 9 {
             let message = format!(
-                "{bad} of {} touches are far from their places, and {good} would be right if {}",
+                "{bad} of {} touches are far from their planned positions, and {good} would be right if {}",
                 pairs.len(),
-                mistake.says
+                mistake.kind.says()
             );
             return Finding::error("log::swapped", message).help(mistake.help);
         }
@@ -111,7 +153,10 @@ pub(super) fn explain_rows(plan: &Plan, lines: &Lines<'_>, rows: &[RawTouch], on
     let supposed = suppose_rows(plan, lines, rows, on_none)?;
     let message = format!(
         "{} of {} rows lie on the line of no touch, and {} would if {}",
-        supposed.far, supposed.of, supposed.right, supposed.says
+        supposed.far,
+        supposed.of,
+        supposed.right,
+        supposed.mistake.says()
     );
     Some(Finding::error("log::swapped", message).help(supposed.help))
 }
@@ -122,15 +167,12 @@ pub(super) fn suppose_rows(plan: &Plan, lines: &Lines<'_>, rows: &[RawTouch], on
         rows.iter().filter(|row| !lines.at(&undo(row.position), row.present).is_empty()).count()
     };
     let simple = mistakes(lines.machine()).into_iter();
-    let shifts = [
-        ("shift", "", Box::new(|p: Position| p) as Box<dyn Fn(Position) -> Position>),
-        ("inch shift", "the numbers were inches, and then ", Box::new(inches_undone)),
-    ];
-    let shifted = shifts.into_iter().filter_map(|(name, before, first)| {
+    let shifts =
+        [(false, Box::new(|p: Position| p) as Box<dyn Fn(Position) -> Position>), (true, Box::new(inches_undone))];
+    let shifted = shifts.into_iter().filter_map(|(inches, first)| {
         let by = shift_of_rows(plan, lines, rows, &first)?;
         Some(Mistake {
-            name: name.to_owned(),
-            says: format!("{before}{}", shift_says(&by)),
+            kind: LogMistake::Shift { by_mm: by, inches },
             help: SHIFT_HELP,
             undo: Box::new(move |p| {
                 let p = first(p);
@@ -140,16 +182,15 @@ pub(super) fn suppose_rows(plan: &Plan, lines: &Lines<'_>, rows: &[RawTouch], on
     });
     simple.chain(shifted).find_map(|mistake| {
         let right = right(&mistake.undo);
-        let help = match mistake.name.as_str() {
-            "inch" => "rows do not say their unit: write unit = \"inch\" into [log.columns] of a postprocessor file of your own",
-            "shift" | "inch shift" => {
+        let help = match mistake.kind {
+            LogMistake::Inches => "rows do not say their unit: write unit = \"inch\" into [log.columns] of a postprocessor file of your own",
+            LogMistake::Shift { .. } => {
                 "rows of PROBEOPEN and of a console are in the work coordinate system that was active: was it another one than the program's? is `origin` in machines.toml the machine position at the origin of R?"
             }
             _ => mistake.help,
         };
         (right * 10 >= rows.len() * 9).then_some(Supposed {
-            name: mistake.name,
-            says: mistake.says,
+            mistake: mistake.kind,
             help,
             far: on_none,
             right,
@@ -184,16 +225,15 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
     let mut all = Vec::new();
     let [x, y, z] = [0usize, 1, 2];
     let orders = [
-        ([y, x, z], "X and Y", "swap_XY"),
-        ([z, y, x], "X and Z", "swap_ZX"),
-        ([x, z, y], "Y and Z", "swap_YZ"),
-        ([y, z, x], "X, Y and Z", "swap_XYZ"),
-        ([z, x, y], "X, Y and Z", "swap_XYZ"),
+        ([y, x, z], LogMistake::Exchanged(AxisName::X, AxisName::Y)),
+        ([z, y, x], LogMistake::Exchanged(AxisName::Z, AxisName::X)),
+        ([x, z, y], LogMistake::Exchanged(AxisName::Y, AxisName::Z)),
+        ([y, z, x], LogMistake::ExchangedXyz),
+        ([z, x, y], LogMistake::ExchangedXyz),
     ];
-    for (order, names, name) in orders {
+    for (order, kind) in orders {
         all.push(Mistake {
-            name: name.to_owned(),
-            says: format!("the columns {names} were exchanged"),
+            kind,
             help: columns,
             undo: Box::new(move |p| p.with_xyz_mm(Vector3::new(p.0[order[0]], p.0[order[1]], p.0[order[2]]))),
         });
@@ -201,8 +241,7 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
     let rotary: Vec<AxisName> = machine.rotary().map(|a| a.name).collect();
     if let [first, second] = rotary[..] {
         all.push(Mistake {
-            name: format!("swap_{first}{second}"),
-            says: format!("the columns {first} and {second} were exchanged"),
+            kind: LogMistake::Exchanged(first, second),
             help: columns,
             undo: Box::new(move |mut p| {
                 p.0.swap(first.index(), second.index());
@@ -211,14 +250,12 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
         });
     }
     all.push(Mistake {
-        name: "inch".to_owned(),
-        says: "the numbers were inches".into(),
+        kind: LogMistake::Inches,
         help: "the head of a log says its unit, MM or INCH, as the program was written (unit in [log]): was the log written by it?",
         undo: Box::new(inches_undone),
     });
     all.push(Mistake {
-        name: "mm".to_owned(),
-        says: "the numbers were millimetres".into(),
+        kind: LogMistake::Millimetres,
         help: "the head of a log says INCH, or `unit` of [log] does: was the log written by that program?",
         undo: Box::new(|p| p.with_xyz_mm(p.xyz_mm().map(inch_from_mm))),
     });
@@ -230,10 +267,8 @@ fn mistakes(machine: &Machine) -> Vec<Mistake> {
         }
         let turned: Vec<AxisName> =
             axes.iter().enumerate().filter(|(i, _)| subset >> i & 1 == 1).map(|(_, a)| *a).collect();
-        let names: Vec<String> = turned.iter().map(ToString::to_string).collect();
         all.push(Mistake {
-            name: names.iter().map(|n| format!("flip_{n}")).collect::<Vec<_>>().join(" "),
-            says: format!("the sign of {} were the other one", names.join(" and ")),
+            kind: LogMistake::Sign(turned.clone()),
             help: signs,
             undo: Box::new(move |mut p| {
                 turned.iter().for_each(|a| p.set(*a, -p.get(*a)));
@@ -251,11 +286,6 @@ fn inches_undone(at: Position) -> Position {
 const SHIFT_HELP: &str =
     "is `origin` in machines.toml the machine position at the origin of R? was another offset active in that run?";
 
-/// A shift in words.
-pub(super) fn shift_says(by: &Vector3<f64>) -> String {
-    format!("all were shifted by X {:.3} Y {:.3} Z {:.3} mm", by.x, by.y, by.z)
-}
-
 /// The same shift in all touches: another origin.
 fn shift(pairs: &[(&PlanTouch, RawTouch)], whole: impl Fn(&RawTouch, &PlanTouch) -> Position) -> Option<Mistake> {
     let median = |axis: usize| {
@@ -266,8 +296,7 @@ fn shift(pairs: &[(&PlanTouch, RawTouch)], whole: impl Fn(&RawTouch, &PlanTouch)
     };
     let by = Vector3::new(median(0)?, median(1)?, median(2)?);
     Some(Mistake {
-        name: "shift".to_owned(),
-        says: shift_says(&by),
+        kind: LogMistake::Shift { by_mm: by, inches: false },
         help: SHIFT_HELP,
         undo: Box::new(move |p| p.with_xyz_mm(p.xyz_mm() - by)),
     })

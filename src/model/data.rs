@@ -2,6 +2,7 @@
 
 use super::formula::{State, VARIABLES, slot};
 use super::predict::{Observation, SetUp};
+use super::temperatures::TemperatureGap;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
 use crate::machine::{Carrier, Machine};
@@ -92,8 +93,8 @@ pub struct Data {
     /// Where touches of a run are far from their places: the one simple mistake that would explain it. What is left of such
     /// a run is no sample of the machine, however many touches it has.
     pub supposed: Option<Supposed>,
-    /// What is to be said of touches that carry no temperature while others do.
-    pub temperature_says: Option<String>,
+    /// Touches without a temperature while others have one.
+    pub temperature_gap: Option<TemperatureGap>,
     /// For each run: the last digit of its log, mm, where all its lengths are multiples of one.
     pub digits_mm: Vec<Option<f64>>,
 }
@@ -128,8 +129,8 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     let mut first_touch_s: Option<f64> = None;
     let mut earliest_h = 0.0;
     let mut visits = Visits::default();
-    let (temperatures, temperature_says) = super::temperatures::of_runs(runs);
-    data.temperature_says = temperature_says;
+    let (temperatures, temperature_gap) = super::temperatures::of_runs(runs);
+    data.temperature_gap = temperature_gap;
     for (index, run) in runs.iter().enumerate() {
         let label = run_label(runs, index);
         let numbered = run.plan.numbered();

@@ -17,4 +17,4 @@ pub mod predict;
 pub mod reference_points;
 mod rigid_motions;
 pub mod sensitivities;
-mod temperatures;
+pub mod temperatures;

@@ -5,14 +5,25 @@ use crate::units::hours_from_s;
 
 /// A touch without a temperature takes that of the readings around it where one is nearer than this, h: a room does not turn
 /// in a quarter of an hour.
-const NEAR_H: f64 = 0.25;
+pub const NEAR_H: f64 = 0.25;
+
+/// Touches without a temperature while others have one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TemperatureGap {
+    /// So many touches have none …
+    pub missing: usize,
+    /// … of so many.
+    pub of: usize,
+    /// For so many no reading is near: no temperature is used at all. Else the readings around them are used.
+    pub far: usize,
+}
 
 /// Temperatures of the touches of each run, °C, as the model takes them; `None` where no effect of temperature is to be seen.
 pub(super) type Temperatures = Vec<Vec<Option<f64>>>;
 
-/// Of all runs, with what is to be said of touches that lack one. Readings near in time fill a gap; where that cannot be, no
+/// Of all runs, with the touches that lack one. Readings near in time fill a gap; where that cannot be, no
 /// temperature is used at all: 20 °C in the middle of a warm hour would be a jump that nothing made.
-pub(super) fn of_runs(runs: &[Run]) -> (Temperatures, Option<String>) {
+pub(super) fn of_runs(runs: &[Run]) -> (Temperatures, Option<TemperatureGap>) {
     let read = |run: &Run| -> Vec<Option<f64>> { run.touches.iter().map(|t| t.temperature_deg_c).collect() };
     let as_read: Temperatures = runs.iter().map(read).collect();
     let all = as_read.iter().map(Vec::len).sum::<usize>();
@@ -23,18 +34,9 @@ pub(super) fn of_runs(runs: &[Run]) -> (Temperatures, Option<String>) {
     let filled: Temperatures = runs.iter().map(filled).collect();
     let far = filled.iter().flatten().filter(|t| t.is_none()).count();
     if far == 0 {
-        let says = format!(
-            "{missing} of {all} touches carry no temperature: it is taken from the readings before and after them"
-        );
-        return (filled, Some(says));
+        return (filled, Some(TemperatureGap { missing, of: all, far }));
     }
-    let says = format!(
-        "{missing} of {all} touches carry no temperature, and for {far} of them there is no reading within {:.0} min: no \
-         temperature is used at all, and no effect that goes with it can be told; write one for every touch, or leave the touches \
-         without one out",
-        60.0 * NEAR_H
-    );
-    (as_read.iter().map(|run| vec![None; run.len()]).collect(), Some(says))
+    (as_read.iter().map(|run| vec![None; run.len()]).collect(), Some(TemperatureGap { missing, of: all, far }))
 }
 
 fn filled(run: &Run) -> Vec<Option<f64>> {

@@ -36,13 +36,13 @@ pub fn page(view: &View) -> Result<String> {
     );
     let (level, word) = match view.headline.level {
         Level::Good => ("good", "✓ In order"),
-        Level::Act => ("act", "▲ Something is to be done"),
-        Level::Unknown => ("unknown", "? Not told yet"),
+        Level::Act => ("act", "▲ Action needed"),
+        Level::Unknown => ("unknown", "? Not determined yet"),
     };
     let title = format!("{} – {}", view.machine.name, view.study.name);
     // where the sentence says the figures, they are not said twice
     let detail = match view.diagnosis.answer.verdict {
-        Verdict::MissingEffect | Verdict::Unexplained if view.headline.detail != view.headline.sentence => {
+        Verdict::MissingEffect(_) | Verdict::Unexplained(_) if view.headline.detail != view.headline.sentence => {
             view.headline.detail.as_str()
         }
         _ => "",

@@ -79,8 +79,7 @@ fn errors(view: &View) -> Chart {
     let names: Vec<String> = rungs.iter().map(|r| format!("{}: {} µm", r.label, significant(r.rms_um))).collect();
     let y = Axis::named(names);
     let ends = y.range;
-    let mut c =
-        chart("error", "The error before and after", Axis::new("how far the touches miss (RMS), µm", (0.0, top)), y);
+    let mut c = chart("error", "The error before and after", Axis::new("residual (RMS), µm", (0.0, top)), y);
     c.downwards = true;
     c.aspect = 0.35;
     for (i, rung) in rungs.iter().enumerate() {
@@ -97,7 +96,7 @@ fn errors(view: &View) -> Chart {
         rungs.iter().enumerate().filter_map(|(i, r)| Some(point(r.held_out_rms_um?, i as f64))).collect();
     if !points.is_empty() {
         c.marks.push(Mark::Points {
-            series: "index visits left out".to_owned(),
+            series: "cross-validated".to_owned(),
             look: look(INK, Shape::Diamond, false),
             points,
         });
@@ -131,7 +130,7 @@ fn results(view: &View) -> Chart {
     let x = Axis::new(format!("error at {} mm, µm (bar: 95 %)", view.tolerance.radius_mm), (-reach, reach));
     let partly = view.diagnosis.answer.verdict != Verdict::Adequate && view.proposed.is_empty();
     let title = if partly {
-        "The machine's errors against the tolerance: these values hold part of what is missing"
+        "The machine's errors against the tolerance: these values include part of the missing error"
     } else {
         "The machine's errors against the tolerance"
     };
@@ -235,7 +234,7 @@ fn ladder(view: &View) -> Chart {
         view.ladder.iter().enumerate().filter_map(|(i, r)| Some(point(i as f64, r.held_out_rms_um?))).collect();
     if !held.is_empty() {
         c.marks.push(Mark::Points {
-            series: "index visits left out".to_owned(),
+            series: "cross-validated".to_owned(),
             look: look(RED, Shape::Diamond, false),
             points: held,
         });
@@ -293,15 +292,10 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
     // a line between the touches may go further than any of them
     let drawn = added.iter().flat_map(|q| q.y_um.iter().map(|y| y.abs()));
     let reach = 1.08 * highest(missed.chain(drawn).chain([noise]));
-    let title = if along { "miss along the face, µm" } else { "miss, µm" };
+    let title = if along { "residual along the face, µm" } else { "residual, µm" };
     let name = format!("residual-{}", variable.id.to_lowercase());
     let x = Axis::new(variable.title.clone(), (low - room, high + room));
-    let mut c = chart(
-        &name,
-        format!("How far the touches miss against the {}", variable.title),
-        x,
-        Axis::new(title, (-reach, reach)),
-    );
+    let mut c = chart(&name, format!("Residual against the {}", variable.title), x, Axis::new(title, (-reach, reach)));
     c.marks.push(Mark::Area {
         series: "twice the noise".to_owned(),
         colour: BLUE,
@@ -370,7 +364,7 @@ fn candidates(view: &View) -> Chart {
             let note = if k.same_as.is_empty() {
                 String::new()
             } else {
-                format!("cannot be told from {}", k.same_as.join(" "))
+                format!("cannot be separated from {}", k.same_as.join(" "))
             };
             (standing(k) == name).then_some(Point { x: k.rms_after_um, y: i as f64, note })
         };
@@ -386,7 +380,7 @@ fn candidates(view: &View) -> Chart {
         .filter_map(|(i, k)| Some(point(k.held_out_after_um.filter(|h| *h > 0.0)?, i as f64)))
         .collect();
     c.marks.push(Mark::Points {
-        series: "index visits left out".to_owned(),
+        series: "cross-validated".to_owned(),
         look: look(RED, Shape::Diamond, false),
         points: held,
     });

@@ -158,7 +158,7 @@ pub(super) fn machine(view: &View) -> Chart {
     Chart {
         name: "machine".to_owned(),
         title: format!(
-            "{}: how far each touch misses ({label}), by stage; arrows {magnification} times as long as the misses",
+            "{}: the residual of each touch ({label}), by stage; arrows {magnification} times as long as the residuals",
             view.machine.name
         ),
         x: Axis::new("", (x - 1.3 * r, x + 1.3 * r)),

@@ -43,10 +43,10 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     *out += &format!("model: {}\n", a.model.join(", "));
     *out += &format!("this plan is {}: {}\n\n", a.score.word(), a.says);
     let mut t =
-        table(&["parameter", "unit", "probe noise alone", "with indexing", "with unmodelled effects", "holds as well"]);
+        table(&["parameter", "unit", "probe noise alone", "with indexing", "with unmodelled effects", "includes"]);
     for p in &a.parameters {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |alias| format!("{} ({alias})", p.name));
-        let size = |s: Option<f64>| number(s.map_or_else(|| "not told".into(), significant));
+        let size = |s: Option<f64>| number(s.map_or_else(|| "unknown".into(), significant));
         t.add_row(vec![
             Cell::new(name),
             Cell::new(&p.unit),
@@ -58,19 +58,22 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     }
     lay(&mut t, paper.width.min(120), &[]);
     *out += &format!(
-        "expected standard uncertainty at {} um noise of a touch ({} um scatter per index in the second and third)\n{t}\n\n",
+        "expected standard uncertainty at {} µm noise of a touch ({} µm scatter of index positions in the second and third)\n{t}\n\n",
         significant(a.noise_um),
         significant(a.visit_um)
     );
     for u in &a.undetermined {
-        *out += &format!("cannot be told: {}\n", u.says);
+        *out += &format!("cannot be determined: {}\n", u.says);
     }
     if !a.parted_together.is_empty() {
-        *out += &super::fit::together(&a.parted_together);
+        *out += &super::fit::together(&a.parted_together, a.never_determined);
     }
     let visible = a.effects.iter().filter(|e| e.visible).count();
-    *out += &format!("\neffects that are not in the model: {visible} of {} leave a trace\n", a.effects.len());
-    let mut t = table(&["effect", "found from (um)", "usual (um)", "cannot be told from"]);
+    *out += &format!(
+        "\neffects that are not in the model: {visible} of {} have an effect on the touches\n",
+        a.effects.len()
+    );
+    let mut t = table(&["effect", "found from, µm", "usual, µm", "cannot be separated from"]);
     for e in a.effects.iter().filter(|e| e.visible) {
         t.add_row(vec![
             Cell::new(&e.effect),
@@ -83,14 +86,14 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     *out += &format!("{t}\n");
     let invisible: Vec<&Seen> = a.effects.iter().filter(|e| !e.visible).collect();
     if !invisible.is_empty() {
-        *out += "\nno trace whatever their size:\n";
+        *out += "\nno effect on the touches at any size:\n";
         for e in invisible {
             *out += &format!("  {}: {}\n", e.effect, e.tell_apart);
         }
     }
     if !a.alias_groups.is_empty() {
         *out += &format!(
-            "\nnot to be told apart ({} pairs in all, those included that explain each other one way):\n",
+            "\ncannot be separated ({} pairs in all, with those of which only one explains the other):\n",
             a.alias_pairs
         );
         for (g, number) in a.alias_groups.iter().zip(1..) {
@@ -111,7 +114,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
                 gains.push(format!("shows {}", listed(&x.shows)));
             }
             if x.parts > 0 {
-                gains.push(format!("parts {} pair{}", x.parts, if x.parts == 1 { "" } else { "s" }));
+                gains.push(format!("separates {} pair{}", x.parts, if x.parts == 1 { "" } else { "s" }));
             }
             *out += &format!("  +{} {}: {}\n", time(x.time_s), x.says, gains.join(", "));
         }
@@ -132,21 +135,19 @@ fn side_by_side(first: &Assessment, paper: Paper, out: &mut String) {
     row("score", &|a| a.score.word().into());
     row("touches", &|a| a.touches.to_string());
     row("time", &|a| time(a.time_s));
-    row("combinations not told", &|a| a.undetermined.len().to_string());
-    row("effects with a trace", &|a| {
-        format!("{} of {}", a.effects.iter().filter(|e| e.visible).count(), a.effects.len())
-    });
-    row("pairs not told apart", &|a| a.alias_pairs.to_string());
+    row("combinations not determined", &|a| a.undetermined.len().to_string());
+    row("effects that show", &|a| format!("{} of {}", a.effects.iter().filter(|e| e.visible).count(), a.effects.len()));
+    row("pairs not separated", &|a| a.alias_pairs.to_string());
     for p in &first.parameters {
         let of = |a: &Assessment| a.parameters.iter().find(|q| q.name == p.name).cloned();
         row(&format!("{} ({})", p.name, p.unit), &|a| {
-            of(a).and_then(|q| q.sigma).map_or_else(|| "not told".into(), significant)
+            of(a).and_then(|q| q.sigma).map_or_else(|| "unknown".into(), significant)
         });
         row("  with indexing", &|a| {
-            of(a).and_then(|q| q.sigma_with_visits).map_or_else(|| "not told".into(), significant)
+            of(a).and_then(|q| q.sigma_with_visits).map_or_else(|| "unknown".into(), significant)
         });
         row("  with unmodelled", &|a| {
-            of(a).and_then(|q| q.sigma_with_unmodelled).map_or_else(|| "not told".into(), significant)
+            of(a).and_then(|q| q.sigma_with_unmodelled).map_or_else(|| "unknown".into(), significant)
         });
     }
     lay(&mut t, paper.width.min(160), &[]);

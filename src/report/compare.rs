@@ -20,17 +20,17 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
         n => format!(" ({n} more cannot be used)"),
     };
     let mut out = format!(
-        "{}: {} um RMS left over {} touches{missed}, noise {} um; chi2/dof {:.2}",
+        "{}: residual {} µm RMS over {} touches{missed}, noise {} µm; chi2/dof {:.2}",
         c.machine,
         significant(c.rms_um),
         c.points.iter().filter(|p| p.used).count(),
         significant(c.noise_um),
         c.chi2_per_dof
     );
-    out += &c.held_out_rms_um.map_or_else(String::new, |h| format!("; {} um on index visits left out", significant(h)));
+    out += &c.held_out_rms_um.map_or_else(String::new, |h| format!("; cross-validated {} µm", significant(h)));
     let noise = super::prose::sentence(&format!("noise: {}", c.noise_says), paper.width, 0, 2);
     out += &format!("\n{noise}\n{}\n\n", c.says);
-    let mut t = table(&["split by", "share", "groups", "what it says"]);
+    let mut t = table(&["split by", "share", "groups", "result"]);
     for s in &c.splits {
         t.add_row(vec![
             Cell::new(&s.by),
@@ -40,22 +40,22 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
         ]);
     }
     lay(&mut t, paper.width.min(160), &[]);
-    out += &format!("{t}\nshares are of the misfit beyond the noise, each split taken alone: they overlap\n");
+    out += &format!("{t}\nshare: part of the residual beyond the noise; the splits overlap\n");
     let shown = |s: &&Split| !s.groups.is_empty() && (all || s.share >= WORTH_SHOWING);
     for s in c.splits.iter().filter(shown).take(if all { usize::MAX } else { LISTED }) {
         out += &format!("\n{}\n{}\n", s.by, groups(s, paper));
     }
-    out += &format!("\nfurthest off\n{}\n", worst(c, paper));
+    out += &format!("\nlargest residuals\n{}\n", worst(c, paper));
     for variable in plotted(c, all) {
         let points: Vec<(f64, f64)> =
             c.points.iter().filter(|p| p.used).filter_map(|p| Some((p.value(&variable)?, p.residual_um))).collect();
-        out += &format!("\n{}", scatter(&format!("residual, um, against {}", named(&variable)), &points, paper));
+        out += &format!("\n{}", scatter(&format!("residual, µm, against {}", named(&variable)), &points, paper));
     }
     paper.plain(out)
 }
 
 fn groups(s: &Split, paper: Paper) -> String {
-    let mut t = table(&["value", "touches", "mean um", "RMS um"]);
+    let mut t = table(&["value", "touches", "mean, µm", "RMS, µm"]);
     for g in &s.groups {
         t.add_row(vec![
             number(paper.plain(g.value.clone())),
@@ -69,7 +69,7 @@ fn groups(s: &Split, paper: Paper) -> String {
 }
 
 fn worst(c: &Comparison, paper: Paper) -> String {
-    let mut t = table(&["run", "touch", "log line", "residual um", "sigmas", "block", "face", "pose", ""]);
+    let mut t = table(&["run", "touch", "log line", "residual, µm", "sigmas", "block", "face", "pose", ""]);
     for w in &c.worst {
         let pose: Vec<String> = w.pose.iter().map(|(a, v)| format!("{a}{v:.1}")).collect();
         t.add_row(vec![

@@ -1,11 +1,11 @@
 //! The answer of `diagnose`: the verdict first, then what may be missing, then on what the misfit depends.
 
-use super::fit::{digits, number, significant, table, with_unit};
+use super::fit::{digits, first_remarks, number, significant, table, unit, with_unit};
 use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
-use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape, Verdict};
-use crate::diagnose::setup_mistakes;
+use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape};
+use crate::diagnose::{Verdict, setup_mistakes};
 use crate::words::diagnose::plain;
 use comfy_table::Cell;
 
@@ -30,52 +30,110 @@ fn wrapped(text: &str, indent: usize, paper: Paper) -> String {
     sentence(text.trim_start(), paper.width, own, indent) + "\n"
 }
 
-/// The whole answer.
+/// The answer: verdict, candidates, what to check; at most three remarks where all are not asked for.
 #[must_use]
-pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
+pub fn diagnosis(d: &Diagnosis, paper: Paper, verbose: bool) -> String {
     let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
     let mut out = wrapped(&d.says, 0);
-    out += &wrapped(&format!("noise: {}", d.noise_says), 2);
-    if !d.candidates.is_empty() {
-        out += &candidates(d, paper);
+    if verbose {
+        out += &wrapped(&format!("noise: {}", d.noise_says), 2);
     }
-    if let Some(first) = d.depends.first() {
-        out += &wrapped(&format!("depends: {}", first.says), 2);
+    if !d.candidates.is_empty() {
+        out += &candidates(d, paper, verbose);
+        out += &to_check(d, paper);
+    }
+    // where no effect is named the curve is the finding
+    if let Some(shape) = d.shape.as_ref().filter(|_| verbose || d.verdict.unexplained().is_some()) {
+        out += &plot(shape, paper);
+        if !shape.kind.is_empty() {
+            out += &wrapped(&format!("possible cause: {}", shape.kind), 2);
+        }
+    }
+    let remarks: Vec<String> = remarks(d, verbose).iter().map(|r| wrapped(r, 2).trim_end().to_owned()).collect();
+    out += &first_remarks(&remarks, verbose);
+    paper.plain(out)
+}
+
+/// What a reader must know beside the verdict, the most important first.
+fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
+    let mut out: Vec<String> = d.warnings.iter().map(|w| format!("warning: {w}")).collect();
+    // what nothing speaks for is not explained
+    if let Some(first) = d.candidates.first().filter(|c| d.verdict != Verdict::Adequate && c.proposed) {
+        out.extend(of_candidate(first));
+    }
+    for g in d.gross.iter().take(3) {
+        let share = |share: f64| format!("{:.0} %", 100.0 * share);
+        out.push(match (g.in_place, g.agrees) {
+            (Some(of), _) => format!("tried: {}: {} of the touches would be where planned", g.says, share(of)),
+            (_, Some(of)) => format!("tried: {}: {} of the touches would hit or miss as they did", g.says, share(of)),
+            _ => format!("tried: {}: the residual would be {} µm RMS", g.says, significant(g.rms_um)),
+        });
+    }
+    out.extend(not_used(d));
+    if !d.needs_temperature.is_empty() {
+        out.push(format!("cannot be measured without temperatures in the log: {}", d.needs_temperature.join(", ")));
+    }
+    let unseen: Vec<&str> =
+        d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).map(String::as_str).collect();
+    if !unseen.is_empty() {
+        out.push(format!("have no effect on these touches at any size: {}", unseen.join(", ")));
+    }
+    let small: Vec<String> = d
+        .power
+        .iter()
+        .take(MOST_POWER)
+        .map(|p| format!("{} below {} µm", p.effect, significant(p.minimal_detectable_um)))
+        .collect();
+    if !small.is_empty() {
+        out.push(format!("too small to be found with these touches: {}", small.join(", ")));
+    }
+    if verbose && let Some(first) = d.depends.first() {
+        out.push(first.says.clone());
         // they share much of it with the first, and with each other
         let others: Vec<String> =
             d.depends[1..].iter().map(|w| format!("{} ({:.0} %)", plain(&w.by), 100.0 * w.share)).collect();
         if !others.is_empty() {
-            out += &wrapped(&format!("  taken alone, also {}", others.join(", ")), 4);
+            out.push(format!("each taken alone, the residual also depends on: {}", others.join(", ")));
         }
     }
-    if let Some(shape) = &d.shape {
-        out += &plot(shape, paper);
-        if !shape.kind.is_empty() {
-            out += &wrapped(&format!("what does that: {}", shape.kind), 2);
-        }
+    out
+}
+
+/// What is to be known of the effect that is named.
+fn of_candidate(first: &Candidate) -> Vec<String> {
+    let mut out = Vec::new();
+    if !first.wrong_sign.is_empty() {
+        out.push(wrong_sign(first));
     }
-    for g in d.gross.iter().take(3) {
-        out += &match (g.in_place, g.agrees) {
-            (Some(share), _) => wrapped(
-                &format!("tried: {}: {:.0} % of the touches would be where they belong", g.says, 100.0 * share),
-                2,
-            ),
-            (_, Some(agrees)) => wrapped(
-                &format!("tried: {}: {:.0} % of the touches would hit or miss as they did", g.says, 100.0 * agrees),
-                2,
-            ),
-            _ => wrapped(&format!("tried: {}: {} um RMS would be left", g.says, significant(g.rms_um)), 2),
-        };
+    if !first.plausible {
+        out.push(match first.same_as.len() {
+            0 => format!("{} would be unusually large: another effect may look like it", first.effect),
+            _ => format!("{} would be unusually large: check the others of its group first", first.effect),
+        });
     }
-    // the touches of a block that moved are one finding, and not so many chips
-    let moved = |o: &&Outlier| d.moved_block.as_ref().is_some_and(|b| *b == o.block);
+    for w in &first.weakens {
+        out.push(format!(
+            "{} becomes less certain with {}: {} in place of {}",
+            w.name,
+            first.effect,
+            with_unit(significant(w.sigma_after), &w.unit),
+            with_unit(significant(w.sigma_before), &w.unit)
+        ));
+    }
+    out
+}
+
+/// Touches that are not used. Those of a block that moved, and those that agree with the first candidate, are one finding.
+fn not_used(d: &Diagnosis) -> Vec<String> {
+    let mut out = Vec::new();
+    let moved = |o: &&Outlier| d.verdict.moved_block().is_some_and(|b| b == o.block);
     let of_block: Vec<&Outlier> = d.outliers.iter().filter(moved).collect();
-    if let (Some(block), Some(first)) = (&d.moved_block, of_block.first()) {
+    if let (Some(block), Some(first)) = (d.verdict.moved_block(), of_block.first()) {
         let ids: Vec<String> = of_block.iter().map(|o| o.id.to_string()).collect();
-        out += &match ids.len() {
-            1 => wrapped(&format!("not used: touch {} of run {}, of block {block} that moved", first.id, first.run), 2),
-            n => wrapped(&format!("not used: {n} touches of block {block} that moved: {}", ids.join(", ")), 2),
-        };
+        out.push(match ids.len() {
+            1 => format!("not used: touch {} of run {}, of block {block} that moved", first.id, first.run),
+            n => format!("not used: {n} touches of block {block} that moved: {}", ids.join(", ")),
+        });
     }
     let (back, stay): (Vec<&Outlier>, Vec<&Outlier>) =
         d.outliers.iter().filter(|o| !moved(o)).partition(|o| o.comes_back);
@@ -83,45 +141,26 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper) -> String {
     if together {
         let ids: Vec<String> = back.iter().map(|o| format!("{}/{}", o.run, o.id)).collect();
         let n = ids.len();
-        let says = "that belong to the rest once the first candidate is in the model";
-        out += &wrapped(&format!("not used: {n} touches {says} (run/touch): {}", ids.join(", ")), 2);
+        let says = "that agree with the others once the first candidate is in the model";
+        out.push(format!("not used: {n} touches {says} (run/touch): {}", ids.join(", ")));
     }
     for o in stay.into_iter().chain(back.into_iter().filter(|_| !together)) {
-        let back = if o.comes_back { "; it belongs to the rest once the first candidate is in the model" } else { "" };
-        out += &wrapped(
-            &format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason),
-            2,
-        );
+        let back =
+            if o.comes_back { "; it agrees with the others once the first candidate is in the model" } else { "" };
+        out.push(format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason));
     }
-    let large: Vec<String> = d
-        .power
-        .iter()
-        .take(MOST_POWER)
-        .map(|p| format!("{} below {} um", p.effect, significant(p.minimal_detectable_um)))
-        .collect();
-    if !large.is_empty() {
-        out += &wrapped(&format!("these touches could not have seen: {}", large.join(", ")), 2);
-    }
-    let unseen: Vec<&str> =
-        d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).map(String::as_str).collect();
-    if !unseen.is_empty() {
-        out += &wrapped(&format!("no trace in these touches at any size: {}", unseen.join(", ")), 2);
-    }
-    if !d.needs_temperature.is_empty() {
-        out +=
-            &wrapped(&format!("not to be seen without temperatures in the log: {}", d.needs_temperature.join(", ")), 2);
-    }
-    for w in &d.warnings {
-        out += &wrapped(&format!("warning: {w}"), 2);
-    }
-    paper.plain(out)
+    out
 }
 
-fn candidates(d: &Diagnosis, paper: Paper) -> String {
+/// The table of candidates with their sizes.
+fn candidates(d: &Diagnosis, paper: Paper, verbose: bool) -> String {
     let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
-    // where nothing is missing the list says what was tried; a place to look at would send a person after noise
+    // where nothing is missing the list says what was tried
     let missing = d.verdict != Verdict::Adequate;
-    let mut t = table(&["candidate", "p (Holm)", "error um", "held out um", "share"]);
+    if !missing && !verbose {
+        return String::new();
+    }
+    let mut t = table(&["candidate", "p (Holm)", "error, µm", "cross-validated, µm", "share"]);
     for c in &d.candidates {
         if c.effect == setup_mistakes::EFFECT {
             // a mistake of yes or no: it has neither a size nor a chance, and an error only where it was fitted
@@ -149,73 +188,49 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
         ]);
     }
     lay(&mut t, paper.width.min(100), &[]);
-    let mut out = if missing { String::new() } else { "tried, and none of them needed:\n".to_owned() };
+    let mut out = if missing { String::new() } else { "tried, and not needed:\n".to_owned() };
     out += &format!("{t}\n");
     let rises = |c: &Candidate| c.held_out_before_um.zip(c.held_out_after_um).is_some_and(|(b, a)| a >= b);
     let tested = || d.candidates.iter().filter(|c| c.proposed && c.effect != setup_mistakes::EFFECT);
     if tested().any(rises) {
         out += &wrapped(
-            "* passes the test with all candidates counted in; with so few index visits those left out speak neither for \
-             nor against it (the error rises by less than its standard error)",
+            "* passes the test; with so few index positions, unused measurements neither confirm nor refute it",
             2,
         );
     } else if tested().next().is_some() {
-        out += &wrapped(
-            "* passes the test with all candidates counted in, and touches that had no part in choosing it are predicted \
-             better with it (± one standard error of the difference)",
-            2,
-        );
+        out += &wrapped("* passes the test and is confirmed on unused measurements (± one standard error)", 2);
     }
-    let sized = || d.candidates.iter().filter(|c| missing && c.p_adjusted < 1.0 && c.effect != setup_mistakes::EFFECT);
+    let sized = || {
+        let of = |c: &&Candidate| missing && c.p_adjusted < 1.0 && c.effect != setup_mistakes::EFFECT;
+        d.candidates.iter().filter(of).take(if verbose { usize::MAX } else { 1 })
+    };
     if sized().any(|c| c.moves_sigma_um.is_some() || c.parameters.iter().any(|p| p.sigma.is_some())) {
-        out += "expected sizes, ± one standard uncertainty:\n";
+        out += "expected size, ± one standard uncertainty:\n";
     }
     for c in sized() {
         let which = if c.same_as.is_empty() { c.effect.clone() } else { format!("if it is {}", c.effect) };
-        out += &wrapped(&format!("{which}: {}", sizes(c)), 2);
+        out += &wrapped(&format!("  {which}: {}", sizes(c)), 4);
         if !c.same_as.is_empty() {
-            out += &wrapped(&format!("  cannot be told from {}", c.same_as.join(", ")), 4);
+            out += &wrapped(&format!("  cannot be separated from {}", c.same_as.join(", ")), 4);
         }
     }
-    // what nothing speaks for is not explained, and nobody is sent to look for it
-    if let Some(first) = d.candidates.first().filter(|c| missing && (c.proposed || d.most_missed)) {
-        let which = if first.same_as.is_empty() { String::new() } else { format!("if it is {}: ", first.effect) };
-        // an effect of a person's own may say nothing of either
-        let says = if first.says.is_empty() { String::new() } else { format!(": {}", first.says) };
-        out += &wrapped(&format!("{which}{}{says}", first.name), 2);
-        if let Some(other) = &first.or_else {
-            out += &wrapped(&format!("  or {other}: these touches cannot tell"), 4);
-        }
-        if !first.look.is_empty() {
-            out += &wrapped(&format!("  look: {}", first.look), 4);
-        }
-        if !first.tell_apart.is_empty() {
-            out += &wrapped(&format!("  to tell apart: {}", first.tell_apart), 4);
-        }
-        if !first.wrong_sign.is_empty() {
-            out += &wrapped(&format!("  {}", wrong_sign(first)), 4);
-        }
-        if !first.plausible {
-            out += match first.same_as.len() {
-                0 => "  its size would be unusual: it may be a name for something else\n",
-                _ => "  its size would be unusual: look at the others of its group first\n",
-            };
-        }
-        for w in &first.weakens {
-            out += &wrapped(
-                &format!(
-                    "  with it {} is known to {} {} only, instead of {}: a smaller error left over, and a less certain result",
-                    w.name,
-                    significant(w.sigma_after),
-                    w.unit,
-                    significant(w.sigma_before)
-                ),
-                4,
-            );
-        }
-        if first.remains == Some(true) {
-            out += "  with it in the model something else is still missing: add it and diagnose again\n";
-        }
+    out
+}
+
+/// What the first candidate is, and what to check at the machine. What is not named sends nobody to the machine.
+fn to_check(d: &Diagnosis, paper: Paper) -> String {
+    let wrapped = |text: &str, indent: usize| wrapped(text, indent, paper);
+    let named = |c: &&Candidate| d.verdict != Verdict::Adequate && (c.proposed || d.verdict.most_touches_unusable());
+    let Some(first) = d.candidates.first().filter(named) else { return String::new() };
+    let which = if first.same_as.is_empty() { String::new() } else { format!("if it is {}: ", first.effect) };
+    // an effect of a person's own may say nothing of either
+    let says = if first.says.is_empty() { String::new() } else { format!(": {}", first.says) };
+    let mut out = wrapped(&format!("{which}{}{says}", first.name), 2);
+    if !first.look.is_empty() {
+        out += &wrapped(&format!("  check at the machine: {}", first.look), 4);
+    }
+    if !first.tell_apart.is_empty() {
+        out += &wrapped(&format!("  to separate them: {}", first.tell_apart), 4);
     }
     out
 }
@@ -224,7 +239,7 @@ fn candidates(d: &Diagnosis, paper: Paper) -> String {
 #[must_use]
 pub fn wrong_sign(c: &Candidate) -> String {
     format!(
-        "{} would be negative, and it is positive by nature: only a compensation that is set too far makes that, or a part that cools down",
+        "{} would be negative, but such an effect is positive: a compensation that is too large, or a part that cools down, would look like this",
         c.wrong_sign.join(", ")
     )
 }
@@ -274,10 +289,10 @@ fn sizes(c: &Candidate) -> String {
         let unknown: Vec<String> = c.not_told.iter().take(MOST).map(|name| format!("{name} ?")).collect();
         let gap = if text.is_empty() { "" } else { ", " };
         let more = if c.not_told.len() > MOST { ", …" } else { "" };
-        text += &format!("{gap}{}{more} (cannot be told one by one by this plan)", unknown.join(", "));
+        text += &format!("{gap}{}{more} (cannot be determined one by one with this plan)", unknown.join(", "));
         if let (Some(most), Some(sigma)) = (c.moves_um, c.moves_sigma_um) {
             let size = digits(most, Some(sigma));
-            text += &format!("; together they move a touch by up to {size} ± {} um", significant(sigma));
+            text += &format!("; together they move a touch by up to {size} ± {} µm", significant(sigma));
         }
     }
     text
@@ -304,13 +319,17 @@ fn plot(s: &Shape, paper: Paper) -> String {
         grid[row(s.y[i])][c] = curve;
     }
     // a group has a number and no unit
-    let unit = if s.x_unit == "1" { String::new() } else { format!(" ({})", s.x_unit) };
+    let unit = match self::unit(&s.x_unit) {
+        none if none.is_empty() => none,
+        shown => format!(" ({shown})"),
+    };
     let against = match &s.block {
         Some(block) => format!("the time on block {block}"),
         None => plain(&s.by),
     };
-    let what = format!("what is left against {against}{unit}, {}, about its mean", s.direction);
+    let what = format!("residual against {against}{unit}, {}, about its mean", s.direction);
     let mut out = wrapped(&what, 2, paper);
+    let y_unit = self::unit(&s.y_unit);
     for (r, line) in grid.iter().enumerate() {
         let label = match r {
             0 => format!("{limit:+8.1}"),
@@ -321,7 +340,7 @@ fn plot(s: &Shape, paper: Paper) -> String {
         out += &format!(
             "{label} {} {}\n",
             line.iter().collect::<String>().trim_end(),
-            if r == 0 { s.y_unit.as_str() } else { "" }
+            if r == 0 { y_unit.as_str() } else { "" }
         );
     }
     let (from, to) = (axis_label(from, to - from), axis_label(to, to - from));

@@ -50,162 +50,257 @@ fn unsigned_zero(text: String) -> String {
 /// An amount in words: a number without a dimension has no unit beside it.
 #[must_use]
 pub fn with_unit(amount: impl std::fmt::Display, unit: &str) -> String {
-    if unit == "1" { amount.to_string() } else { format!("{amount} {unit}") }
+    match self::unit(unit).as_str() {
+        "" => amount.to_string(),
+        shown => format!("{amount} {shown}"),
+    }
 }
 
-/// The variations that tell what no single one parts; the last part may say that something is left.
-pub(super) fn together(parts: &[String]) -> String {
-    let all = parts.last().is_none_or(|last| !last.contains("left that no variation"));
-    let which = if all { "what tells all of it together" } else { "what tells a part of it" };
-    format!("{which}: {}\n", parts.join("; and "))
+/// The variations that together determine what the touches cannot, and how many combinations they leave.
+pub(super) fn together(variations: &[String], left: usize) -> String {
+    let what = if left == 0 { "to determine all of them" } else { "to determine some of them" };
+    let rest = match left {
+        0 => String::new(),
+        1 => ". No variation of these touches determines 1 combination".to_owned(),
+        n => format!(". No variation of these touches determines {n} combinations"),
+    };
+    format!("{what}: {}{rest}\n", variations.join("; and "))
 }
 
-/// The whole answer.
+/// A unit as it is printed.
 #[must_use]
-pub fn outcome(o: &Outcome, paper: Paper) -> String {
-    let mut out = String::new();
-    out += &format!(
-        "{}: {} touches, {} unknown{} of rank {} ({} degrees of freedom), condition {:.1}\n",
+pub fn unit(unit: &str) -> String {
+    match unit {
+        "1" => String::new(),
+        "urad" => "µrad".to_owned(),
+        "um" => "µm".to_owned(),
+        other => other.strip_prefix("um/").map_or_else(|| other.to_owned(), |per| format!("µm/{per}")),
+    }
+}
+
+/// Remarks on the first screen.
+const FIRST_REMARKS: usize = 3;
+
+/// The first remarks, or all of them; the most important one is first.
+#[must_use]
+pub fn first_remarks(remarks: &[String], verbose: bool) -> String {
+    let shown = if verbose { remarks.len() } else { remarks.len().min(FIRST_REMARKS) };
+    let mut out: String = remarks[..shown].iter().map(|r| format!("{r}\n")).collect();
+    match remarks.len() - shown {
+        0 => {}
+        1 => out += "1 more remark: --verbose\n",
+        n => out += &format!("{n} more remarks: --verbose\n"),
+    }
+    out
+}
+
+/// The answer: what is determined, how well the model fits, and the table; at most three remarks where all are not asked for.
+#[must_use]
+pub fn outcome(o: &Outcome, paper: Paper, verbose: bool) -> String {
+    let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
+    let mut out = answer(o, &results);
+    if verbose {
+        out += &fit_details(o);
+    }
+    out.push('\n');
+    let (table, left_out) = results_table(&results, paper, verbose);
+    out += &table;
+    if verbose {
+        let shown = |head: &str| !left_out.iter().any(|h| h == head);
+        out += &legend(&results, &shown);
+        out += &left_out_says(&left_out);
+        out += &result_details(o);
+    }
+    out += &first_remarks(&remarks(o, &results, verbose), verbose);
+    paper.plain(out)
+}
+
+/// The first sentences: what is determined, and how large the residual is.
+fn answer(o: &Outcome, results: &[&Parameter]) -> String {
+    let lost = results.iter().filter(|p| p.status == Status::Undetermined).count();
+    let determined = match (results.len(), lost) {
+        (1, 0) => "The 1 parameter is determined".to_owned(),
+        (n, 0) => format!("All {n} parameters are determined"),
+        (n, lost) => format!("{} of {n} parameters are determined, {lost} cannot be determined", n - lost),
+    };
+    let times = if o.noise_um > 0.0 && o.rms_um / o.noise_um < 1e4 {
+        format!(", {:.1} times the probe noise of {} µm", o.rms_um / o.noise_um, significant(o.noise_um))
+    } else {
+        String::new()
+    };
+    let mut out = format!(
+        "{determined} ({}).\nThe residual is {} µm RMS{times}, over {} touches.\n",
         o.machine,
-        o.touches,
+        significant(o.rms_um),
+        o.touches
+    );
+    if let Some(held_out) = o.held_out_rms_um {
+        out += &format!("The cross-validated error is {} µm RMS.\n", significant(held_out));
+    }
+    if !o.converged {
+        out += &format!("The fit did NOT converge: {}.\n", o.stopped);
+    }
+    out
+}
+
+fn fit_details(o: &Outcome) -> String {
+    format!(
+        "{} unknown{}, rank {}, {} degrees of freedom, condition {:.1}, chi2/dof {:.3}\nnoise: {}\n{} after {} steps: {}\n",
         o.unknowns,
         if o.unknowns == 1 { "" } else { "s" },
         o.rank,
         o.dof,
-        o.condition
-    );
-    out += &format!("error left {} um RMS; chi2/dof {:.3}", significant(o.rms_um), o.chi2_per_dof);
-    if let Some(held_out) = o.held_out_rms_um {
-        out += &format!("; {} um on index visits left out", significant(held_out));
-    }
-    out += &format!("\nnoise: {}\n", o.noise_says);
-    out += &format!(
-        "{} after {} steps: {}\n\n",
+        o.condition,
+        o.chi2_per_dof,
+        o.noise_says,
         if o.converged { "converged" } else { "NOT converged" },
         o.iterations,
         o.stopped
-    );
-    let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
+    )
+}
+
+/// The table, and the columns that the paper has no room for.
+fn results_table(results: &[&Parameter], paper: Paper, verbose: bool) -> (String, Vec<String>) {
     // two figures side by side: what the probe's noise leaves open, and what everything else may add
     let unmodelled = results.iter().any(|p| p.sigma_with_unmodelled.is_some());
-    let mut head = vec!["parameter", "value", "unit", "probe noise", "std. unc.", "95 %"];
-    if unmodelled {
+    let mut head = vec!["parameter", "value", "unit"];
+    if verbose {
+        head.extend(["probe noise", "std. unc."]);
+    }
+    head.push("95 %");
+    if unmodelled && verbose {
         head.push("unmodelled");
     }
     head.push("status");
     let mut t = table(&head);
-    for p in &results {
+    let short = paper.width < ROOMY;
+    for p in results {
         let name = p.alias.as_ref().map_or_else(|| p.name.clone(), |a| format!("{} ({a})", p.name));
         let mut cells = vec![
             Cell::new(name),
             number(if p.status == Status::Undetermined { "?".into() } else { digits(p.value, p.sigma) }),
-            Cell::new(&p.unit),
-            number(p.sigma_noise.map_or_else(|| "-".into(), significant)),
-            number(p.sigma.map_or_else(|| "-".into(), significant)),
-            number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
+            Cell::new(unit(&p.unit)),
         ];
-        if unmodelled {
+        if verbose {
+            cells.push(number(p.sigma_noise.map_or_else(|| "-".into(), significant)));
+            cells.push(number(p.sigma.map_or_else(|| "-".into(), significant)));
+        }
+        cells.push(number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))));
+        if unmodelled && verbose {
             cells.push(number(p.sigma_with_unmodelled.map_or_else(|| "-".into(), significant)));
         }
-        cells.push(Cell::new(status(p.status, paper.width < ROOMY)));
+        cells.push(Cell::new(status(p.status, short)));
         t.add_row(cells);
     }
     // numbers are never broken: a name is, where it must. What a reader decides by stays on any paper: value, 95 % and status
     let left_out = lay(&mut t, paper.width.min(120), &["probe noise", "std. unc.", "unmodelled"]);
-    out += &t.to_string();
-    out.push('\n');
-    out += &uneven(&results);
-    let shown = |head: &str| !left_out.iter().any(|h| h == head);
-    match (shown("probe noise"), shown("std. unc.")) {
-        (true, _) => {
-            out += "probe noise: standard uncertainty from the touches' own noise alone; std. unc.: with all that the fit counts\n";
-        }
-        (false, true) => out += "std. unc.: standard uncertainty with all that the fit counts\n",
-        (false, false) => {}
+    (format!("{t}\n{}", uneven(results)), left_out)
+}
+
+/// What the columns are.
+fn legend(results: &[&Parameter], shown: &dyn Fn(&str) -> bool) -> String {
+    let mut out = String::new();
+    if shown("probe noise") {
+        out += "probe noise: standard uncertainty from the noise of the touches alone\n";
     }
-    if unmodelled && shown("unmodelled") {
-        out += "unmodelled: standard uncertainty if every effect that the model leaves out acts at its typical size\n";
+    if shown("std. unc.") {
+        out += "std. unc.: standard uncertainty with everything that the fit counts\n";
     }
-    out += &left_out_says(&left_out);
-    let holds: Vec<String> = held(&o.parameters).collect();
-    if !holds.is_empty() {
-        out += &format!("{HOLDS}: {}\n", holds.join("; "));
+    if shown("unmodelled") && results.iter().any(|p| p.sigma_with_unmodelled.is_some()) {
+        out += "unmodelled: standard uncertainty if every effect outside the model has its usual size\n";
     }
-    let following: Vec<String> = following(&results).collect();
-    if !following.is_empty() {
-        out += &format!("{FOLLOW}: {}\n", following.join(", "));
-    }
+    out
+}
+
+/// What stands beside the table.
+fn result_details(o: &Outcome) -> String {
+    let mut out = String::new();
     let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
     if !blocks.is_empty() {
         let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
-        out += &format!(
-            "and {} set-up unknowns of the blocks, {n_known} of them identified (--json lists them)\n",
-            blocks.len()
-        );
+        out += &format!("block positions: {n_known} of {} unknowns determined (--json lists them)\n", blocks.len());
     }
     if o.parameters.iter().any(|p| p.effect.starts_with("location") || p.effect == "paper-table") {
         let [x, y, z] = o.reference_mm;
         out += &format!("location errors of workpiece-side axes are stated at ({x}, {y}, {z}) mm in R\n");
     }
     for p in &o.priors {
-        out += &format!("prior: {} = {} ± {} {}, counted once\n", p.name, p.value, significant(p.sigma), p.unit);
+        out += &format!("prior: {} = {} ± {} {}, counted once\n", p.name, p.value, significant(p.sigma), unit(&p.unit));
     }
     for b in &o.type_b {
         out += &format!(
             "type B: {} uncertain by {} {}, in the standard uncertainties\n",
             b.name,
             significant(b.sigma),
-            b.unit
+            unit(&b.unit)
         );
     }
     if !o.correlations.is_empty() {
-        let pairs: Vec<String> = o.correlations.iter().map(|c| format!("{} ~ {} {:+.2}", c.a, c.b, c.r)).collect();
-        out += &format!("told apart worst (correlation): {}\n", pairs.join(", "));
+        let pairs: Vec<String> = o.correlations.iter().map(|c| format!("{} and {} {:+.2}", c.a, c.b, c.r)).collect();
+        out += &format!("highest correlations: {}\n", pairs.join(", "));
     }
-    for w in &o.weak {
-        out += &format!("hardly told by this data: {}\n", w.says);
-    }
-    for u in &o.undetermined {
-        out += &format!("not told by this data: {}\n", u.says);
-    }
-    if !o.parted_together.is_empty() {
-        out += &together(&o.parted_together);
-    }
-    // a column of the other sign puts hundreds of them elsewhere: one line says so
-    let far = |r: &&Rejected| r.is_far;
-    let all_far: Vec<&Rejected> = o.rejected.iter().filter(far).collect();
-    let many = all_far.len() > MOST_FAR;
-    if let Some(first) = all_far.first().filter(|_| many) {
-        let n = all_far.len();
-        out += &format!(
-            "not used: {n} touches far from their places, the first of them touch {} of run {}\n",
-            first.id, first.run
-        );
-    }
-    for r in o.rejected.iter().filter(|r| !(many && far(r))) {
-        out += &format!("not used: touch {} of run {}: {}\n", r.id, r.run, r.reason);
-    }
-    for w in &o.warnings {
-        out += &format!("warning: {w}\n");
-    }
-    paper.plain(out)
+    out
 }
 
-/// What is said of values that hold more than their name says.
-pub const HOLDS: &str =
-    "no touch here tells these from effects that the model leaves out, whose size stands in the value";
+/// What a reader must know, the most important first.
+fn remarks(o: &Outcome, results: &[&Parameter], verbose: bool) -> Vec<String> {
+    let mut out: Vec<String> = o.warnings.iter().map(|w| format!("warning: {w}")).collect();
+    out.extend(o.undetermined.iter().map(|u| format!("cannot be determined: {}", u.says)));
+    if !o.parted_together.is_empty() {
+        out.push(together(&o.parted_together, o.never_determined).trim_end().to_owned());
+    }
+    out.extend(not_used(o, verbose));
+    out.extend(o.weak.iter().map(|w| format!("hardly determined: {}", w.says)));
+    let holds: Vec<String> = held(&o.parameters).collect();
+    if !holds.is_empty() {
+        out.push(format!("{HOLDS}: {}", holds.join("; ")));
+    }
+    let following: Vec<String> = following(results).collect();
+    if !following.is_empty() {
+        out.push(format!("{FOLLOW}: {}", following.join(", ")));
+    }
+    out
+}
 
-/// Results with the effects that stand in their values: `EZ0A holds tool-length`.
+/// Touches that are not used: in one line on the first screen.
+fn not_used(o: &Outcome, verbose: bool) -> Vec<String> {
+    let one = |r: &Rejected| format!("not used: touch {} of run {}: {}", r.id, r.run, r.reason);
+    let (far, others): (Vec<&Rejected>, Vec<&Rejected>) = o.rejected.iter().partition(|r| r.is_far);
+    let mut out = Vec::new();
+    // a column of the other sign puts hundreds of them elsewhere: one line says so
+    match far.first() {
+        Some(first) if far.len() > MOST_FAR || (far.len() > 1 && !verbose) => out.push(format!(
+            "not used: {} touches far from their planned positions, the first is touch {} of run {}",
+            far.len(),
+            first.id,
+            first.run
+        )),
+        _ => out.extend(far.into_iter().map(one)),
+    }
+    if others.len() > 1 && !verbose {
+        let ids: Vec<String> = others.iter().take(MOST_FAR).map(|r| format!("{}/{}", r.run, r.id)).collect();
+        let more = if others.len() > MOST_FAR { ", …" } else { "" };
+        out.push(format!("not used: {} touches (run/touch): {}{more}", others.len(), ids.join(", ")));
+    } else {
+        out.extend(others.into_iter().map(one));
+    }
+    out
+}
+
+/// What is said of values that include more than their name says.
+pub const HOLDS: &str = "these values include effects outside the model, which these touches cannot separate";
+
+/// Results with the effects that stand in their values: `EZ0A includes tool-length`.
 pub fn held(parameters: &[Parameter]) -> impl Iterator<Item = String> {
     let with = parameters.iter().filter(|p| !p.holds.is_empty() && !p.name.contains('@'));
-    with.map(|p| format!("{} holds {}", p.name, p.holds.join(", ")))
+    with.map(|p| format!("{} includes {}", p.name, p.holds.join(", ")))
 }
 
-/// What is said of values that are told exactly only while what is not told is what it is held at.
+/// What is said of values that depend on what cannot be determined.
 pub const FOLLOW: &str =
-    "these move, while what is not told below moves by its usual size, by (in the standard uncertainties)";
+    "these values change, if what cannot be determined has its usual size, by (counted in the uncertainties)";
 
-/// Results that follow what is not told, and by how much: `EZ0B by 0.000000760 mm`.
+/// Results that follow what cannot be determined, and by how much: `EZ0B by 0.000000760 mm`.
 fn following(results: &[&Parameter]) -> impl Iterator<Item = String> {
     let moves = results.iter().filter_map(|p| Some((*p, p.moves_with_unseen?)));
     moves.map(|(p, by)| format!("{} by {}", p.name, with_unit(significant(by), &p.unit)))
@@ -216,7 +311,7 @@ pub(super) fn left_out_says(heads: &[String]) -> String {
     if heads.is_empty() {
         return String::new();
     }
-    format!("too narrow here for: {} (a wider terminal, COLUMNS=120 or --json has it)\n", heads.join(", "))
+    format!("no room for: {} (use a wider terminal, COLUMNS=120 or --json)\n", heads.join(", "))
 }
 
 /// Three significant digits, plainly written where that is readable.
@@ -248,7 +343,7 @@ fn uneven(results: &[&Parameter]) -> String {
                 }
                 format!("{} to {}", shown(low), with_unit(shown(high), &p.unit))
             }
-            // an end that the touches do not set: more than that they do not tell
+            // the touches set no other end
             (Some(low), None) => {
                 out += &format!("{}: {} or more with 95 %\n", p.name, with_unit(significant(low), &p.unit));
                 continue;
@@ -259,7 +354,7 @@ fn uneven(results: &[&Parameter]) -> String {
             }
             (None, None) => continue,
         };
-        out += &format!("{}: {says} with 95 %; the wider side stands in the table\n", p.name);
+        out += &format!("{}: {says} with 95 %; the table has the wider side\n", p.name);
     }
     out
 }
@@ -269,7 +364,7 @@ fn status(status: Status, short: bool) -> &'static str {
         // the rule needs no word where there is little room
         Status::Identified if short => "",
         Status::PriorDominated if short => "prior",
-        Status::Undetermined if short => "not told",
+        Status::Undetermined if short => "unknown",
         Status::Identified => "identified",
         Status::Fixed => "fixed",
         Status::PriorDominated => "prior-dominated",
@@ -289,7 +384,7 @@ mod tests {
         assert_eq!(digits(-0.000_01, Some(0.1)), "0.00");
         assert_eq!(digits(-0.3, Some(4.0)), "-0.3");
         assert_eq!(significant(-0.0), "0");
-        assert_eq!((with_unit("0.3", "1"), with_unit("0.3", "um")), ("0.3".into(), "0.3 um".into()));
+        assert_eq!((with_unit("0.3", "1"), with_unit("0.3", "um")), ("0.3".into(), "0.3 µm".into()));
         assert_eq!(significant(0.000_234_5), "0.000235");
         assert_eq!(significant(1234.5), "1234");
     }

@@ -57,17 +57,17 @@ pub fn change(
     let mut row = |what: &str, b: String, a: String| {
         t.add_row(vec![Cell::new(what), number(b), number(a)]);
     };
-    row("error left, um RMS", significant(before.rms_um), significant(after.rms_um));
+    row("residual, µm RMS", significant(before.rms_um), significant(after.rms_um));
     row(
-        "on index visits left out, um RMS",
+        "cross-validated, µm RMS",
         with_error(before.held_out_rms_um, doubt.standard_errors.0),
         with_error(after.held_out_rms_um, doubt.standard_errors.1),
     );
     if doubt.nested_rms_um.is_some() {
-        row("  choice redone each time, um RMS", "-".into(), or_dash(doubt.nested_rms_um));
+        row("  choice repeated, µm RMS", "-".into(), or_dash(doubt.nested_rms_um));
     }
     if later.0.is_some() || later.1.is_some() {
-        row("on the last run, um RMS", or_dash(later.0), or_dash(later.1));
+        row("on the last run, µm RMS", or_dash(later.0), or_dash(later.1));
     }
     row("chi2/dof", format!("{:.3}", before.chi2_per_dof), format!("{:.3}", after.chi2_per_dof));
     row("unknowns", before.unknowns.to_string(), after.unknowns.to_string());
@@ -77,10 +77,10 @@ pub fn change(
     }
     lay(&mut t, paper.width.min(100), &[]);
     let mut out =
-        format!("{t}\n± in this table: one standard uncertainty, or one standard error of what is left out\n");
+        format!("{t}\n± in this table: one standard uncertainty, or one standard error of the cross-validated error\n");
     if other_noise((before.noise_um, before.visit_um), (after.noise_um, after.visit_um)) {
         let line = format!(
-            "chi2/dof is held against the noise as each fit finds it: touch {} and index visits {} um before, {} and {} um after",
+            "chi2/dof uses the noise that each fit finds: touch {} and index position {} µm before, {} and {} µm after",
             significant(before.noise_um),
             significant(before.visit_um),
             significant(after.noise_um),
@@ -91,11 +91,11 @@ pub fn change(
     // less than a thousandth of a nanometre is the arithmetic's
     const NOTHING_UM: f64 = 1e-6;
     if doubt.fall.is_some_and(|(fall, _)| fall.abs() < NOTHING_UM) {
-        out += "on index visits left out it stays as it is: what was changed leaves no trace in these touches\n";
+        out += "the cross-validated error stays the same: the change has no effect on these touches\n";
     } else if let Some((fall, se)) = doubt.fall {
-        let how = if doubt.nested_rms_um.is_some() { "" } else { "; you chose the effect knowing all touches" };
+        let how = if doubt.nested_rms_um.is_some() { "" } else { "; you chose the effect with all touches known" };
         out += &format!(
-            "on index visits left out it {} by {} ± {} um (one standard error, {} visits in turn{how})\n",
+            "the cross-validated error {} by {} ± {} µm (one standard error, {} index positions{how})\n",
             if fall < 0.0 { "rises" } else { "falls" },
             digits(fall.abs(), Some(se)),
             two_digits(se),
@@ -108,7 +108,7 @@ pub fn change(
             t.add_row(vec![
                 Cell::new(&p.name),
                 number(if p.sigma.is_some() { digits(p.value, p.sigma) } else { "?".into() }),
-                Cell::new(&p.unit),
+                Cell::new(super::fit::unit(&p.unit)),
                 number(or_dash(p.sigma)),
                 number(p.expanded.map_or_else(|| "-".into(), |e| format!("± {}", significant(e)))),
             ]);
@@ -135,9 +135,9 @@ fn other_noise(before: (f64, f64), after: (f64, f64)) -> bool {
 pub fn history(h: &History, paper: Paper) -> String {
     // only where the search chose there is a nested figure
     let nested = h.steps.iter().any(|s| s.nested_rms_um.is_some());
-    let mut head = vec!["step", "change", "left um", "held out um", "later run um", "chi2/dof"];
+    let mut head = vec!["step", "change", "residual, µm", "cross-validated, µm", "later run, µm", "chi2/dof"];
     if nested {
-        head.insert(4, "nested um");
+        head.insert(4, "choice repeated, µm");
     }
     let mut t = table(&head);
     for s in &h.steps {
@@ -160,11 +160,11 @@ pub fn history(h: &History, paper: Paper) -> String {
     }
     lay(&mut t, paper.width.min(120), &[]);
     let note = if nested {
-        "held out: each index visit is left out of the fit in turn, ± one standard error; nested: the choice of the effect is \
-         redone each time as well (-: a person chose it, knowing all touches)"
+        "cross-validated: each index position is left out of the fit in turn, ± one standard error; choice repeated: the effect is \
+         chosen anew each time as well (-: a person chose it with all touches known)"
     } else {
-        "held out: each index visit is left out of the fit in turn, ± one standard error; the effects were chosen knowing all \
-         touches"
+        "cross-validated: each index position is left out of the fit in turn, ± one standard error; the effects were chosen with \
+         all touches known"
     };
     let noises: Vec<(usize, f64, f64)> =
         h.steps.iter().filter_map(|s| Some((s.step, s.noise_um?, s.visit_um?))).collect();
@@ -175,7 +175,7 @@ pub fn history(h: &History, paper: Paper) -> String {
                 .iter()
                 .map(|(k, noise, visit)| format!("{k}: {} and {}", significant(*noise), significant(*visit)));
             let line = format!(
-                "chi2/dof is held against the noise of a touch and of index visits as each fit finds it, um: step {}",
+                "chi2/dof uses the noise of a touch and of index positions that each fit finds, µm: step {}",
                 each.collect::<Vec<_>>().join("; ")
             );
             sentence(&line, paper.width, 0, 0) + "\n"
@@ -187,8 +187,8 @@ pub fn history(h: &History, paper: Paper) -> String {
     };
     let mut out = format!("{t}\n{}\n{noise_note}", sentence(note, paper.width, 0, 0));
     for (title, p) in [
-        ("error left, um RMS, by step", points(&|s| Some(s.rms_um))),
-        ("error on index visits left out, um RMS, by step", points(&|s| s.held_out_rms_um)),
+        ("residual, µm RMS, by step", points(&|s| Some(s.rms_um))),
+        ("cross-validated error, µm RMS, by step", points(&|s| s.held_out_rms_um)),
     ] {
         let drawn = line(title, &p, paper);
         if !drawn.is_empty() {
@@ -206,9 +206,9 @@ pub fn verification(v: &Verification, paper: Paper) -> String {
     let mut row = |what: &str, b: f64, a: f64| {
         t.add_row(vec![Cell::new(what), number(significant(b)), number(significant(a))]);
     };
-    row("readings, blocks placed, um RMS", v.before.readings_rms_um, v.after.readings_rms_um);
-    row("left by the model, um RMS", v.before.fit_rms_um, v.after.fit_rms_um);
-    row("noise of a touch, um", v.before.noise_um, v.after.noise_um);
+    row("readings, blocks placed, µm RMS", v.before.readings_rms_um, v.after.readings_rms_um);
+    row("residual of the model, µm RMS", v.before.fit_rms_um, v.after.fit_rms_um);
+    row("noise of a touch, µm", v.before.noise_um, v.after.noise_um);
     lay(&mut t, paper.width.min(100), &[]);
     out += &format!("{t}\n\n");
     let mut t = table(&["error", "unit", "before", "after", "difference", "95 %", ""]);

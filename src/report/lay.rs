@@ -136,7 +136,7 @@ mod tests {
                 Cell::new("mm"),
                 number("0.0000714"),
                 number("± 0.000140"),
-                Cell::new("not told"),
+                Cell::new("unknown"),
             ]);
         }
         t

@@ -24,7 +24,7 @@ pub fn remove(text: &str, ids: &[String]) -> Result<String> {
     ids.iter().try_fold(text.to_owned(), |text, id| {
         let at = effects(&text)?.iter().position(|e| e == id).ok_or_else(|| {
             Failure::new("study::not_in_model", format!("effect {id:?} is not in the model"))
-                .help(format!("the model holds: {}", effects(&text).unwrap_or_default().join(", ")))
+                .help(format!("the model has: {}", effects(&text).unwrap_or_default().join(", ")))
         })?;
         if effects(&text)?.len() == 1 {
             return Err(Failure::new("study::last_effect", format!("{id:?} is the only effect of the model"))

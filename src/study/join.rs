@@ -21,7 +21,7 @@ pub struct Joined {
 /// When the text is no study.
 pub fn join(text: &str, run: &Joined) -> Result<String> {
     let mut doc: DocumentMut = text.parse().map_err(|e| {
-        Failure::new("study::not_toml", format!("the study is no TOML: {e}")).help("mend it by hand first")
+        Failure::new("study::not_toml", format!("the study is no TOML: {e}")).help("correct it by hand first")
     })?;
     let runs =
         doc.entry("data").or_insert(Item::ArrayOfTables(ArrayOfTables::new())).as_array_of_tables_mut().ok_or_else(

@@ -15,7 +15,7 @@ pub const LONGEST_REASON: usize = 200;
 pub fn mask(text: &str, touches: &[(usize, u64)], reason: &str) -> Result<String> {
     let reason = reason.trim();
     if reason.is_empty() || reason.chars().count() > LONGEST_REASON || reason.chars().any(char::is_control) {
-        return Err(Failure::new("study::reason", "a touch is taken out with a reason, in one line")
+        return Err(Failure::new("study::reason", "a touch is excluded with a reason, in one line")
             .help(format!("say in up to {LONGEST_REASON} signs why, for instance: chip on the block")));
     }
     let mut expected = masked(text)?;
@@ -121,7 +121,7 @@ fn masked(text: &str) -> Result<Vec<Mask>> {
 
 fn document(text: &str) -> Result<DocumentMut> {
     text.parse().map_err(|e| {
-        Failure::new("study::not_toml", format!("the study is no TOML: {e}")).help("mend it by hand first")
+        Failure::new("study::not_toml", format!("the study is no TOML: {e}")).help("correct it by hand first")
     })
 }
 

@@ -207,7 +207,7 @@ impl Study {
         }
         if w.model.effects.is_empty() {
             findings.push(
-                Finding::error("study::no_effects", "the model holds no effect")
+                Finding::error("study::no_effects", "the model has no effect")
                     .help("write [model] effects = [\"location-b\", …]: `axiscal effects` lists them")
                     .at(source, 0..0),
             );
@@ -383,7 +383,7 @@ impl Study {
             }
             doc["uncertainty"] = Item::Table(rows);
         }
-        let text = format!("# what was measured, and what the model holds (docs/guide)\n{doc}");
+        let text = format!("# what was measured, and the effects of the model (docs/guide)\n{doc}");
         Self::parse(&crate::diag::source("study.toml", text.clone()))
             .map_err(|f| Failure::new("study::unwritable", format!("the study cannot be written: {f}")))?;
         Ok(text)

@@ -4,6 +4,7 @@ use super::Material;
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
+use crate::diagnose::verdict::{Missing, NotNamed, Unexplained};
 use crate::fit::outcome::Status;
 use crate::model::catalogue::Place;
 use crate::units::um_from_mm;
@@ -21,10 +22,12 @@ pub enum Level {
     Unknown,
 }
 
+/// The verdict.
 #[derive(Debug, Clone, Serialize)]
 pub struct Headline {
     /// Good, act, unknown.
     pub level: Level,
+    /// One sentence.
     pub sentence: String,
     /// What stands behind it, in a second one.
     pub detail: String,
@@ -76,55 +79,43 @@ pub(super) fn size(p: &ParameterRecord, m: &Material) -> String {
 /// The sentence on top of the page.
 pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> Headline {
     let d = m.diagnosis;
-    let first = d.candidates.first().filter(|c| c.proposed || d.verdict == Verdict::MissingEffect);
-    let open = d.untried();
-    let (level, sentence) = match d.verdict {
-        Verdict::TooLittleData => (Level::Unknown, d.says.clone()),
-        // a gross mistake that made touches miss: there is nothing to compare its error with
-        Verdict::MissingEffect if d.most_missed => (Level::Act, d.says.clone()),
-        Verdict::MissingEffect => (Level::Act, first.map_or_else(|| d.says.clone(), |c| missing(m, c))),
-        Verdict::Unexplained if d.faint => (Level::Unknown, d.says.clone()),
-        Verdict::Unexplained if !open.is_empty() => (Level::Act, one_of(m, &open)),
-        Verdict::Unexplained if d.in_question().is_some() => (
-            Level::Act,
-            format!(
-                "Something is missing in the model: {} may be it, but touches that had no part in choosing it are not predicted better with it.",
-                d.in_question().map_or_else(String::new, |c| in_question(m, c))
-            ),
-        ),
-        Verdict::Unexplained => (
-            Level::Act,
-            format!(
-                "The machine does something that no known effect explains: the touches miss the model by {}, and the probe's noise is {}.",
-                um(d.rms_um),
-                um(d.noise_um)
-            ),
-        ),
+    let errors = || format!("The residual is {}; the probe noise is {}.", um(d.rms_um), um(d.noise_um));
+    let (level, sentence, detail) = match &d.verdict {
+        Verdict::TooLittleData(_) => (Level::Unknown, d.says.clone(), String::new()),
+        Verdict::MissingEffect(Missing::Effect(_)) => match d.candidates.first() {
+            Some(first) => (Level::Act, missing(m, first), falls(m, first)),
+            None => (Level::Act, d.says.clone(), d.says.clone()),
+        },
+        // a set-up mistake that made touches miss: there is nothing to compare its error with
+        Verdict::MissingEffect(_) => (Level::Act, d.says.clone(), d.says.clone()),
+        Verdict::Unexplained(Unexplained { why, .. }) => match why {
+            NotNamed::WeakPattern => (Level::Unknown, d.says.clone(), d.says.clone()),
+            NotNamed::CannotBeConfirmed(effects) => {
+                (Level::Act, one_of(m, effects), errors() + " No touches are left to confirm one of them.")
+            }
+            _ => {
+                let sentence = match d.in_question() {
+                    Some(c) => format!(
+                        "An effect is missing in the model. It may be {}, but unused measurements do not confirm it.",
+                        in_question(m, c)
+                    ),
+                    None => format!("The machine has an error that no known effect explains. {}", errors()),
+                };
+                let depends = d.depends.first().map_or_else(String::new, |w| format!("{}.", w.says));
+                (Level::Act, sentence, depends)
+            }
+        },
         Verdict::Adequate if !m.fit.outcome.converged => (
             Level::Unknown,
-            format!(
-                "The search for the errors did not come to an end ({}): do not use these values.",
-                m.fit.outcome.stopped
-            ),
+            format!("The fit did not converge ({}). Do not use these values.", m.fit.outcome.stopped),
+            d.says.clone(),
         ),
-        Verdict::Adequate => adequate(m, parameters, c),
-    };
-    let detail = match d.verdict {
-        Verdict::TooLittleData => String::new(),
-        Verdict::MissingEffect if !d.most_missed => first.map_or_else(|| d.says.clone(), |c| falls(m, c)),
-        Verdict::Unexplained if !d.faint && !open.is_empty() => format!(
-            "The touches miss the model by {}, and the probe's noise is {}. No touches are left over to try one of them on.",
-            um(d.rms_um),
-            um(d.noise_um)
-        ),
-        Verdict::Unexplained if !d.faint => {
-            d.depends.first().map_or_else(String::new, |w| format!("{}.", super::record::in_words(&w.says)))
+        Verdict::Adequate => {
+            let (level, sentence) = adequate(m, parameters, c);
+            (level, sentence, d.says.clone())
         }
-        _ => d.says.clone(),
     };
-    // the rooms write um in plain letters
-    let plain = |text: String| text.replace(" um ", " µm ");
-    Headline { level, sentence: plain(sentence), detail: plain(detail) }
+    Headline { level, sentence, detail }
 }
 
 /// The name of an effect.
@@ -133,14 +124,14 @@ pub(super) fn named(m: &Material, id: &str) -> String {
 }
 
 /// Several effects would do, and nothing tells which.
-fn one_of(m: &Material, open: &[&str]) -> String {
+fn one_of(m: &Material, open: &[String]) -> String {
     match open {
         [one] => format!(
-            "Something is missing in the model, and one known effect explains it ({}), but these poses cannot tell whether it is the right one.",
+            "An effect is missing in the model. One known effect explains it ({}), but there are too few poses to confirm it.",
             named(m, one)
         ),
         _ => format!(
-            "Something is missing in the model: one of {} known effects explains it; these poses cannot tell which.",
+            "An effect is missing in the model. One of {} known effects explains it, but there are too few poses to decide which.",
             open.len()
         ),
     }
@@ -160,9 +151,9 @@ fn falls(m: &Material, c: &Candidate) -> String {
     let d = m.diagnosis;
     let moves = if is_one_size(c) { None } else { most_moved_um(m) };
     let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
-    let rest = if c.remains == Some(true) { " Something else is missing besides." } else { "" };
+    let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
     format!(
-        "The touches miss by {}, and by {} once it is in the model; the probe's noise is {}.{moves}{rest}",
+        "The residual is {}, and {} with this effect in the model; the probe noise is {}.{moves}{rest}",
         um(d.rms_um),
         um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         um(d.noise_um)
@@ -193,7 +184,7 @@ fn missing(m: &Material, c: &Candidate) -> String {
         several => Some(format!("one of {} others", several.len())),
     };
     let or: String = others.iter().chain(&c.or_else).map(|other| format!(", or {other}")).collect();
-    let which = if or.is_empty() { "" } else { ": these touches cannot tell which" };
+    let which = if or.is_empty() { "" } else { ": these touches cannot separate them" };
     let what = format!("{}{size}{or}{which}", c.name);
     let (whose, has) = whose(m, &c.effect);
     format!("{whose} {has} an error that is not in the model yet: {what}.")
@@ -232,15 +223,18 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     };
     let untold = match lost {
         0 => String::new(),
-        n => format!(" {n} more {} not told by these touches.", if n == 1 { "error is" } else { "errors are" }),
+        n => format!(
+            " {n} more {} be determined with these touches.",
+            if n == 1 { "error cannot" } else { "errors cannot" }
+        ),
     };
     let with = if c.active { "With the compensation that was active, " } else { "" };
     let start = |text: &str| if with.is_empty() { capital(text) } else { format!("{with}{text}") };
     if let Some(worst) = largest(parameters, Judgement::Beyond) {
         let sentence = format!(
-            "{} {} larger than the tolerance ({limit}), the largest {} ({}): {}. Nothing else is missing that these touches can show.{untold}",
+            "{} {} the tolerance ({limit}), the largest is {} ({}): {}. The model is complete as far as these touches can measure.{untold}",
             start(&of(beyond, judged)),
-            verb(beyond),
+            if beyond == 1 { "exceeds" } else { "exceed" },
             worst.says,
             worst.name,
             size(worst, m)
@@ -249,22 +243,18 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     }
     if let Some(worst) = largest(parameters, Judgement::Open) {
         let sentence = format!(
-            "{} too uncertain to say whether {} within the tolerance ({limit}): {} ({}) is the worst; no error is certainly larger.{untold}",
+            "{} too uncertain to compare with the tolerance ({limit}): {} ({}) is the worst. No error is certainly larger.{untold}",
             start(&format!("{} {}", of(open, judged), verb(open))),
-            if open == 1 { "it is" } else { "they are" },
             worst.says,
             worst.name
         );
         return (Level::Unknown, sentence);
     }
     if judged == 0 {
-        return (
-            Level::Unknown,
-            format!("The model fits, and none of its errors can be held against a tolerance.{untold}"),
-        );
+        return (Level::Unknown, format!("The model fits, but none of its errors has a tolerance.{untold}"));
     }
     let level = if lost == 0 { Level::Good } else { Level::Unknown };
-    let nothing = "nothing else is missing that these touches can show";
+    let nothing = "the model is complete as far as these touches can measure";
     (
         level,
         format!(
@@ -275,11 +265,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
 }
 
 fn all(n: usize) -> String {
-    if n == 1 {
-        "the one error that these touches tell".to_owned()
-    } else {
-        format!("all {n} errors that these touches tell")
-    }
+    if n == 1 { "the one error that is determined".to_owned() } else { format!("all {n} errors that are determined") }
 }
 
 /// With a capital letter.
@@ -291,111 +277,9 @@ pub(super) fn capital(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::answer::Diagnosis;
-    use crate::diagnose::unresolved_pairs::Open;
-
-    fn candidate(effect: &str, p_adjusted: f64, held_out: Option<f64>, same_as: &[&str]) -> Candidate {
-        Candidate {
-            effect: effect.into(),
-            name: effect.into(),
-            p: p_adjusted,
-            p_adjusted,
-            proposed: false,
-            rms_after_um: 1.0,
-            held_out_before_um: held_out,
-            held_out_after_um: held_out,
-            held_out_se_um: None,
-            nested: true,
-            moves_um: None,
-            moves_sigma_um: None,
-            parameters: Vec::new(),
-            not_told: Vec::new(),
-            same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
-            or_else: None,
-            tell_apart: String::new(),
-            never_parted: false,
-            says: String::new(),
-            look: String::new(),
-            share: 0.9,
-            plausible: true,
-            wrong_sign: Vec::new(),
-            weakens: Vec::new(),
-            remains: None,
-        }
-    }
-
-    fn diagnosis(candidates: Vec<Candidate>) -> Diagnosis {
-        Diagnosis {
-            format: crate::diagnose::answer::FORMAT,
-            verdict: Verdict::Unexplained,
-            says: String::new(),
-            sketchable: true,
-            moved_block: None,
-            faces: Vec::new(),
-            blocks: Vec::new(),
-            consequences: Vec::new(),
-            faint: false,
-            rms_um: 5.0,
-            held_out_rms_um: None,
-            held_out_se_um: None,
-            noise_um: 1.0,
-            most_missed: false,
-            name_in_doubt: false,
-            untold: false,
-            visit_um: 0.0,
-            visit_source: String::new(),
-            noise_says: String::new(),
-            lack_of_fit_p: 0.0,
-            depends: Vec::new(),
-            shape: None,
-            candidates,
-            gross: Vec::new(),
-            outliers: Vec::new(),
-            tested: 50,
-            power: Vec::new(),
-            not_seen: Vec::new(),
-            needs_temperature: Vec::new(),
-            visits_come_back: false,
-            open: Open::default(),
-            warnings: Vec::new(),
-        }
-    }
 
     #[test]
     fn a_size_keeps_its_sign() {
         assert_eq!((signed_um(-2.95).as_str(), signed_um(2.95).as_str()), ("-2.95 µm", "2.95 µm"));
-    }
-
-    #[test]
-    fn what_passes_and_is_not_borne_out_is_in_question() {
-        let mut d = diagnosis(vec![candidate("a", 1e-9, Some(2.0), &[])]);
-        assert!(d.in_question().is_none(), "nothing is open: shapes say it better");
-        d.open.suspects.push(crate::design::questions::Suspect {
-            id: "a".into(),
-            size: nalgebra::DVector::from_element(1, 1.0),
-            shape: None,
-        });
-        assert!(d.in_question().is_some_and(|c| c.effect == "a"));
-        d.faint = true;
-        assert!(d.in_question().is_none());
-    }
-
-    #[test]
-    fn what_cannot_be_tried_is_not_unexplained() {
-        // no figure, no number, 0 against 0: no touch could be predicted without its visit
-        for held_out in [None, Some(f64::NAN), Some(0.0)] {
-            let all = vec![
-                candidate("a", 1e-9, held_out, &["b", "c"]),
-                candidate("d", 1e-3, held_out, &["b"]),
-                candidate("e", 0.4, held_out, &[]),
-            ];
-            let mut d = diagnosis(all);
-            assert_eq!(d.untried(), ["a", "b", "c", "d"]);
-            d.verdict = Verdict::MissingEffect;
-            assert!(d.untried().is_empty());
-        }
-        // tried and not borne out: no known effect explains it
-        assert!(diagnosis(vec![candidate("a", 1e-9, Some(2.0), &[])]).untried().is_empty());
-        assert!(diagnosis(vec![candidate("a", 0.2, None, &[])]).untried().is_empty());
     }
 }

@@ -130,7 +130,7 @@ pub fn gather(m: &Material) -> View {
         ladder_notes: m.ladder.notes.clone(),
         diagnosis: record::diagnosis(m),
         splits: m.comparison.splits.clone(),
-        comparison_says: record::in_words(&m.comparison.says),
+        comparison_says: m.comparison.says.clone(),
         correlation: parameters::correlation(fit),
         undetermined: fit.outcome.undetermined.clone(),
         weak: fit.outcome.weak.clone(),

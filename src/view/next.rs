@@ -6,7 +6,8 @@ use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::diagnose::consequence::Consequence;
-use crate::diagnose::next_step::{NextStep, OpenQuestion};
+use crate::diagnose::next_step::NextStep;
+use crate::diagnose::verdict::{NotNamed, Unexplained};
 use crate::post::Postprocessor;
 use crate::tables::control;
 use crate::units::um_from_mm;
@@ -15,6 +16,7 @@ use serde::Serialize;
 /// A thing to do.
 #[derive(Debug, Clone, Serialize)]
 pub struct Next {
+    /// What to do.
     pub what: String,
     /// How, or why.
     pub how: String,
@@ -35,59 +37,57 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
     let controller = m.runs.iter().map(|r| r.controller).find(|c| *c != "csv").unwrap_or("YOUR-CONTROLLER");
     let plan_next = format!("axiscal plan-next {study} --controller {controller} --out next");
     let d = m.diagnosis;
-    match d.next_step() {
-        NextStep::RicherProgram => out.push(Next::new(
-            "Measure more touches",
-            "A richer program sees what this one cannot. First make sure that the log belongs to the plan and that the blocks stand where it says.",
-            format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
-        )),
-        NextStep::CorrectSetupMistake => {
+    match &d.verdict {
+        _ if d.next_step() == NextStep::CorrectSetupMistake => {
             let look = d.candidates.first().map(|c| c.look.clone()).filter(|look| !look.is_empty());
             let how = look.or_else(|| d.mistake()).unwrap_or_default();
-            out.push(Next::new("Put the mistake right and measure again", capital(&how), ""));
+            out.push(Next::new("Correct the set-up mistake and measure again", capital(&how), ""));
         }
-        NextStep::Add(first)
-        | NextStep::AddOrCheck(first, _)
-        | NextStep::CheckWhich(first)
-        | NextStep::Separate(first) => found(m, first, &plan_next, c, &mut out),
-        NextStep::MeasureMore(OpenQuestion::WeakPattern) => {
-            out.push(Next::new(
-                "Measure more touches",
-                "Repeats and further poses say whether the weak pattern is there at all.",
-                plan_next.clone(),
-            ));
-            // what could be wrong by more than its tolerance would be refused
-            let within = |c: &Consequence| m.tolerance.limit(&c.parameter, &c.unit).is_none_or(|limit| c.off <= limit);
-            if d.consequences.iter().all(within) && c.refused.is_none() {
-                compensate(m, parameters, c, &mut out);
+        Verdict::TooLittleData(_) => out.push(Next::new(
+            "Measure more touches",
+            "A larger program measures what this one cannot. First check that the log belongs to the plan and that the blocks are where it says.",
+            format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
+        )),
+        Verdict::MissingEffect(_) => {
+            if let Some(first) = d.candidates.first() {
+                found(m, first, &plan_next, c, &mut out);
             }
         }
-        NextStep::MeasureMore(OpenQuestion::UntriedEffects) => which(m, &d.untried(), &plan_next, controller, &mut out),
-        NextStep::MeasureMore(OpenQuestion::EffectInQuestion) => {
-            let what = d.in_question().map_or_else(|| "one of these effects".to_owned(), |c| in_question(m, c));
-            let how = format!("Whether it is {what}, touches at further poses tell.");
-            out.push(Next::new("Measure more index visits", how, plan_next.clone()));
-        }
-        NextStep::Sketch | NextStep::CorrectAtMachine(_) => unexplained(m, &mut out),
-        NextStep::Nothing if d.verdict == Verdict::Adequate => {
-            settled(m, headline, parameters, c, controller, &mut out);
-        }
-        NextStep::Nothing => {}
+        Verdict::Unexplained(u) => match (&u.why, d.next_step() == NextStep::MeasureMore) {
+            (NotNamed::WeakPattern, true) => {
+                out.push(Next::new(
+                    "Measure more touches",
+                    "Repeats and further poses show whether the weak pattern is real.",
+                    plan_next.clone(),
+                ));
+                // what could be wrong by more than its tolerance would be refused
+                let within =
+                    |c: &Consequence| m.tolerance.limit(&c.parameter, &c.unit).is_none_or(|limit| c.off <= limit);
+                if d.consequences.iter().all(within) && c.refused.is_none() {
+                    compensate(m, parameters, c, &mut out);
+                }
+            }
+            (NotNamed::CannotBeConfirmed(effects), _) => which(m, effects, &plan_next, controller, &mut out),
+            (_, true) => {
+                let what = d.in_question().map_or_else(|| "one of these effects".to_owned(), |c| in_question(m, c));
+                let how = format!("Touches at further poses show whether it is {what}.");
+                out.push(Next::new("Measure more index positions", how, plan_next.clone()));
+            }
+            (_, false) => unexplained(m, u, &mut out),
+        },
+        Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
     }
-    if d.verdict != Verdict::TooLittleData
-        && !m.fit.outcome.undetermined.is_empty()
-        && (d.verdict == Verdict::Adequate || d.faint)
-    {
+    if !m.fit.outcome.undetermined.is_empty() && (d.verdict == Verdict::Adequate || d.verdict.is_weak_pattern()) {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
-        let how = how.map_or_else(|| "A program that sees what these touches cannot tell.".to_owned(), Clone::clone);
-        out.push(Next::new("Measure what is not told yet", capital(&how), plan_next));
+        let how = how.map_or_else(|| "A program that measures what these touches cannot.".to_owned(), Clone::clone);
+        out.push(Next::new("Measure what cannot be determined yet", capital(&how), plan_next));
     }
     odd_touches(m, &mut out);
     out
 }
 
-/// Where several effects explain it and these poses cannot tell which: touches that can.
-fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &mut Vec<Next>) {
+/// Where several effects explain it and these poses cannot separate them: touches that can.
+fn which(m: &Material, open: &[String], plan_next: &str, controller: &str, out: &mut Vec<Next>) {
     const MOST: usize = 4;
     let mut names: Vec<String> = open.iter().take(MOST).map(|id| named(m, id)).collect();
     if open.len() > MOST {
@@ -95,12 +95,12 @@ fn which(m: &Material, open: &[&str], plan_next: &str, controller: &str, out: &m
     }
     out.push(Next::new(
         "Measure further poses",
-        format!("The touches that tell most of what may be missing: {}.", names.join("; ")),
+        format!("The touches that show most of what may be missing: {}.", names.join("; ")),
         plan_next,
     ));
     out.push(Next::new(
         "Or run the full program",
-        "It has the poses in which every known effect shows, and some to try the answer on.",
+        "It has the poses in which every known effect shows, and some to confirm the answer.",
         format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
     ));
 }
@@ -109,20 +109,20 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
     let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
     // an effect of a person's own may not say where
     if !first.look.is_empty() {
-        out.push(Next::new("Look at the machine", format!("{one_of_several}{}", first.look), ""));
+        out.push(Next::new("Check at the machine", format!("{one_of_several}{}", first.look), ""));
     }
     if !first.same_as.is_empty() {
         let command = if first.never_parted { "" } else { plan_next };
         out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), command));
     }
     out.push(Next::new(
-        "Put it into the model",
-        "The error falls, the other values become right, and this page says what comes next.",
+        "Add it to the model",
+        "The error falls and the other values become right. This page then shows the next step.",
         format!("axiscal add {} {}", m.study, first.effect),
     ));
     let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
     if !mends.is_empty() {
-        out.push(Next::new("What mends it", format!("{one_of_several}{mends}"), ""));
+        out.push(Next::new("How to correct it", format!("{one_of_several}{mends}"), ""));
     }
     let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
     let beyond = known.iter().filter(|p| p.judgement == Judgement::Beyond);
@@ -133,12 +133,11 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         out.push(Next::new(
             "Then compensate",
             format!(
-                "{n} {} larger than the tolerance, the largest {} {}.",
-                if n == 1 { "error is" } else { "errors are" },
+                "{} the tolerance: {} is {}.",
+                if n == 1 { "One error exceeds".to_owned() } else { format!("{n} errors exceed") },
                 worst.name,
                 worst.at_radius_um.map_or_else(|| size(worst, m), um)
-            )
-            .replace("1 error is larger than the tolerance, the largest", "One error is larger than the tolerance:"),
+            ),
             "",
         ));
     }
@@ -152,26 +151,26 @@ fn is_carried(c: &Compensation, p: &ParameterRecord) -> bool {
     !left && (term || shape || (c.tool_length_mm.is_some() && p.effect == "tool-length"))
 }
 
-fn unexplained(m: &Material, out: &mut Vec<Next>) {
+fn unexplained(m: &Material, found: &Unexplained, out: &mut Vec<Next>) {
     let d = m.diagnosis;
     if let Some(gross) = d.gross.first() {
-        out.push(Next::new("Check for a gross mistake", gross.says.clone(), ""));
+        out.push(Next::new("Check for a set-up mistake", gross.says.clone(), ""));
     }
     if let Some(shape) = &d.shape {
         let depends = d.depends.first().map_or("", |w| w.says.as_str());
         let kind = if shape.kind.is_empty() { String::new() } else { format!("{}. ", capital(&shape.kind)) };
-        out.push(Next::new("Look for it on the machine", format!("{kind}{depends}."), ""));
+        out.push(Next::new("Check at the machine", format!("{kind}{depends}."), ""));
     }
     if let NextStep::CorrectAtMachine(check) = d.next_step() {
         let how = capital(&crate::words::diagnose::machine_check(check)) + ".";
-        out.push(Next::new("Put it right at the machine", how, ""));
+        out.push(Next::new("Correct it at the machine", how, ""));
     }
-    if !d.sketchable {
+    if !found.sketchable {
         return;
     }
     out.push(Next::new(
-        "Write down its formula",
-        "A starting formula for what no known effect explains; then put it into the model.",
+        "Write it as a formula",
+        "A starting formula for what no known effect explains. Then add it to the model.",
         format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
     ));
 }
@@ -188,7 +187,7 @@ fn settled(
         out.push(Next::new(
             "Do not compensate yet",
             format!(
-                "{}. Such values are faults of the set-up: look for a wrong block, sense or length first.",
+                "{}. Such values come from a set-up mistake: check blocks, directions and lengths first.",
                 capital(why)
             ),
             "",
@@ -198,19 +197,19 @@ fn settled(
     let beyond: Vec<&ParameterRecord> = parameters.iter().filter(|p| p.judgement == Judgement::Beyond).collect();
     compensate(m, parameters, c, out);
     for p in beyond.iter().filter(|p| !is_carried(c, p)).take(2) {
-        out.push(Next::new(format!("Mend {}", p.says), p.mends.clone(), ""));
+        out.push(Next::new(format!("Correct {}", p.says), p.mends.clone(), ""));
     }
     if headline.level == Level::Good {
         out.push(Next::new(
             "Nothing needs to be done",
-            "Keep this page: the next measurement can be held against it.",
+            "Keep this page to compare the next measurement with it.",
             format!("axiscal verify {} LATER-STUDY.toml", m.study),
         ));
     }
     if beyond.is_empty() && parameters.iter().any(|p| p.judgement == Judgement::Open) {
         out.push(Next::new(
             "Measure more touches",
-            "The uncertainty is larger than what the tolerance leaves: repeats and further poses make it smaller.",
+            "The uncertainty is too large for this tolerance. Repeats and further poses reduce it.",
             format!("axiscal plan-next {} --controller {controller} --out next", m.study),
         ));
     }
@@ -222,7 +221,7 @@ fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, ou
         return;
     }
     let (controller, accepts) = export_to(m);
-    let mut how = "The values go into the control as its own tables; the README beside them says how, and what must be set again.".to_owned();
+    let mut how = "The values go into the control as its own tables. The README beside them says how, and what must be set again.".to_owned();
     if !accepts.is_empty() {
         how += &format!(
             " With --accept-unverified you accept table entries that were not tried on a real control ({}): compare each with the control's manual before you load it.",
@@ -242,7 +241,7 @@ fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, ou
     ));
     out.push(Next::new(
         "Measure again and compare",
-        "Run the same program with the compensation loaded; the two studies side by side say whether it works.",
+        "Run the same program with the compensation loaded. Comparing the two studies shows whether it works.",
         format!("axiscal verify {} again.toml", m.study),
     ));
 }
@@ -268,7 +267,7 @@ fn export_to<'a>(m: &Material<'a>) -> (&'a str, Vec<String>) {
     own.map_or(("YOUR-CONTROLLER", Vec::new()), |name| (name, vec![format!("entries of {name} that name no document")]))
 }
 
-/// Touches that do not belong to the rest are a finding of their own.
+/// Outliers are a finding of their own.
 fn odd_touches(m: &Material, out: &mut Vec<Next>) {
     // touches that fit once the missing effect is in the model are no fault of theirs
     let back = |i: usize| {
@@ -300,15 +299,10 @@ fn odd_touches(m: &Material, out: &mut Vec<Next>) {
     let more = odd.len().saturating_sub(named.len());
     let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
     out.push(Next::new(
+        if odd.len() == 1 { "Check 1 outlier".to_owned() } else { format!("Check {} outliers", odd.len()) },
         format!(
-            "Look at {} {} that do not belong to the rest",
-            odd.len(),
-            if odd.len() == 1 { "touch" } else { "touches" }
-        )
-        .replace("1 touch that do not belong", "1 touch that does not belong"),
-        format!(
-            "Chips, dirt, a false trigger? {}{rest}. {} not used.",
-            named.join(", "),
+            "{}{rest}. Look for chips, dirt or a false trigger. {} excluded.",
+            capital(&named.join(", ")),
             if odd.len() == 1 { "It is" } else { "They are" }
         ),
         "",

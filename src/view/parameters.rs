@@ -21,11 +21,14 @@ pub fn results(fit: &Fit, catalogue: &Catalogue, machine: &Machine, tolerance: &
     let effects = effects_of(&fit.outcome.effects, catalogue, machine).unwrap_or_default();
     let each = fit.outcome.parameters.iter().zip(&fit.model.unknowns);
     each.filter(|(_, u)| !u.nuisance)
-        .map(|(p, u)| record(tolerance, p, &null_space::meaning(u, &effects), &effects))
+        .map(|(p, u)| {
+            let says = null_space::name_at_the_machine(u, &effects).unwrap_or_else(|| u.name.clone());
+            record(tolerance, p, says, &effects)
+        })
         .collect()
 }
 
-fn record(t: &Tolerance, p: &Parameter, meaning: &str, effects: &[&Effect]) -> ParameterRecord {
+fn record(t: &Tolerance, p: &Parameter, says: String, effects: &[&Effect]) -> ParameterRecord {
     let effect = effects.iter().find(|e| e.id == p.effect);
     // a shape parameter (a period, a time constant) scales nothing: it has no size as an error
     let is_shape = effect.is_some_and(|e| e.parameters.iter().any(|q| q.name == p.name && q.shape.is_some()));
@@ -49,8 +52,7 @@ fn record(t: &Tolerance, p: &Parameter, meaning: &str, effects: &[&Effect]) -> P
     ParameterRecord {
         name: p.name.clone(),
         alias: p.alias.clone(),
-        // "the place of axis C in Y (EY0C)": the symbol has a place of its own
-        says: meaning.rsplit_once(" (").map_or(meaning, |(words, _)| words).to_owned(),
+        says,
         effect: p.effect.clone(),
         effect_name: effect.map_or_else(String::new, |e| e.name.clone()),
         mends: effect.map_or_else(String::new, |e| e.mends.clone()),

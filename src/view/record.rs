@@ -428,34 +428,5 @@ pub(super) fn diagnosis(m: &Material) -> DiagnosisRecord {
             });
         }
     }
-    let mut answer = d.clone();
-    answer.says = in_words(&answer.says);
-    answer.depends.iter_mut().for_each(|w| w.says = in_words(&w.says));
-    DiagnosisRecord { answer, effects }
-}
-
-/// Variables of formulas that stand alone in a sentence (`sZ`, `B*sB`), as a machinist says them.
-pub(super) fn in_words(text: &str) -> String {
-    let word = |piece: &str| {
-        let rest = piece.trim_end_matches([',', '.', ';', ':', ')']);
-        let axis = rest.strip_prefix('s').filter(|a| matches!(*a, "X" | "Y" | "Z" | "A" | "B" | "C"));
-        match (axis, rest.split_once('*')) {
-            (Some(axis), _) => format!("the sense of {axis}'s last motion{}", &piece[rest.len()..]),
-            (None, Some((a, b))) if !a.is_empty() && !b.is_empty() => in_words(&piece.replace('*', " and ")),
-            _ => piece.to_owned(),
-        }
-    };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::in_words;
-
-    #[test]
-    fn variables_of_formulas_are_words() {
-        assert_eq!(in_words("40 % goes with sZ (up)"), "40 % goes with the sense of Z's last motion (up)");
-        assert_eq!(in_words("with B*sB, along"), "with B and the sense of B's last motion, along");
-        assert_eq!(in_words("(0.50 um, 3 * 4) as is"), "(0.50 um, 3 * 4) as is");
-    }
+    DiagnosisRecord { answer: d.clone(), effects }
 }

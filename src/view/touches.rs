@@ -78,7 +78,7 @@ pub(super) fn rungs(m: &Material) -> Vec<RungRecord> {
         let mut changes = signed("+", &r.added);
         changes.extend(signed("\u{2212}", &r.removed));
         let label = match (r.kind, i) {
-            (Kind::Uncorrected, _) => "machine as it stands".to_owned(),
+            (Kind::Uncorrected, _) => "machine as it is".to_owned(),
             (Kind::Proposed, _) => format!("{} (proposed)", changes.join(" ")),
             (_, 1) if m.ladder.rungs[0].kind == Kind::Uncorrected => "first model".to_owned(),
             (_, 0) => "first model".to_owned(),

@@ -1,9 +1,11 @@
 //! Findings in the words of the shop floor.
 
-use crate::diagnose::Subject;
 use crate::diagnose::features::direction_words;
 use crate::diagnose::next_step::MachineCheck;
+use crate::diagnose::verdict::{Missing, NameDoubt, NotNamed, TooLittle, Unexplained, Verdict};
+use crate::diagnose::{Diagnosis, Subject, setup_mistakes};
 use crate::fit::{Fit, VisitSource};
+use crate::log::LogMistake;
 use crate::machine::Machine;
 use crate::search::dependence::Dependence;
 use crate::search::pattern_tests::{CONSTANT, Features};
@@ -59,8 +61,8 @@ pub fn plain(by: &str) -> String {
     match by.split_once('.') {
         Some(("pose", axis)) => axis.to_owned(),
         Some(("axis", axis)) => of("the position of", axis),
-        Some(("before", axis)) => format!("where {axis} stood before"),
-        Some(("sense", axis)) => format!("the sense of {axis}'s last motion"),
+        Some(("before", axis)) => format!("where {axis} was before"),
+        Some(("sense", axis)) => format!("the direction of {axis}'s last motion"),
         _ => match by {
             "time*block" => "time and block".to_owned(),
             "length" => "the length of the stylus".to_owned(),
@@ -121,7 +123,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
     let rotary = machine.rotary().any(|a| a.name.to_string() == d.on) || d.on == "S";
     let direction = direction_words(&d.direction, machine);
     if d.on == CONSTANT {
-        return format!("{percent} % of what is left is the same at every touch, {direction}");
+        return format!("{percent} % of the residual is the same at every touch, {direction}");
     }
     let (on, how) = match d.on.as_str() {
         "t" => (
@@ -135,12 +137,12 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
         ),
         "t*block" => {
             let block = moved_block(d, fit).unwrap_or("");
-            (format!("block {block}"), format!("it stands elsewhere from {:.2} h after the first touch on", d.scanned))
+            (format!("block {block}"), format!("it moved {:.2} h after the first touch", d.scanned))
         }
         "T" => ("the temperature".to_owned(), "smoothly".to_owned()),
         "block" => ("the block".to_owned(), "blocks disagree".to_owned()),
         "face" => ("the face".to_owned(), "faces disagree".to_owned()),
-        "visit" => ("the index visit".to_owned(), "visits disagree".to_owned()),
+        "visit" => ("the index position".to_owned(), "index positions disagree".to_owned()),
         "run" => ("the run".to_owned(), "runs disagree".to_owned()),
         "S" => ("the orientation of the spindle".to_owned(), harmonic(d)),
         "L" => ("the length of the stylus".to_owned(), "longer against shorter".to_owned()),
@@ -148,9 +150,9 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
         "approach" => ("the direction of approach".to_owned(), "around the probe".to_owned()),
         on if on.contains('*') => (factors(on), "both together".to_owned()),
         on => match (on.strip_suffix(" before"), on.strip_prefix('s')) {
-            (Some(axis), _) => (format!("where {axis} stood before"), "the way it came from".to_owned()),
+            (Some(axis), _) => (format!("where {axis} was before"), "the way it came from".to_owned()),
             (_, Some(axis)) if axis.len() == 1 => {
-                (format!("the sense of {axis}'s last motion"), "up against down".to_owned())
+                (format!("the direction of {axis}'s last motion"), "up against down".to_owned())
             }
             _ => (
                 on.to_owned(),
@@ -163,7 +165,7 @@ pub fn says(d: &Dependence, share: f64, fit: &Fit, machine: &Machine) -> String 
             ),
         },
     };
-    format!("{percent} % of what is left goes with {on} ({how}), {direction}")
+    format!("{percent} % of the residual depends on {on} ({how}), {direction}")
 }
 
 /// The block that stands elsewhere from some moment on.
@@ -193,15 +195,212 @@ pub(crate) fn speaks_of(subject: Subject, effect: &str, variable: &str) -> bool 
     effect.is_some_and(|e| e.terms.iter().any(|t| t.formula.variables().into_iter().any(|v| v == variable)))
 }
 
+/// A set-up mistake of the catalogue: `flip_B`, `swap_XY`.
+pub(crate) fn catalogue_mistake(parameter: &str) -> String {
+    match parameter.split_once('_') {
+        Some(("flip", axis)) => format!("axis {axis} counts the wrong way round"),
+        Some((_, axes)) => {
+            let (a, b) = axes.split_at(1.min(axes.len()));
+            format!("axes {a} and {b} are exchanged")
+        }
+        None => parameter.to_owned(),
+    }
+}
+
+/// A mistake that a log shows.
+pub(crate) fn log_mistake(mistake: &LogMistake) -> String {
+    match mistake {
+        LogMistake::Inches => "the log is in inches and was read as millimetres".to_owned(),
+        LogMistake::Millimetres => "the log is in millimetres and was read as inches".to_owned(),
+        LogMistake::ExchangedXyz => "axes X, Y and Z are exchanged".to_owned(),
+        LogMistake::Exchanged(a, b) => format!("axes {a} and {b} are exchanged"),
+        LogMistake::Sign(axes) => {
+            let each: Vec<String> = axes.iter().map(|a| format!("axis {a} counts the wrong way round")).collect();
+            each.join(", and ")
+        }
+        LogMistake::Shift { .. } => mistake.says(),
+    }
+}
+
+/// The size of the residual beside the noise.
+fn against(d: &Diagnosis) -> String {
+    /// Noise below this is none: the touches are made by a program without noise, µm.
+    const NO_NOISE_UM: f64 = 0.005;
+    if d.noise_um < NO_NOISE_UM {
+        return format!("{:.2} µm RMS", d.rms_um);
+    }
+    format!("{:.2} µm RMS, {:.1} times the probe noise of {:.2} µm", d.rms_um, d.rms_um / d.noise_um, d.noise_um)
+}
+
+/// The verdict, the first sentence as the answer.
+pub(crate) fn verdict(d: &Diagnosis, fit: &Fit) -> String {
+    match &d.verdict {
+        Verdict::Adequate => adequate(d),
+        Verdict::MissingEffect(missing) => missing_effect(d, missing),
+        Verdict::Unexplained(unexplained) => not_explained(d, unexplained, fit),
+        Verdict::TooLittleData(why) => too_little(d, why),
+    }
+}
+
+fn adequate(d: &Diagnosis) -> String {
+    let fits = format!("The model is complete as far as these touches can measure: {}.", against(d));
+    if d.power.is_empty() {
+        return fits;
+    }
+    let unseen = match d.not_seen.len() {
+        0 => String::new(),
+        1 => "; 1 more has no effect on these touches".to_owned(),
+        n => format!("; {n} more have no effect on these touches"),
+    };
+    format!("{fits} {} effects were tested{unseen}.", d.tested)
+}
+
+fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
+    const CORRECT: &str =
+        "Correct it in the machine file or in the log, and measure again. Small effects cannot be judged before that.";
+    match missing {
+        Missing::TouchesFarOff { far, of, right, mistake } => format!(
+            "{far} of {of} touches are far from their planned positions. Probable cause: {mistake}. Without it {right} of them \
+             would be right. {CORRECT}"
+        ),
+        Missing::TouchesMissed { unusable, of, mistakes, agrees } => format!(
+            "{unusable} of {of} touches cannot be used, most of them because the probe did not trigger. Probable cause: {}. This \
+             explains {:.0} % of the hits and misses. {CORRECT}",
+            list(mistakes),
+            100.0 * agrees
+        ),
+        Missing::Effect(doubt) => {
+            let Some(c) = d.candidates.first() else { return String::new() };
+            let or_else = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
+            let what = match &c.same_as[..] {
+                [] => format!("{} ({}){or_else}", c.name, c.effect),
+                others => format!("{}{or_else}", one_of(&c.effect, others)),
+            };
+            let which = match c.same_as.is_empty() && c.or_else.is_none() {
+                true => "",
+                false => " These touches cannot separate them.",
+            };
+            let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
+            let doubt = match doubt {
+                None => String::new(),
+                Some(NameDoubt::Pattern(says)) => {
+                    format!(" The name may be wrong: a pattern that no listed effect explains fits better ({says}).")
+                }
+                Some(NameDoubt::OtherForm { by, more }) => format!(
+                    " The name may be wrong: another dependence on {} explains {:.0} % more of the residual than {}.",
+                    plain(by),
+                    100.0 * more,
+                    c.effect
+                ),
+            };
+            format!(
+                "Missing: {what}.{which} With it the error falls from {:.2} to {:.2} µm RMS; the probe noise is {:.2} µm.{rest}{doubt}",
+                d.rms_um, c.rms_after_um, d.noise_um
+            )
+        }
+    }
+}
+
+fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit) -> String {
+    let depends = d.depends.first().map_or("", |w| w.says.as_str());
+    let mistake = d.gross.first().filter(|g| g.rms_um < setup_mistakes::RIGHT * d.rms_um);
+    let cause = match mistake {
+        Some(mistake) => format!(" Probable cause: {}.", mistake.says),
+        None if depends.is_empty() => String::new(),
+        None => format!(" {depends}."),
+    };
+    let missing = format!("Something is missing in the model: {}.", against(d));
+    match &unexplained.why {
+        NotNamed::WeakPattern => {
+            let pattern = if depends.is_empty() { "a weak pattern" } else { depends };
+            format!(
+                "The model fits within the noise: {}. A weak pattern is left: {pattern}. Measure more touches to see whether it is real.",
+                against(d)
+            )
+        }
+        NotNamed::Scatter => format!("{depends}. The residual is {}.", against(d)),
+        NotNamed::PatternExplainsMore { alone } => {
+            let patterns = match alone {
+                true => "A pattern that no listed effect explains fits clearly better",
+                false => "Several patterns that no listed effect explains fit clearly better together",
+            };
+            format!(
+                "{missing} No listed effect explains it: {} would explain {:.0} %. {patterns}.{cause}",
+                candidate_names(d),
+                d.candidates.first().map_or(0.0, |c| (100.0 * c.share).round())
+            )
+        }
+        NotNamed::NotConfirmed => format!(
+            "{missing} It may be {}: it passes the test, but unused measurements do not confirm it, so no effect is named.{cause} \
+             Measure more index positions to decide.",
+            candidate_names(d)
+        ),
+        NotNamed::CannotBeConfirmed(effects) => match &effects[..] {
+            [one] => format!(
+                "{missing} One listed effect explains it ({one}), but there are too few poses to confirm it on unused \
+                 measurements.{cause}"
+            ),
+            several => format!(
+                "{missing} One of {} listed effects explains it; there are too few poses to decide which. The best match is {}.{cause}",
+                several.len(),
+                several.first().map_or("", String::as_str)
+            ),
+        },
+        NotNamed::NoEffectPasses => {
+            let or = fit.noise.or_the_probe(fit.outcome.chi2_per_dof.sqrt());
+            let or = or.map_or_else(String::new, |or| format!(" {or}"));
+            format!("{missing} No listed effect explains it.{or}{cause}")
+        }
+    }
+}
+
+/// The first candidate with those that these touches cannot separate from it.
+fn candidate_names(d: &Diagnosis) -> String {
+    let Some(c) = d.candidates.first() else { return "an effect".to_owned() };
+    match &c.same_as[..] {
+        [] => c.effect.clone(),
+        [other] => format!("{} or {other}", c.effect),
+        others => format!("{} or one of {} others", c.effect, others.len()),
+    }
+}
+
+fn too_little(d: &Diagnosis, why: &TooLittle) -> String {
+    match why {
+        TooLittle::FewTouches { used, unknowns } => format!(
+            "Too few touches to judge: {used} touches for {unknowns} unknowns. Use a program with more touches, or remove effects \
+             from the model."
+        ),
+        TooLittle::NoneUsed { excluded: 0 } => {
+            "Too few touches to judge: there is no touch that can be used. Measure again.".to_owned()
+        }
+        TooLittle::NoneUsed { excluded } => format!(
+            "Too few touches to judge: all {excluded} touches are excluded. Include touches again, or measure again."
+        ),
+        TooLittle::NothingDetermined(names) => format!(
+            "Too little data to judge: these touches determine none of the machine errors in the model ({}). The fit is good \
+             ({}), but says nothing about the machine. Run the program to its end, or touch in other poses; `axiscal identify` \
+             lists poses that help.",
+            names.join(", "),
+            against(d)
+        ),
+        TooLittle::MostUnusable { unusable, of, far } => format!(
+            "{unusable} of {of} touches cannot be used, most of them because {}. Small effects cannot be judged. Check: does an axis \
+             count the wrong way round? Are two axes exchanged? Are the blocks where the plan says? Does the log belong to this plan?",
+            if *far { "they are far from their planned positions" } else { "the probe did not trigger" }
+        ),
+    }
+}
+
 /// What to check at the machine.
 #[must_use]
-pub fn machine_check(check: MachineCheck) -> String {
+pub fn machine_check(check: &MachineCheck) -> String {
     match check {
         MachineCheck::NamedFaces(faces) => {
             let faces = faces.join(", ");
             return format!("clean {faces} and touch them again. If they are clean, measure the block: its size may differ from the plan");
         }
-        MachineCheck::NamedBlock(block) => {
+        MachineCheck::NamedBlocks(blocks) => {
+            let block = blocks.first().map_or("", String::as_str);
             return format!("clean and clamp block {block}, measure its size, and measure again");
         }
         MachineCheck::MovedBlock(block) => return format!("clamp block {block} again and repeat the measurement"),
@@ -216,8 +415,8 @@ pub fn machine_check(check: MachineCheck) -> String {
              [[data]]), give a run whose blocks were moved a `mounting` of its own, and diagnose again"
         }
         MachineCheck::Clamping => "check the clamping and indexing of the rotary axes for play or dirt, and measure again",
-        MachineCheck::WeakPattern => "measure again: further touches tell whether the pattern is there at all",
-        MachineCheck::NoFormula => "look for it at the machine: no formula describes it",
+        MachineCheck::WeakPattern => "measure again: further touches show whether the pattern is real",
+        MachineCheck::NoFormula => "check at the machine: no formula describes it",
         MachineCheck::NoPattern => "measure again with more touches: the residual depends on nothing that these touches show",
     }
     .to_owned()
@@ -244,11 +443,11 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
         ("t", "exponential") => "warming up: it moves fast at first and comes to rest",
         ("t", _) => "slow change: temperature, creep of a clamp",
         ("t*block", _) => "a block was knocked or slid: a loose clamp, dirt under it, a collision",
-        (CONSTANT, _) => "an offset that the model does not hold: a zero point, a length, a position error of an axis",
-        ("block", _) => "a block that stands or measures otherwise than the rest: loose, tilted, another size",
-        ("face", _) => "single faces that lie elsewhere: chips, burrs, coolant",
+        (CONSTANT, _) => "an offset that the model lacks: a zero point, a length, a position error of an axis",
+        ("block", _) => "a block that differs from the others: loose, tilted, another size",
+        ("face", _) => "single faces that are offset: chips, burrs, coolant",
         ("visit", _) if comes_back => {
-            "poses that each have an error of their own, and come back with it: a pattern that no shape here has"
+            "poses that each have an error of their own, and come back with it: a pattern that no listed effect explains"
         }
         ("run", _) => "something that changed between two runs: the machine's temperature, a stylus, a block, a knock",
         ("visit", _) => "poses that do not come back: clamping or indexing scatter",
@@ -268,8 +467,10 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
             );
         }
         (_, "order") => "an eccentric or wobbling bearing, or an encoder ring mounted off its centre",
-        (_, "step") => "looseness that lets go at one place: a stop, a clamp, a worn spot",
-        (_, "kink") => "contact that changes at one place: a counterweight, a guideway joint, slack that is taken up",
+        (_, "step") => "looseness that gives way at one position: a stop, a clamp, a worn spot",
+        (_, "kink") => {
+            "contact that changes at one position: a counterweight, a guideway joint, slack that is taken up"
+        }
         _ => "a guideway or scale that is bent, or weight that shifts",
     };
     text.to_owned()
@@ -282,12 +483,12 @@ mod tests {
     #[test]
     fn variables_and_groups_have_names() {
         let rotary = |name: &str| name == "C";
-        assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C stood before");
-        assert_eq!(plain(&by("C before", &rotary)), "where C stood before");
+        assert_eq!(plain(&by("C*C before", &rotary)), "the product of C and where C was before");
+        assert_eq!(plain(&by("C before", &rotary)), "where C was before");
         let ids = ["pitch-y".to_owned(), "pitch-x".to_owned()];
         assert_eq!(one_of("backlash-x", &ids), "one of backlash-x, pitch-y, pitch-x");
         assert_eq!(one_of("backlash-x", &[]), "backlash-x");
-        assert_eq!(plain("sX*C"), "the product of the sense of X's last motion and C");
+        assert_eq!(plain("sX*C"), "the product of the direction of X's last motion and C");
         assert_eq!(plain("time*block"), "time and block");
     }
 }

@@ -1,9 +1,11 @@
 //! Sentences of a fit: its remarks, why a touch is not used, where the noise comes from, what cannot be determined.
 
+use crate::fit::candidates::NoValue;
 use crate::fit::noise::Noise;
 use crate::fit::null_space::{Combined, Kind, NullDirection};
 use crate::fit::outliers::MOST_SHARE;
 use crate::fit::{Contradiction, Found, NoiseSource, Reason, Remark, VisitSource};
+use crate::model::temperatures::{NEAR_H, TemperatureGap};
 use crate::units::{mm_from_um, significant, um_from_mm};
 
 /// Other values of a shape parameter that are named.
@@ -12,9 +14,9 @@ const NAMED: usize = 3;
 /// Why a touch is not used.
 pub(crate) fn reason(reason: &Reason) -> String {
     match reason {
-        Reason::Masked { reason } => format!("taken out: {reason}"),
+        Reason::Masked { reason } => format!("excluded: {reason}"),
         Reason::Outlier { off_mm, robust_only: true, .. } => format!(
-            "{:+.1} um off what the other touches predict; a robust fit excludes it together with others: check for a chip, a drop or a double touch",
+            "{:+.1} µm off what the other touches predict; a robust fit excludes it together with others: check for a chip, a drop or a double touch",
             um_from_mm(*off_mm)
         ),
         Reason::Outlier { off_mm, standardised, .. } => {
@@ -22,7 +24,7 @@ pub(crate) fn reason(reason: &Reason) -> String {
             let times = standardised.abs();
             let times = if times < 1000.0 { format!("{times:.1}") } else { "more than 1000".to_owned() };
             format!(
-                "{:+.1} um off what the other touches predict ({times} standard deviations of their scatter): check for a chip, a drop or a double touch",
+                "{:+.1} µm off what the other touches predict ({times} standard deviations of their scatter): check for a chip, a drop or a double touch",
                 um_from_mm(*off_mm)
             )
         }
@@ -36,7 +38,10 @@ pub(crate) fn remark(remark: &Remark) -> String {
         Remark::NoTemperature { effect } => {
             format!("Effect {effect} depends on the temperature T, and no touch has one. Log the temperature.")
         }
-        Remark::OfTemperatures(says) | Remark::LeftOut(says) => says.clone(),
+        Remark::TemperatureGap(gap) => temperature_gap(*gap),
+        Remark::NotCounted(bad) => {
+            format!("The effect is not counted among those outside of the model: {}.", no_value(bad))
+        }
         Remark::NotCredible { name, times } => format!(
             "{name} is more than {times} times its usual size; no machine is like that. Check the plan, units and signs; a combination of parameters may hardly be determined."
         ),
@@ -50,8 +55,9 @@ pub(crate) fn remark(remark: &Remark) -> String {
         Remark::UnmodelledNotCounted { most_touches } => {
             format!("What effects outside of the model may add is computed for up to {most_touches} touches only.")
         }
-        Remark::SetUpMistake { far, of, right, says } => format!(
-            "{far} of {of} touches are far from their nominal positions; {right} would be right if {says}. Correct that first: these values come only from the touches that happen to fit."
+        Remark::SetUpMistake { far, of, right, mistake } => format!(
+            "{far} of {of} touches are far from their planned positions; {right} would be right if {}. Correct that first: these values come only from the touches that happen to fit.",
+            mistake.says()
         ),
         Remark::OutliersBeyond { found, of, excluded } => format!(
             "a robust fit finds {found} outliers among {of} touches ({:.1} %), and the others still do not agree without them. {} excluded (exclusion stops at {:.0} %). Do not trust the values and their uncertainties; look for dirt, a loose block or stylus, or an effect that the model lacks.",
@@ -69,28 +75,28 @@ pub(crate) fn remark(remark: &Remark) -> String {
             100.0 * MOST_SHARE
         ),
         Remark::NoiseContradicted { stated_mm, found_mm, dof } => format!(
-            "The study states a noise of {:.2} um ([noise] touch_um); the repeated touches show {:.2} um ({dof:.0} degrees of freedom). The repeats are used. Remove touch_um, or find out what has changed.",
+            "The study states a noise of {:.2} µm ([noise] touch_um); the repeated touches show {:.2} µm ({dof:.0} degrees of freedom). The repeats are used. Remove touch_um, or find out what has changed.",
             um(*stated_mm),
             um(*found_mm)
         ),
         Remark::VisitsContradicted { stated_mm, found_mm, dof } => format!(
-            "The study states a scatter of index positions of {:.2} um ([noise] visit_um); revisited poses show {:.2} um ({} of freedom). The stated scatter is used, also for the uncertainties. Remove visit_um, or find out what has changed.",
+            "The study states a scatter of index positions of {:.2} µm ([noise] visit_um); revisited poses show {:.2} µm ({} of freedom). The stated scatter is used, also for the uncertainties. Remove visit_um, or find out what has changed.",
             um(*stated_mm),
             um(*found_mm),
             degrees(*dof)
         ),
         Remark::VisitsBeyond { tau_mm, dof, declared_mm } => format!(
-            "Index positions scatter by {:.2} um (revisited poses, {} of freedom); the axes declare an indexing repeatability of {:.2} um. Drift, warm-up or a slip that the model lacks counts as scatter here: chi2/dof does not show it, and values may be off by more than their uncertainties. Run `axiscal diagnose`, or declare what the axes repeat to (indexing_repeatability_um in machines.toml).",
+            "Index positions scatter by {:.2} µm (revisited poses, {} of freedom); the axes declare an indexing repeatability of {:.2} µm. Drift, warm-up or a slip that the model lacks counts as scatter here: chi2/dof does not show it, and values may be off by more than their uncertainties. Run `axiscal diagnose`, or declare what the axes repeat to (indexing_repeatability_um in machines.toml).",
             um(*tau_mm),
             degrees(*dof),
             um(*declared_mm)
         ),
         Remark::CoarseLog { rounding_mm } => format!(
-            "The digits of the log take away {:.2} um, more than the touches' own noise. The same is lost wherever a point is touched again: uncertainties may be too small, and patterns may appear that do not exist. Let the program write more decimals.",
+            "The digits of the log take away {:.2} µm, more than the touches' own noise. The same is lost wherever a point is touched again: uncertainties may be too small, and patterns may appear that do not exist. Let the program write more decimals.",
             um(*rounding_mm)
         ),
         Remark::NoiseTooLarge { times_better, sigma_mm, source } => format!(
-            "The touches fit {times_better:.1} times better than the {} noise of {:.2} um. Your probe repeats better than that, and the uncertainties are too large. Set `touch_um` ([noise] of the study).",
+            "The touches fit {times_better:.1} times better than the {} noise of {:.2} µm. Your probe repeats better than that, and the uncertainties are too large. Set `touch_um` ([noise] of the study).",
             declared_or_stated(*source),
             um(*sigma_mm)
         ),
@@ -102,10 +108,10 @@ pub(crate) fn remark(remark: &Remark) -> String {
             or_the_probe(noise, *times).map_or_else(String::new, |or| format!(" {or}"))
         ),
         Remark::OutOfRange { name, prior: Some((value, sigma)) } => format!(
-            "{name} ran out of its range beside its prior of {value} ± {sigma}: touches and prior disagree, or its range is too narrow. It is set to the end of its range that fits both better."
+            "{name} left its range; its prior is {value} ± {sigma}: touches and prior disagree, or its range is too narrow. It is set to the end of its range that fits both better."
         ),
         Remark::OutOfRange { name, prior: None } => format!(
-            "{name} ran out of its range: these touches cannot determine it. It is set to the end of its range that fits better."
+            "{name} left its range: these touches cannot determine it. It is set to the end of its range that fits better."
         ),
         Remark::OtherValues { name, unit, value, others } => {
             let others: Vec<String> = others.iter().take(NAMED).map(|v| significant(*v, 4)).collect();
@@ -129,7 +135,7 @@ pub(crate) fn remark(remark: &Remark) -> String {
             let shapes = shapes.join(", ");
             let blocks = if *n_blocks > 0 { format!(", and {n_blocks} block positions") } else { String::new() };
             format!(
-                "{}{blocks} cannot be determined, because {shapes} cannot: beside other values of it they may be much different. Remove the effect from the model if nothing needs it, or set {shapes} to what is known of the machine.",
+                "{}{blocks} cannot be determined, because {shapes} cannot: with other values of it they may be very different. Remove the effect from the model if nothing needs it, or set {shapes} to what is known of the machine.",
                 results.join(", ")
             )
         }
@@ -145,6 +151,48 @@ pub(crate) fn remark(remark: &Remark) -> String {
         Remark::UnknownMask { id, run } => {
             format!("There is no touch {id} in run {}: its mask has no effect.", run + 1)
         }
+    }
+}
+
+/// A formula without a usable value at some touches.
+pub(crate) fn no_value(bad: &NoValue) -> String {
+    let NoValue { effect, formula, .. } = bad;
+    format!("formula {formula:?} of effect {effect} has {}", where_no_value(bad))
+}
+
+/// The same beside the formula itself.
+pub(crate) fn no_value_of_formula(bad: &NoValue) -> String {
+    format!("formula {:?} has {}", bad.formula, where_no_value(bad))
+}
+
+/// The same for an effect that is only a candidate.
+pub(crate) fn not_a_candidate(bad: &NoValue) -> String {
+    format!("effect {} is not tested: {}", bad.effect, no_value(bad))
+}
+
+fn where_no_value(bad: &NoValue) -> String {
+    let NoValue { n_touches, first, too_large, .. } = bad;
+    let which = match n_touches {
+        1 => format!("1 touch: touch {first}"),
+        n => format!("{n} touches: the first is touch {first}"),
+    };
+    match too_large {
+        true => format!("no usable value at {which}, more than a kilometre at its usual size"),
+        false => format!("no value at {which}"),
+    }
+}
+
+fn temperature_gap(gap: TemperatureGap) -> String {
+    let TemperatureGap { missing, of, far } = gap;
+    match far {
+        0 => format!(
+            "{missing} of {of} touches have no temperature. It is taken from the readings before and after them."
+        ),
+        far => format!(
+            "{missing} of {of} touches have no temperature, and {far} of them have no reading within {:.0} min. No temperature is \
+             used, and no effect of the temperature can be determined. Log one for every touch, or exclude the touches without one.",
+            60.0 * NEAR_H
+        ),
     }
 }
 
@@ -194,7 +242,7 @@ fn with_digits(value: f64, sigma: f64) -> String {
 /// Both figures of the noise and where they come from.
 pub(crate) fn noise(noise: &Noise) -> String {
     format!(
-        "touch {:.2} um ({}); index position {:.2} um ({})",
+        "touch {:.2} µm ({}); index position {:.2} µm ({})",
         um_from_mm(noise.sigma_mm),
         touch_noise(noise),
         um_from_mm(noise.tau_mm),
@@ -208,11 +256,11 @@ fn touch_noise(noise: &Noise) -> String {
             let dof = dof.unwrap_or(0.0);
             match (noise.later_mm, noise.contradicted_mm) {
                 (Some(later), _) => format!(
-                    "from touches repeated at once, {dof:.0} degrees of freedom; the same points later differ by {:.2} um, which is more than noise",
+                    "from touches repeated at once, {dof:.0} degrees of freedom; the same points later differ by {:.2} µm, which is more than noise",
                     um_from_mm(later)
                 ),
                 (None, Some(stated)) => format!(
-                    "from repeated touches, {dof:.0} degrees of freedom; they contradict the {:.2} um that the study states",
+                    "from repeated touches, {dof:.0} degrees of freedom; they contradict the {:.2} µm that the study states",
                     um_from_mm(stated)
                 ),
                 (None, None) => format!("from repeated touches, {dof:.0} degrees of freedom"),
@@ -225,7 +273,7 @@ fn touch_noise(noise: &Noise) -> String {
         (NoiseSource::Declared, _) => "the probe's declared repeatability: the plan has too few repeats".to_owned(),
     };
     if noise.source != NoiseSource::Repeats && noise.rounding_shows() {
-        return format!("{sigma}; {:.2} um of it from the digits of the log", um_from_mm(noise.rounding_mm));
+        return format!("{sigma}; {:.2} µm of it from the digits of the log", um_from_mm(noise.rounding_mm));
     }
     sigma
 }
@@ -237,7 +285,7 @@ fn visit_scatter(noise: &Noise) -> String {
             "from revisited poses, which differ by no more than the touches' own noise".to_owned()
         }
         VisitSource::Revisits => format!(
-            "from revisited poses, {} of freedom, at most {:.2} um with 90 % certainty",
+            "from revisited poses, {} of freedom, at most {:.2} µm with 90 % certainty",
             degrees(noise.visit_dof.unwrap_or(0.0)),
             um_from_mm(noise.tau_test_mm)
         ),
@@ -257,12 +305,15 @@ pub(crate) fn or_the_probe(noise: &Noise, times: f64) -> Option<String> {
     let source = noise.unconfirmed()?;
     let with_visits = noise.tau_mm > 0.0 && noise.visit_source == VisitSource::Declared;
     let (axes, how) = if with_visits {
-        (" or the axes index less exactly than declared", "Touch a point several times in a row, and visit poses again")
+        (
+            " or the axes index less exactly than declared",
+            "Touch a point several times in a row, and come back to poses",
+        )
     } else {
         ("", "Touch a point ten times in a row")
     };
     Some(format!(
-        "Or the model is complete, and a touch scatters by up to {:.2} um in place of the {} {:.2} um{axes}. {how} to find out.",
+        "Or the model is complete, and a touch scatters by up to {:.2} µm in place of the {} {:.2} µm{axes}. {how} to find out.",
         um_from_mm(noise.sigma_mm * times),
         declared_or_stated(source),
         um_from_mm(noise.sigma_mm)
@@ -289,7 +340,7 @@ pub(crate) fn undetermined(direction: &NullDirection) -> String {
             "{named} cannot be determined: the touches do not show its effect clearly. It is set to the usual value that fits best. Add touches where the effect changes, or set it to what is known of the machine"
         ),
         Kind::Single => {
-            format!("{named} has no effect on these touches and cannot be determined; it stays at its start value")
+            format!("{named} has no effect on these touches; it stays at its start value")
         }
         Kind::Pair => format!(
             "Only {} can be measured, not {named} separately. {}",

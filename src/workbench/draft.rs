@@ -2,11 +2,13 @@
 
 use super::session::Refused;
 use crate::diag::{Failure, Finding, source};
+use crate::fit::candidates::{NO_VALUE_HELP, NoValue, without_value};
+use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::model::formula::{Formula, VARIABLES};
+use crate::model::predict::Observation;
 use crate::model::{degrees_in_formula, formula_errors};
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
 /// Longest text of one field, in bytes.
@@ -222,7 +224,7 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
             let lead = t.formula.len() - t.formula.trim_start().len();
             let found = formula_errors::find(t.formula.trim(), &shapes);
             let help = found.as_ref().and_then(|m| m.help).map(str::to_owned);
-            let at = found.map_or_else(|| place(t.formula.trim(), &message), |m| m.at);
+            let at = found.map_or(0..t.formula.trim().len(), |m| m.at);
             let signs = |byte: usize| t.formula.get(..lead + byte).map_or(0, |text| text.chars().count());
             let (from, to) = (signs(at.start), signs(at.end));
             mistakes.push(Mistake {
@@ -257,19 +259,22 @@ fn hints(draft: &Draft, shapes: &[&str]) -> Vec<Mistake> {
     draft.terms.iter().enumerate().filter_map(of).collect()
 }
 
-/// Why a draft cannot be fitted: a formula without a value at some touches is a mistake in its field.
-#[must_use]
-pub fn of_the_fit(failure: Failure, draft: &Draft, id: &str) -> Refused {
-    let about = |f: &Finding| {
-        let formula = |t: &DraftTerm| f.message.starts_with(&format!("formula {:?} of", t.formula.trim()));
-        let i = draft.terms.iter().position(formula).filter(|_| f.code == "model::no_value")?;
-        let message = f.message.replace(&format!("of effect {id} "), "");
-        Some(Mistake { field: format!("terms.{i}.formula"), from: None, to: None, message, help: f.help.clone() })
+/// The formulas of a draft that have no value at some of the touches.
+///
+/// # Errors
+/// Each as a mistake in its field.
+pub fn check_values(draft: &Draft, typed: &Typed, machine: &Machine, touches: &[Observation]) -> Result<(), Refused> {
+    let Some(effect) = typed.catalogue.get(&typed.id, machine) else { return Ok(()) };
+    let mistake = |bad: &NoValue| Mistake {
+        field: format!("terms.{}.formula", bad.term),
+        from: None,
+        to: None,
+        message: crate::words::fit::no_value_of_formula(bad),
+        help: Some(NO_VALUE_HELP.to_owned()),
     };
-    match failure.0.iter().map(about).collect::<Option<Vec<Mistake>>>() {
-        Some(mistakes) if !mistakes.is_empty() => Refused::Mistakes(mistakes),
-        _ => Refused::Unusable(failure),
-    }
+    let mistakes: Vec<Mistake> =
+        without_value(effect, touches).iter().filter(|bad| bad.term < draft.terms.len()).map(mistake).collect();
+    if mistakes.is_empty() { Ok(()) } else { Err(Refused::Mistakes(mistakes)) }
 }
 
 /// What the file's own form would let pass, but a person cannot mean.
@@ -336,41 +341,6 @@ fn from_finding(f: &Finding, text: &str, draft: &Draft) -> Mistake {
     Mistake { field: field.unwrap_or_default(), from: None, to: None, message: f.message.clone(), help }
 }
 
-/// Which part of a formula a message is about, in bytes: the word that it quotes, else the bracket that has no partner,
-/// else the end, where something is missing.
-fn place(formula: &str, message: &str) -> Range<usize> {
-    let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
-    if let Some(word) = message.split('"').nth(1).filter(|w| !w.is_empty()) {
-        let alone = |at: &usize| {
-            let before = formula[..*at].chars().next_back().is_some_and(is_word);
-            let after = formula[*at + word.len()..].chars().next().is_some_and(is_word);
-            !(before || after)
-        };
-        let mut hits = formula.match_indices(word).map(|(at, _)| at);
-        if let Some(at) = hits.clone().find(alone).or_else(|| hits.next()) {
-            return at..at + word.len();
-        }
-    }
-    let mut open = Vec::new();
-    for (at, c) in formula.char_indices() {
-        match c {
-            '(' => open.push(at),
-            ')' if open.pop().is_none() => return at..at + 1,
-            _ => {}
-        }
-    }
-    if let Some(at) = open.pop() {
-        return at..at + 1;
-    }
-    // a sign that no formula knows
-    let known = |c: char| is_word(c) || c.is_whitespace() || "+-*/^(),".contains(c);
-    if let Some((at, c)) = formula.char_indices().find(|(_, c)| !known(*c)) {
-        return at..at + c.len_utf8();
-    }
-    let last = formula.char_indices().next_back().map_or(0, |(at, _)| at);
-    last..formula.len()
-}
-
 /// What each variable of a formula is.
 pub const MEANING: [(&str, &str); VARIABLES.len()] = [
     ("X", "position of X, mm"),
@@ -387,12 +357,12 @@ pub const MEANING: [(&str, &str); VARIABLES.len()] = [
     ("mx", "outward normal in the probe's frame, which turns with head and spindle, its x part"),
     ("my", "the same, its y part"),
     ("mz", "the same, its z part"),
-    ("sX", "sense of the last motion of X: +1 or -1, 0 while it is not known"),
-    ("sY", "sense of the last motion of Y"),
-    ("sZ", "sense of the last motion of Z"),
-    ("sA", "sense of the last motion of A"),
-    ("sB", "sense of the last motion of B"),
-    ("sC", "sense of the last motion of C"),
+    ("sX", "direction of the last motion of X: +1 or -1, 0 while it is not known"),
+    ("sY", "direction of the last motion of Y"),
+    ("sZ", "direction of the last motion of Z"),
+    ("sA", "direction of the last motion of A"),
+    ("sB", "direction of the last motion of B"),
+    ("sC", "direction of the last motion of C"),
     ("feed", "feed of the touch, mm/min"),
     ("S", "turn of the spindle (M19), radians"),
     ("gx", "which way is down, in the tool's frame, its x part"),
@@ -478,20 +448,28 @@ mod tests {
 
     #[test]
     fn a_formula_without_a_value_has_its_field() {
+        let machine = crate::machine::built_in("swivel-head").unwrap().unwrap();
         let mut d = draft("1");
-        d.terms.push(DraftTerm { formula: " 1 / 0 ".into(), ..d.terms[0].clone() });
-        let finding = |formula: &str| {
-            Finding::error(
-                "model::no_value",
-                format!("formula {formula:?} of effect my-sag-typed has no value at 7 touches, the first is touch 1"),
-            )
+        d.terms.push(DraftTerm { formula: " 1 / C ".into(), ..d.terms[0].clone() });
+        let typed = check(&d, &Catalogue::built_in().unwrap(), &[]).unwrap();
+        let touch = Observation {
+            run: 0,
+            id: 1,
+            set_up: 0,
+            point: nalgebra::Vector3::zeros(),
+            normal: nalgebra::Vector3::z(),
+            ball_radius: 3.0,
+            ball_at_zero: nalgebra::Vector3::zeros(),
+            position: crate::axes::Position::default(),
+            state: [0.0; VARIABLES.len()],
+            has_temperature: false,
         };
-        let Refused::Mistakes(mistakes) = of_the_fit(Failure(vec![finding("1 / 0")]), &d, "my-sag-typed") else {
+        let touches = [touch.clone(), touch];
+        let Err(Refused::Mistakes(mistakes)) = check_values(&d, &typed, &machine, &touches) else {
             panic!("no mistake")
         };
-        assert_eq!(mistakes[0].field, "terms.1.formula");
-        assert!(mistakes[0].message.contains("has no value at 7 touches") && !mistakes[0].message.contains("typed"));
-        assert!(matches!(of_the_fit(Failure(vec![finding("B")]), &d, "my-sag-typed"), Refused::Unusable(_)));
+        assert_eq!((mistakes.len(), mistakes[0].field.as_str()), (1, "terms.1.formula"));
+        assert!(mistakes[0].message.contains("has no value at 2 touches"), "{}", mistakes[0].message);
     }
 
     #[test]

@@ -516,9 +516,10 @@ pub fn tried(now: &Snapshot, shelf: &Shelf, effect: Option<&str>, draft: Option<
     let fit = match (&typed, draft) {
         // what is only typed is in no catalogue, and so on no shelf
         (Some(typed), Some(draft)) => {
+            draft::check_values(draft, typed, &opened.machine, &opened.data.observations)?;
             let data = crate::model::data::Data::clone(&opened.data);
             let fitted = fit::identify_data(&opened.machine, &typed.catalogue, data, &settings);
-            Arc::new(fitted.map_err(|failure| draft::of_the_fit(failure, draft, &typed.id))?)
+            Arc::new(fitted.map_err(Refused::Unusable)?)
         }
         _ => shelf.fit(opened, now.inputs, settings)?.0,
     };

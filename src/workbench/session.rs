@@ -271,7 +271,7 @@ impl Session {
                 some_are_left(opened, touches)?;
                 Ok((
                     mask::mask(&text, touches, reason)?,
-                    format!("{} taken out: {}", count(touches.len()), reason.trim()),
+                    format!("{} excluded: {}", count(touches.len()), reason.trim()),
                 ))
             }
             Ask::Unmask { touches } => {
@@ -462,7 +462,7 @@ fn some_are_left(opened: &Opened, touches: &[(usize, u64)]) -> Result<()> {
         return Ok(());
     }
     Err(Failure::new("workbench::all_touches", "these are all the touches that there are")
-        .help("a fit needs touches: take out those with which something was wrong"))
+        .help("a fit needs touches: exclude only those with which something was wrong"))
 }
 
 fn every_touch_exists(opened: &Opened, touches: &[(usize, u64)]) -> Result<()> {

@@ -108,7 +108,7 @@ pub fn beside_the_axis(compensation: &Compensation, machine: &Machine, plan: &Pl
             Finding::info(
                 "compensation::beside_the_axis",
                 format!(
-                    "the compensation holds errors of {}, which carries {} of the {} blocks of program {}, and not {which} {}",
+                    "the compensation has errors of {}, which carries {} of the {} blocks of program {}, and not {which} {}",
                     term.axis,
                     plan.blocks.len() - blocks.len(),
                     plan.blocks.len(),
@@ -122,7 +122,7 @@ pub fn beside_the_axis(compensation: &Compensation, machine: &Machine, plan: &Pl
     Some(
         Finding::warning(
             "compensation::beside_the_axis",
-            format!("the compensation holds errors of {}, which does not carry the blocks of program {}", term.axis, plan.program),
+            format!("the compensation has errors of {}, which does not carry the blocks of program {}", term.axis, plan.program),
         )
         .help(format!(
             "such blocks are read with the errors of {0} the wrong way round: measure them with {0}'s values at 0, or use a program whose blocks {0} carries",

@@ -88,7 +88,7 @@ impl Loaded {
     pub fn compare(&self, fit: &Fit) -> Result<(Comparison, Diagnosis)> {
         let found = self.diagnose(&self.settings(), fit, &VERDICT)?;
         let mut comparison = compare(fit).led_by(&leads(&found));
-        if found.most_missed {
+        if found.verdict.most_touches_unusable() {
             comparison.says.clone_from(&found.says);
         }
         Ok((comparison, found))

@@ -50,7 +50,7 @@ pub fn generate(
     if !generated.plan.skipped.is_empty() {
         let lost = lost_parameters(machine, spec, &generated.plan)?;
         if !lost.is_empty() {
-            let note = format!("without the touches that were left out these cannot be told: {}", lost.join(", "));
+            let note = format!("without the omitted touches these cannot be determined: {}", lost.join(", "));
             generated.path.head.push(format!("  {note}"));
             generated.plan.notes.push(note);
         }

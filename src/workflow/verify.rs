@@ -60,12 +60,8 @@ pub fn verify(before: &Loaded, after: &Loaded, env: &dyn Environment) -> Result<
 /// What the runs after show that their model lacks: its errors are then not those of the machine.
 fn still_missing(after: &Loaded, fit: &Fit) -> Result<Option<String>> {
     let found = after.diagnose(&after.settings(), fit, &VERDICT)?;
-    let fails = match found.verdict {
-        diagnose::Verdict::MissingEffect => true,
-        diagnose::Verdict::Unexplained => !found.faint,
-        _ => false,
-    };
-    let missing = fails || found.mistake().is_some();
+    let fails = matches!(found.verdict, diagnose::Verdict::MissingEffect(_) | diagnose::Verdict::Unexplained(_));
+    let missing = (fails && !found.verdict.is_weak_pattern()) || found.mistake().is_some();
     Ok(missing.then(|| format!("`axiscal diagnose` says of the study after: {}", found.says)))
 }
 

@@ -7,7 +7,7 @@ use crate::compare::model_ladder::{Kind, Ladder, Rung, climb};
 use crate::compare::{Comparison, compare};
 use crate::design;
 use crate::diag::Result;
-use crate::diagnose::{Diagnosis, Options, Verdict, with_effects};
+use crate::diagnose::{Diagnosis, Options, with_effects};
 use crate::fit::Fit;
 use crate::study::history::History;
 use crate::tables::Correction;
@@ -43,7 +43,7 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environmen
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();
     let mut ladder = climb(&loaded.machine, &loaded.catalogue, &settings, &fit, &tried);
     let mut proposed = None;
-    if diagnosis.verdict == Verdict::MissingEffect
+    if diagnosis.verdict.is_missing_effect()
         && let Some(first) = diagnosis.candidates.first().filter(|c| c.proposed)
     {
         // a candidate that cannot be fitted beside the others is still a candidate
@@ -52,7 +52,7 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environmen
                 ladder.push(Rung::of(&with, Kind::Proposed));
                 proposed = Some(with);
             }
-            Err(failure) => ladder.notes.push(format!("{} cannot be put beside the model: {failure}", first.effect)),
+            Err(failure) => ladder.notes.push(format!("{} cannot be added to the model: {failure}", first.effect)),
         }
     }
     let date = newest_log(loaded, env);

@@ -353,7 +353,7 @@ fn null_directions_are_sentences_with_a_remedy() {
     };
     let offset = about("ey");
     assert!(offset.says.contains("the tip's offset in Y (ey)"), "{}", offset.says);
-    assert!(offset.says.contains("the place of axis C in Y (EY0C)"), "{}", offset.says);
+    assert!(offset.says.contains("the position of axis C in Y (EY0C)"), "{}", offset.says);
     assert!(offset.says.contains("set to 0"), "{}", offset.says);
     assert!(offset.says.contains("+1 mm of EY0C with +1 mm of ey"), "{}", offset.says);
     assert!(!fit.outcome.parted_together.is_empty());
@@ -509,7 +509,7 @@ fn full_leaves_only_what_no_touch_can_show() {
         // a value that holds another effect with any touches is no fault of the plan, but it is named
         for p in a.parameters.iter().filter(|p| !p.holds.is_empty()) {
             let poor = p.sigma_with_unmodelled.is_none_or(|s| s > if p.unit == "mm" { 0.016 } else { 0.0018 });
-            let said = a.says.contains(&format!("{} holds {} as well", p.name, p.holds.join(", ")));
+            let said = a.says.contains(&format!("{} includes {}", p.name, p.holds.join(", ")));
             assert_eq!(said, poor, "{name} {}: {}", p.name, a.says);
         }
     }
@@ -531,7 +531,7 @@ fn remedies_are_chosen_together() {
     let a = assess(&request).unwrap();
     assert_eq!(a.undetermined.len(), 4, "{:#?}", a.undetermined);
     for u in &a.undetermined {
-        assert!(!u.parted_by.is_empty() && u.says.contains("what parts them"), "{u:?}");
+        assert!(!u.parted_by.is_empty() && u.says.contains("what separates them"), "{u:?}");
     }
     println!("{:#?}", a.parted_together);
     for part in ["turn the spindle by", "looks down", "times the feed"] {
@@ -554,10 +554,12 @@ fn the_verb_answers_in_json_and_side_by_side() {
     assert!(a.time_s > 1800.0 && a.compared.len() == 1 && a.compared[0].alias_pairs < a.alias_pairs);
     // the sentence and the list count alike
     let without = a.effects.iter().filter(|e| !e.visible).count();
-    let says = format!("{without} effects leave no trace (not counted against it: tool-length, which EZ0B holds)");
+    let says = format!(
+        "{without} effects have no effect on the touches (not counted against it: tool-length, which EZ0B includes)"
+    );
     assert!(a.says.contains(&says), "{}", a.says);
     let text = run(&["assess", "--machine", "swivel-head", "--plan", "head,table"]);
-    let with = format!("{} of {} leave a trace", a.effects.len() - without, a.effects.len());
+    let with = format!("{} of {} have an effect on the touches", a.effects.len() - without, a.effects.len());
     assert!(text.contains(&with), "{with}: {text}");
     let text = run(&["assess", "--machine", "trunnion", "--plan", "basic", "--json"]);
     let b: Assessment = serde_json::from_str(&text).unwrap();

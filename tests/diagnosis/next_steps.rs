@@ -44,7 +44,7 @@ fn commands(said: &str) -> Vec<String> {
 
 /// `diagnose` of the study: its words, after each command that it names has run and did something.
 fn diagnosed(at: &Path) -> String {
-    let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml"]).stdout).unwrap();
+    let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml", "--verbose"]).stdout).unwrap();
     for command in commands(&said) {
         let words: Vec<&str> = command.split(' ').skip(1).collect();
         let out = axiscal(at, &words);
@@ -63,7 +63,7 @@ fn a_column_of_the_other_sign_stops_every_verb() {
         let b = row.iter_mut().find(|c| c.0 == "B").unwrap();
         b.1 = b.1.parse::<f64>().map(|v| (-v).to_string()).unwrap();
     });
-    let says = "axis B is counted the wrong way round";
+    let says = "axis B counts the wrong way round";
     let (d, code) = json(at, &["diagnose", "study.toml"]);
     assert_eq!((d["verdict"].as_str(), code), (Some("missing-effect"), 1), "{}", d["says"]);
     assert!(d["says"].as_str().unwrap().contains(says), "{}", d["says"]);
@@ -71,7 +71,7 @@ fn a_column_of_the_other_sign_stops_every_verb() {
     assert_eq!(d["candidates"][0]["effect"], "sign-or-axis-swap", "{d}");
     assert!(d["gross"][0]["in_place"].as_f64().is_some_and(|s| s > 0.99), "{}", d["gross"]);
     let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml"]).stdout).unwrap();
-    assert!(said.contains("next: put that right") && unwrapped(&said).contains("would be where they belong"), "{said}");
+    assert!(said.contains("next: correct that") && unwrapped(&said).contains("would be where planned"), "{said}");
     let (c, _) = json(at, &["compare", "study.toml"]);
     assert!(c["says"].as_str().unwrap().contains(says) && c["explained_by_noise"] == false, "{}", c["says"]);
     let (i, _) = json(at, &["identify", "study.toml", "--quick"]);

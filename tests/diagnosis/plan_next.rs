@@ -118,7 +118,7 @@ fn moved_blocks_get_a_set_up_of_their_own() {
     let join = &next[..next.len() - 1];
     let out = axiscal(dir, &[join, &["--join", "next-3.log"]].concat());
     let said = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success() && said.contains("put up anew"), "{said}");
+    assert!(out.status.success() && said.contains("mounted again"), "{said}");
     let text = std::fs::read_to_string(dir.join("study.toml")).unwrap();
     assert!(!text.contains("mounting"), "{text}");
 }

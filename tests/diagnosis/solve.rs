@@ -4,7 +4,7 @@ use crate::common;
 
 use axiscal::diag::{Result, source};
 use axiscal::diagnose::answer::Candidate;
-use axiscal::diagnose::solving::{self, Added, Change, Ending, Host, Request, State, badness};
+use axiscal::diagnose::solving::{self, Added, Change, Ending, Host, Request, State};
 use axiscal::diagnose::{Options, Subject, diagnose};
 use axiscal::fit::{self, Settings};
 use axiscal::machine::Machine;
@@ -140,16 +140,16 @@ fn it_never_ends_worse_than_it_was() {
             // the model that is kept is the one that was fitted last, and what is said of it is what a diagnosis of it says
             assert_eq!(kept, state.fit.outcome.effects, "{}", about());
             let last = models.last().unwrap();
-            assert_eq!((&last.effects, last.verdict), (&kept, state.found.verdict), "{}", about());
+            assert_eq!((&last.effects, &last.verdict), (&kept, &state.found.verdict), "{}", about());
             let settings = bench.settings(&kept);
             let fit = fit::identify_data(&bench.machine, &bench.catalogue, data, &settings).unwrap();
             let subject =
                 Subject { machine: &bench.machine, catalogue: &bench.catalogue, settings: &settings, fit: &fit };
             let again = diagnose(subject, &LEAN).unwrap();
-            assert_eq!((again.verdict, &again.says), (state.found.verdict, &state.found.says), "{}", about());
+            assert_eq!((&again.verdict, &again.says), (&state.found.verdict, &state.found.says), "{}", about());
             // and no model before it was better
-            let best = models.iter().map(|m| badness(m.verdict, m.faint)).min().unwrap();
-            assert_eq!(badness(last.verdict, last.faint), best, "{}", about());
+            let best = models.iter().map(|m| m.verdict.badness()).min().unwrap();
+            assert_eq!(last.verdict.badness(), best, "{}", about());
             (
                 usize::from(best == 0),
                 usize::from(!ending.dropped.is_empty()),

@@ -10,6 +10,7 @@ mod library;
 mod many_findings;
 mod report;
 mod rooms;
+mod screens;
 mod shell;
 mod terminal;
 mod torture;

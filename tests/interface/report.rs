@@ -139,7 +139,7 @@ fn every_plot_has_its_files(folder: &Path, answer: &serde_json::Value, view: &se
         }
     }
     let csv = std::fs::read_to_string(folder.join("plots/residual-c.csv")).unwrap();
-    assert!(csv.starts_with("series,\"angle of axis C, deg\",\"miss, µm\",note\n"), "{}", &csv[..80]);
+    assert!(csv.starts_with("series,\"angle of axis C, deg\",\"residual, µm\",note\n"), "{}", &csv[..80]);
     assert!(csv.contains("run.log:"), "the source line of a touch is behind each point");
 }
 

@@ -47,6 +47,85 @@ fn rooms_import_only_what_stands_before_them() {
     assert!(files.len() > 100 && wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Files that take text apart because it comes from elsewhere.
+const READS_FOREIGN_TEXT: [(&str, &str); 7] = [
+    ("check/", "reads NC programs back"),
+    ("tables/control/backup.rs", "reads a control's backup"),
+    ("cli/export.rs", "recognises the backup among its own files"),
+    ("study/mod.rs", "the error of the TOML reader has no other form"),
+    ("words/diagnose.rs", "names of variables: `C before`"),
+    ("page/", "the page's template"),
+    ("diagnose/sketch.rs", "writes a sentence into a TOML file: quotes must go"),
+];
+
+const TAKES_APART: [&str; 10] = [
+    ".starts_with(",
+    ".ends_with(",
+    ".contains(",
+    ".split(",
+    ".split_once(",
+    ".rsplit_once(",
+    ".strip_prefix(",
+    ".strip_suffix(",
+    ".replace(",
+    ".find(",
+];
+
+/// No decision is taken from a sentence: it is not searched for words, split or rewritten.
+#[test]
+fn no_sentence_is_taken_apart() {
+    let mut files = Vec::new();
+    collect(Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let mut wrong = Vec::new();
+    for file in &files {
+        let inside = file.strip_prefix(concat!(env!("CARGO_MANIFEST_DIR"), "/src")).unwrap().display().to_string();
+        if READS_FOREIGN_TEXT.iter().any(|(allowed, _)| inside.starts_with(allowed)) {
+            continue;
+        }
+        let text = std::fs::read_to_string(file).unwrap();
+        let code = text.split("#[cfg(test)]\n").next().unwrap();
+        for (number, line) in code.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
+            if takes_a_sentence_apart(line) {
+                wrong.push(format!("{inside}:{}: {}", number + 1, line.trim()));
+            }
+        }
+    }
+    assert!(files.len() > 100 && wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Is a text searched for words of a sentence, or is a message searched for anything?
+fn takes_a_sentence_apart(line: &str) -> bool {
+    TAKES_APART.iter().any(|call| {
+        line.match_indices(call).any(|(at, _)| {
+            let (before, after) = (&line[..at], &line[at + call.len()..]);
+            let of_message = ["message", "says", "reason", "sentence", "detail", "tell_apart", "warning", "remark"]
+                .iter()
+                .any(|name| before.ends_with(name) || before.ends_with(&format!("{name}()")));
+            let quoted = after.trim_start_matches("&format!(").trim_start_matches('&').strip_prefix('"');
+            let words = quoted
+                .and_then(|text| text.split('"').next())
+                .is_some_and(|text| text.contains(' ') && text.chars().any(char::is_alphabetic));
+            (of_message && !after.starts_with('|')) || words
+        })
+    })
+}
+
+#[test]
+fn a_sentence_that_is_taken_apart_is_found() {
+    for bad in [
+        r#"if reason.starts_with("taken out") {"#,
+        r#"let plain = |text: String| text.replace(" um ", " µm ");"#,
+        r#"if !last.contains("left that no variation") {"#,
+        r#"let word = f.message.split('"').nth(1);"#,
+        r#"f.message.starts_with(&format!("formula {:?} of", text))"#,
+    ] {
+        assert!(takes_a_sentence_apart(bad), "{bad}");
+    }
+    for good in [r#"if id.starts_with("location-") {"#, r#"name.split('@').next()"#, r#"text.replace('-', "_")"#] {
+        assert!(!takes_a_sentence_apart(good), "{good}");
+    }
+}
+
 /// The sources without the unit tests in files of their own, which may use any room.
 fn collect(folder: PathBuf, files: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 /// A machine with something missing in its model, and a later run of it.
 const HIDDEN: &str = "seed = 4\n[effects.location-c]\nEX0C = 0.012\n[effects.radial-c-2]\nEXC2c = 6.0\nEYC2s = -5.0\n[noise]\ntouch_um = 0.5\n";
 
-fn axiscal(folder: &Path, columns: Option<&str>, args: &[&str]) -> std::process::Output {
+pub(super) fn axiscal(folder: &Path, columns: Option<&str>, args: &[&str]) -> std::process::Output {
     let mut command = Command::cargo_bin("axiscal").unwrap();
     command.current_dir(folder).args(args).env_remove("COLUMNS").env_remove("NO_COLOR");
     if let Some(columns) = columns {
@@ -19,7 +19,7 @@ fn axiscal(folder: &Path, columns: Option<&str>, args: &[&str]) -> std::process:
 }
 
 /// The folder that all tests read; what a verb changes is changed in a copy.
-fn folder() -> &'static Path {
+pub(super) fn folder() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     FOLDER
         .get_or_init(|| {
@@ -53,7 +53,7 @@ fn folder() -> &'static Path {
 }
 
 /// A copy, for verbs that write.
-fn copy() -> tempfile::TempDir {
+pub(super) fn copy() -> tempfile::TempDir {
     let to = tempfile::tempdir().unwrap();
     for entry in std::fs::read_dir(folder()).unwrap() {
         let entry = entry.unwrap();
@@ -62,11 +62,13 @@ fn copy() -> tempfile::TempDir {
     to
 }
 
-const READING: [&[&str]; 8] = [
+const READING: [&[&str]; 10] = [
     &["identify", "study.toml"],
+    &["identify", "study.toml", "--verbose"],
     &["compare", "study.toml"],
     &["compare", "study.toml", "--all"],
     &["diagnose", "study.toml"],
+    &["diagnose", "study.toml", "--verbose"],
     &["history", "study.toml"],
     &["verify", "study.toml", "later.toml"],
     &["assess", "--machine", "swivel-head", "--plan", "head.plan.json"],
@@ -210,7 +212,7 @@ fn a_number_is_never_broken() {
         let wide = printed(Some("160"));
         for narrow in [printed(Some("80")), printed(None)] {
             let sentences = narrow.replace("\n  ", " ");
-            let left_out = sentences.lines().find_map(|l| l.strip_prefix("too narrow here for: ")).unwrap_or_default();
+            let left_out = sentences.lines().find_map(|l| l.strip_prefix("no room for: ")).unwrap_or_default();
             let left_out: Vec<&str> = left_out.split(" (").next().unwrap().split(", ").collect();
             let mut words: std::collections::BTreeMap<&str, i64> = std::collections::BTreeMap::new();
             let lines = in_tables(&narrow);

@@ -60,7 +60,7 @@ fn a_chip_is_rejected_with_its_size_and_the_rest_is_left_alone() {
     for (run, index) in [(0, 17), (0, 18), (1, 60), (1, 100)] {
         let id = runs[run].1[index].id;
         let found = o.rejected.iter().find(|r| r.run == run + 1 && r.id == id);
-        assert!(found.is_some_and(|r| r.reason.contains("um off")), "{id} of run {run}: {:?}", o.rejected);
+        assert!(found.is_some_and(|r| r.reason.contains("µm off")), "{id} of run {run}: {:?}", o.rejected);
     }
     assert!(o.rejected.len() <= 5, "{:?}", o.rejected);
     assert!(o.rms_um < 1.1 && (o.chi2_per_dof - 1.0).abs() < 0.25, "{} {}", o.rms_um, o.chi2_per_dof);
@@ -408,7 +408,7 @@ fn nothing_falls_between_weak_and_unseen() {
         println!("{share}: {weak:?} {unseen}");
         let weak = weak.unwrap_or_else(|| panic!("{share}: {:?} {:?}", o.weak, o.undetermined));
         assert!(weak.times_typical > 100.0 && !unseen);
-        assert!(weak.says.contains("the place of axis C in X (EX0C)"), "{}", weak.says);
+        assert!(weak.says.contains("the position of axis C in X (EX0C)"), "{}", weak.says);
     }
 }
 

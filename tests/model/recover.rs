@@ -204,7 +204,7 @@ fn what_follows_a_held_value_says_by_how_much() {
             let fit = identify(&machine, &runs, &[&[first, second, "block-setup", "pretravel"], &more[..]].concat());
             let case = format!("{name} {programs:?} with {more:?}");
             let paper = axiscal::report::plot::Paper { width: 400, ascii: false, colour: false };
-            let said = axiscal::report::fit::outcome(&fit.outcome, paper);
+            let said = axiscal::report::fit::outcome(&fit.outcome, paper, true);
             let named = said.lines().find(|l| l.starts_with(axiscal::report::fit::FOLLOW)).unwrap_or_default();
             let results = truth.into_iter().filter(|t| !t.0.contains('@'));
             for (parameter, planted) in results.chain(planted.iter().map(|(name, value)| ((*name).to_owned(), *value)))

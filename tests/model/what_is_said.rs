@@ -72,7 +72,7 @@ fn what_would_help_after_an_aborted_run_is_asked_of_the_touches_made() {
 fn a_model_of_which_nothing_is_told_is_not_adequate() {
     let touches = clean(1.0);
     let few = diagnosed(&touches[..39], None);
-    assert_eq!(few.verdict, Verdict::TooLittleData, "{}", few.says);
+    assert!(matches!(few.verdict, Verdict::TooLittleData(_)), "{}", few.says);
     assert!(few.says.contains("EX0B") && few.says.contains("EB0C") && !few.says.contains("pretravel"), "{}", few.says);
     assert!(few.candidates.is_empty());
     let all = diagnosed(&touches, None);
@@ -86,12 +86,12 @@ fn a_noise_that_the_repeats_contradict_is_said_and_not_judged_by() {
     for stated in [0.3, 0.7, 20.0] {
         let found = diagnosed(&touches, Some(stated));
         assert_eq!(found.verdict, Verdict::Adequate, "{stated}: {}", found.says);
-        assert!(found.noise_says.contains(&format!("{stated:.2} um that the study states")), "{}", found.noise_says);
+        assert!(found.noise_says.contains(&format!("{stated:.2} µm that the study states")), "{}", found.noise_says);
         let fit = fitted(&touches, Some(stated));
         assert!((fit.outcome.noise_um - 1.0).abs() < 0.2, "{}", fit.outcome.noise_um);
         let warned = fit.outcome.warnings.join("\n");
-        assert!(warned.contains(&format!("states a noise of {stated:.2} um")), "{warned}");
-        assert!(!warned.contains("miss the model"), "{warned}");
+        assert!(warned.contains(&format!("states a noise of {stated:.2} µm")), "{warned}");
+        assert!(!warned.contains("something is missing in the model"), "{warned}");
         // a bound on the visits of nothing at all would be the stated noise's, not theirs
         assert!(fit.noise.tau_test_mm > 0.1e-3, "{}", fit.noise.tau_test_mm);
     }
@@ -119,7 +119,7 @@ fn hardly_any_degrees_of_freedom_are_not_called_none() {
             (axiscal::fit::VisitSource::Revisits, Some(dof), 0.3e-3);
         said.push(noise.says());
     }
-    assert!(said[0].contains("less than 0.1 degrees of freedom, at most 0.30 um"), "{said:?}");
+    assert!(said[0].contains("less than 0.1 degrees of freedom, at most 0.30 µm"), "{said:?}");
     assert!(said[1].contains("0.4 degrees of freedom") && said[2].contains("10 degrees of freedom"), "{said:?}");
     noise.tau_test_mm = 0.0;
     assert!(!noise.says().contains("at most") && noise.says().contains("own noise"), "{}", noise.says());
@@ -196,7 +196,7 @@ fn what_no_touches_part_is_said() {
     let found = diagnose(subject, &options).unwrap();
     let first = &found.candidates[0];
     assert_eq!((first.effect.as_str(), &first.same_as[..]), ("warm-up", &["spindle-growth".to_owned()][..]));
-    assert_eq!(first.tell_apart, axiscal::diagnose::NEVER_PARTED);
+    assert!(first.never_parted, "{}", first.tell_apart);
     assert!(first.never_parted);
 }
 
@@ -253,7 +253,7 @@ fn a_joined_log_finds_its_plan_by_its_name() {
 
     // an effect of which these touches see nothing changes nothing, and no digits of the arithmetic are shown
     let said = verbs::ok(at, &["add", "study.toml", "zero-b", "--dry-run"]);
-    assert!(said.contains("it stays as it is") && !said.contains("0.00000000"), "{said}");
+    assert!(said.contains("the cross-validated error stays the same") && !said.contains("0.00000000"), "{said}");
     assert!(said.contains("± in this table: one standard uncertainty"), "{said}");
 
     // a file that is not there has its line in the study

@@ -56,7 +56,7 @@ function row(effect, score) {
     const first = score.parameters[0];
     const words = score.visible
       ? `${standing(effect.id, score)}; probability ${chance(score.p_adjusted, score.ln_p)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
-      : "leaves no trace in these touches";
+      : "has no effect on these touches";
     const found = candidate(effect.id);
     const same = [...(found?.same_as ?? []), ...(found?.or_else ? [found.or_else] : [])];
     what.append(element("div", { class: "bar", "aria-hidden": "true" }, bar), element("small", {}, words));

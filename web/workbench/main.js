@@ -25,7 +25,7 @@ on("live", (live, newer, first) => {
   }
   if (newer) {
     document.body.dataset.version = live.version;
-    show("status", first ? "" : `${live.undo ? `done: ${live.undo}; ` : ""}${significant(live.rms_um)} µm RMS left, noise ${significant(live.noise_um)} µm`);
+    show("status", first ? "" : `${live.undo ? `done: ${live.undo}; ` : ""}${significant(live.rms_um)} µm RMS, noise ${significant(live.noise_um)} µm`);
     parameters(live);
   }
   verdict();
@@ -44,8 +44,8 @@ function verdict() {
   at.className = bad ? "bad" : found?.verdict === "adequate" ? "good" : "";
   at.dataset.verdict = found?.verdict ?? "";
   const ratio = significant(Math.sqrt(live.chi2_per_dof), 2);
-  const soFar = noise === null ? "As many unknowns as touches: nothing is left over to judge the model by."
-    : noise ? "What is left is as small as noise; whether it depends on something is being worked out …"
+  const soFar = noise === null ? "There are as many unknowns as touches: the model cannot be judged."
+    : noise ? "The residual is as small as the noise. Searching for a pattern in it …"
     : `The residuals are ${ratio} times the noise. Searching for the missing effect …`;
   // the rooms write um in plain letters
   const first = found?.candidates[0];
@@ -58,10 +58,10 @@ function verdict() {
   show("verdict", says?.replace(/(\d )um\b/g, "$1µm") ?? soFar);
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` It cannot be separated from ${[...first.same_as, ...(first.or_else ? [first.or_else] : [])].join(", ")}: a further program can.` : ""}`
-    : found.faint ? "What is left is as small as the noise, but for a faint pattern: write the program that tells more."
+    : found.faint ? "The residual is as small as the noise, except for a weak pattern: write the program that shows whether it is real."
     : open.size ? "Measure further poses: write the program that tells more, or run the full program."
-    : found.verdict === "unexplained" ? "No known effect explains what is left: try a formula of your own, or look at the touches that stand out."
-    : found.verdict === "adequate" ? "Nothing is missing that these touches can show: write the compensation." : "There are too few touches to judge: write a further program.");
+    : found.verdict === "unexplained" ? "No known effect explains the residual: try a formula of your own, or check the outliers."
+    : found.verdict === "adequate" ? "The model is complete as far as these touches can measure: write the compensation." : "There are too few touches to judge: write a further program.");
   const t = live.tolerance;
   const partly = !found || found.verdict === "adequate" ? "" : `; these values ${found.faint || found.verdict === "too-little-data" ? "may include" : "include"} part of the missing error`;
   byId("parameters").caption.textContent = `Results with their 95 % uncertainty, against ${t.error_um} µm at ${t.radius_mm} mm${partly}`;
@@ -77,7 +77,7 @@ function parameters(live) {
   for (const p of live.parameters) top[p.unit] = Math.max(top[p.unit] ?? 0, size(p));
   const rows = live.parameters.map((p) => {
     const told = p.sigma !== null;
-    return element("tr", {}, element("td", { class: "word" }, p.name, element("small", {}, p.says)), element("td", {}, told || p.status === "fixed" ? stated(p.value, p.sigma) : "not told"),
+    return element("tr", {}, element("td", { class: "word" }, p.name, element("small", {}, p.says)), element("td", {}, told || p.status === "fixed" ? stated(p.value, p.sigma) : "not determined"),
       element("td", {}, significant(p.expanded, 2)), element("td", { class: "word" }, p.unit), element("td", { class: "word" }, p.tolerance === null ? "–" : `${told && VERDICTS[p.judgement] ? `${VERDICTS[p.judgement]}: ` : ""}${significant(p.tolerance)}`), element("td", {}, told ? bar(p, top[p.unit]) : ""));
   });
   table.replaceChildren(table.caption, element("thead", {}, element("tr", {}, head)), element("tbody", {}, rows));

@@ -205,7 +205,7 @@ function draw(cell) {
   const layout = layoutOf({
     dragmode: "zoom", uirevision: "keep", selectionrevision: live.version,
     xaxis: { title: { text: cell.variable.title } },
-    yaxis: { title: { text: "miss, µm" }, range: [-scale, scale] },
+    yaxis: { title: { text: "residual, µm" }, range: [-scale, scale] },
     shapes: [{ type: "rect", layer: "below", xref: "paper", x0: 0, x1: 1, y0: -band, y1: band, fillcolor: colour("band"), line: { width: 0 } }],
   });
   const config = { ...CONFIG, modeBarButtonsToAdd: ["select2d", "lasso2d"] };
@@ -316,8 +316,8 @@ function ladder(live) {
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: live.noise_um, y1: live.noise_um, line: { dash: "dot", color: colour("soft") } }],
     annotations: [{ xref: "paper", x: 0, xanchor: "left", y: Math.log10(live.noise_um), yanchor: "bottom", bgcolor: colour("paper"), text: "noise of a touch", showarrow: false }],
   });
-  Plotly.react(byId("ladder"), [line("error left", "rms_um", "solid", "circle"), line("on index visits left out", "held_out_rms_um", "dash", "square")], layout, { ...CONFIG, displayModeBar: false });
-  const head = element("tr", {}, ["model", "error left, µm", "on index visits left out, µm", "χ²/dof"].map((h) => element("th", { scope: "col" }, h)));
+  Plotly.react(byId("ladder"), [line("residual", "rms_um", "solid", "circle"), line("cross-validated", "held_out_rms_um", "dash", "square")], layout, { ...CONFIG, displayModeBar: false });
+  const head = element("tr", {}, ["model", "residual, µm", "cross-validated, µm", "χ²/dof"].map((h) => element("th", { scope: "col" }, h)));
   const rows = steps.map((s, i) => element("tr", {}, [names[i], significant(s.rms_um), significant(s.held_out_rms_um), significant(s.chi2_per_dof)].map((v) => element("td", {}, v))));
   const table = byId("ladder-table");
   table.replaceChildren(table.caption, element("thead", {}, head), element("tbody", {}, rows));

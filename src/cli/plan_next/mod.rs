@@ -22,16 +22,16 @@ pub struct Args {
     /// Name of the controller, or a postprocessor file
     #[arg(long, short)]
     pub controller: String,
-    /// How long the program may take, minutes (putting up other blocks not counted)
+    /// How long the program may take, minutes (without mounting other blocks)
     #[arg(long, default_value_t = 10.0)]
     pub minutes: f64,
-    /// The effects that are to be told apart (default: what the data leave open)
+    /// The effects to separate (default: those that the data leave open)
     #[arg(long, value_delimiter = ',')]
     pub effects: Vec<String>,
-    /// The blocks were put up anew since the last run, or will be: their set-up is unknown again
+    /// The blocks were mounted again since the last run, or will be: their positions are unknown again
     #[arg(long)]
     pub moved: bool,
-    /// Put this log of the program into the study as its next run, instead of writing a program
+    /// Add this log of the program to the study as its next run, instead of writing a program
     #[arg(long, value_name = "LOG")]
     pub join: Option<PathBuf>,
 }
@@ -51,7 +51,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let request = Request { minutes: args.minutes, effects: &args.effects, moved: args.moved, name: &name };
     match plan_next(&loaded, &request, io)? {
         Next::NothingConfounded => {
-            io.say("the touches of this study tell every effect from every other: no further program is needed");
+            io.say("the touches of this study separate all effects: no further program is needed");
             io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": "nothing is confounded" }));
             Ok(Answer::Done)
         }

@@ -52,7 +52,7 @@ pub(super) fn write(
         Some(_) => io.say("leave the blocks as the last run left them"),
         None => io.say("put the blocks up first; the time for it is not counted"),
     }
-    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "told apart"]);
+    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "separated"]);
     for s in chosen.separations.iter().take(MOST_LISTED) {
         t.add_row(vec![
             Cell::new(&s.one),
@@ -71,8 +71,8 @@ pub(super) fn write(
     io.say(io.paper(false).plain(t.to_string()));
     let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
     io.say(format!(
-        "{} of {} pairs will be told apart by `diagnose` (with 95 % or more, whichever of the two acts); 25 and more of \
-         separation tells a pair apart nearly always",
+        "{} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts); a separation of 25 or \
+         more is nearly always enough",
         told(SAFELY),
         chosen.separations.len()
     ));
@@ -90,7 +90,7 @@ pub(super) fn write(
     };
     turns.iter().for_each(|says| io.say(says));
     for pair in &chosen.never {
-        io.say(format!("no touches of this machine tell {pair} apart: look at the machine which it is"));
+        io.say(format!("no touches of this machine separate {pair}: check at the machine which it is"));
     }
     let log = args.out.join(format!("{}.log", plan.program));
     io.say(format!(

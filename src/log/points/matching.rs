@@ -4,10 +4,10 @@
 use super::{Point, Points, PointsForm};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
+use crate::log::LogMistake;
 use crate::log::finding_places::{Capped, Places};
 use crate::log::matching::ranges;
 use crate::log::origin_shift::common_shift;
-use crate::log::setup_mistakes::shift_says;
 use crate::log::touch::{RawTouch, Status};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Plan, PlanTouch};
@@ -58,7 +58,7 @@ pub fn touches(
     findings.0.extend(other_ball.drain("points with another ball", "log::ball_radius"));
     findings.push(
         Finding::info("log::centres", "such a file holds centres of the ball as the control computed them")
-            .help("rotary axes are taken from the plan; times, missed touches and what the control's own transformation added cannot be told from it"),
+            .help("rotary axes are taken from the plan; times, missed touches and what the control's own transformation added are not in the file"),
     );
     Ok((out, unclear, findings))
 }
@@ -129,7 +129,7 @@ fn pair<'a>(
             unclear.extend(&ids);
             doubtful.push(|| {
                 let message = format!(
-                    "{} points stand at the nominal place of {} touches ({}): which is which cannot be told; they are not used",
+                    "{} points are at the planned position of {} touches ({}): they cannot be assigned and are not used",
                     alike.len(),
                     planned.len(),
                     ranges(&ids)
@@ -158,8 +158,9 @@ fn none_fits(plan: &Plan, points: &[Point], form: &PointsForm, places: &Places<'
         );
         return places.at_line(Finding::error("log::swapped", message).help(help), line);
     }
-    if let Some(by) = shift(plan, points) {
-        let message = format!("no point of the file is one of the plan; most would be if {}", shift_says(&by));
+    if let Some(by_mm) = shift(plan, points) {
+        let shift = LogMistake::Shift { by_mm, inches: false };
+        let message = format!("no point of the file is one of the plan; most would be if {}", shift.says());
         return places.at_line(Finding::error("log::swapped", message).help(OTHER_ZERO), line);
     }
     let distance = |p: &Point, t: &PlanTouch| (p.in_part(&p.nominal) - Vector3::from(t.point)).norm();

@@ -4,12 +4,12 @@ use super::backup::Old;
 use super::changes::{Division, SHEET};
 use super::fill::{Filled, Value as Entry};
 use super::{Export, Options};
-use crate::diag::{Failure, Findings, Result};
+use crate::diag::{Failure, Result};
 use crate::machine::Machine;
 use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, compile};
 use crate::tables::compensation::Grid;
 use crate::tables::correction::Correction;
-use crate::tables::linuxcnc::{head, head_of_readme, one_line, render};
+use crate::tables::linuxcnc::{head, one_line, render};
 use crate::units::{Plain, inch_from_mm, mm_from_inch};
 use minijinja::{Value, context};
 use nalgebra::Vector3;
@@ -102,25 +102,20 @@ pub(super) fn write(
     options: &Options,
     (first, others, division): (&Filled, &BTreeMap<&str, Filled>, &Division),
     export: &mut Export,
-    findings: &mut Findings,
 ) -> Result<()> {
-    let doubts: Vec<String> = findings
-        .0
-        .iter()
-        .filter(|f| f.code == "tables::unverified")
-        .map(|f| one_line(&f.message.replace(super::NOT_VERIFIED, ": ")))
-        .collect();
+    let unverified = export.compensation.tables.iter().flat_map(|t| &t.unverified);
+    let doubts: Vec<String> = unverified.clone().map(|(what, why)| one_line(&format!("{what}: {why}"))).collect();
     // for heads that have no room for the reasons
-    let doubted: Vec<String> = super::unverified_entries(findings).keys().map(|what| one_line(what)).collect();
+    let doubted: Vec<String> = unverified.map(|(what, _)| one_line(what)).collect();
     // of several tables of the same values the one that is open widest
     let by_width = |a: &&Vector3<f64>, b: &&Vector3<f64>| a.norm().total_cmp(&b.norm());
     let opened = std::iter::once(first).chain(others.values()).filter_map(|f| f.opened_mm.as_ref()).max_by(by_width);
     let head = head(machine, correction);
     let head_of = |restore: bool| -> Vec<String> {
         let says = if restore {
-            "The vectors of this file do not close, the new ones did: touch off all work offsets again, see README.txt"
+            "The vectors of this file do not close, the new ones did: touch off all work offsets again (README.txt)"
         } else {
-            "The old vectors did not close, the new ones do: touch off all work offsets again, see README.txt"
+            "The old vectors did not close, the new ones do: touch off all work offsets again (README.txt)"
         };
         head.iter().cloned().chain(opened.map(|_| says.to_owned())).collect()
     };
@@ -227,7 +222,7 @@ pub(super) fn write(
         README,
         &context! {
             ..common(false, None), ..context! {
-                own_head => head_of_readme(head_of(false)), says => tables.says.clone(), worksheet => tables.worksheet, load, cannot => tables.cannot.clone(),
+                own_head => head_of(false), says => tables.says.clone(), worksheet => tables.worksheet, load, cannot => tables.cannot.clone(),
                 files => files.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>(),
                 variants => tables.file.iter().filter(|f| f.variant).map(|f| f.name.clone()).collect::<Vec<_>>(),
                 reads => tables.reads.is_some() && division.complete(),

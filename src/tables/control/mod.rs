@@ -342,7 +342,7 @@ pub fn export(
     }
     let division =
         Division::of(tables, (&filled, &others), &grid_list, active.and_then(|a| a.tables.as_ref()), &options.old);
-    say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
+    let unverified = say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
     let lacking = filled.lacking(&options.old, spellings.first().copied());
     let instead = format!("no file with values is written, {SHEET} says by how much each value changes");
     if division.values_known || filled.values.is_empty() {
@@ -385,7 +385,7 @@ pub fn export(
             .help("`axiscal identify` says what the data cannot tell"),
         );
     }
-    let ((), mut findings) = findings.finish(())?;
+    let ((), findings) = findings.finish(())?;
     let pieces = left::Pieces {
         machine,
         correction,
@@ -434,7 +434,7 @@ pub fn export(
         zero_deg: zero,
         grids: grid_list,
         workpiece_shift_mm: shift.into(),
-        unverified: unverified_entries(&findings),
+        unverified,
     };
     let compensation = Compensation {
         format: FORMAT.to_owned(),
@@ -464,7 +464,7 @@ pub fn export(
         table_errors,
     };
     let tables_of = (&filled, &others, &division);
-    files::write(machine, tables, kind, &noted, options, tables_of, &mut export, &mut findings)?;
+    files::write(machine, tables, kind, &noted, options, tables_of, &mut export)?;
     Ok((export, findings))
 }
 
@@ -508,16 +508,6 @@ fn add_angles(
     out
 }
 
-/// What stands between an entry that nobody has verified and the reason.
-const NOT_VERIFIED: &str = ": not verified: ";
-
-/// Names of the entries that nobody has verified, and why.
-fn unverified_entries(findings: &Findings) -> BTreeMap<String, String> {
-    let unverified = findings.0.iter().filter(|f| f.code == "tables::unverified");
-    let parts = unverified.filter_map(|f| f.message.split_once(NOT_VERIFIED));
-    parts.map(|(what, why)| (what.to_owned(), why.to_owned())).collect()
-}
-
 /// Entries of the tables for a machine that were not run on a real control: what `--accept-unverified` accepts.
 #[must_use]
 pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec<String> {
@@ -543,7 +533,7 @@ pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec
     out
 }
 
-/// Entries that nobody has verified: refused, or said.
+/// Entries that are not verified, and why: refused, or reported.
 fn say_unverified(
     tables: &Tables,
     kind: &Kind,
@@ -551,7 +541,7 @@ fn say_unverified(
     (grids, division): (bool, &Division),
     options: &Options,
     findings: &mut Findings,
-) {
+) -> BTreeMap<String, String> {
     let mut doubts: Vec<(String, String)> = Vec::new();
     let mut add = |what: String, why: Option<String>| {
         if let Some(why) = why {
@@ -573,8 +563,8 @@ fn say_unverified(
     for file in tables.file.iter().filter(|f| division.files.contains(&f.name)) {
         add(format!("file {}", file.name), doubt(file.source.as_ref(), file.unverified.as_ref()));
     }
-    for (what, why) in doubts {
-        let message = format!("{what}{NOT_VERIFIED}{why}");
+    for (what, why) in &doubts {
+        let message = format!("{what}: not verified: {why}");
         findings.push(if options.accept_unverified {
             Finding::warning("tables::unverified", message)
                 .help("compare it with the control's manual and its own backup before you load it")
@@ -583,6 +573,7 @@ fn say_unverified(
                 .help("compare it with the control's manual and backup; --accept-unverified writes it all the same")
         });
     }
+    doubts.into_iter().collect()
 }
 
 /// The first of some names; a person who needs the rest finds it in the sheet.

@@ -264,16 +264,9 @@ pub(in crate::tables) fn head(machine: &Machine, correction: &Correction) -> Vec
     ];
     // whoever loads it has not seen the screen
     if !p.forced.is_empty() {
-        lines.push(format!("FORCED, {} spoke against it: README.txt says what", count(p.forced.len())));
+        lines.push(format!("FORCED, {} spoke against it (listed in README.txt)", count(p.forced.len())));
     }
     lines
-}
-
-/// The same lines in README.txt itself.
-pub(in crate::tables) fn head_of_readme(head: Vec<String>) -> Vec<String> {
-    let here =
-        |line: String| line.replace(": README.txt says what", ", see below").replace("see README.txt", "see below");
-    head.into_iter().map(here).collect()
 }
 
 fn count(n: usize) -> String {

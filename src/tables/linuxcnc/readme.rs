@@ -1,7 +1,7 @@
 //! README.txt of an export: what is carried, what is not and how large an error that leaves, how to load, how to go back.
 
 use super::pack::Packing;
-use super::{Left, Way, component, head, head_of_readme, one_line, render, stock};
+use super::{Left, Way, component, head, one_line, render, stock};
 use crate::diag::Result;
 use crate::machine::{Carrier, Side};
 use crate::tables::compensation::Term;
@@ -110,7 +110,7 @@ pub(super) fn text(packing: &Packing, by_component: &Way, by_stock: &Way) -> Res
         "README.txt",
         TEMPLATE,
         &context! {
-            head => head_of_readme(head(machine, correction)),
+            head => head(machine, correction),
             forced => correction.provenance.forced.iter().map(|l| one_line(l)).collect::<Vec<_>>(),
             component => component::name(machine),
             coordinates => packing.joints.coordinates(),

@@ -2,7 +2,7 @@
 
 use crate::diag::{Finding, Result, Severity};
 use crate::diagnose::consequence::Consequence;
-use crate::diagnose::{Diagnosis, Verdict};
+use crate::diagnose::Diagnosis;
 use crate::fit::Fit;
 use crate::report::fit::significant;
 use crate::tables::correction::left_um;
@@ -41,12 +41,12 @@ impl Doubt {
     fn says(&self, radius_mm: f64) -> String {
         let Consequence { parameter, unit, off, because, .. } = &self.what;
         let size = match self.off_um {
-            Some(um) => format!("{} um at {} mm", significant(um), Plain(radius_mm)),
+            Some(um) => format!("{} µm at {} mm", significant(um), Plain(radius_mm)),
             None => format!("{} {unit}", significant(*off)),
         };
         // in the same unit, so that the two can be compared
         let limit = match self.off_um.filter(|_| self.ratio() > 0.0) {
-            Some(um) => format!("{} um", significant(um / self.ratio())),
+            Some(um) => format!("{} µm", significant(um / self.ratio())),
             None => format!("{} {unit}", significant(self.tolerance)),
         };
         format!("{parameter} could be wrong by {size}; its tolerance is {limit} (cause: {because})")
@@ -77,15 +77,12 @@ fn doubts(loaded: &Loaded, found: &Diagnosis) -> Vec<Doubt> {
 /// tolerance, and else refuses the export.
 pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, env: &dyn Environment) -> Result<Judged> {
     let found = loaded.diagnose(&loaded.settings(), fit, &VERDICT)?;
-    let word = match found.verdict {
-        Verdict::Adequate => return Ok(Judged::default()),
-        Verdict::TooLittleData if !found.most_missed => return Ok(Judged::default()),
-        Verdict::TooLittleData => "too-little-data",
-        Verdict::MissingEffect => "missing-effect",
-        Verdict::Unexplained => "unexplained",
-    };
+    if !found.verdict.is_no() {
+        return Ok(Judged::default());
+    }
+    let word = found.verdict.as_str();
     let doubts = doubts(loaded, &found);
-    let named = found.candidates.first().filter(|_| found.verdict == Verdict::MissingEffect);
+    let named = found.candidates.first().filter(|_| found.verdict.is_missing_effect());
     let named = named.map_or_else(String::new, |c| format!(" ({})", c.effect));
     let radius_mm = loaded.study.tolerance.radius_mm;
     let refused = match (found.mistake(), doubts.first()) {
@@ -94,7 +91,7 @@ pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, env: &dyn Environm
         (None, worst) => {
             let most = worst.map_or_else(|| "no exported value depends on it".to_owned(), |d| d.says(radius_mm));
             let says = format!("the diagnosis is {word}{named}; the largest consequence: {most}");
-            let remark = if found.faint {
+            let remark = if found.verdict.is_weak_pattern() {
                 Finding::info("export::verdict", says)
             } else {
                 Finding::warning("export::verdict", says)

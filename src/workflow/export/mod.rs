@@ -260,7 +260,7 @@ pub(super) fn correction(
     let holds: Vec<String> = crate::report::fit::held(&fit.outcome.parameters).collect();
     if !holds.is_empty() {
         let says = format!("{}: {}", crate::report::fit::HOLDS, holds.join("; "));
-        let help = "where such an error is none of the machine (a stylus length that was entered wrongly, say), put it right and measure \
+        let help = "where such an error is none of the machine (a stylus length that was entered wrongly, say), correct it and measure \
                     again before this is loaded";
         remarks.push(Finding::info("export::holds", says).help(help));
     }

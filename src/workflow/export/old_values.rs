@@ -117,7 +117,7 @@ fn written_by_an_export(backup: &Source, correction: &Correction) -> Option<Find
     (new_values && correction.active.is_none() && correction.transformation).then(|| {
         Finding::warning(
             "export::written_before",
-            format!("{} holds the new values of an export, and the study names no compensation", backup.name()),
+            format!("{} has the new values of an export, and the study names no compensation", backup.name()),
         )
         .help("if they were loaded when these touches were made, name that export as `compensation` in the study; if not, give what the control held then")
     })

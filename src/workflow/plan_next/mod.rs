@@ -9,7 +9,9 @@ use super::{Environment, Loaded};
 use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{self, LinearisedPlan, Room};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::verdict::{NotNamed, TooLittle, Unexplained};
 use crate::diagnose::{Diagnosis, Options, Verdict, sketch::sketch};
+use crate::fit::candidates::NoValue;
 use crate::fit::{Fit, Settings, effects_of};
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::search::distinguishability::SEEN;
@@ -70,8 +72,8 @@ impl NoProgram {
     }
 }
 
-fn warn<'a>(said: impl Iterator<Item = &'a String>, env: &dyn Environment) {
-    env.remark(&said.map(|w| Finding::warning("next::left_out", w.clone())).collect::<Vec<_>>());
+fn warn(said: impl Iterator<Item = String>, env: &dyn Environment) {
+    env.remark(&said.map(|w| Finding::warning("next::left_out", w)).collect::<Vec<_>>());
 }
 
 /// Chooses the touches that separate most of what the study leaves open, and proves that they can be reached.
@@ -87,7 +89,7 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
         Err(no_program) => return Ok(Next::NoProgram(no_program)),
     };
     let sketched = open.sketched(loaded, request);
-    if let Some(no_program) = open.unexplained(request, sketched.as_ref()) {
+    if let Some(no_program) = open.no_program(request, sketched.as_ref()) {
         return Ok(Next::NoProgram(no_program));
     }
     let mut setting = Setting::new(loaded, &open.settings.effects, &open.fit)?;
@@ -97,12 +99,12 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
     }
     let effects = asked_effects(loaded, &questions, sketched.as_ref());
     let asked_of = LinearisedPlan::with_effects(&setting.task, &setting.runs, &setting.known, setting.noise, &effects)?;
-    if let Some((_, says)) = asked_of.left_out.first() {
-        return Err(Failure::new("next::no_value", says.clone())
-            .help("write its formula so that it holds at every touch, or ask for other effects"));
+    if let Some(bad) = asked_of.left_out.first() {
+        return Err(Failure::new("next::no_value", bad.left_out())
+            .help("write its formula so that it has a value at every touch, or ask for other effects"));
     }
     let best = best(loaded, &mut setting, &effects, &questions, request, env)?;
-    warn(setting.holes.borrow().iter(), env);
+    warn(setting.holes.borrow().iter().cloned(), env);
     let never = setting.never(&questions);
     if never.len() == questions.pairs.len() {
         let says = format!(
@@ -116,9 +118,8 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
         return Ok(Next::NoProgram(NoProgram::of(says, more)));
     }
     let Some(mut chosen) = best else {
-        return Err(Failure::new("next::nothing", "no reachable touch parts these effects within the time").help(
-            "give more time (--minutes), let the blocks be put up anew (--moved), or name other effects (--effects)",
-        ));
+        return Err(Failure::new("next::nothing", "no reachable touch separates these effects within the time")
+            .help("give more time (--minutes), mount the blocks again (--moved), or name other effects (--effects)"));
     };
     chosen.never = never;
     let of_room = goes_with_room(&setting, &effects);
@@ -142,16 +143,20 @@ impl Open {
         effects_of(request.effects, &loaded.catalogue, &loaded.machine)?;
         let mut open = Self::look(loaded, settings)?;
         if let Some(mistake) = open.found.mistake() {
-            let says = format!("a gross mistake must be put right first, and the touches made again: {mistake}");
+            let says = format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}");
             return Ok(Err(NoProgram::of(says, &open.found.says)));
         }
-        if request.effects.is_empty() && open.found.untold {
+        let nothing_determined =
+            matches!(open.found.verdict, Verdict::TooLittleData(TooLittle::NothingDetermined(_)));
+        if request.effects.is_empty() && nothing_determined {
             design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut open.fit)?;
             let help = match &open.fit.outcome.parted_together[..] {
                 [] => "run the program to its end, or touch in more poses, and ask again".to_owned(),
-                remedies => format!("run the program to its end; or what tells them: {}", remedies.join("; and ")),
+                remedies => {
+                    format!("run the program to its end; or add touches that determine them: {}", remedies.join("; and "))
+                }
             };
-            let says = format!("nothing to part before the model's own errors are told. {}", open.found.says);
+            let says = format!("the model's own errors must be determined first. {}", open.found.says);
             return Ok(Err(NoProgram::of(says, help)));
         }
         if request.effects.is_empty() && !open.found.leaves_open() {
@@ -178,24 +183,27 @@ impl Open {
         Ok(Self { settings, fit, found })
     }
 
-    fn is_unexplained(&self, request: &Request) -> bool {
-        request.effects.is_empty() && !self.found.leaves_open() && self.found.verdict == Verdict::Unexplained
+    fn unexplained(&self, request: &Request) -> Option<&Unexplained> {
+        let found = self.found.verdict.unexplained();
+        found.filter(|_| request.effects.is_empty() && !self.found.leaves_open())
     }
 
+    /// Further touches show whether a weak pattern is there.
     fn sketched(&self, loaded: &Loaded, request: &Request) -> Option<Sketched> {
-        let is_asked = self.is_unexplained(request) && self.found.touches_would_tell();
+        let found = self.unexplained(request)?;
+        let weak = found.why == NotNamed::WeakPattern && found.sketchable;
+        let is_asked = weak && self.found.verdict.moved_block().is_none();
         if is_asked { Sketched::of(loaded, &self.settings, &self.fit) } else { None }
     }
 
-    /// A faint pattern is there or is not: touches tell. A clear one is there, and no known effect stands against another.
-    fn unexplained(&self, request: &Request, sketched: Option<&Sketched>) -> Option<NoProgram> {
-        if !self.is_unexplained(request) || (self.found.faint && sketched.is_some()) {
-            return None;
-        }
-        let says = format!("nothing here to part: no known effect explains what is left. {}", self.found.says);
-        Some(match self.found.sketchable {
+    /// A clear pattern is there, and no known effects have to be separated.
+    fn no_program(&self, request: &Request, sketched: Option<&Sketched>) -> Option<NoProgram> {
+        let found = self.unexplained(request).filter(|_| sketched.is_none())?;
+        let says =
+            format!("no known effect explains the residual, so there are no effects to separate. {}", self.found.says);
+        Some(match found.sketchable {
             true => NoProgram { says, advice: Advice::Sketch },
-            false => NoProgram::of(says, crate::words::diagnose::machine_check(self.found.machine_check())),
+            false => NoProgram::of(says, crate::words::diagnose::machine_check(&found.check)),
         })
     }
 
@@ -211,24 +219,24 @@ impl Open {
             return Ok(Questions {
                 pairs: vec![Pair { one: s.effect.id.clone(), other: None }],
                 suspects: vec![Suspect { id: s.effect.id.clone(), size: s.size.clone(), shape: None }],
-                says: format!("is this faint pattern there at all? {}", s.says),
+                says: format!("is this weak pattern real? {}", s.says),
             });
         }
         if !request.effects.is_empty() {
             return Ok(Questions::named(request.effects));
         }
-        warn(found.warnings.iter(), env);
+        warn(found.warnings.iter().cloned(), env);
         if found.leaves_open() {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
             return Ok(Questions::left_open(found.open.suspects.clone(), &found.open.pairs));
         }
         let view = LinearisedPlan::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
-        let left_out = view.left_out.iter().map(|(_, says)| says);
+        let left_out = view.left_out.iter().map(NoValue::left_out);
         warn(left_out.filter(|says| !found.warnings.contains(says)), env);
         let asked = Questions::of_plan(&view);
         Ok(match found.verdict {
-            Verdict::TooLittleData => Questions {
+            Verdict::TooLittleData(_) => Questions {
                 says: format!("{} These effects would be confounded if one of them acted", found.says),
                 ..asked
             },
@@ -304,7 +312,7 @@ fn best(
         env.remark(&[Finding::info(
             "next::other_blocks",
             format!(
-                "with mounting {:?} put up anew {} of {} pairs would be told apart",
+                "with mounting {:?} mounted again, {} of {} pairs would be separated",
                 other.generated.plan.mounting,
                 other.told(),
                 other.separations.len()
@@ -319,11 +327,11 @@ fn best(
 fn not_worth_it(chosen: &Chosen, questions: &Questions, of_room: bool, request: &Request) -> Option<NoProgram> {
     if chosen.separations.iter().all(|s| s.most() <= GAIN * s.before) {
         let says = format!(
-            "{}: these touches tell it as well as any program of {:.0} minutes would",
+            "{}: these touches determine it as well as any program of {:.0} minutes would",
             says(questions),
             request.minutes
         );
-        let moved = if chosen.label.is_none() { " with the blocks put up anew" } else { "" };
+        let moved = if chosen.label.is_none() { " with the blocks mounted again" } else { "" };
         let more = format!("no program{moved} brings more: confirm it at the machine, or give more time (--minutes)");
         return Some(NoProgram::of(says, more));
     }
@@ -332,7 +340,7 @@ fn not_worth_it(chosen: &Chosen, questions: &Questions, of_room: bool, request: 
         return None;
     }
     let says = format!(
-        "no program of {:.0} minutes that this machine can run would tell any of these effects apart: {}",
+        "no program of {:.0} minutes on this machine would separate any of these effects: {}",
         request.minutes,
         says(questions)
     );

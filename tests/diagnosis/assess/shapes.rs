@@ -46,7 +46,7 @@ fn what_is_expected_of_a_time_constant_is_what_the_fit_says() {
         assert!((then / said - 1.0).abs() < 0.02, "{}: {said} expected, {then} found", p.name);
     }
     assert!(
-        expected.warnings.iter().any(|w| w.starts_with("tau (Warm-up) is looked at where it is 0.5 h")),
+        expected.warnings.iter().any(|w| w.starts_with("tau (Warm-up) is examined where it is 0.5 h")),
         "{:?}",
         expected.warnings
     );
@@ -73,15 +73,19 @@ fn a_shape_that_touches_would_not_tell_is_said_before() {
     let says = |a: &Assessment, word: &str| a.warnings.iter().any(|w| w.contains(word));
     let told = with("full", "pitch-x");
     assert!(
-        row(&told, "pitch_X").unwrap().sigma.is_some_and(|s| s < 0.1) && !says(&told, "may not tell it from"),
+        row(&told, "pitch_X").unwrap().sigma.is_some_and(|s| s < 0.1) && !says(&told, "may not separate it from"),
         "{:?}",
         told.warnings
     );
     let not = with("head", "pitch-x");
-    assert!(row(&not, "pitch_X").unwrap().sigma.is_none() && says(&not, "may not tell it from"), "{:?}", not.warnings);
+    assert!(
+        row(&not, "pitch_X").unwrap().sigma.is_none() && says(&not, "may not separate it from"),
+        "{:?}",
+        not.warnings
+    );
     let slip = with("full", "block-slip");
     assert!(row(&slip, "from_h").is_none() && row(&slip, "dx").unwrap().sigma.is_some(), "{:?}", slip.parameters);
-    assert!(says(&slip, "from_h") && says(&slip, "trying every place"), "{:?}", slip.warnings);
+    assert!(says(&slip, "from_h") && says(&slip, "trying every position"), "{:?}", slip.warnings);
 }
 
 /// A slip is looked at among the touches: behind the last one, where its range of hours begins, it moved nothing.
@@ -149,7 +153,7 @@ fn what_each_block_does_by_itself_is_expected_too() {
     for block in ["a", "b", "c", "f"] {
         let says = format!("st@full/{block} (");
         assert!(
-            expected.warnings.iter().any(|w| w.starts_with(&says) && w.contains("is looked at where it is 0.5 h")),
+            expected.warnings.iter().any(|w| w.starts_with(&says) && w.contains("is examined where it is 0.5 h")),
             "{block}: {:?}",
             expected.warnings
         );

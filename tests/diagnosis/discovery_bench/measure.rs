@@ -134,7 +134,7 @@ pub fn outcome(bench: &Bench, base: &str, case: &Sized, seed: u64) -> Outcome {
         other_shape: case.hidden.other_shape,
         lambda: case.lambda,
         proposed: d.candidates.first().is_some_and(|c| c.p_adjusted < 0.05),
-        verdict: d.verdict,
+        verdict: d.verdict.clone(),
         by_name: groups.first().is_some_and(|g| right(&g[0])),
         first_group: groups.first().is_some_and(|g| g.iter().any(right)),
         first_three: groups.iter().any(|g| g.iter().any(right)),
@@ -178,7 +178,7 @@ pub fn clean(bench: &Bench, count: u64, visit_told_um: Option<f64>, seed: u64) -
                 d.noise_um,
                 d.visit_um
             );
-            Clean { verdict: d.verdict, because }
+            Clean { verdict: d.verdict.clone(), because }
         })
         .collect()
 }

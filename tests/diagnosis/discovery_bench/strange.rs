@@ -66,7 +66,7 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
     Seen {
         kind,
         lambda,
-        verdict: d.verdict,
+        verdict: d.verdict.clone(),
         first: d.depends.first().map(|w| format!("{} ({:.2})", w.id, w.share)),
         depends: d.depends.iter().map(|w| w.by.clone()).collect(),
         rejected: d.outliers.len(),
