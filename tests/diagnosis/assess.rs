@@ -563,10 +563,12 @@ fn the_verb_answers_in_json_and_side_by_side() {
     assert!(text.contains(&with), "{with}: {text}");
     let text = run(&["assess", "--machine", "trunnion", "--plan", "basic", "--json"]);
     let b: Assessment = serde_json::from_str(&text).unwrap();
-    let says =
-        format!("{} effects leave no trace (not counted against it: ", b.effects.iter().filter(|e| !e.visible).count());
+    let says = format!(
+        "{} effects have no effect on the touches (not counted against it: ",
+        b.effects.iter().filter(|e| !e.visible).count()
+    );
     assert!(b.says.contains(&says), "{}", b.says);
-    for part in ["tool-length, which EZ0A holds", "angular-cy, angular-cz, stylus-sag", "which move nothing here"] {
+    for part in ["tool-length, which EZ0A includes", "angular-cy, angular-cz, stylus-sag", "which move nothing here"] {
         assert!(b.says.contains(part), "{part}: {}", b.says);
     }
     let text = run(&["assess", "--machine", "swivel-head", "--plan", "head,table", "--plan", "full"]);
