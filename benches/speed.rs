@@ -129,9 +129,9 @@ fn candidates(c: &mut Criterion) {
         }
         let settings = Settings { quick: true, ..problem.settings() };
         let fit = fit::identify_data(&problem.machine, &problem.catalogue, problem.data(), &settings).unwrap();
-        let evidence = Evidence::of(&fit);
+        let evidence = Evidence::from_fit(&fit);
         group.bench_function(BenchmarkId::new(n_touches.to_string(), n_unknowns), |b| {
-            b.iter(|| Named::of(&fit, &evidence, &problem.machine, &problem.catalogue));
+            b.iter(|| Named::for_fit(&fit, &evidence, &problem.machine, &problem.catalogue));
         });
     });
 }

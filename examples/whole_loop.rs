@@ -50,7 +50,7 @@ pub fn run() -> Result<Vec<f64>> {
     }
 
     // the compensation as the control's own tables
-    let request = ExportRequest::of("linuxcnc");
+    let request = ExportRequest::new("linuxcnc");
     let form = request.form(&files)?;
     let exported = export(&loaded, &form, &request, &files)?;
     for (name, contents) in exported.files() {

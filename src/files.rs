@@ -111,7 +111,7 @@ pub fn write_together(files: &[(PathBuf, &[u8])]) -> Result<()> {
     let differs = |(path, contents): &&(PathBuf, &[u8])| std::fs::read(path).ok().as_deref() != Some(contents);
     let mut staged = Vec::new();
     for (path, contents) in files.iter().filter(differs) {
-        staged.push((path, Staged::of(path, contents)?));
+        staged.push((path, Staged::stage(path, contents)?));
     }
     for (path, file) in staged.iter().filter(|(path, _)| **path != files[0].0).rev() {
         if file.target.exists() {
@@ -148,7 +148,7 @@ fn put(path: &Path, contents: &[u8]) -> Result<()> {
         };
         return write().map_err(|e| unwritable(path, &e));
     }
-    Staged::of(path, contents)?.persist(path)
+    Staged::stage(path, contents)?.persist(path)
 }
 
 /// A new file, whole, beside the place that it will take.
@@ -158,7 +158,7 @@ struct Staged {
 }
 
 impl Staged {
-    fn of(path: &Path, contents: &[u8]) -> Result<Self> {
+    fn stage(path: &Path, contents: &[u8]) -> Result<Self> {
         Self::try_of(path, contents).map_err(|e| unwritable(path, &e))
     }
 

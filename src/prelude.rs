@@ -74,7 +74,7 @@
 //! let changed = change_study(study, Edit::Add(&missing), None, false, &files)?;
 //! assert!(changed.after.outcome.rms_um < 0.5 * changed.before.outcome.rms_um);
 //!
-//! let request = ExportRequest::of("linuxcnc");
+//! let request = ExportRequest::new("linuxcnc");
 //! let form = request.form(&files)?;
 //! let exported = export(&changed.loaded, &form, &request, &files)?;
 //! assert!(exported.files().iter().any(|(name, _)| name == "README.txt"));

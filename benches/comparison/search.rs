@@ -46,10 +46,10 @@ fn measure(n_touches: usize, n_unknowns: usize) -> ScoreTests {
     let settings = Settings { quick: true, ..problem.settings() };
     let (machine, catalogue) = (problem.machine.clone(), problem.catalogue.clone());
     let fit = fit::identify_data(&machine, &catalogue, problem.data(), &settings).unwrap();
-    let evidence = Evidence::of(&fit);
-    let named = Named::of(&fit, &evidence, &machine, &catalogue);
+    let evidence = Evidence::from_fit(&fit);
+    let named = Named::for_fit(&fit, &evidence, &machine, &catalogue);
     let few = if n_touches > 1000 { 3 } else { 20 };
-    let columns_s = fastest(few, || drop(Named::of(&fit, &evidence, &machine, &catalogue)));
+    let columns_s = fastest(few, || drop(Named::for_fit(&fit, &evidence, &machine, &catalogue)));
     let tests_s = fastest(5 * few, || drop(Search::new(evidence.question(), &named.library)));
     let (mut solves_s, mut refits_s) = (0.0, 0.0);
     for effect in &named.effects {

@@ -42,7 +42,7 @@ impl HiddenRotation {
     const PER_MM: f64 = 0.0004;
 
     /// The state that a control begins in.
-    pub fn of(start: Start) -> Self {
+    pub fn from_start(start: Start) -> Self {
         if let Start::Rotated(turn) = start { Self::Acts(turn) } else { Self::None }
     }
 

@@ -330,7 +330,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
                 dead.extend(spindle::searches_dead(told, on, off));
             }
             if kind == Kind::Begun {
-                begun.push(Begun::of(told));
+                begun.push(Begun::from_run(told));
                 faultless &= told.fault.is_none();
             }
             each(kind, told);

@@ -10,11 +10,11 @@ use crate::workflow::load_controller;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
-    what: Option<What>,
+    what: Option<ControllersCommand>,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum ControllersCommand {
     /// Print one: the file, to save, change and use with `--controller FILE.toml`
     Show {
         /// Its name, or a file of your own to check
@@ -46,7 +46,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
                 "log_forms": forms.iter().map(form_facts).collect::<Vec<_>>(),
             }));
         }
-        Some(What::Show { name }) => {
+        Some(ControllersCommand::Show { name }) => {
             // `csv` is no file
             let shown = match Reader::load(name, crate::files::read_text) {
                 Ok((Reader::Points(form), findings)) => Some((form, findings)),

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// `show ID` prints one effect
     #[command(subcommand)]
-    pub what: Option<What>,
+    pub what: Option<EffectsCommand>,
     /// Only those that apply to this machine
     #[arg(long, short, global = true)]
     pub machine: Option<String>,
@@ -27,7 +27,7 @@ pub struct Args {
 
 /// What to print.
 #[derive(Debug, clap::Subcommand)]
-pub enum What {
+pub enum EffectsCommand {
     /// Print one effect
     Show {
         /// Its id
@@ -45,7 +45,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     let here = |e: &&Effect| machine.as_ref().is_none_or(|m| e.applies_to(m));
     match &args.what {
-        Some(What::Show { id }) => {
+        Some(EffectsCommand::Show { id }) => {
             let rows: Vec<&Effect> = catalogue.iter().filter(|e| &e.id == id).filter(here).collect();
             if rows.is_empty() {
                 return Err(unknown(id, &catalogue, machine.as_ref()));

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// `show NAME` prints one machine
     #[command(subcommand)]
-    pub what: Option<What>,
+    pub what: Option<MachinesCommand>,
     /// A machines.toml of your own (default: the one built in)
     #[arg(long, value_name = "FILE", global = true)]
     pub machines: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub struct Args {
 
 /// What to print.
 #[derive(Debug, clap::Subcommand)]
-pub enum What {
+pub enum MachinesCommand {
     /// Print one machine
     Show {
         /// Its name
@@ -34,7 +34,7 @@ pub enum What {
 /// When the file is unusable or there is no such machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     match &args.what {
-        Some(What::Show { name }) => show(&load_machine(name, args.machines.as_deref(), io)?, io),
+        Some(MachinesCommand::Show { name }) => show(&load_machine(name, args.machines.as_deref(), io)?, io),
         None => {
             let machines = load_machines(args.machines.as_deref(), io)?;
             let mut t = table(&["machine", "workpiece side", "tool side", "what it is"]);

@@ -16,12 +16,12 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// `show NAME` prints one program
     #[command(subcommand)]
-    pub what: Option<What>,
+    pub what: Option<ProgramsCommand>,
 }
 
 /// What to print.
 #[derive(Debug, clap::Subcommand)]
-pub enum What {
+pub enum ProgramsCommand {
     /// Print the set-ups of one program and their counts
     Show {
         /// Its name, or a file of your own: FILE.toml
@@ -41,7 +41,7 @@ pub enum What {
 /// # Errors
 /// When there is no such program, or a file is unusable.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let Some(What::Show { name, machine, machines, toml }) = &args.what else {
+    let Some(ProgramsCommand::Show { name, machine, machines, toml }) = &args.what else {
         let specs = program::built_in()?;
         let mut t = table(&["program", "machine", "mounting", "what it is for"]);
         for s in &specs {

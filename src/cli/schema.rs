@@ -7,12 +7,12 @@ use crate::diag::Result;
 pub struct Args {
     /// Which file
     #[arg(value_enum)]
-    pub what: What,
+    pub what: SchemaOf,
 }
 
 /// Files that have a schema.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum What {
+pub enum SchemaOf {
     /// machines.toml
     Machines,
     /// A program of your own
@@ -29,11 +29,11 @@ pub enum What {
 /// Never: the schemas are built in.
 pub fn run(args: &Args, _io: &Io) -> Result<Answer> {
     let schema = match args.what {
-        What::Machines => schemars::schema_for!(crate::machine::as_written::File),
-        What::Programs => crate::program::schema(),
-        What::Postprocessors => schemars::schema_for!(crate::post::as_written::File),
-        What::Study => schemars::schema_for!(crate::study::AsWritten),
-        What::Effects => schemars::schema_for!(crate::model::as_written::File),
+        SchemaOf::Machines => schemars::schema_for!(crate::machine::as_written::File),
+        SchemaOf::Programs => crate::program::schema(),
+        SchemaOf::Postprocessors => schemars::schema_for!(crate::post::as_written::File),
+        SchemaOf::Study => schemars::schema_for!(crate::study::AsWritten),
+        SchemaOf::Effects => schemars::schema_for!(crate::model::as_written::File),
     };
     // a schema is JSON with and without --json
     let text = serde_json::to_string_pretty(&schema).unwrap_or_default();

@@ -84,7 +84,7 @@ struct Step {
 }
 
 impl Step {
-    fn of(added: &Added) -> Self {
+    fn from_added(added: &Added) -> Self {
         let Added { id, proposal, name_in_doubt, rms_um } = added;
         let mut same_as: Vec<String> = std::iter::once(&proposal.effect).chain(&proposal.same_as).cloned().collect();
         same_as.retain(|s| s != id);
@@ -163,7 +163,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         false => added.iter().map(|a| a.id.as_str()).collect(),
     };
     let stopped = stopped(&stop, &beside, &loaded);
-    let steps: Vec<Step> = added.iter().map(Step::of).collect();
+    let steps: Vec<Step> = added.iter().map(Step::from_added).collect();
     let solution = Solution {
         format: "axiscal-solution/1",
         open: open(&steps, &found, &fit.outcome),

@@ -59,7 +59,7 @@ pub struct Rung {
 impl Rung {
     /// A fit as a rung.
     #[must_use]
-    pub fn of(fit: &Fit, kind: Kind) -> Self {
+    pub fn from_fit(fit: &Fit, kind: Kind) -> Self {
         let o = &fit.outcome;
         Self {
             kind,
@@ -122,13 +122,13 @@ pub fn climb(
     models.append(&mut before);
     for (kind, effects) in models {
         match refit(machine, catalogue, settings, current, effects.clone()) {
-            Ok(fit) => out.push(Rung::of(&fit, kind)),
+            Ok(fit) => out.push(Rung::from_fit(&fit, kind)),
             Err(failure) => {
                 out.notes.push(format!("the model {} cannot be fitted any more: {failure}", effects.join(", ")))
             }
         }
     }
-    out.push(Rung::of(current, Kind::Current));
+    out.push(Rung::from_fit(current, Kind::Current));
     out
 }
 

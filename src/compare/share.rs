@@ -45,7 +45,7 @@ impl<'f> Misfit<'f> {
     }
 
     /// Sums of columns (one row per touch) beside the model: AᵀPA and AᵀPr with P = I − JCJᵀ, columns of unit norm.
-    pub(super) fn beside(&self, mut columns: DMatrix<f64>) -> Beside {
+    pub(super) fn beside(&self, mut columns: DMatrix<f64>) -> ColumnsBesideModel {
         self.whitening.apply(&mut columns);
         for mut column in columns.column_iter_mut() {
             let norm = column.norm();
@@ -55,7 +55,7 @@ impl<'f> Misfit<'f> {
         }
         let seen = self.jacobian.tr_mul(&columns);
         let gram = columns.tr_mul(&columns) - seen.tr_mul(&(&self.covariance * &seen));
-        Beside {
+        ColumnsBesideModel {
             n: self.fit.n_used() as f64,
             gram,
             slope: columns.tr_mul(&self.residual),
@@ -66,7 +66,7 @@ impl<'f> Misfit<'f> {
 }
 
 /// Columns beside the model.
-pub(super) struct Beside {
+pub(super) struct ColumnsBesideModel {
     /// Touches used.
     n: f64,
     gram: DMatrix<f64>,
@@ -75,7 +75,7 @@ pub(super) struct Beside {
     dof: f64,
 }
 
-impl Beside {
+impl ColumnsBesideModel {
     /// What a choice of the columns explains.
     ///
     /// With the misfit χ² on ν degrees of freedom and the part S that q columns take away, the excess is χ² − ν and the

@@ -107,7 +107,7 @@ pub fn assess(request: &Request) -> Result<Assessment> {
         let visible = p.q > 0;
         let of = |both: bool| pairs.iter().filter(move |x| x.explained == c && x.both_ways == both).map(|x| id(x.by));
         let (same_as, contained_in): (Vec<String>, Vec<String>) = (of(true).collect(), of(false).collect());
-        let absorbed_by = if visible { Vec::new() } else { absorbed.of(&view, c) };
+        let absorbed_by = if visible { Vec::new() } else { absorbed.absorbing(&view, c) };
         let (tell_apart, helps) = if !visible {
             to_show(c, &tried, &view, &absorbed_by, blind(&candidate.id))
         } else {
@@ -226,11 +226,11 @@ impl Absorbed {
                 norm
             })
             .collect();
-        Self { least: LeastNorm::of(&scaled, 1e-8), norms }
+        Self { least: LeastNorm::new(&scaled, 1e-8), norms }
     }
 
     /// Names, largest first; the blocks' set-ups are one name.
-    fn of(&self, view: &LinearisedPlan, candidate: usize) -> Vec<String> {
+    fn absorbing(&self, view: &LinearisedPlan, candidate: usize) -> Vec<String> {
         let columns: DMatrix<f64> = view.library.columns(candidate, 0);
         let x = self.least.solve(&columns);
         // in units of what it does to the touches, so that unlike units compare

@@ -138,7 +138,7 @@ pub(super) fn part(
 
 /// The largest weight of each direction (unit columns) in the combinations that make up a space of theirs.
 fn shares(directions: &DMatrix<f64>, space: &DMatrix<f64>) -> DVector<f64> {
-    let weights = LeastNorm::of(directions, 1e-6).solve(space);
+    let weights = LeastNorm::new(directions, 1e-6).solve(space);
     DVector::from_fn(directions.ncols(), |i, _| weights.row(i).iter().fold(0.0_f64, |m, w| m.max(w.abs())))
 }
 
@@ -181,7 +181,7 @@ pub fn explain(machine: &Machine, catalogue: &Catalogue, runs: &[Run], fit: &mut
         fit.priors.iter().map(|(i, _, sigma)| Known { sum: vec![(name(*i), 1.0)], sigma: *sigma }).collect();
     let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: 0.0 };
     // what was planned and not made tells nothing: a run may have been broken off
-    let mut planned: Vec<Planned> = runs.iter().map(Planned::of).collect();
+    let mut planned: Vec<Planned> = runs.iter().map(Planned::from_run).collect();
     keep_measured(&mut planned, &fit.data);
     let remedies: Vec<Remedy> = variations(machine, &planned, &fit.model)
         .into_par_iter()

@@ -99,7 +99,7 @@ impl Planned {
 
     /// Of a run that was made.
     #[must_use]
-    pub fn of(run: &Run) -> Self {
+    pub fn from_run(run: &Run) -> Self {
         let of = |t: &Touch| (t.id, Made { time_s: t.time_s, temperature_deg_c: t.temperature_deg_c });
         Self {
             plan: run.plan.clone(),

@@ -134,7 +134,7 @@ fn may_be_below(growth: f64, limit: f64) -> bool {
 /// `name`: of the unknown, one of a block where the effect has one for each.
 fn others(task: &Task, view: &LinearisedPlan, (effect, p, start): (&Effect, &Parameter, f64), name: &str) -> Others {
     let model = Model::new(task.machine, &[effect], &view.data.set_ups, task.reference);
-    let trials = Trials::of(&model, &view.data.nominal);
+    let trials = Trials::new(&model, &view.data.nominal);
     let shaped: Vec<&Unknown> = model.unknowns.iter().filter(|u| u.shape).collect();
     let starts: Vec<f64> = shaped.iter().map(|u| u.start).collect();
     let which = shaped.iter().position(|u| u.name == name).unwrap_or(0);
@@ -202,8 +202,8 @@ fn others(task: &Task, view: &LinearisedPlan, (effect, p, start): (&Effect, &Par
         }
         for k in rivals {
             let there = does(places[k].0);
-            let size = Follow::new(&base.project_columns(&there)).of(&signal);
-            let go = follow.of(&(&whole - &there * &size));
+            let size = Follow::new(&base.project_columns(&there)).follow(&signal);
+            let go = follow.follow(&(&whole - &there * &size));
             let own = (0..sizes.len()).map(|k| (sizes[k], size[k] - typical[k]));
             let own = own.map(|(i, by)| (model.unknowns[i].name.clone(), by));
             let others =
@@ -235,10 +235,10 @@ impl Follow {
         let scale: Vec<f64> = columns.column_iter().map(norm).map(|n| if n > 0.0 { 1.0 / n } else { 0.0 }).collect();
         let scaled = DMatrix::from_fn(columns.nrows(), columns.ncols(), |r, c| columns[(r, c)] * scale[c]);
         const LEAST: f64 = 1e-7;
-        Self { least: LeastNorm::of(&scaled, LEAST), scale }
+        Self { least: LeastNorm::new(&scaled, LEAST), scale }
     }
 
-    fn of(&self, what: &DVector<f64>) -> DVector<f64> {
+    fn follow(&self, what: &DVector<f64>) -> DVector<f64> {
         let x = self.least.solve(&DMatrix::from_column_slice(what.len(), 1, what.as_slice()));
         DVector::from_fn(x.len(), |k, _| x[k] * self.scale[k])
     }
@@ -287,7 +287,7 @@ impl Moments<'_> {
         /// Places that are tried.
         const MOST: usize = 60;
         let alone = Model::new(self.task.machine, &[effect], &self.data.set_ups, self.task.reference);
-        let trials = Trials::of(&alone, &self.data.nominal);
+        let trials = Trials::new(&alone, &self.data.nominal);
         let at = alone.unknowns.iter().position(|u| u.name == name)?;
         let first = at / effect.parameters.len() * effect.parameters.len();
         let own = first..first + effect.parameters.len();

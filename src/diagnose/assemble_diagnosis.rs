@@ -51,7 +51,7 @@ pub(super) fn put_together(
         candidates.push(candidate);
     }
     if decided != Decided::TooFewTouches {
-        let first_order = FirstOrder::of(fit);
+        let first_order = FirstOrder::from_fit(fit);
         let tell_apart = separating_touches::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
             tell_apart: told.says,
@@ -209,7 +209,7 @@ pub(super) fn put_together(
         _ if !faces.is_empty() => MachineCheck::NamedFaces(faces),
         _ if !blocks.is_empty() => MachineCheck::NamedBlocks(blocks),
         Some(block) => MachineCheck::MovedBlock(block),
-        None => MachineCheck::of(depends.first(), words::visits_come_back(fit)),
+        None => MachineCheck::from_dependence(depends.first(), words::visits_come_back(fit)),
     };
     let findings = Findings {
         subject,

@@ -91,7 +91,7 @@ impl Source {
 
     /// Columns of some choices, each with the place of a column in it, at some touches; mm per typical size.
     fn some(&self, wanted: &[(Chosen, usize)], places: &[Observation]) -> DMatrix<f64> {
-        let trials = Trials::of(&self.model, places);
+        let trials = Trials::new(&self.model, places);
         let mut out = DMatrix::zeros(places.len(), wanted.len());
         let mut at = 0;
         while at < wanted.len() {
@@ -255,7 +255,7 @@ fn without_noise(fit: &Fit) -> Vec<Observation> {
 impl<'c> Named<'c> {
     /// All candidates of a fit.
     #[must_use]
-    pub fn of(fit: &Fit, evidence: &Evidence, machine: &Machine, catalogue: &'c Catalogue) -> Self {
+    pub fn for_fit(fit: &Fit, evidence: &Evidence, machine: &Machine, catalogue: &'c Catalogue) -> Self {
         Self::with(fit, evidence, machine, missing(fit, machine, catalogue))
     }
 
@@ -267,7 +267,7 @@ impl<'c> Named<'c> {
         let model = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
         let starts = effects.iter().map(|e| starts(e)).collect();
         let source = Arc::new(Source { model, places, starts, rows: evidence.rows.clone() });
-        let maker = Maker { fit, evidence, source: &source, trials: Trials::of(&source.model, &source.places) };
+        let maker = Maker { fit, evidence, source: &source, trials: Trials::new(&source.model, &source.places) };
         let kept = Library::keeps(evidence.n_rows());
         let all_of = |(i, effect): (usize, &&Effect)| {
             let scan = scan_of(effect, &fit.data);
@@ -314,7 +314,7 @@ impl<'c> Named<'c> {
     /// are zero.
     #[must_use]
     pub fn raw_um(&self, wanted: &[(usize, usize)]) -> Vec<DMatrix<f64>> {
-        let trials = Trials::of(&self.source.model, &self.source.places);
+        let trials = Trials::new(&self.source.model, &self.source.places);
         let each = wanted.par_iter().map(|&(candidate, variant)| {
             let effect = self.effects[candidate];
             let value = self.library.candidates()[candidate].variants[variant].shape;

@@ -48,7 +48,7 @@ pub(super) fn consequences(
     if !matches!(verdict, Verdict::MissingEffect(_) | Verdict::Unexplained(_)) {
         return Ok(Vec::new());
     }
-    let moves = Moves::of(seen.evidence);
+    let moves = Moves::from_evidence(seen.evidence);
     let mut explained: Vec<(String, DVector<f64>)> = Vec::new();
     let passes = |candidate: usize| seen.search.scores[candidate].p_adjusted < FAMILY_LEVEL;
     for group in seen.groups.iter().filter(|g| g.members.iter().any(|m| passes(m.candidate))) {
@@ -119,7 +119,7 @@ struct Moves<'a> {
 }
 
 impl<'a> Moves<'a> {
-    fn of(evidence: &'a Evidence) -> Self {
+    fn from_evidence(evidence: &'a Evidence) -> Self {
         Self::new(&evidence.base, &evidence.jacobian, &evidence.residual, &evidence.visits)
     }
 

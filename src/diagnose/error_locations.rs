@@ -47,7 +47,7 @@ pub struct Tried {
 impl Tried {
     /// The dependence as its own test has it.
     #[must_use]
-    pub fn of(d: &Dependence) -> Self {
+    pub fn from_dependence(d: &Dependence) -> Self {
         let terms = d.terms.iter().enumerate().map(|(i, t)| (d.dof.clone(), i, t.size, t.sigma)).collect();
         Self { at: d.at.clone(), terms, left_um: f64::NAN, criterion: 0.0 }
     }
@@ -100,7 +100,7 @@ pub fn tried(subject: Subject, evidence: &Evidence, d: &Dependence) -> Vec<Tried
     for at in ["tool", "workpiece", "block", "trigger"] {
         add(at);
     }
-    let first_order = FirstOrder::of(subject.fit);
+    let first_order = FirstOrder::from_fit(subject.fit);
     let mut out: Vec<Tried> = places
         .par_iter()
         .filter_map(|at| {

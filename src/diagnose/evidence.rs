@@ -85,7 +85,7 @@ impl Rows for WhiteRows {
 impl Evidence {
     /// Of a fit, with the scatter of index visits that tests must allow for.
     #[must_use]
-    pub fn of(fit: &Fit) -> Self {
+    pub fn from_fit(fit: &Fit) -> Self {
         Self::with_visits(fit, fit.noise.tau_test_mm)
     }
 

@@ -30,7 +30,7 @@ struct Fallen {
 }
 
 impl<'f> FirstOrder<'f> {
-    pub fn of(fit: &'f Fit) -> Self {
+    pub fn from_fit(fit: &'f Fit) -> Self {
         // the weights of the fit, which a refit keeps, and not those of the tests, which allow for more scatter or for none
         let tau_mm = fit.noise.tau_mm;
         Self {

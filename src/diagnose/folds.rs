@@ -35,7 +35,7 @@ pub struct Errors {
 
 impl Folds {
     /// Of a fit; `evidence` is that of the tests.
-    pub(super) fn of(fit: &Fit, evidence: &Evidence) -> Self {
+    pub(super) fn new(fit: &Fit, evidence: &Evidence) -> Self {
         let model = held_out::by_visit(fit);
         let otherwise =
             (evidence.tau_mm != fit.noise.tau_fold_mm).then(|| Evidence::with_visits(fit, fit.noise.tau_fold_mm));

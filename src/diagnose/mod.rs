@@ -129,11 +129,11 @@ pub struct Ordering<'c> {
 impl<'c> Ordering<'c> {
     /// Where the scatter of visits is only declared.
     #[must_use]
-    pub fn of(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Option<Self> {
+    pub fn for_fit(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Option<Self> {
         let declared = fit.noise.visit_source == VisitSource::Declared && fit.noise.tau_test_mm > 0.0;
         declared.then(|| {
             let evidence = Evidence::with_visits(fit, 0.0);
-            Self { named: Named::of(fit, &evidence, machine, catalogue), evidence }
+            Self { named: Named::for_fit(fit, &evidence, machine, catalogue), evidence }
         })
     }
 
@@ -185,7 +185,7 @@ pub fn examine<'a>(
         lack_of_fit: lack_of_fit(&question),
         nested: behind.unwrap_or(nested),
         given,
-        folds: folds::Folds::of(fit, evidence),
+        folds: folds::Folds::new(fit, evidence),
         evidence,
         named,
         search,
@@ -227,7 +227,7 @@ fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Feat
         return None;
     }
     let evidence = Evidence::with_visits(fit, declared_mm);
-    let mut library = Named::of(fit, &evidence, machine, catalogue).library;
+    let mut library = Named::for_fit(fit, &evidence, machine, catalogue).library;
     // groups of visits are the scatter itself
     library.append(features::shapes(&evidence, features).without("visit"));
     let question = evidence.question();
@@ -275,10 +275,10 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         return Ok(no_usable_touches::used(subject, options));
     }
     let features = Arc::new(features::features(fit, machine));
-    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
-    let named = Named::of(fit, &evidence, machine, catalogue);
+    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::from_fit(fit));
+    let named = Named::for_fit(fit, &evidence, machine, catalogue);
     let generics = features::shapes(&evidence, &features);
-    let ordering = Ordering::of(fit, machine, catalogue);
+    let ordering = Ordering::for_fit(fit, machine, catalogue);
     let seen = examine(fit, &evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
     let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
         Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first()),
@@ -341,8 +341,8 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let features = Arc::new(features::features(fit, machine));
     // as the diagnosis of that model would see it: what else acts may look like scatter of the visits
-    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::of(fit));
-    let named = Named::of(fit, &evidence, machine, catalogue);
+    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::from_fit(fit));
+    let named = Named::for_fit(fit, &evidence, machine, catalogue);
     let question = evidence.question();
     if Search::new(question, &named.library).leader().is_some() {
         return true;

@@ -90,7 +90,7 @@ impl Diagnosis {
 
 impl MachineCheck {
     /// What to check about the first finding that no formula describes.
-    pub(super) fn of(first: Option<&Where>, visits_come_back: bool) -> Self {
+    pub(super) fn from_dependence(first: Option<&Where>, visits_come_back: bool) -> Self {
         let Some(first) = first else { return Self::NoPattern };
         match first.by.as_str() {
             "face" => Self::Faces,

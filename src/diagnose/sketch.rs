@@ -34,7 +34,7 @@ pub struct Sketch {
 pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> {
     let features = std::sync::Arc::new(features(subject.fit, subject.machine));
     let evidence = super::calm(subject.fit, subject.machine, subject.catalogue, &features)
-        .unwrap_or_else(|| Evidence::of(subject.fit));
+        .unwrap_or_else(|| Evidence::from_fit(subject.fit));
     let generics = shapes(&evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let best = best(&all, subject.fit)?;
@@ -112,7 +112,7 @@ fn write(
     let prefix: String = id.replace('-', "_");
     let says = words::says(d, share, subject.fit, subject.machine);
     let shape_name = d.shape.as_ref().map(|s| format!("{prefix}_{}", s.name));
-    let own = error_locations::Tried::of(d);
+    let own = error_locations::Tried::from_dependence(d);
     let place = tried.first().unwrap_or(&own);
     let mut terms = String::new();
     let (mut formula, mut sizes) = (Vec::new(), Vec::new());

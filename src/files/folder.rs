@@ -39,7 +39,7 @@ impl Manifest {
     }
 
     /// That of a folder, where it has one that can be read.
-    fn of(folder: &Path) -> Option<Self> {
+    fn read(folder: &Path) -> Option<Self> {
         let text = fs::read(folder.join(MANIFEST)).ok()?;
         serde_json::from_slice(&text).ok().filter(|m: &Self| m.format == FORMAT)
     }
@@ -127,7 +127,7 @@ impl Folder {
     /// What the earlier call wrote, when this one may take its place.
     fn earlier(&self, owner: &str, files: &[NewFile]) -> Result<Manifest> {
         let is_new = |name: &str| files.iter().any(|(new, _)| new == name);
-        let Some(old) = Manifest::of(&self.real) else {
+        let Some(old) = Manifest::read(&self.real) else {
             self.no_unknown_tables(&is_new)?;
             // before there was a list: what has the name of a new file is its earlier state
             let names = files.iter().map(|(name, _)| name.clone());
@@ -184,7 +184,7 @@ impl Folder {
     fn recover(&self) -> io::Result<()> {
         temporary::sweep(&self.real);
         let aside = self.aside();
-        let Some(old) = Manifest::of(&aside) else { return Ok(()) };
+        let Some(old) = Manifest::read(&aside) else { return Ok(()) };
         if self.real.exists() { clear(&aside, &self.real, &old) } else { fs::rename(&aside, &self.real) }
     }
 

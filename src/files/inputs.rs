@@ -17,7 +17,7 @@ struct Place {
 
 impl Place {
     /// `None` for a device or a pipe: those are never written over.
-    fn of(path: &Path) -> Option<Self> {
+    fn resolve(path: &Path) -> Option<Self> {
         let found = std::fs::metadata(path).ok();
         if found.as_ref().is_some_and(|f| !f.is_file() && !f.is_dir()) {
             return None;
@@ -59,7 +59,7 @@ fn inputs() -> MutexGuard<'static, Vec<Input>> {
 
 /// Remembers a file that was read.
 pub(super) fn keep(path: &Path) {
-    let Some(place) = Place::of(path) else { return };
+    let Some(place) = Place::resolve(path) else { return };
     let mut inputs = inputs();
     inputs.retain(|known| known.place.real != place.real);
     inputs.push(Input { path: path.to_path_buf(), place });
@@ -67,7 +67,7 @@ pub(super) fn keep(path: &Path) {
 
 /// A file that is known may be another one of the same name now.
 pub(super) fn replaced(path: &Path) {
-    let Some(place) = Place::of(path) else { return };
+    let Some(place) = Place::resolve(path) else { return };
     for known in inputs().iter_mut().filter(|known| known.place.real == place.real) {
         known.place = place.clone();
     }
@@ -93,7 +93,7 @@ pub fn check_outputs<P: AsRef<Path>>(outputs: &[P]) -> Result<()> {
     let inputs = inputs();
     let mut seen: Vec<(&Path, Place)> = Vec::new();
     for output in outputs.iter().map(AsRef::as_ref) {
-        let Some(place) = Place::of(output) else { continue };
+        let Some(place) = Place::resolve(output) else { continue };
         if let Some(input) = inputs.iter().find(|input| input.place.is(&place)) {
             return Err(Failure::new(
                 "file::is_input",

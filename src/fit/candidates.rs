@@ -30,7 +30,7 @@ pub fn columns(
 ) -> Columns {
     let model = Model::new(machine, effects, &data.set_ups, reference);
     let all = Variant { effects: (0..effects.len()).collect(), shapes: shapes.unwrap_or_default().to_vec() };
-    Trials::of(&model, observations).columns(&all)
+    Trials::new(&model, observations).columns(&all)
 }
 
 /// Columns of all unknowns of a model at some touches, in the order of its θ, at the start of its shape parameters.
@@ -76,7 +76,7 @@ pub struct Trials<'a> {
 impl<'a> Trials<'a> {
     /// Of the effects of a model, at touches.
     #[must_use]
-    pub fn of(model: &'a Model, observations: &'a [Observation]) -> Self {
+    pub fn new(model: &'a Model, observations: &'a [Observation]) -> Self {
         Self { model, traces: Sensitivities::new(model, observations), start: model.start() }
     }
 

@@ -31,7 +31,13 @@ pub(super) fn contradictions(fit: &Fit, asked: &Asked) -> Vec<Contradiction> {
         let chi2 = (value - stated).powi(2) / (1.0 / rest + prior);
         let own = (scale2(chi2) / rest).sqrt();
         let apart = (value - stated).abs() / own.hypot(sigma);
-        out.push(Contradiction { value, found: Found::Sigma(own), apart, chi2, ..of(fit, (i, stated, Some(sigma))) });
+        out.push(Contradiction {
+            value,
+            found: Found::Sigma(own),
+            apart,
+            chi2,
+            ..contradiction(fit, (i, stated, Some(sigma)))
+        });
     }
     out.extend(of_held_sizes(fit, scale2));
     // of shapes only what the user holds: the search holds some by itself
@@ -46,7 +52,7 @@ pub(super) fn contradictions(fit: &Fit, asked: &Asked) -> Vec<Contradiction> {
 }
 
 /// What is stated of an unknown, with nothing found yet.
-fn of(fit: &Fit, (i, stated, sigma): (usize, f64, Option<f64>)) -> Contradiction {
+fn contradiction(fit: &Fit, (i, stated, sigma): (usize, f64, Option<f64>)) -> Contradiction {
     let u = &fit.model.unknowns[i];
     let (name, unit) = (u.name.clone(), u.unit.clone());
     Contradiction { name, unit, stated, sigma, value: stated, found: Found::Sigma(0.0), apart: 0.0, chi2: 0.0 }
@@ -63,7 +69,7 @@ fn of_a_shape(
     let alone = profile::without_prior(fit, asked.machine, asked.effects, known.0, scale2)?;
     let apart = (alone.falls / scale2(alone.falls)).max(0.0).sqrt();
     let (value, found) = (alone.value, Found::Interval(alone.interval));
-    Some(Contradiction { value, found, apart, chi2: alone.falls, ..of(fit, known) })
+    Some(Contradiction { value, found, apart, chi2: alone.falls, ..contradiction(fit, known) })
 }
 
 /// The same for held sizes: the score test of each, and what the touches would make of it.
@@ -96,7 +102,13 @@ fn of_held_sizes(fit: &Fit, scale2: impl Fn(f64) -> f64) -> Vec<Contradiction> {
         let sigma = (scale2(chi2) / information).sqrt();
         let (stated, apart) = (fit.theta[i], by.abs() / sigma);
         let value = stated + by;
-        out.push(Contradiction { value, found: Found::Sigma(sigma), apart, chi2, ..of(fit, (i, stated, None)) });
+        out.push(Contradiction {
+            value,
+            found: Found::Sigma(sigma),
+            apart,
+            chi2,
+            ..contradiction(fit, (i, stated, None))
+        });
     }
     out
 }

@@ -145,7 +145,7 @@ fn identify_from(
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
     let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
     let with_catalogue = !settings.quick && !settings.bare && is_small;
-    let left_out = with_catalogue.then(|| uncertainty::LeftOut::of(&fit.model, machine, catalogue, &fit.data));
+    let left_out = with_catalogue.then(|| uncertainty::LeftOut::new(&fit.model, machine, catalogue, &fit.data));
     let asked = Asked { machine, effects, search };
     let solved = (&found.solution, found.condition);
     let masks = std::mem::take(&mut found.unknown_masks);

@@ -73,7 +73,7 @@ pub(super) fn variant(alone: &Model, set: &Range<usize>, values: &[f64]) -> Vari
 #[must_use]
 pub fn start_shapes(fit: &Fit, machine: &Machine, effect: &Effect) -> Start {
     let alone = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
-    let trials = Trials::of(&alone, &fit.data.observations);
+    let trials = Trials::new(&alone, &fit.data.observations);
     let instances = alone.instances(0).iter().map(|&(first, count)| first..first + count);
     ScoreTest::new(fit, effect, (&alone, &trials), instances.collect()).best_start()
 }

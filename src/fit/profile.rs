@@ -69,7 +69,7 @@ pub fn intervals(
     let has_asked = |effect: &Effect| fit.model.unknowns.iter().any(|u| u.shape && u.effect == effect.id && asked(u));
     for effect in effects.iter().filter(|e| has_asked(e)) {
         let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
-        let trials = Trials::of(&model, &fit.data.observations);
+        let trials = Trials::new(&model, &fit.data.observations);
         // an effect of blocks has a set of parameters for each
         for (u, p) in model.unknowns.iter().zip(effect.parameters.iter().cycle()).filter(|(u, _)| u.shape && asked(u)) {
             let unknown = fit.model.unknowns.iter().position(|v| v.effect == u.effect && v.name == u.name);
@@ -117,7 +117,7 @@ pub fn without_prior(
     let p = effect.parameters.iter().find(|p| p.name == u.own_name())?;
     let (_, low, high) = p.shape?;
     let model = Model::new(machine, &[effect], &fit.data.set_ups, fit.model.reference);
-    let trials = Trials::of(&model, &fit.data.observations);
+    let trials = Trials::new(&model, &fit.data.observations);
     let mut profile = Profile::new(fit, (&model, &trials), effect, unknown)?;
     let whole = profile.residual.norm_squared();
     profile.drop_prior_of_shape();

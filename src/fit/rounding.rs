@@ -13,11 +13,11 @@ impl Rounding {
     /// Of the touches of a study, each with the digits of its own log.
     pub(super) fn of_touches(data: &Data) -> Self {
         let touches = |run: usize| data.observations.iter().filter(|o| o.run == run).count();
-        Self::of(data.digits_mm.iter().enumerate().map(|(run, digit_mm)| (touches(run), *digit_mm)))
+        Self::from_logs(data.digits_mm.iter().enumerate().map(|(run, digit_mm)| (touches(run), *digit_mm)))
     }
 
     /// Of logs whose touches count as many as given, each with its last digit, mm: the root mean square.
-    fn of(logs: impl Iterator<Item = (usize, Option<f64>)>) -> Self {
+    fn from_logs(logs: impl Iterator<Item = (usize, Option<f64>)>) -> Self {
         let (mut touches, mut squares) = (0, 0.0);
         for (n, digit_mm) in logs {
             touches += n;
@@ -100,7 +100,7 @@ mod tests {
             assert!((rounding.with_what_repeats_hide(within) / all - 1.0).abs() < 0.01, "{sigma} {within} {all}");
             assert!(sigma > 0.2 || within < 0.92 * all, "{sigma}");
         }
-        assert!((Rounding::of([(300, Some(2e-3)), (100, None)].into_iter()).sigma_mm() - 5e-4).abs() < 1e-12);
+        assert!((Rounding::from_logs([(300, Some(2e-3)), (100, None)].into_iter()).sigma_mm() - 5e-4).abs() < 1e-12);
         assert_eq!(Rounding::default().with_what_repeats_hide(1e-3), 1e-3);
     }
 }

@@ -38,7 +38,7 @@ pub struct LeastNorm {
 impl LeastNorm {
     /// Of a matrix; what is left of a column beside the others counts as nothing below this share of the longest one.
     #[must_use]
-    pub fn of(a: &DMatrix<f64>, share: f64) -> Self {
+    pub fn new(a: &DMatrix<f64>, share: f64) -> Self {
         let n_columns = a.ncols();
         let qr = if a.is_empty() { None } else { Some(a.clone().col_piv_qr()) };
         let kept = qr.as_ref().map(|qr| qr.r()).map(|r| r.rows(0, rank(&r, share)).into_owned());
@@ -90,7 +90,7 @@ mod tests {
             lacking += usize::from(q.ncols() < n.min(p));
             // what A makes of a shortest x is its own image, and what lies across the span has none
             let b = &a * DMatrix::from_fn(p, 2, |_, _| rng.random_range(-1.0..1.0));
-            let least = LeastNorm::of(&a, 1e-9);
+            let least = LeastNorm::new(&a, 1e-9);
             let x = least.solve(&b);
             assert!((&a * &x - &b).amax() < 1e-9, "{a}");
             assert!((x.row(0) + x.row(p - 1)).amax() < 1e-9, "equal columns share equally");
@@ -105,7 +105,7 @@ mod tests {
     fn nothing_spans_nothing() {
         assert_eq!(span(&DMatrix::zeros(3, 0), 1e-9).shape(), (3, 0));
         assert_eq!(span(&DMatrix::zeros(3, 2), 1e-9).shape(), (3, 0));
-        assert_eq!(LeastNorm::of(&DMatrix::zeros(3, 2), 1e-9).solve(&DMatrix::zeros(3, 1)).shape(), (2, 1));
-        assert_eq!(LeastNorm::of(&DMatrix::zeros(0, 2), 1e-9).solve(&DMatrix::zeros(0, 1)).shape(), (2, 1));
+        assert_eq!(LeastNorm::new(&DMatrix::zeros(3, 2), 1e-9).solve(&DMatrix::zeros(3, 1)).shape(), (2, 1));
+        assert_eq!(LeastNorm::new(&DMatrix::zeros(0, 2), 1e-9).solve(&DMatrix::zeros(0, 1)).shape(), (2, 1));
     }
 }

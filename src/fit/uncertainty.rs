@@ -137,7 +137,7 @@ pub(super) struct LeftOut {
 
 impl LeftOut {
     /// What `model` leaves out.
-    pub(super) fn of(model: &Model, machine: &Machine, catalogue: &Catalogue, data: &Data) -> Self {
+    pub(super) fn new(model: &Model, machine: &Machine, catalogue: &Catalogue, data: &Data) -> Self {
         let mut effects = unmodelled_by(&model.unknowns, machine, catalogue);
         effects.retain(|e| !e.per_block);
         let (effects, without_value) = with_values(effects, &data.observations);

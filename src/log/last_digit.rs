@@ -23,7 +23,7 @@ mod tests {
     use super::digit_mm;
     use crate::axes::Position;
 
-    fn of(places: &[f64]) -> Option<f64> {
+    fn common_digit(places: &[f64]) -> Option<f64> {
         let at = |&x: &f64| {
             let mut p = Position::default();
             p.0[..3].copy_from_slice(&[x, 2.0 * x, -x]);
@@ -34,12 +34,12 @@ mod tests {
 
     #[test]
     fn the_last_digit_of_a_log() {
-        assert_eq!(of(&[1.234, -200.001, 17.0]), Some(1e-3));
-        assert_eq!(of(&[1.2345, 17.0]), Some(1e-4));
-        assert_eq!(of(&[1.234_567, 17.0]), Some(1e-6));
-        assert_eq!(of(&[1.234_567_8, 17.0]), None);
+        assert_eq!(common_digit(&[1.234, -200.001, 17.0]), Some(1e-3));
+        assert_eq!(common_digit(&[1.2345, 17.0]), Some(1e-4));
+        assert_eq!(common_digit(&[1.234_567, 17.0]), Some(1e-6));
+        assert_eq!(common_digit(&[1.234_567_8, 17.0]), None);
         // 0.1234 and 3.0001 inches
-        let inches = of(&[0.1234 * 25.4, 3.0001 * 25.4]).unwrap();
+        let inches = common_digit(&[0.1234 * 25.4, 3.0001 * 25.4]).unwrap();
         assert!((inches - 0.00254).abs() < 1e-12, "{inches}");
     }
 }

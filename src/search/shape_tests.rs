@@ -86,7 +86,7 @@ impl Rows for Plain {
     }
 }
 
-fn of(f: &Features) -> Generics {
+fn generics_of(f: &Features) -> Generics {
     generics(&Arc::new(f.clone()), Arc::new(Plain(f.block.len())))
 }
 
@@ -99,7 +99,7 @@ fn shapes_of_no_catalogue_are_named_by_their_variable() {
     let mut rng = rng(20);
     let f = table_of_touches(&mut rng);
     let base = location_base(&f);
-    let g = of(&f);
+    let g = generics_of(&f);
     let n = f.block.len();
     let values = |v: usize| &f.variables[v].values;
     type Effect<'a> = (&'a str, Box<dyn Fn(usize) -> f64 + 'a>);
@@ -157,7 +157,7 @@ fn named_effects_and_shapes_share_one_level() {
     let base = location_base(&f);
     let n = f.block.len();
     let mut library = correlated_library(&mut rng, n, 60);
-    library.append(of(&f).library);
+    library.append(generics_of(&f).library);
     let runs = std::env::var("RUNS").map_or(250, |r| r.parse().unwrap());
     let (mut any, mut generic) = (0, 0);
     for _ in 0..runs {

@@ -55,7 +55,7 @@ impl Errors {
 
     /// Those of one axis.
     #[must_use]
-    pub fn of(&self, axis: AxisName) -> &AxisErrors {
+    pub fn of_axis(&self, axis: AxisName) -> &AxisErrors {
         &self.axes[axis.index()]
     }
 
@@ -100,7 +100,7 @@ impl<'a> Kins<'a> {
                 directions.set_column(axis.name.index(), &(frame.rotation * axis.direction.into_inner()));
                 continue;
             }
-            let errors = self.errors.of(axis.name);
+            let errors = self.errors.of_axis(axis.name);
             if real {
                 frame *= errors.before.transform_about(&self.errors.centre(axis));
             }
@@ -126,7 +126,7 @@ impl<'a> Kins<'a> {
 
     /// Degrees by which an axis is told less than it shall stand at.
     fn zero_deg(&self, axis: &Axis) -> f64 {
-        deg_from_rad(axis.sense * self.errors.of(axis.name).zero_rad)
+        deg_from_rad(axis.sense * self.errors.of_axis(axis.name).zero_rad)
     }
 
     /// `to.xyz` such that the ball stands where it stands at `from.xyz`; the same pose for both.

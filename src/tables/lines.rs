@@ -10,7 +10,7 @@
 //! is where the workpiece stands, which is touched off; on the tool side it moves the ball by the same δ for every
 //! position of the axes, and a control whose vectors close (at zero the machine coordinates are those of the tool) counts
 //! its lines from there. What is not said by lines is the tool's own direction: right for the tool length that was
-//! measured with, see [`Seen::of`].
+//! measured with, see [`Seen::from_errors`].
 
 use super::kins::{Errors, Kins};
 use crate::axes::{AxisName, Position};
@@ -97,11 +97,11 @@ impl Seen {
     /// Where the head is tilted the ball of this tool stands right at every angle; that of a tool longer by L is off by
     /// the tilt times L.
     #[must_use]
-    pub fn of(machine: &Machine, errors: &Errors, length_mm: f64) -> Self {
+    pub fn from_errors(machine: &Machine, errors: &Errors, length_mm: f64) -> Self {
         let side = |side: Side| {
             let (mut frame, mut lines) = (Transform::identity(), Vec::new());
             for axis in machine.side(side).filter(|a| a.name.is_rotary()) {
-                let e = errors.of(axis.name);
+                let e = errors.of_axis(axis.name);
                 frame *= e.before.transform_about(&errors.centre(axis));
                 lines.push(Line {
                     axis: axis.name,
@@ -226,8 +226,10 @@ mod tests {
             }
             let errors = Errors::from_terms(&terms, [3.0, -4.0, -190.0]);
             let length = machine.tool.length_mm;
-            let (nominal, seen) =
-                (Seen::of(&machine, &Errors::from_terms(&[], [0.0; 3]), length), Seen::of(&machine, &errors, length));
+            let (nominal, seen) = (
+                Seen::from_errors(&machine, &Errors::from_terms(&[], [0.0; 3]), length),
+                Seen::from_errors(&machine, &errors, length),
+            );
             let kins = Kins::new(&machine, errors, length);
             let none = BTreeMap::new();
             let mut pose = Position::default();

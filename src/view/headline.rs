@@ -52,7 +52,7 @@ fn signed_um(x: f64) -> String {
 }
 
 /// "3 of 8 errors", "1 of 8 errors", "the one error".
-fn of(n: usize, total: usize) -> String {
+fn count_of_errors(n: usize, total: usize) -> String {
     if total == 1 { "the one error".to_owned() } else { format!("{n} of {total} errors") }
 }
 
@@ -233,7 +233,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     if let Some(worst) = largest(parameters, Judgement::Beyond) {
         let sentence = format!(
             "{} {} the tolerance ({limit}), the largest is {} ({}): {}. The model is complete as far as these touches can measure.{untold}",
-            start(&of(beyond, judged)),
+            start(&count_of_errors(beyond, judged)),
             if beyond == 1 { "exceeds" } else { "exceed" },
             worst.says,
             worst.name,
@@ -244,7 +244,7 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     if let Some(worst) = largest(parameters, Judgement::Open) {
         let sentence = format!(
             "{} too uncertain to compare with the tolerance ({limit}): {} ({}) is the worst. No error is certainly larger.{untold}",
-            start(&format!("{} {}", of(open, judged), verb(open))),
+            start(&format!("{} {}", count_of_errors(open, judged), verb(open))),
             worst.says,
             worst.name
         );

@@ -89,7 +89,7 @@ pub struct Mistake {
 }
 
 impl Mistake {
-    fn of(field: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
+    fn new(field: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
         Self { field: field.into(), from: None, to: None, message: message.into(), help: Some(help.into()) }
     }
 }
@@ -169,7 +169,7 @@ pub fn replaced(before: &str, draft: &Draft) -> Option<String> {
 #[must_use]
 pub fn elsewhere(draft: &Draft, file: &str) -> Mistake {
     let message = format!("effect {:?} exists already, and not once in {file}", draft.id);
-    Mistake::of("id", message, "choose another short name, or change it in its own file")
+    Mistake::new("id", message, "choose another short name, or change it in its own file")
 }
 
 /// One item a line, as a person would write it.
@@ -216,7 +216,7 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
     let replaces = catalogue.iter().any(|e| e.id == draft.id && !e.built_in);
     if replaces && model.contains(&draft.id) {
         let help = "switch it off to change it, or choose another short name";
-        mistakes.push(Mistake::of("id", format!("effect {:?} is in the model", draft.id), help));
+        mistakes.push(Mistake::new("id", format!("effect {:?} is in the model", draft.id), help));
     }
     let shapes: Vec<&str> = draft.shape.iter().map(|s| s.parameter.trim()).collect();
     for (i, t) in draft.terms.iter().enumerate() {
@@ -254,7 +254,7 @@ pub fn check(draft: &Draft, catalogue: &Catalogue, model: &[String]) -> Result<T
 fn hints(draft: &Draft, shapes: &[&str]) -> Vec<Mistake> {
     let of = |(i, t): (usize, &DraftTerm)| {
         let found = degrees_in_formula::find(t.formula.trim(), shapes)?;
-        Some(Mistake::of(format!("terms.{i}.formula"), found.to_string(), &found.remedy()))
+        Some(Mistake::new(format!("terms.{i}.formula"), found.to_string(), &found.remedy()))
     };
     draft.terms.iter().enumerate().filter_map(of).collect()
 }
@@ -286,14 +286,14 @@ fn words(draft: &Draft) -> Vec<Mistake> {
         && id.starts_with(|c: char| c.is_ascii_lowercase())
         && id.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
     if !good {
-        out.push(Mistake::of(
+        out.push(Mistake::new(
             "id",
             "the short name is not usable",
             "small letters, digits and -, a letter first, up to 40 signs: my-sag",
         ));
     }
     if draft.terms.is_empty() || draft.terms.len() > MOST_ROWS || draft.shape.len() > MOST_ROWS {
-        out.push(Mistake::of("", format!("an effect has 1 to {MOST_ROWS} terms"), "add a term, or take some away"));
+        out.push(Mistake::new("", format!("an effect has 1 to {MOST_ROWS} terms"), "add a term, or take some away"));
     }
     let fields = [("name", &draft.name), ("says", &draft.says), ("look", &draft.look), ("at", &draft.at)];
     let mut all: Vec<(String, &String)> = fields.iter().map(|(w, t)| ((*w).to_owned(), *t)).collect();
@@ -308,7 +308,7 @@ fn words(draft: &Draft) -> Vec<Mistake> {
     }
     for (field, text) in all {
         if text.len() > LONGEST || text.chars().any(char::is_control) {
-            out.push(Mistake::of(field, "too long, or more than one line", "write it shorter, in one line"));
+            out.push(Mistake::new(field, "too long, or more than one line", "write it shorter, in one line"));
         }
     }
     out

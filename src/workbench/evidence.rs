@@ -43,8 +43,8 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
     if fit.n_used() == 0 || fit.dof == 0 {
         return Vec::new();
     }
-    let evidence = Evidence::of(fit);
-    let named = Named::of(fit, &evidence, &opened.machine, &opened.catalogue);
+    let evidence = Evidence::from_fit(fit);
+    let named = Named::for_fit(fit, &evidence, &opened.machine, &opened.catalogue);
     let search = Search::new(evidence.question(), &named.library);
     let total = evidence.residual.norm_squared().max(f64::MIN_POSITIVE);
     let each = search.scores.iter().enumerate().map(|(i, s)| {

@@ -35,7 +35,7 @@ pub fn join(loaded: &Loaded, run: &Join, env: &dyn Environment) -> Result<usize>
     if plan.blocks_anew && !moved {
         env.remark(&[Finding::info(
             "next::blocks_anew",
-            "this program was made for blocks that are put up anew: their set-up counts as unknown",
+            "this program was made for blocks that are mounted again: their positions are unknown",
         )
         .help("where they were not moved after all, write the [[data]] by hand with the same mounting")]);
     }

@@ -110,7 +110,7 @@ impl Loaded {
     /// The runs as they were planned.
     #[must_use]
     pub fn planned(&self) -> Vec<Planned> {
-        self.runs().iter().map(Planned::of).collect()
+        self.runs().iter().map(Planned::from_run).collect()
     }
 
     /// The same with the touches that a fit could use: only what was measured tells anything.

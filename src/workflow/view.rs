@@ -49,7 +49,7 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environmen
         // a candidate that cannot be fitted beside the others is still a candidate
         match with_effects(loaded.subject(&settings, &fit), &[first.effect.as_str()]) {
             Ok(with) => {
-                ladder.push(Rung::of(&with, Kind::Proposed));
+                ladder.push(Rung::from_fit(&with, Kind::Proposed));
                 proposed = Some(with);
             }
             Err(failure) => ladder.notes.push(format!("{} cannot be added to the model: {failure}", first.effect)),

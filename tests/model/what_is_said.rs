@@ -159,7 +159,7 @@ fn a_room_that_goes_on_parts_nothing_from_time() {
     let effects: Vec<_> =
         ["ambient-bending", "drift-linear"].map(|e| (catalogue.get(e, machine).unwrap(), None)).into();
     let noise = design::Noise { sigma_mm: 1e-3, tau_mm: 0.0 };
-    let made = design::Planned::of(&runs(&touches)[0]);
+    let made = design::Planned::from_run(&runs(&touches)[0]);
     let left = |room: Option<design::Room>| {
         let next = room.map(|room| design::Planned {
             room,
@@ -190,7 +190,7 @@ fn what_no_touches_part_is_said() {
     let effects = ["location-a", "location-c", "block-setup", "pretravel"].map(str::to_owned).to_vec();
     let settings = Settings { effects, quick: true, ..Settings::default() };
     let fit = fit::identify(&machine, &catalogue, &runs, &settings).unwrap();
-    let planned = [design::Planned::of(&runs[0])];
+    let planned = [design::Planned::from_run(&runs[0])];
     let options = Options { planned: Some(&planned), ..Options::default() };
     let subject = Subject { machine: &machine, catalogue: &catalogue, settings: &settings, fit: &fit };
     let found = diagnose(subject, &options).unwrap();

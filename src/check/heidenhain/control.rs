@@ -279,7 +279,7 @@ impl Dialect for Heidenhain {
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             shift: some([-4.0, 2.5, 6.0, 0.5, 0.25, -1.0], awkward),
             rotation: if start == Start::LeftoverMode(LeftoverMode::Rotated) { 1.5 } else { 0.0 },
-            skew: HiddenRotation::of(start),
+            skew: HiddenRotation::from_start(start),
             tilted: awkward,
             tcpm: if awkward || third { Tcpm::Found } else { Tcpm::Off },
             short_way: awkward,

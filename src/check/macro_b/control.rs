@@ -341,7 +341,7 @@ impl Dialect for MacroB {
                 Start::LeftoverMode(what) => Some(what).filter(|what| leftover_modes::may_act(*what, post)),
                 _ => None,
             },
-            skew: HiddenRotation::of(start),
+            skew: HiddenRotation::from_start(start),
             ahead: false,
             feed: 0.0,
             holds: 0.0,
@@ -350,7 +350,7 @@ impl Dialect for MacroB {
             skipped: [0.0; 6],
             seconds: 0.0,
             calls: post.check.iter().flat_map(|c| c.calls.iter().cloned()).collect(),
-            builder: Arc::new(Builder::of(post)),
+            builder: Arc::new(Builder::from_settings(post)),
             modulo: AxisName::ALL.map(|a| {
                 a.is_rotary() && post.settings.get("modulo").is_some_and(|letters| letters.contains(a.letter()))
             }),

@@ -27,7 +27,7 @@ pub struct Builder {
 }
 
 impl Builder {
-    pub fn of(post: &Postprocessor) -> Self {
+    pub fn from_settings(post: &Postprocessor) -> Self {
         let setting = |name: &str| post.settings.get(name).map_or("", String::as_str);
         let switches =
             ["probe_on", "probe_off"].into_iter().flat_map(|name| setting(name).lines()).map(block).collect();

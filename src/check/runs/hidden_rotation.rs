@@ -18,7 +18,7 @@ pub(super) struct Begun {
 }
 
 impl Begun {
-    pub(super) fn of(told: &ExploredRun) -> Self {
+    pub(super) fn from_run(told: &ExploredRun) -> Self {
         let leads = |h: &Happened| if let Event::Move { to, .. } = &h.event { Some(*to) } else { None };
         Self { from: told.from, places: told.trunk.iter().filter_map(leads).take(FIRST_MOVES).collect() }
     }

@@ -65,7 +65,7 @@ impl Vectors {
         let meant = Linear::ball_in_workpiece(nominal, &Shifts::default(), pose, stylus);
         let tool = nominal.tool_direction().map(|d| d * stylus.length_mm);
         let arm = self.head.place(tool, pose);
-        Linear::of(|commanded| {
+        Linear::linearise(|commanded| {
             let place = plus(minus(meant.at(commanded), self.adapter), 1.0, self.origin);
             minus(plus(self.table.place(place, pose), 1.0, arm), self.origin)
         })

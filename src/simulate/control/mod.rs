@@ -111,7 +111,7 @@ impl Linear {
     const SAME: Self = Self { offset: [0.0; 3], columns: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 
     /// From a function that is affine in the commanded axes.
-    fn of(place: impl Fn(Vec3) -> Vec3) -> Self {
+    fn linearise(place: impl Fn(Vec3) -> Vec3) -> Self {
         // a step of machine size, a power of two: the difference loses no digits, the division is exact
         const STEP_MM: f64 = 512.0;
         let offset = place([0.0; 3]);
@@ -125,7 +125,7 @@ impl Linear {
 
     /// The ball in the workpiece for linear axes at a pose.
     fn ball_in_workpiece(chain: &Chain, shifts: &Shifts, pose: &Position, stylus: Stylus) -> Self {
-        Self::of(|linear| {
+        Self::linearise(|linear| {
             let mut at = *pose;
             at.0[..3].copy_from_slice(&linear);
             chain.ball_in(&at, shifts, chain.links_to_workpiece(), stylus)

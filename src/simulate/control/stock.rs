@@ -42,7 +42,7 @@ impl TiltingTable {
         let meant = Linear::ball_in_workpiece(nominal, &none, pose, stylus);
         let at_zero = nominal.ball_in(&Position::default(), &none, nominal.links_to_workpiece(), stylus);
         let fixed = plus(minus(self.origin, at_zero), 1.0, self.workpiece_shift);
-        Linear::of(|commanded| {
+        Linear::linearise(|commanded| {
             let world = plus(meant.at(commanded), 1.0, fixed);
             minus(self.joints(world, pose, stylus), self.origin)
         })

@@ -49,7 +49,7 @@ enum Word {
 }
 
 impl Word {
-    fn of(text: &str, parameters: &[String]) -> Option<Self> {
+    fn parse(text: &str, parameters: &[String]) -> Option<Self> {
         if let Some(i) = parameters.iter().position(|p| p == text) {
             return Some(Self::Parameter(i));
         }
@@ -266,7 +266,7 @@ impl<'a> Reader<'a> {
         let end = self.rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest;
-        if let Some(known) = Word::of(word, self.parameters) {
+        if let Some(known) = Word::parse(word, self.parameters) {
             self.words.push(known);
             self.steps.push(Step::Word(self.words.len() - 1));
             return Ok(());
@@ -319,7 +319,7 @@ impl Formula {
         };
         for (at, word) in words_in(text) {
             let function = FUNCTION_WORDS.split(' ').any(|f| f == word);
-            if !function && !matches!(word, "pi" | "PI") && Word::of(word, parameters).is_none() {
+            if !function && !matches!(word, "pi" | "PI") && Word::parse(word, parameters).is_none() {
                 return Err((format!("unknown word {word:?} at character {}", at + 1), help()));
             }
         }

@@ -57,7 +57,7 @@ pub struct Division {
 
 impl Division {
     /// Divides the tables of an export.
-    pub(super) fn of(
+    pub(super) fn new(
         tables: &Tables,
         (first, others): (&Filled, &BTreeMap<&str, Filled>),
         list: &[Grid],

@@ -63,7 +63,7 @@ impl Pieces<'_> {
     /// Largest distance of the ball, µm, where a control drives a machine with these errors.
     fn worst(&self, control: &Seen, errors: Errors, longer: f64, told_deg: &BTreeMap<AxisName, f64>) -> f64 {
         let length = self.machine.tool.length_mm;
-        let nominal = Seen::of(self.machine, &Errors::from_terms(&[], self.carried.reference_mm), length);
+        let nominal = Seen::from_errors(self.machine, &Errors::from_terms(&[], self.carried.reference_mm), length);
         let kins = Kins::new(self.machine, errors, length + longer);
         let (poses, places) = (self.poses(), self.places());
         let off = |pose: &Position| {

@@ -254,13 +254,14 @@ pub fn export(
     let options = &Options { old: held, ..options.clone() };
     let carried = carried(machine, correction, kind);
     let length = machine.tool.length_mm;
-    let seen = |terms: &[Term]| Seen::of(machine, &Errors::from_terms(terms, carried.reference_mm), length);
+    let seen = |terms: &[Term]| Seen::from_errors(machine, &Errors::from_terms(terms, carried.reference_mm), length);
     let (before, now) = (seen(&with_active(&carried.terms)), seen(&carried.terms));
     let spellings = old::spellings(tables);
     if !carried.kept.is_empty() {
         findings.push(Finding::info("tables::kept", kept_in_words(&carried.kept)));
     }
-    let replaced = (!correction.transformation).then(|| Replaced::of(machine, correction, &carried, length));
+    let replaced =
+        (!correction.transformation).then(|| Replaced::from_correction(machine, correction, &carried, length));
     let question = |spelling| Question {
         machine,
         tables,
@@ -341,7 +342,7 @@ pub fn export(
         force(&mut findings.0, &mut noted);
     }
     let division =
-        Division::of(tables, (&filled, &others), &grid_list, active.and_then(|a| a.tables.as_ref()), &options.old);
+        Division::new(tables, (&filled, &others), &grid_list, active.and_then(|a| a.tables.as_ref()), &options.old);
     let unverified = say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
     let lacking = filled.lacking(&options.old, spellings.first().copied());
     let instead = format!("no file with values is written, {SHEET} says by how much each value changes");

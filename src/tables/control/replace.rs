@@ -30,8 +30,14 @@ pub struct Replaced {
 }
 
 impl Replaced {
-    pub(super) fn of(machine: &Machine, correction: &Correction, carried: &Carried, length_mm: f64) -> Self {
-        let seen = |terms: &[Term]| Seen::of(machine, &Errors::from_terms(terms, carried.reference_mm), length_mm);
+    pub(super) fn from_correction(
+        machine: &Machine,
+        correction: &Correction,
+        carried: &Carried,
+        length_mm: f64,
+    ) -> Self {
+        let seen =
+            |terms: &[Term]| Seen::from_errors(machine, &Errors::from_terms(terms, carried.reference_mm), length_mm);
         let found = || carried.terms.iter().filter(|t| correction.found.contains(&t.spot()));
         let moved = |t: &Term| seen(&[Term { value: STEP, ..t.clone() }]);
         Self {

@@ -45,7 +45,7 @@ impl Joints {
     ///
     /// # Errors
     /// When the INI lacks one of the machine's axes.
-    pub fn of(machine: &Machine, ini: Option<&UserIni>) -> Result<Self> {
+    pub fn for_machine(machine: &Machine, ini: Option<&UserIni>) -> Result<Self> {
         let letters: Vec<char> = match ini {
             Some(ini) => ini.letters.clone(),
             None => coordinates(machine).chars().collect(),

@@ -161,7 +161,7 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
         }
         findings.push(mode_note(active, correction.transformation || active.idle_without_transformation(machine) == 0));
     }
-    let joints = match ini::Joints::of(machine, options.ini.as_ref()) {
+    let joints = match ini::Joints::for_machine(machine, options.ini.as_ref()) {
         Ok(joints) => Some(joints),
         Err(failure) => {
             findings.0.extend(failure.0);

@@ -1,8 +1,8 @@
 //! What a model that lacks something means for the values that are exported.
 
 use crate::diag::{Finding, Result, Severity};
-use crate::diagnose::consequence::Consequence;
 use crate::diagnose::Diagnosis;
+use crate::diagnose::consequence::Consequence;
 use crate::fit::Fit;
 use crate::report::fit::significant;
 use crate::tables::correction::left_um;

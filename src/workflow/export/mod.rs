@@ -50,7 +50,7 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// For a controller, with nothing known of its old values.
     #[must_use]
-    pub fn of(controller: &'a str) -> Self {
+    pub fn new(controller: &'a str) -> Self {
         Self {
             controller,
             target: None,

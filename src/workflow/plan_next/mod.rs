@@ -66,7 +66,7 @@ pub struct Program {
 type Asked<T> = std::result::Result<T, NoProgram>;
 
 impl NoProgram {
-    fn of(says: impl Into<String>, more: impl Into<String>) -> Self {
+    fn new(says: impl Into<String>, more: impl Into<String>) -> Self {
         let advice = Advice::Says(vec![more.into(), "nothing is written".to_owned()]);
         Self { says: says.into(), advice }
     }
@@ -84,7 +84,7 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
     if !(request.minutes.is_finite() && request.minutes > 0.0 && request.minutes < 1e5) {
         return Err(Failure::new("next::minutes", "the time is no usable number").help("write --minutes more than 0"));
     }
-    let open = match Open::of(loaded, request, env)? {
+    let open = match Open::look_at(loaded, request, env)? {
         Ok(open) => open,
         Err(no_program) => return Ok(Next::NoProgram(no_program)),
     };
@@ -108,14 +108,14 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
     let never = setting.never(&questions);
     if never.len() == questions.pairs.len() {
         let says = format!(
-            "no touches that this machine can make, with its blocks and styli, tell these apart: {} do the same wherever it \
+            "no touches that this machine can make, with its blocks and styli, separate these: {} have the same effect wherever it \
              touches",
             never.join(", ")
         );
         let looks: Vec<String> =
             effects.iter().filter(|(e, _)| !e.look.is_empty()).map(|(e, _)| format!("{}: {}", e.id, e.look)).collect();
         let more = format!("look at the machine which it is. {}", looks.join(". "));
-        return Ok(Next::NoProgram(NoProgram::of(says, more)));
+        return Ok(Next::NoProgram(NoProgram::new(says, more)));
     }
     let Some(mut chosen) = best else {
         return Err(Failure::new("next::nothing", "no reachable touch separates these effects within the time")
@@ -137,27 +137,29 @@ struct Open {
 }
 
 impl Open {
-    fn of(loaded: &Loaded, request: &Request, env: &dyn Environment) -> Result<Asked<Self>> {
+    fn look_at(loaded: &Loaded, request: &Request, env: &dyn Environment) -> Result<Asked<Self>> {
         let mut settings = loaded.quick_settings();
         settings.effects.retain(|e| !request.effects.contains(e));
         effects_of(request.effects, &loaded.catalogue, &loaded.machine)?;
         let mut open = Self::look(loaded, settings)?;
         if let Some(mistake) = open.found.mistake() {
             let says = format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}");
-            return Ok(Err(NoProgram::of(says, &open.found.says)));
+            return Ok(Err(NoProgram::new(says, &open.found.says)));
         }
-        let nothing_determined =
-            matches!(open.found.verdict, Verdict::TooLittleData(TooLittle::NothingDetermined(_)));
+        let nothing_determined = matches!(open.found.verdict, Verdict::TooLittleData(TooLittle::NothingDetermined(_)));
         if request.effects.is_empty() && nothing_determined {
             design::explain(&loaded.machine, &loaded.catalogue, &loaded.runs(), &mut open.fit)?;
             let help = match &open.fit.outcome.parted_together[..] {
                 [] => "run the program to its end, or touch in more poses, and ask again".to_owned(),
                 remedies => {
-                    format!("run the program to its end; or add touches that determine them: {}", remedies.join("; and "))
+                    format!(
+                        "run the program to its end; or add touches that determine them: {}",
+                        remedies.join("; and ")
+                    )
                 }
             };
             let says = format!("the model's own errors must be determined first. {}", open.found.says);
-            return Ok(Err(NoProgram::of(says, help)));
+            return Ok(Err(NoProgram::new(says, help)));
         }
         if request.effects.is_empty() && !open.found.leaves_open() {
             // what was added last may stand for others that the same touches could not tell from it: still an open question
@@ -193,7 +195,7 @@ impl Open {
         let found = self.unexplained(request)?;
         let weak = found.why == NotNamed::WeakPattern && found.sketchable;
         let is_asked = weak && self.found.verdict.moved_block().is_none();
-        if is_asked { Sketched::of(loaded, &self.settings, &self.fit) } else { None }
+        if is_asked { Sketched::sketch(loaded, &self.settings, &self.fit) } else { None }
     }
 
     /// A clear pattern is there, and no known effects have to be separated.
@@ -203,7 +205,7 @@ impl Open {
             format!("no known effect explains the residual, so there are no effects to separate. {}", self.found.says);
         Some(match found.sketchable {
             true => NoProgram { says, advice: Advice::Sketch },
-            false => NoProgram::of(says, crate::words::diagnose::machine_check(&found.check)),
+            false => NoProgram::new(says, crate::words::diagnose::machine_check(&found.check)),
         })
     }
 
@@ -333,7 +335,7 @@ fn not_worth_it(chosen: &Chosen, questions: &Questions, of_room: bool, request: 
         );
         let moved = if chosen.label.is_none() { " with the blocks mounted again" } else { "" };
         let more = format!("no program{moved} brings more: confirm it at the machine, or give more time (--minutes)");
-        return Some(NoProgram::of(says, more));
+        return Some(NoProgram::new(says, more));
     }
     let is_told = |told: f64| told >= SAFELY;
     if chosen.separations.iter().any(|s| is_told(s.told) || s.told_if_room_turns.is_some_and(is_told)) {
@@ -362,7 +364,7 @@ struct Sketched {
 
 impl Sketched {
     /// `None` where formulas have no word for it.
-    fn of(loaded: &Loaded, settings: &Settings, fit: &Fit) -> Option<Self> {
+    fn sketch(loaded: &Loaded, settings: &Settings, fit: &Fit) -> Option<Self> {
         let made = sketch(loaded.subject(settings, fit), &|id| loaded.catalogue.knows(id)).ok()?;
         let mut own = Catalogue::default();
         own.add_file(&source("sketch", made.toml)).ok()?;

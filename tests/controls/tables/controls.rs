@@ -229,7 +229,7 @@ fn foretold(machine: &Machine, planted: &Planted, export: &Export, plan: &Plan) 
     let errors = Errors::from_terms(&terms, machine.reference.pivot.into());
     let length = machine.tool.length_mm;
     let (kins, nominal) =
-        (Kins::new(machine, errors, length), Seen::of(machine, &Errors::from_terms(&[], [0.0; 3]), length));
+        (Kins::new(machine, errors, length), Seen::from_errors(machine, &Errors::from_terms(&[], [0.0; 3]), length));
     let zero = &export.compensation.tables.as_ref().unwrap().zero_deg;
     let reading = |t: &axiscal::program::plan::PlanTouch| {
         let n = Vector3::from(t.normal);

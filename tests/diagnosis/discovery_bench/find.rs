@@ -83,7 +83,7 @@ pub fn sketched(machine: &Machine, built_in: &Catalogue, first: &Fit, settings: 
 
 /// √(χ²/dof) in units of the noise of a touch.
 pub fn reduced_rms(fit: &Fit) -> f64 {
-    let evidence = Evidence::of(fit);
+    let evidence = Evidence::from_fit(fit);
     let ss = evidence.base.project(&evidence.residual).norm_squared();
     (ss / evidence.dof() as f64).sqrt() * fit.noise.sigma_mm * 1000.0
 }

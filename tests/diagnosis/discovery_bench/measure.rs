@@ -42,7 +42,7 @@ pub fn sized(bench: &Bench, base: &str, hidden: Hidden, peak_um: f64) -> Sized {
         let (with, _) = gaps(&format!("{base}{}", own.written(1.0)), own.own());
         (with - &at_rest) * 1000.0 * size
     });
-    let evidence = Evidence::of(&fit);
+    let evidence = Evidence::from_fit(&fit);
     // the base at σ = 1 um and no scatter of visits
     let jacobian = fit.linear(0.0).jacobian;
     let n = difference_um.len();
