@@ -35,7 +35,6 @@ pub struct Finding {
     pub code: &'static str,
     /// What is wrong: expected and found, lower case, no full stop.
     pub message: String,
-    /// What to do.
     pub help: Option<String>,
     /// The word of a file that it is about: its place is there, where it has none of its own.
     pub about: Option<String>,
@@ -46,14 +45,12 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// An error.
     #[must_use]
     pub fn error(code: &'static str, message: impl Into<String>) -> Self {
         let message = message.into();
         Self { severity: Severity::Error, code, message, help: None, about: None, span: None, source: None }
     }
 
-    /// A warning.
     #[must_use]
     pub fn warning(code: &'static str, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, ..Self::error(code, message) }

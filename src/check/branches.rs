@@ -1,7 +1,7 @@
 //! What a program does when something goes wrong: it must say so and stay where it is.
 
+use super::checked_program::{CheckedProgram, CollectedFindings, SIDEWAYS_MM};
 use super::explore::{Branch, Deviation, ExploredRun};
-use super::judge::{Case, CollectedFindings, SIDEWAYS_MM};
 use super::run::{Alarm, Event, Happened};
 use super::settings::{compare_settings, stopped_by_itself};
 use crate::axes::Position;
@@ -18,7 +18,7 @@ pub fn last_line(told: &ExploredRun) -> Option<&str> {
 
 /// When something went wrong the program must say so and stay where it is. `last_line` is that of the run.
 pub fn branch_stops(
-    case: &Case<'_>,
+    case: &CheckedProgram<'_>,
     told: &ExploredRun,
     last_line: Option<&str>,
     branch: &Branch,

@@ -80,10 +80,8 @@ pub enum Function {
     Sign,
 }
 
-/// An expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expr {
-    /// A number.
     Number(f64),
     /// What a variable holds.
     Var(Var),
@@ -123,7 +121,6 @@ pub type Text = Vec<Piece>;
 pub struct Word {
     /// `X`, `G`, `MEAS`: one of the words that the dialect knows.
     pub address: &'static str,
-    /// Its value.
     pub value: Expr,
     /// Written with a decimal point: some controls count in thousandths without one.
     pub point: bool,
@@ -144,11 +141,9 @@ pub enum Instruction {
     JumpUnless(Expr, usize),
     /// A text is kept, at most so many characters of it.
     SetText {
-        /// Where.
         var: Var,
         /// The longest text that it takes.
         most: usize,
-        /// What.
         text: Text,
     },
     /// A subroutine: the number of its first statement.
@@ -159,14 +154,11 @@ pub enum Instruction {
     Message(Text),
     /// A log is opened; `append`: what it holds is kept.
     LogOpen {
-        /// Its name.
         name: Text,
         /// What it holds is kept.
         append: bool,
     },
-    /// A line of a log.
     LogLine(Text),
-    /// The log is closed.
     LogClose,
     /// A line is added to a log that need not be opened, and may be full: the variable then holds what is wrong.
     LogWrite {
@@ -188,7 +180,6 @@ pub enum Instruction {
     Wait(Text),
     /// The program is broken off with a message.
     Abort(Text),
-    /// The end.
     End,
 }
 
@@ -197,7 +188,6 @@ pub enum Instruction {
 pub struct Statement {
     /// Bytes.
     pub at: Range<usize>,
-    /// What it does.
     pub what: Instruction,
 }
 
@@ -226,7 +216,6 @@ pub struct Unknown {
 /// What is not known of a word or a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UnknownKind {
-    /// Its meaning.
     Meaning,
     /// It calls another program: what that does.
     Program,

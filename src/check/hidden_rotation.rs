@@ -20,7 +20,6 @@ pub enum HiddenRotation {
 pub struct Turn {
     /// The way along this axis goes over,
     pub of: AxisName,
-    /// to this one,
     pub to: AxisName,
     /// in the negative sense.
     pub negative: bool,

@@ -7,18 +7,16 @@ mod faces;
 mod proofs;
 
 use super::branches::{branch_stops, last_line};
+use super::checked_program::{CheckedProgram, CollectedFindings};
 use super::doubt::Doubt;
 use super::explore::ExploredRun;
 use super::run::{Event, Happened, Rate};
 use super::settings::settings_return;
 use super::touches::{Made, against_plan};
-use super::world::World;
 use crate::axes::{AxisMap, AxisName, Position};
-use crate::diag::{Finding, Source};
-use crate::machine::{Machine, Mounting};
-use crate::post::Postprocessor;
+use crate::diag::Finding;
 use crate::program::heights::Lift;
-use crate::program::plan::{ControllerFrame, Plan};
+use crate::program::plan::ControllerFrame;
 use crate::program::scene::Scene;
 use crate::program::sweep::Manner;
 use crate::units::Plain;
@@ -28,71 +26,9 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// What is judged, and against what.
-pub struct Case<'a> {
-    /// The machine with its own stylus.
-    pub machine: &'a Machine,
-    /// The control.
-    pub post: &'a Postprocessor,
-    /// The plan, where there is one.
-    pub plan: Option<&'a Plan>,
-    /// Shapes of each part.
-    pub scenes: &'a [Scene<'a>],
-    /// Blocks and coordinates.
-    pub world: &'a World,
-    /// The program.
-    pub source: &'a Source,
-    /// Coordinates that differ by less are the same, mm or deg.
-    pub same: f64,
-    /// What is mounted in each part.
-    pub mountings: &'a [&'a Mounting],
-    /// A person may start it from anywhere only when this holds.
-    pub clear_from_anywhere: bool,
-    /// The settings of a control as it is switched on.
-    pub neutral: &'a BTreeMap<String, String>,
-}
-
-/// Findings of one kind that are shown; the rest is counted.
-const SHOWN: usize = 8;
-
-/// Collects findings; equal ones are said once.
-#[derive(Default)]
-pub struct CollectedFindings {
-    findings: Vec<Finding>,
-    seen: BTreeSet<(&'static str, usize, String)>,
-    count: BTreeMap<&'static str, usize>,
-    /// In which run it happens, where that is none of the usual ones.
-    when: Option<String>,
-}
-
-impl CollectedFindings {
-    /// Notes a finding at a place.
-    pub fn say(&mut self, case: &Case<'_>, code: &'static str, at: &Range<usize>, message: String, help: &str) {
-        if !self.seen.insert((code, at.start, message.clone())) {
-            return;
-        }
-        let message = self.when.as_ref().map_or(message.clone(), |when| format!("{when}: {message}"));
-        let count = self.count.entry(code).or_default();
-        *count += 1;
-        if *count <= SHOWN {
-            let finding = Finding::error(code, message).at(case.source, at.clone());
-            self.findings.push(if help.is_empty() { finding } else { finding.help(help) });
-        }
-    }
-
-    /// All findings in the order of the program; first where the control stops, for others may follow from that.
-    pub fn finish(mut self) -> Vec<Finding> {
-        self.findings.sort_by_key(|f| (f.code != "check::not_run", f.span.as_ref().map_or(usize::MAX, |s| s.start)));
-        for (code, count) in self.count.iter().filter(|(_, n)| **n > SHOWN) {
-            self.findings.push(Finding::error(code, format!("{} more of the kind {code}", count - SHOWN)));
-        }
-        self.findings
-    }
-}
-
 /// Judges runs one by one.
 pub struct Judge<'a> {
-    case: &'a Case<'a>,
+    case: &'a CheckedProgram<'a>,
     said: CollectedFindings,
     /// Moves that are to be proven, and those that were.
     proofs: BTreeMap<Key, Proof>,
@@ -101,7 +37,7 @@ pub struct Judge<'a> {
 
 impl<'a> Judge<'a> {
     /// Nothing is judged yet.
-    pub fn new(case: &'a Case<'a>) -> Self {
+    pub fn new(case: &'a CheckedProgram<'a>) -> Self {
         Self { case, said: CollectedFindings::default(), proofs: BTreeMap::new(), proven: BTreeSet::new() }
     }
 
@@ -161,8 +97,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// In which run it is.
-fn when(case: &Case<'_>, told: &ExploredRun) -> String {
+fn when(case: &CheckedProgram<'_>, told: &ExploredRun) -> String {
     let line = |at: &Range<usize>| case.source.inner().get(..at.start).map_or(0, |text| text.matches('\n').count()) + 1;
     let each = |(at, doubt): &(Range<usize>, Doubt)| format!("line {} (it depends on {})", line(at), doubt.says());
     let conditions: Vec<String> = told.otherwise.iter().map(each).collect();
@@ -184,7 +119,7 @@ struct Contact {
 }
 
 struct Walk<'a, 'b> {
-    case: &'a Case<'a>,
+    case: &'a CheckedProgram<'a>,
     told: &'b ExploredRun,
     said: &'b mut CollectedFindings,
     proofs: &'b mut BTreeMap<Key, Proof>,
@@ -200,7 +135,7 @@ struct Walk<'a, 'b> {
 
 impl<'a, 'b> Walk<'a, 'b> {
     fn new(
-        case: &'a Case<'a>,
+        case: &'a CheckedProgram<'a>,
         told: &'b ExploredRun,
         said: &'b mut CollectedFindings,
         proofs: &'b mut BTreeMap<Key, Proof>,
@@ -487,6 +422,3 @@ fn stops_by_itself(told: &ExploredRun) -> bool {
     });
     told.from == 1 && waits && closed != Some(true)
 }
-
-/// How far a way back may lead sideways: its words are rounded, and it may be short, mm.
-pub const SIDEWAYS_MM: f64 = 0.002;

@@ -76,7 +76,6 @@ pub fn control_byte(text: &str) -> Option<usize> {
     (0..bytes.len()).find(|at| bad(*at))
 }
 
-/// Blanks.
 pub fn blanks(input: &str) -> IResult<&str, &str> {
     nom::bytes::complete::take_while(|c| c == ' ' || c == '\t').parse(input)
 }

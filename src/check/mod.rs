@@ -10,6 +10,7 @@
 //! [`crate::simulate`].
 
 mod branches;
+mod checked_program;
 mod code;
 mod doubt;
 mod explore;
@@ -38,8 +39,9 @@ use crate::program::plan::{ControllerFrame, Plan, Proof};
 use crate::program::scene::Scene;
 use crate::simulate::Errorless;
 use crate::units::Plain;
+use checked_program::CheckedProgram;
 use code::{Unknown, UnknownKind};
-use judge::{Case, Judge};
+use judge::Judge;
 use proof::Proving;
 use run::Event;
 use runs::Kind;
@@ -354,7 +356,7 @@ fn with_parts(
     // under a transformation the rounding of one word shows in the others as well
     let turned = if tcp { 3f64.sqrt() } else { 1.0 };
     let same = 0.51 * roundings * turned * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };
-    let case = Case {
+    let case = CheckedProgram {
         machine,
         post,
         plan: against.plan,
@@ -429,7 +431,6 @@ fn too_many(source: &Source, at: Range<usize>) -> Finding {
         .at(source, at)
 }
 
-/// Does it begin where it is meant to?
 fn begins(post: &Postprocessor, program: &runs::Program, meant: u32, source: &Source) -> Option<Finding> {
     let begins = program.begins_at()?;
     // a run behind the last set-up gives the settings back, where the postprocessor file says so

@@ -170,9 +170,7 @@ pub trait Dialect: Clone + Send + Sync {
 /// A word with its value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spoken {
-    /// Address.
     pub address: &'static str,
-    /// Value.
     pub value: f64,
     /// It was computed, or written with a decimal point.
     pub point: bool,

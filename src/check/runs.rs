@@ -248,9 +248,7 @@ pub struct Stage<'a> {
     pub machine: &'a Machine,
     /// The control.
     pub post: &'a Postprocessor,
-    /// The plan, where there is one.
     pub plan: Option<&'a Plan>,
-    /// The program.
     pub program: &'a Program,
     /// Blocks and coordinates.
     pub world: &'a Arc<World>,

@@ -1,14 +1,14 @@
 //! The user's settings: what a program leaves of them.
 
+use super::checked_program::{CheckedProgram, CollectedFindings};
 use super::explore::ExploredRun;
-use super::judge::{Case, CollectedFindings};
 use super::run::{Event, Happened};
 use crate::program::plan::ControllerFrame;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Compares what a run leaves, at its end and after a person has broken it off, with what it found.
-pub fn settings_return(case: &Case<'_>, told: &ExploredRun, said: &mut CollectedFindings) {
+pub fn settings_return(case: &CheckedProgram<'_>, told: &ExploredRun, said: &mut CollectedFindings) {
     if told.fault.is_some() {
         return;
     }
@@ -33,7 +33,7 @@ pub fn stopped_by_itself(trace: &[Happened]) -> bool {
 /// Says which settings are neither as before nor, where they may be left, off. A program that has stopped by itself under the
 /// control's own transformation may leave on what `stays_on` of the postprocessor file names; one that is complete may not.
 pub fn compare_settings(
-    case: &Case<'_>,
+    case: &CheckedProgram<'_>,
     [before, after]: [&BTreeMap<String, String>; 2],
     stopped: bool,
     at: &Range<usize>,

@@ -1,7 +1,7 @@
 //! The touches that a program made, against those of its plan.
 
+use super::checked_program::{CheckedProgram, CollectedFindings};
 use super::explore::ExploredRun;
-use super::judge::{Case, CollectedFindings};
 use super::run::{Event, Probe};
 use crate::axes::{AxisMap, Position};
 use crate::log;
@@ -75,7 +75,7 @@ impl Made {
 const LOGGED: f64 = 1e-6;
 
 /// Compares the touches of a run with the plan.
-pub fn against_plan(case: &Case<'_>, told: &ExploredRun, made: &[Made], said: &mut CollectedFindings) {
+pub fn against_plan(case: &CheckedProgram<'_>, told: &ExploredRun, made: &[Made], said: &mut CollectedFindings) {
     let lines: Vec<(&Range<usize>, &str)> = told
         .trunk
         .iter()
@@ -164,7 +164,12 @@ pub fn against_plan(case: &Case<'_>, told: &ExploredRun, made: &[Made], said: &m
 }
 
 /// Where the log has times, each touch has one, it goes on as the run does, and it does not jump.
-fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &str)], said: &mut CollectedFindings) {
+fn times(
+    case: &CheckedProgram<'_>,
+    touches: &[log::RawTouch],
+    lines: &[(&Range<usize>, &str)],
+    said: &mut CollectedFindings,
+) {
     // no touch with the way to it takes as long
     const LONGEST_S: f64 = 3600.0;
     if !case.post.log.writes_time {
@@ -194,7 +199,7 @@ fn times(case: &Case<'_>, touches: &[log::RawTouch], lines: &[(&Range<usize>, &s
 }
 
 /// The whole log must read as that of a complete run of this plan.
-fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut CollectedFindings) {
+fn whole_log(case: &CheckedProgram<'_>, text: &str, end: &Range<usize>, said: &mut CollectedFindings) {
     let Some(plan) = case.plan else { return };
     let writer = log::Writer::Controller(case.post);
     let mut complain = |message: &str| {
@@ -213,7 +218,7 @@ fn whole_log(case: &Case<'_>, text: &str, end: &Range<usize>, said: &mut Collect
 }
 
 /// Lines that are written while no log is open are lost.
-fn log_is_open(case: &Case<'_>, told: &ExploredRun, said: &mut CollectedFindings) {
+fn log_is_open(case: &CheckedProgram<'_>, told: &ExploredRun, said: &mut CollectedFindings) {
     if case.post.check.as_ref().is_some_and(|c| c.log_always_open) {
         return;
     }
@@ -262,7 +267,7 @@ fn moves(told: &ExploredRun) -> bool {
 
 /// The whole plan, or all of it from some touch on.
 fn order(
-    case: &Case<'_>,
+    case: &CheckedProgram<'_>,
     told: &ExploredRun,
     ids: &[(u64, Range<usize>)],
     end: &Range<usize>,
@@ -296,8 +301,7 @@ fn order(
     }
 }
 
-/// What in a touch is not as the plan has it.
-fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String> {
+fn differences(case: &CheckedProgram<'_>, made: &Made, planned: &PlanTouch) -> Vec<String> {
     let mut says = Vec::new();
     let mut need = |good: bool, text: String| {
         if !good {
@@ -359,6 +363,6 @@ fn differences(case: &Case<'_>, made: &Made, planned: &PlanTouch) -> Vec<String>
 }
 
 /// Some machines cannot orient the spindle: the user's setting says so.
-fn orients(case: &Case<'_>) -> bool {
+fn orients(case: &CheckedProgram<'_>) -> bool {
     case.post.settings.get("orient").is_none_or(|o| !matches!(o.as_str(), "" | "no"))
 }

@@ -80,9 +80,7 @@ pub struct Outcome {
 pub enum Event {
     /// A move that does not look at the probe.
     Move {
-        /// From where.
         from: Position,
-        /// To where.
         to: Position,
         /// How fast.
         rate: Rate,
@@ -111,7 +109,6 @@ pub enum Event {
     },
     /// A log was opened.
     LogOpen {
-        /// Its name.
         name: String,
         /// What it held is kept.
         append: bool,
@@ -142,7 +139,6 @@ pub const SPINDLE_OFF: &str = "spindle off";
 pub struct Happened {
     /// Bytes of the text.
     pub at: Range<usize>,
-    /// What.
     pub event: Event,
 }
 
@@ -153,7 +149,6 @@ pub struct Vm {
     pub at: Position,
     /// Axes whose place the program knows because it has sent them there.
     pub known: [bool; 6],
-    /// What happened.
     pub trace: Vec<Happened>,
     /// The statement that is being done.
     pub place: Range<usize>,

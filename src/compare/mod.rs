@@ -133,7 +133,6 @@ pub struct Worst {
     pub standardised: f64,
     /// The block as it stood.
     pub block: String,
-    /// Its face.
     pub face: String,
     /// Rotary axes, deg.
     pub pose: BTreeMap<String, f64>,
@@ -163,7 +162,6 @@ pub struct Point {
     pub stage: String,
     /// The block as it stood.
     pub block: String,
-    /// Its face.
     pub face: String,
     /// Index visit, counted through all runs.
     pub visit: usize,

@@ -65,7 +65,6 @@ impl<'f> Misfit<'f> {
     }
 }
 
-/// Columns beside the model.
 pub(super) struct ColumnsBesideModel {
     /// Touches used.
     n: f64,

@@ -80,7 +80,6 @@ pub enum Question {
 pub enum Verdict {
     /// The machine's errors are smaller than before.
     Improved,
-    /// They are not.
     NotImproved,
     /// At least one error differs by more than its doubt.
     Changed,

@@ -48,7 +48,6 @@ pub struct Bundle {
     pub manner: Manner,
     /// The block's name.
     pub block: String,
-    /// Its faces.
     pub faces: Vec<String>,
     /// The touches, with axis positions.
     pub touches: Vec<PlanTouch>,

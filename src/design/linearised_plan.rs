@@ -43,7 +43,6 @@ const MOST_SHAPES: usize = 16;
 /// What is looked at: machine, model and everything that could act beside it.
 #[derive(Debug, Clone)]
 pub struct Task<'a> {
-    /// The machine.
     pub machine: &'a Machine,
     /// All effects that exist.
     pub catalogue: &'a Catalogue,
@@ -187,7 +186,6 @@ pub struct Known {
 pub struct LinearisedPlan {
     /// The touches as an errorless machine makes them.
     pub data: Data,
-    /// The model.
     pub model: Model,
     /// Where it is linearised: an errorless machine, and moments of jumps where they show.
     pub theta: Vec<f64>,
@@ -206,7 +204,6 @@ pub struct LinearisedPlan {
     /// Effects whose formula has no value at some of these touches, with what is said of them: they stand in the library with
     /// columns of nothing.
     pub left_out: Vec<NoValue>,
-    /// The noise.
     pub noise: Noise,
     /// When the last touch is made, s.
     pub end_s: f64,

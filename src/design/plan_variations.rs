@@ -133,7 +133,6 @@ impl Pool<'_> {
         }
     }
 
-    /// A visit once more, with a change.
     fn once_more(&self, visit: &Visit, change: &Change) -> Vec<PlanTouch> {
         let plan = self.plan(visit.run);
         visit.light().iter().filter_map(|t| again(self.machine, plan, t, change)).collect()

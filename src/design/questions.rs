@@ -26,7 +26,6 @@ pub struct Pair {
 /// An effect as the data would have it, if it is the one that acts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Suspect {
-    /// Its id.
     pub id: String,
     /// Expected size of each parameter, in typical sizes.
     pub size: DVector<f64>,

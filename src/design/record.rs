@@ -20,7 +20,6 @@ pub enum Score {
 }
 
 impl Score {
-    /// The word.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -42,7 +41,6 @@ pub struct Assessment {
     pub plan: Vec<String>,
     /// Ids of the effects in the model.
     pub model: Vec<String>,
-    /// Touches.
     pub touches: usize,
     /// How long it takes, s.
     pub time_s: f64,
@@ -56,7 +54,6 @@ pub struct Assessment {
     pub says: String,
     /// Unknowns of the model, and how many of them the touches determine.
     pub unknowns: usize,
-    /// Rank.
     pub rank: usize,
     /// Combinations that leave no trace.
     pub undetermined: Vec<Undetermined>,
@@ -145,7 +142,6 @@ pub struct Seen {
 pub struct Advice {
     /// Short word.
     pub habit: String,
-    /// What to do.
     pub says: String,
     /// Further touches.
     pub touches: usize,

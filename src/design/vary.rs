@@ -35,9 +35,7 @@ pub struct Change {
 /// Touches of one index visit.
 #[derive(Debug, Clone)]
 pub struct Visit<'a> {
-    /// Which run.
     pub run: usize,
-    /// Its touches.
     pub touches: Vec<&'a PlanTouch>,
 }
 

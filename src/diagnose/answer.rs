@@ -144,7 +144,6 @@ pub struct Shape {
     pub by: String,
     /// Unit of x; `1` for groups of touches, which are numbered.
     pub x_unit: String,
-    /// Unit of y.
     pub y_unit: String,
     /// Direction in which it acts.
     pub direction: String,
@@ -208,7 +207,6 @@ pub struct Candidate {
     /// No touches that this machine can make tell the first two apart, whatever else may.
     #[serde(skip)]
     pub never_parted: bool,
-    /// What it is.
     pub says: String,
     /// Where to look on the machine and how to confirm it.
     pub look: String,
@@ -231,7 +229,6 @@ pub struct Candidate {
 /// An expected size.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
-    /// Name.
     pub name: String,
     /// Expected value.
     pub value: f64,
@@ -244,13 +241,11 @@ pub struct Parameter {
 /// A parameter that an added effect makes less certain.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Weakened {
-    /// Name.
     pub name: String,
     /// Its unit.
     pub unit: String,
     /// Standard uncertainty without the effect.
     pub sigma_before: f64,
-    /// With it.
     pub sigma_after: f64,
 }
 
@@ -282,7 +277,6 @@ pub struct Outlier {
     pub reason: String,
     /// The block as it stood.
     pub block: String,
-    /// Its face.
     pub face: String,
     /// True where it belongs to the rest once the first candidate is in the model.
     pub comes_back: bool,
@@ -291,7 +285,6 @@ pub struct Outlier {
 /// What would have been found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Power {
-    /// The effect.
     pub effect: String,
     /// From this size on (peak over the touches, µm) it would have been found nearly always.
     pub minimal_detectable_um: f64,

@@ -32,7 +32,6 @@ pub struct Column {
 /// A shape parameter whose values are tried.
 #[derive(Debug, Clone)]
 pub struct Scanned {
-    /// Name.
     pub name: String,
     /// Its unit.
     pub unit: String,
@@ -41,7 +40,6 @@ pub struct Scanned {
 /// Effects that may be missing; candidate i of the library is `effects[i]`.
 #[derive(Debug, Clone)]
 pub struct Named<'c> {
-    /// The effects.
     pub effects: Vec<&'c Effect>,
     /// Their whitened columns, per typical size.
     pub library: Library,

@@ -104,7 +104,6 @@ pub(super) struct Findings<'a> {
 }
 
 impl Findings<'_> {
-    /// The verdict of a kind.
     pub fn verdict(self, kind: Kind) -> Verdict {
         match kind {
             Kind::Adequate => Verdict::Adequate,

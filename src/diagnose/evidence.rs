@@ -121,7 +121,6 @@ impl Evidence {
         }
     }
 
-    /// Rows.
     #[must_use]
     pub fn n_rows(&self) -> usize {
         self.residual.len()

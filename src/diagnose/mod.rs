@@ -51,13 +51,11 @@ pub use verdict::Verdict;
 /// What is diagnosed.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
-    /// The machine.
     pub machine: &'a Machine,
     /// The effects that exist.
     pub catalogue: &'a Catalogue,
     /// What the fit was asked for: refits ask the same.
     pub settings: &'a Settings,
-    /// The fit.
     pub fit: &'a Fit,
 }
 

@@ -3,7 +3,6 @@
 use super::answer::{Candidate, Diagnosis, Finding, Where};
 use super::verdict::{NotNamed, Verdict};
 
-/// What to do next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NextStep<'d> {
     /// Correct the set-up mistake and measure again.
@@ -28,14 +27,12 @@ pub enum NextStep<'d> {
     Nothing,
 }
 
-/// What to check at the machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum MachineCheck {
     /// These faces are dirty, or their block has another size.
     NamedFaces(Vec<String>),
     /// These blocks are dirty, loose or have another size, the worst first.
     NamedBlocks(Vec<String>),
-    /// This block moved.
     MovedBlock(String),
     /// Some faces are dirty.
     Faces,
@@ -56,7 +53,6 @@ pub enum MachineCheck {
 }
 
 impl Diagnosis {
-    /// What to do next.
     #[must_use]
     pub fn next_step(&self) -> NextStep<'_> {
         if self.mistake().is_some() {

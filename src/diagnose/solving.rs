@@ -20,7 +20,6 @@ use serde::Serialize;
 /// What is to be solved.
 #[derive(Clone, Copy)]
 pub struct Request<'a> {
-    /// The machine.
     pub machine: &'a Machine,
     /// The effects that exist.
     pub catalogue: &'a Catalogue,
@@ -37,7 +36,6 @@ pub struct Request<'a> {
 /// A model, fitted and diagnosed.
 #[derive(Debug)]
 pub struct State {
-    /// Its fit.
     pub fit: Fit,
     /// What its diagnosis says.
     pub found: Diagnosis,
@@ -106,20 +104,15 @@ pub enum Stop {
 pub enum Refusal {
     /// A size of it is so many times what such an effect usually has.
     TooLarge {
-        /// The effect.
         effect: String,
-        /// The parameter.
         parameter: String,
         /// Times its usual size.
         times: f64,
     },
     /// A size of it cannot be separated from that of another effect that was added.
     Together {
-        /// The effect.
         effect: String,
-        /// The other one.
         other: String,
-        /// Their parameters.
         parameters: [String; 2],
         /// Correlation of the two.
         r: f64,

@@ -16,7 +16,6 @@ pub enum Verdict {
     TooLittleData(TooLittle),
 }
 
-/// What is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Missing {
     /// The first candidate. Its name may be wrong.
@@ -29,7 +28,6 @@ pub enum Missing {
         of: usize,
         /// So many would be where the plan has them without the mistake.
         right: usize,
-        /// The mistake.
         mistake: String,
     },
     /// Most touches found nothing, and one of these set-up mistakes explains it.
@@ -38,7 +36,6 @@ pub enum Missing {
         unusable: usize,
         /// … of so many.
         of: usize,
-        /// The mistakes.
         mistakes: Vec<String>,
         /// Share of the touches that would hit or miss as they did.
         agrees: f64,
@@ -64,7 +61,6 @@ pub enum NameDoubt {
 pub struct Unexplained {
     /// Why nothing is named.
     pub why: NotNamed,
-    /// What to check at the machine.
     pub check: MachineCheck,
     /// Can `sketch-effect` write what is seen as a formula?
     pub sketchable: bool,

@@ -114,7 +114,6 @@ pub struct NoValue {
     pub effect: String,
     /// Number of the term.
     pub term: usize,
-    /// Its formula.
     pub formula: String,
     /// How many touches.
     pub n_touches: usize,

@@ -292,9 +292,7 @@ fn some_of(all: &[f64], most: usize) -> Vec<f64> {
 /// A stretch of a shape parameter in which a jump shows in the same touches, wherever in it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
-    /// Some place in it.
     pub place: f64,
-    /// Its ends.
     pub ends: [f64; 2],
 }
 

@@ -69,7 +69,6 @@ pub enum Kind {
 /// A combination that has no effect on the touches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NullDirection {
-    /// Its kind.
     pub kind: Kind,
     /// Results in it, the largest weights first.
     pub members: Vec<Combined>,

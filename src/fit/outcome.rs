@@ -70,7 +70,6 @@ pub struct Outcome {
     /// Combinations that the data determine no better than their typical sizes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weak: Vec<Combination>,
-    /// The parameters.
     pub parameters: Vec<Parameter>,
     /// Pairs of results that are least told apart, worst first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -140,7 +139,6 @@ pub struct Combination {
 /// Two results that go together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Correlation {
-    /// One.
     pub a: String,
     /// The other.
     pub b: String,
@@ -161,7 +159,6 @@ pub struct PriorRow {
     pub unit: String,
 }
 
-/// A type B row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TypeBRow {
     /// Parameter that is not solved for.
@@ -195,7 +192,6 @@ pub enum Status {
     Undetermined,
 }
 
-/// One parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// ISO form, e.g. `EX0B`.
@@ -205,7 +201,6 @@ pub struct Parameter {
     pub alias: Option<String>,
     /// Id of its effect.
     pub effect: String,
-    /// Value.
     pub value: f64,
     /// `mm`, `deg`, …
     pub unit: String,

@@ -15,9 +15,7 @@ use std::collections::BTreeMap;
 /// A fit with everything that later rooms need.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The model.
     pub model: Model,
-    /// The data.
     pub data: Data,
     /// All unknowns, held ones included, each in its unit.
     pub theta: Vec<f64>,
@@ -44,7 +42,6 @@ pub struct Fit {
     pub priors: Vec<Prior>,
     /// What the user said, by unknown.
     pub knowledge: Vec<Option<Knowledge>>,
-    /// The noise.
     pub noise: Noise,
     /// How many outliers a robust fit finds, where they are too many to be excluded.
     pub outliers_beyond: Option<usize>,

@@ -22,7 +22,6 @@ const MAX_STEPS: usize = 60;
 pub struct Observability {
     /// Norm of each column of the nominal Jacobian (1 where it is zero), mm per unit.
     pub scale: DVector<f64>,
-    /// Rank.
     pub rank: usize,
     /// Largest over smallest non-zero singular value of the scaled Jacobian.
     pub condition: f64,

@@ -41,7 +41,6 @@ use finding_places::Places;
 /// Who wrote a log.
 #[derive(Debug, Clone, Copy)]
 pub enum Writer<'a> {
-    /// A control, with its postprocessor.
     Controller(&'a Postprocessor),
     /// Inspection results of another program.
     Points(&'a points::PointsForm),

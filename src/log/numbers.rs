@@ -34,7 +34,6 @@ impl Fault {
 /// A number as it is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Number {
-    /// Its value.
     pub value: f64,
     /// Digits after the mark; `None` without a mark.
     pub decimals: Option<usize>,

@@ -27,9 +27,7 @@ pub struct ReadLines<'a> {
 pub struct Event<'a> {
     /// How many touches stand before it.
     pub at: usize,
-    /// Where.
     pub line: Line<'a>,
-    /// What kind of line.
     pub kind: LineKind,
 }
 
@@ -101,7 +99,6 @@ impl Reader<'_> {
         out
     }
 
-    /// Reads a line.
     fn note<'a>(&self, line: Line<'a>, out: &mut ReadLines<'a>) {
         let kind = match self.line(&line) {
             Ok(Record::Touch(touch)) => {

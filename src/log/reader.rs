@@ -9,7 +9,6 @@ use std::path::Path;
 /// What a log is read with.
 #[derive(Debug, Clone)]
 pub enum Reader {
-    /// A control, with its postprocessor.
     Controller(Box<Postprocessor>),
     /// Inspection results of another program.
     Points(Box<PointsForm>),

@@ -18,7 +18,6 @@ use nom::{IResult, Parser};
 pub enum Record {
     /// A run begins.
     Head(LogHeader),
-    /// A touch.
     Touch(RawTouch),
     /// A run has come to its end; number of touches of the plan.
     End(u64),
@@ -41,7 +40,6 @@ pub struct LogHeader {
     pub touches: u64,
     /// What X, Y and Z are in; a head that does not say so means mm.
     pub unit: LengthUnit,
-    /// It says so.
     pub says_unit: bool,
     /// The control writes no blanks: all three names stand in `controller`, one behind the other.
     pub written_together: bool,

@@ -17,13 +17,11 @@ pub struct RunFound {
     pub number: usize,
     /// First line, from 1.
     pub first_line: usize,
-    /// Last line.
     pub last_line: usize,
     /// Lines of touches that are understood.
     pub touches: usize,
     /// The line of its end is there, and it began with the first set-up.
     pub complete: bool,
-    /// It is the one that is taken.
     pub taken: bool,
 }
 
@@ -35,7 +33,6 @@ impl RunFound {
     }
 }
 
-/// One run.
 #[derive(Debug, Default)]
 pub struct Run {
     /// With which it begins.
@@ -50,7 +47,6 @@ pub struct Run {
 }
 
 impl Run {
-    /// Is there a touch in it?
     pub fn has_touches(&self) -> bool {
         self.count() > 0
     }

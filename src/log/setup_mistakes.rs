@@ -65,7 +65,6 @@ struct Mistake {
 /// What would put the touches that are far from their places where they belong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supposed {
-    /// The mistake.
     pub mistake: LogMistake,
     /// What to look at.
     pub help: &'static str,

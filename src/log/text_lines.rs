@@ -2,7 +2,6 @@
 
 use crate::post::as_written::EndOfLine;
 
-/// One line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Line<'a> {
     /// From 1.

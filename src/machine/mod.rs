@@ -16,7 +16,6 @@ use crate::diag::{Result, source};
 use crate::geometry::{Transform, apply, rotation_about, translation};
 use nalgebra::{Unit, Vector3};
 
-/// The machines that are built in.
 pub const BUILT_IN: &str = include_str!("../../machines.toml");
 
 /// One machine of those that are built in; the tables of the others are not read. `None`: none of them is called so.
@@ -113,20 +112,16 @@ impl Tool {
 pub enum Shape {
     /// Along the axes of R: centre and full edges.
     Box {
-        /// Its centre.
         centre: Vector3<f64>,
         /// Its full edges.
         size: Vector3<f64>,
     },
-    /// A cylinder.
     Cylinder {
         /// Centre of its lower end.
         foot: Vector3<f64>,
         /// From the foot to the other end.
         direction: Unit<Vector3<f64>>,
-        /// Radius.
         radius: f64,
-        /// Height.
         height: f64,
     },
 }
@@ -159,7 +154,6 @@ pub struct Solid {
     pub name: String,
     /// What bears it.
     pub carrier: Carrier,
-    /// Its shape.
     pub shape: Shape,
 }
 
@@ -168,7 +162,6 @@ pub struct Solid {
 pub struct Block {
     /// Short name.
     pub name: String,
-    /// Its centre.
     pub centre: Vector3<f64>,
     /// Its full edges.
     pub size: Vector3<f64>,
@@ -187,7 +180,6 @@ pub struct Mounting {
     pub says: String,
     /// What bears it, where a block says nothing else.
     pub carrier: Carrier,
-    /// Its blocks.
     pub blocks: Vec<Block>,
     /// Its other solids (the risers are among them).
     pub solids: Vec<Solid>,
@@ -202,9 +194,7 @@ pub struct Stylus {
     pub says: String,
     /// How much longer the stem is.
     pub longer: f64,
-    /// Radius of the ball.
     pub ball_radius: f64,
-    /// Radius of the stem.
     pub stem_radius: f64,
 }
 
@@ -224,7 +214,6 @@ pub struct Reference {
 pub struct Machine {
     /// Short name.
     pub name: String,
-    /// What it is.
     pub says: String,
     /// Machine coordinates at the origin of R, mm and deg.
     pub origin: AxisMap,

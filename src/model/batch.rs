@@ -212,7 +212,6 @@ impl Batch<'_> {
         self.observations.is_empty()
     }
 
-    /// The model.
     #[must_use]
     pub fn model(&self) -> &Model {
         self.model

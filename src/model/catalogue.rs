@@ -82,11 +82,9 @@ pub struct Effect {
     pub id: String,
     /// Name for people.
     pub name: String,
-    /// What it is.
     pub says: String,
     /// How to confirm it.
     pub look: String,
-    /// What mends it.
     pub mends: String,
     /// Applies where its axes stand on this side only.
     pub side: Option<Side>,

@@ -12,16 +12,12 @@ const ANGLES: [&str; 7] = ["A", "B", "C", "wA", "wB", "wC", "S"];
 pub enum InDegrees {
     /// An angle stands against a number that is more than a turn in radians.
     Against {
-        /// The angle.
         angle: String,
         /// The number, per one of the angle.
         number: f64,
     },
     /// An angle is multiplied by pi/180.
-    Converted {
-        /// The angle.
-        angle: String,
-    },
+    Converted { angle: String },
 }
 
 impl InDegrees {

@@ -135,7 +135,6 @@ fn sign(x: f64) -> f64 {
 }
 
 impl Two {
-    /// The operator of a sign.
     pub(super) fn operator(sign: char) -> Self {
         match sign {
             '+' => Self::Plus,

@@ -90,7 +90,6 @@ pub struct Observation {
     pub point: Vector3<f64>,
     /// Outward unit normal.
     pub normal: Vector3<f64>,
-    /// Radius of the ball.
     pub ball_radius: f64,
     /// Ball's centre at zero, in R.
     pub ball_at_zero: Vector3<f64>,
@@ -141,7 +140,6 @@ pub(super) enum Changes {
     Never,
     /// Once for each block.
     WithSetUp,
-    /// At every touch.
     WithTouch,
 }
 
@@ -208,7 +206,6 @@ impl Layout {
         self.common.iter().copied().chain(self.own.get(set_up).into_iter().flatten().copied())
     }
 
-    /// Length of a row.
     #[must_use]
     pub fn row_length(&self, set_up: usize) -> usize {
         self.common.len() + self.own.get(set_up).map_or(0, Vec::len)

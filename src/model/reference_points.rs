@@ -22,7 +22,6 @@ pub enum Stated {
     Place,
 }
 
-/// Where a term of an effect is stated on a machine.
 #[must_use]
 pub fn stated(machine: &Machine, effect: &Effect, term: &Term) -> Stated {
     let (name, before) = match term.place {

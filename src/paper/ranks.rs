@@ -14,15 +14,12 @@ use nalgebra::{DMatrix, Vector3};
 /// One statement: so many unknowns, of this rank.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Statement {
-    /// Which machine.
     pub machine: String,
     /// The unknowns in the paper's letters.
     pub unknowns: String,
-    /// The poses.
     pub poses: String,
     /// How many unknowns.
     pub number: usize,
-    /// The rank.
     pub rank: usize,
 }
 

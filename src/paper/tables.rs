@@ -64,7 +64,6 @@ impl Row {
 /// What the tables are made on: a machine and its plan.
 #[derive(Debug, Clone, Copy)]
 pub struct Bench<'a> {
-    /// The machine.
     pub machine: &'a Machine,
     /// What is touched on it.
     pub plan: &'a Plan,

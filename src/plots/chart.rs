@@ -18,9 +18,7 @@ pub enum Shape {
 /// How points look.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// Their colour.
     pub colour: Colour,
-    /// Their shape.
     pub shape: Shape,
     /// Filled, or its outline alone.
     pub filled: bool,
@@ -50,14 +48,12 @@ pub enum Mark {
         series: String,
         /// How they look.
         look: Look,
-        /// Where they are.
         points: Vec<Point>,
     },
     /// A line through points.
     Line {
         /// Name.
         series: String,
-        /// Its colour.
         colour: Colour,
         /// Its width, px.
         width: u32,
@@ -70,13 +66,10 @@ pub enum Mark {
     Area {
         /// Name.
         series: String,
-        /// Its colour.
         colour: Colour,
         /// 0 (unseen) to 1.
         opacity: f64,
-        /// x from and to.
         x: (f64, f64),
-        /// y from and to.
         y: (f64, f64),
     },
     /// A word at a place.
@@ -165,12 +158,10 @@ fn nice(x: f64) -> f64 {
         }
 }
 
-/// A chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     /// Name of its files.
     pub name: String,
-    /// Its title.
     pub title: String,
     /// The axis below.
     pub x: Axis,

@@ -18,11 +18,8 @@ pub struct NcProgram {
 /// A file that the control needs beside the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SideFile {
-    /// Its name.
     pub name: String,
-    /// What it is for.
     pub says: String,
-    /// Its text.
     pub text: String,
 }
 

@@ -20,7 +20,6 @@ pub struct NumberRule {
     pub mark: char,
     /// `{axis}{value}`
     pub word: String,
-    /// What lengths are in.
     pub unit: LengthUnit,
     /// What the control calls an axis, where that is not its letter.
     pub names: BTreeMap<AxisName, String>,
@@ -128,7 +127,6 @@ pub struct CommentRule {
     pub width: usize,
     /// The longest message to the operator that is shown whole, characters.
     pub message_width: Option<usize>,
-    /// Replaced characters.
     pub replace: BTreeMap<char, String>,
     /// For a character outside printable ASCII.
     pub other: String,

@@ -54,7 +54,6 @@ pub struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    /// The block of a target.
     #[must_use]
     pub fn block(&self, setup: &Setup, target: &Target) -> Option<&Block> {
         self.parts.get(setup.part)?.mounting.blocks.get(target.block)

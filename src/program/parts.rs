@@ -15,7 +15,6 @@ pub(super) const OWN_STYLUS: &str = "own";
 /// A part as the program's file names it.
 #[derive(Debug, Clone)]
 pub struct PartSpec {
-    /// The mounting.
     pub mounting: At<String>,
     /// Name of the blocks as they stand: that of the mounting, and `NAME#2`, `NAME#3` … when they are put up anew.
     pub label: String,

@@ -47,7 +47,6 @@ pub enum Step {
     Protected {
         /// The axes that move.
         to: AxisMap,
-        /// Feed.
         feed: f64,
     },
     /// One touch: search from where the ball stands (the touch's `start`), back off, measure, log.
@@ -56,7 +55,6 @@ pub enum Step {
     Retract {
         /// The axes that move.
         to: AxisMap,
-        /// Feed.
         feed: f64,
     },
 }
@@ -72,7 +70,6 @@ pub struct Stop {
     pub mounting: String,
     /// Pivot to ball's centre.
     pub tool_length_mm: f64,
-    /// Radius of the ball.
     pub ball_radius_mm: f64,
 }
 
@@ -95,7 +92,6 @@ pub struct TouchStep {
     pub first: bool,
     /// How far from `nominal` the first touch of a block may trigger.
     pub tolerance_mm: f64,
-    /// Feed of the search.
     pub search_feed: f64,
     /// Feed of the measuring touch.
     pub measure_feed: f64,
@@ -108,7 +104,6 @@ pub struct TouchStep {
 pub struct Path {
     /// What a person must know before pressing start: artefact, layout, settings. One line each.
     pub head: Vec<String>,
-    /// The steps.
     pub steps: Vec<Step>,
     /// Predicted run time, s; with what a person needs at the stops.
     pub seconds: f64,

@@ -31,14 +31,12 @@ pub struct Plan {
     /// What the controller's coordinates mean: axis positions, or the place in the workpiece under its transformation.
     #[serde(default, skip_serializing_if = "ControllerFrame::is_axes")]
     pub controller_frame: ControllerFrame,
-    /// Radius of the ball.
     pub ball_radius_mm: f64,
     /// Pivot to ball's centre.
     pub tool_length_mm: f64,
     /// How far a block may stand from where it should.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement_tolerance_mm: Option<f64>,
-    /// The blocks.
     pub blocks: Vec<PlanBlock>,
     /// The touches, in the order in which they are made.
     pub touches: Vec<PlanTouch>,
@@ -109,7 +107,6 @@ pub struct PlanBlock {
     pub size: [f64; 3],
 }
 
-/// One touch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanTouch {
     /// Its number, unique in the plan.
@@ -294,7 +291,6 @@ impl Plan {
         text.replacen(EMPTY, &format!("\"touches\": [{}\n  ]", lines.join(",")), 1)
     }
 
-    /// The block of a touch.
     #[must_use]
     pub fn block_of(&self, touch: &PlanTouch) -> Option<&PlanBlock> {
         self.blocks.iter().find(|b| {

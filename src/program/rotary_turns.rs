@@ -64,7 +64,6 @@ pub(super) fn turns(
     Ok(turns)
 }
 
-/// A turn as a step.
 pub(super) fn turn_step(axis: AxisName, to: f64, sense: Option<f64>) -> Step {
     let turn = |value: f64| AxisMap::default().with(axis, value);
     Step::Rotary { to: turn(to), sense: sense.map_or_else(AxisMap::default, turn) }

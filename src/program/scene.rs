@@ -23,9 +23,7 @@ pub enum Part {
     Head,
     /// The probe's body.
     Body,
-    /// The stem.
     Stem,
-    /// The ball.
     Ball,
 }
 
@@ -124,7 +122,6 @@ pub(super) struct Obstacle {
 
 /// Machine and artefact as solids.
 pub struct Scene<'m> {
-    /// The machine.
     pub machine: &'m Machine,
     pub(super) parts: Vec<(Part, Solid)>,
     pub(super) obstacles: Vec<Obstacle>,
@@ -324,7 +321,6 @@ impl<'m> Scene<'m> {
         (from_line - line.1 * from_line.dot(&line.1)).norm() + solid.reach()
     }
 
-    /// Which side an axis is on.
     pub(super) fn side_of(&self, axis: AxisName) -> Option<Side> {
         self.machine.axis(axis).map(|a| a.side)
     }

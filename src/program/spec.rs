@@ -26,7 +26,6 @@ pub(super) const MOST_TOUCHES: usize = 100_000;
 /// A word or number with its place in the program's file.
 #[derive(Debug, Clone)]
 pub struct At<T> {
-    /// The value.
     pub value: T,
     /// Byte range in [`ProgramSpec::source`].
     pub span: Range<usize>,
@@ -107,7 +106,6 @@ pub type GridPoint = (f64, Across);
 /// A face and the points on it.
 #[derive(Debug, Clone)]
 pub struct FaceGrid {
-    /// The face.
     pub face: At<Face>,
     /// Its points, mm.
     pub points: Vec<GridPoint>,
@@ -145,7 +143,6 @@ pub struct ProgramSpec {
     pub name: String,
     /// The machine that it was written for.
     pub machine: Option<At<String>>,
-    /// What it is for.
     pub says: String,
     /// Blocks and stylus, from stop to stop: at least one part.
     pub parts: Vec<PartSpec>,

@@ -57,7 +57,6 @@ impl Basis {
         self.q_t.nrows()
     }
 
-    /// Rows N.
     #[must_use]
     pub fn n_rows(&self) -> usize {
         self.q_t.ncols()

@@ -54,7 +54,6 @@ impl Group {
         self.members.first().map_or(self.leader, |m| m.candidate)
     }
 
-    /// Does it hold the candidate?
     #[must_use]
     pub fn holds(&self, candidate: usize) -> bool {
         self.members.iter().any(|m| m.candidate == candidate)

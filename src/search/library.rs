@@ -70,7 +70,6 @@ const MOST_ROWS_KEPT: usize = 4_000;
 /// Columns that are worked on at once.
 const CHUNK: usize = 64;
 
-/// Where columns are.
 #[derive(Clone)]
 enum Columns {
     /// In memory, one after the other.
@@ -221,7 +220,6 @@ impl Library {
         }));
     }
 
-    /// The candidates.
     #[must_use]
     pub fn candidates(&self) -> &[Candidate] {
         &self.candidates
@@ -233,7 +231,6 @@ impl Library {
         self.candidates.iter().position(|c| c.id == id)
     }
 
-    /// Rows.
     #[must_use]
     pub fn n_rows(&self) -> usize {
         self.n_rows

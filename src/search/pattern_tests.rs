@@ -69,7 +69,6 @@ pub struct Variable {
     pub name: String,
     /// How formulas say it; `None`: they cannot.
     pub word: Option<String>,
-    /// What it is.
     pub kind: Kind,
     /// Values, in the kind's unit.
     pub values: Vec<f64>,
@@ -188,7 +187,6 @@ pub struct Shape {
 pub struct Generics {
     /// Candidates; sizes in the unit of their direction.
     pub library: Library,
-    /// What they are.
     pub shapes: Vec<Shape>,
 }
 

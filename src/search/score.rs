@@ -74,7 +74,6 @@ pub struct Score {
     pub p_adjusted: f64,
     /// Expected size of each parameter, in typical sizes.
     pub estimate: DVector<f64>,
-    /// Its covariance.
     pub covariance: DMatrix<f64>,
     /// Share of the candidate's norm that the base model cannot follow.
     pub kept: f64,

@@ -14,7 +14,6 @@ pub enum Contact {
         /// How many faces meet where the ball touches: 1 a face, 2 an edge, 3 a corner.
         faces: u8,
     },
-    /// It does not.
     Missed,
     /// It touches or enters the box before it moves, by this depth in mm.
     Already(f64),

@@ -54,9 +54,7 @@ pub struct Planted {
 /// carrier's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockError {
-    /// Its mounting.
     pub mounting: String,
-    /// Its name.
     pub name: String,
     /// Displacement, mm.
     pub shift_mm: Vec3,

@@ -87,7 +87,6 @@ pub enum Target {
     /// An error of an axis, before or after its own motion, along and about the directions of R. Of a rotary axis these
     /// are the constant ones, which say where its line lies.
     Axis {
-        /// Which axis.
         axis: AxisName,
         /// After its motion (the error moves with the axis) instead of before.
         after: bool,
@@ -96,7 +95,6 @@ pub enum Target {
     },
     /// How a rotary axis runs on its own line: along and about the directions of the axis's own frame, at its own line.
     OwnLine {
-        /// Which axis.
         axis: AxisName,
         /// After its motion (the error moves with the axis) instead of before.
         after: bool,
@@ -252,11 +250,9 @@ pub struct Term {
 pub struct Shifts {
     /// Error motion of each axis before its motion: dx dy dz (mm), rx ry rz (rad).
     pub before: [[f64; 6]; 6],
-    /// And after it.
     pub after: [[f64; 6]; 6],
     /// Of a rotary axis on its own line, in its own frame, before its motion.
     pub line_before: [[f64; 6]; 6],
-    /// And after it.
     pub line_after: [[f64; 6]; 6],
     /// Displacement of the ball in R, mm.
     pub ball_machine: Vec3,

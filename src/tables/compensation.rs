@@ -163,7 +163,6 @@ pub struct Tables {
     pub reads: Option<String>,
     /// The files that are to be loaded.
     pub files: Vec<String>,
-    /// The vectors.
     pub vectors: Vec<Vector>,
     /// By the control's name: what the files hold, in their unit. A later backup must hold the same.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

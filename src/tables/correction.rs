@@ -24,9 +24,7 @@ pub struct AxisShape {
     pub parameter: String,
     /// Id of its effect.
     pub effect: String,
-    /// The axis.
     pub axis: AxisName,
-    /// Its value.
     pub value: f64,
     /// Unit of the value.
     pub unit: String,
@@ -49,11 +47,9 @@ pub struct LeftOut {
     pub parameter: String,
     /// Id of its effect.
     pub effect: String,
-    /// Its value.
     pub value: f64,
     /// Unit of the value.
     pub unit: String,
-    /// Why.
     pub why: String,
     /// True when it is a known error of the machine, so that leaving it out leaves that error.
     pub known: bool,

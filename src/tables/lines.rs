@@ -22,7 +22,6 @@ use std::collections::BTreeMap;
 /// The line of a rotary axis at zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Whose.
     pub axis: AxisName,
     /// A point of it, mm: workpiece side in machine coordinates (where the adapter stands at it), tool side from the
     /// adapter.

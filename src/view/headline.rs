@@ -27,7 +27,6 @@ pub enum Level {
 pub struct Headline {
     /// Good, act, unknown.
     pub level: Level,
-    /// One sentence.
     pub sentence: String,
     /// What stands behind it, in a second one.
     pub detail: String,

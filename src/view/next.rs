@@ -16,7 +16,6 @@ use serde::Serialize;
 /// A thing to do.
 #[derive(Debug, Clone, Serialize)]
 pub struct Next {
-    /// What to do.
     pub what: String,
     /// How, or why.
     pub how: String,

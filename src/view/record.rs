@@ -148,7 +148,6 @@ pub struct ParameterRecord {
     /// Id of its effect.
     pub effect: String,
     pub effect_name: String,
-    /// What mends it.
     pub mends: String,
     pub value: f64,
     pub unit: String,
@@ -208,11 +207,9 @@ pub struct DiagnosisRecord {
 pub struct EffectRecord {
     /// Name for people.
     pub name: String,
-    /// What it is.
     pub says: String,
     /// How to confirm it.
     pub look: String,
-    /// What mends it.
     pub mends: String,
 }
 
@@ -277,7 +274,6 @@ pub struct LeftRecord {
 pub struct MachineRecord {
     /// Short name.
     pub name: String,
-    /// What it is.
     pub says: String,
     /// The axes, workpiece side from the base on, then tool side from the base on.
     pub axes: Vec<AxisRecord>,

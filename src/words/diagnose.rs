@@ -391,7 +391,6 @@ fn too_little(d: &Diagnosis, why: &TooLittle) -> String {
     }
 }
 
-/// What to check at the machine.
 #[must_use]
 pub fn machine_check(check: &MachineCheck) -> String {
     match check {

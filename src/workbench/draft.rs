@@ -26,7 +26,6 @@ pub struct Draft {
     /// Name for people.
     #[serde(default)]
     pub name: String,
-    /// What it is.
     #[serde(default)]
     pub says: String,
     /// How to confirm it on the machine.
@@ -83,7 +82,6 @@ pub struct Mistake {
     pub to: Option<usize>,
     /// What is wrong.
     pub message: String,
-    /// What to do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub help: Option<String>,
 }

@@ -12,7 +12,6 @@ use crate::post::Postprocessor;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// One mask.
 #[derive(Debug, Clone, Default)]
 pub struct Mask {
     /// What the file holds is kept; `None`: the mask does not say.
@@ -48,7 +47,6 @@ impl Masks {
         Ok(Self(masks))
     }
 
-    /// The mask of a name.
     pub fn get(&self, name: &str) -> Option<&Mask> {
         self.0.get(name)
     }

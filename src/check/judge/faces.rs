@@ -1,8 +1,9 @@
 //! At a face: the search, the way back, the second search.
 
 use super::proofs::How;
-use super::{Contact, SIDEWAYS_MM, Walk};
+use super::{Contact, Walk};
 use crate::axes::{AxisName, Position};
+use crate::check::checked_program::SIDEWAYS_MM;
 use crate::check::run::Probe;
 use crate::check::touches::Made;
 use crate::program::sweep::Manner;

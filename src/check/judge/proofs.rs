@@ -1,6 +1,6 @@
 //! Moves that must be clear, each proven once.
 
-use super::Case;
+use super::CheckedProgram;
 use crate::axes::{AxisName, Position};
 use crate::program::sweep::Manner;
 use std::ops::Range;
@@ -40,7 +40,7 @@ impl How {
 
 impl Proof {
     /// What is wrong with it: where, code, in words.
-    pub(super) fn check(&self, case: &Case<'_>) -> Option<(Range<usize>, &'static str, String)> {
+    pub(super) fn check(&self, case: &CheckedProgram<'_>) -> Option<(Range<usize>, &'static str, String)> {
         let scene = case.scenes.get(self.part)?;
         let proven = match self.how {
             How::Straight(manner) => scene.clear_straight(&self.from, &self.to, manner),

@@ -25,7 +25,6 @@ const SAME_DEG: f64 = 1e-6;
 const TIMER_S: f64 = 0.001;
 /// A program begins at two minutes before midnight, s since midnight: its run goes over the end of the day.
 const BEGINS_S: f64 = 86_280.0;
-/// A day, s.
 const DAY_S: f64 = 86_400.0;
 
 /// What MEAS has kept.

@@ -71,7 +71,6 @@ fn is_r(name: &str) -> bool {
 }
 
 impl Names {
-    /// The axis of a name.
     pub fn axis(&self, name: &str) -> Option<AxisName> {
         self.axes.iter().find(|(n, _)| n == name).map(|(_, a)| *a)
     }

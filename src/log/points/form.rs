@@ -44,7 +44,6 @@ pub struct PointsForm {
     pub unit: LengthUnit,
     /// The line with which a block begins.
     pub begin: String,
-    /// And ends.
     pub end: String,
     /// What begins a remark.
     pub remark: String,

@@ -21,7 +21,6 @@ use crate::units::{mm_from_inch, rad_from_deg};
 use nalgebra::Vector3;
 use record::{Record, record};
 
-/// One point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// Its number in the file.

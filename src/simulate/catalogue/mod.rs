@@ -24,7 +24,6 @@ pub struct Parameter {
     pub aliases: Vec<String>,
     /// Unit of a bare number.
     pub unit: Unit,
-    /// What it does.
     pub role: Role,
 }
 

@@ -35,7 +35,6 @@ pub enum Kind {
 }
 
 impl Unit {
-    /// All of them.
     pub const ALL: [Self; 13] = [
         Self::Um,
         Self::Mm,
@@ -71,7 +70,6 @@ impl Unit {
         }
     }
 
-    /// From a word.
     pub fn parse(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|u| u.word() == word)
     }

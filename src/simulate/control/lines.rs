@@ -49,7 +49,6 @@ impl Side {
 /// The control's transformation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vectors {
-    /// The head.
     pub head: Side,
     /// The table, in machine coordinates.
     pub table: Side,

@@ -5,7 +5,6 @@ use crate::axes::AxisName;
 /// The table of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Whose it is.
     pub axis: AxisName,
     /// Machine coordinate of R's origin, mm or deg.
     pub origin: f64,

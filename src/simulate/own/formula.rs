@@ -353,7 +353,6 @@ impl Formula {
         self.words.iter().any(|w| matches!(w, Word::Hours | Word::Temperature))
     }
 
-    /// Value at a touch.
     pub fn value(&self, touch: &TouchState, joints: &Position) -> f64 {
         let here = |only: &str| only == &*touch.label || Some(only) == touch.label.rsplit('/').next();
         if !self.only.as_deref().is_none_or(here) {

@@ -107,7 +107,6 @@ struct OwnShape {
 /// A parameter of a user's effect.
 #[derive(Debug, Clone)]
 pub struct OwnParameter {
-    /// Its name.
     pub name: String,
     /// Its unit.
     pub unit: Unit,
@@ -118,9 +117,7 @@ pub struct OwnParameter {
 /// A user's effect as a machine has it.
 #[derive(Debug, Clone)]
 pub struct Own {
-    /// Its id.
     pub id: String,
-    /// Its parameters.
     pub parameters: Vec<OwnParameter>,
     /// Which parameter acts where, how, and by how much.
     acts: Vec<(usize, Target, Formula, f64)>,

@@ -19,7 +19,6 @@ pub const SHEET: &str = "axiscal_changes.txt";
 pub struct Change {
     /// The control's names of the value, one in each of its tables.
     pub names: Vec<String>,
-    /// What it is.
     pub says: String,
     /// What is added to the present value, in the unit.
     pub change: f64,
@@ -96,7 +95,6 @@ impl Division {
         self.values_known && self.grids_known
     }
 
-    /// All changes.
     pub fn changes(&self) -> impl Iterator<Item = &Change> {
         self.values.iter().chain(&self.points)
     }

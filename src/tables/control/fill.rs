@@ -16,7 +16,6 @@ use std::collections::BTreeMap;
 pub struct Value {
     /// Short name of the vector or angle.
     pub id: String,
-    /// What it is.
     pub says: String,
     /// Spelling → name.
     pub names: BTreeMap<String, String>,
@@ -68,7 +67,6 @@ impl Value {
 /// A filled table.
 #[derive(Debug, Clone)]
 pub struct Filled {
-    /// Its values.
     pub values: Vec<Value>,
     /// Its vectors, mm or components of a direction.
     pub vectors: Vec<(VectorForm, Vector3<f64>)>,
@@ -119,7 +117,6 @@ impl Filled {
 
 /// What the filling needs to know.
 pub struct Question<'a> {
-    /// The machine.
     pub machine: &'a Machine,
     /// What the control has.
     pub tables: &'a Tables,
@@ -127,7 +124,6 @@ pub struct Question<'a> {
     pub kind: &'a Kind,
     /// With what was active during the measurement.
     pub before: &'a Seen,
-    /// With what is to be.
     pub now: &'a Seen,
     /// Where the old values did not act on the touches: what was found takes their place.
     pub replaced: Option<&'a Replaced>,
@@ -249,7 +245,6 @@ impl Question<'_> {
         (form.to == Some(Point::WorkpieceCrossing) && mm > LARGEST_MISS_MM).then_some(mm)
     }
 
-    /// As the description has it.
     fn described(&self, form: &VectorForm, seen: &Seen) -> Vector3<f64> {
         match (form.from, form.to, form.direction) {
             (Some(from), Some(to), _) => point_of(seen, to) - point_of(seen, from),

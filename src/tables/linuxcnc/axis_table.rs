@@ -26,11 +26,9 @@ fn told_more(shapes: &[&AxisShape], q: f64, sense: f64) -> f64 {
 /// The table of an axis, with what it leaves.
 #[derive(Debug, Clone)]
 pub struct Made {
-    /// Whose it is.
     pub axis: AxisName,
     /// Rows in mm or deg.
     pub table: AxisTable,
-    /// What it leaves.
     pub leaves: TableError,
 }
 

@@ -64,7 +64,6 @@ pub struct Left {
     pub parameter: String,
     /// Id of its effect.
     pub effect: String,
-    /// Its value.
     pub value: f64,
     /// Unit of the value.
     pub unit: String,

@@ -58,7 +58,6 @@ fn left(lines: &[Left]) -> Vec<String> {
     columns(&rows)
 }
 
-/// The text.
 pub(super) fn text(packing: &Packing, by_component: &Way, by_stock: &Way) -> Result<String> {
     let (machine, correction) = (packing.machine, packing.correction);
     let unwritten = |known: bool| correction.left_out.iter().filter(move |l| l.known == known);

@@ -30,7 +30,6 @@ use std::collections::BTreeMap;
 pub struct Module {
     /// Name of the module, and of its pins.
     pub name: &'static str,
-    /// The tilting axis.
     pub tilting: AxisName,
     /// What its direction pin must be: 1 (true) where positive angles turn the table left-handed. `None`: this version has none.
     pub conventional: Option<bool>,

@@ -56,7 +56,6 @@ pub enum Advice {
     Sketch,
 }
 
-/// A program, and what it is for.
 pub struct Program {
     pub questions: Questions,
     pub chosen: Chosen,
