@@ -58,6 +58,9 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
                 axis_here(axis, machine)?;
                 Ok(vec![rotary_scale(axis)])
             }
+            ("tilt", _) if axis.is_rotary() => {
+                Ok(about_a_point(harmonic(family, axis, k, machine)?, id, along(axis), settings))
+            }
             _ if axis.is_rotary() => harmonic(family, axis, k, machine),
             _ => Err(Refusal::Unknown),
         };
@@ -84,7 +87,13 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
             if dof < 3 {
                 Err(Refusal::Unknown)
             } else {
-                Ok(vec![at_the_ball(polynomial(axis, dof, 1, false), machine)])
+                let arm_along = match (dof, axis) {
+                    (5, AxisName::Y) => 0,
+                    (5, _) => 1,
+                    _ => 2,
+                };
+                let turn = at_the_ball(polynomial(axis, dof, 1, false), machine);
+                Ok(about_a_point(vec![turn], id, arm_along, settings))
             }
         }
         _ => Err(Refusal::Unknown),
@@ -138,6 +147,35 @@ pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)>
     vec![(Target::Axis { axis, after, dof: m }, arm[n]), (Target::Axis { axis, after, dof: n }, -arm[m])]
 }
 
+/// Turns that act about a point at `arm_…` mm along a direction (0, 1, 2: x, y, z): each point of what is turned moves less, or more,
+/// by the turn times that distance.
+fn about_a_point(mut turns: Vec<Parameter>, id: &str, along: usize, settings: Settings<'_>) -> Vec<Parameter> {
+    let name = format!("arm_{}", id.replace('-', "_"));
+    let arm = settings(&name).unwrap_or(0.0);
+    for turn in &mut turns {
+        let Role::Amount(acts) = &mut turn.role else { continue };
+        let Some(&(target, shape, factor)) = acts.first() else { continue };
+        let (dof, at): (usize, &dyn Fn(usize) -> Target) = match target {
+            Target::OwnLine { axis, after, dof } => (dof, &move |dof| Target::OwnLine { axis, after, dof }),
+            Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
+            _ => continue,
+        };
+        // rx: y goes to z and z to -y; ry: z to x, x to -z; rz: x to y, y to -x. The point itself stays where it is
+        let (to, way) = match (dof, along) {
+            (3, 1) => (2, 1.0),
+            (3, 2) => (1, -1.0),
+            (4, 2) => (0, 1.0),
+            (4, 0) => (2, -1.0),
+            (5, 0) => (1, 1.0),
+            (5, 1) => (0, -1.0),
+            _ => continue,
+        };
+        acts.push((at(to), shape, -factor * way * arm));
+    }
+    turns.push(Parameter::signed_setting(&name, Mm).alias("arm"));
+    turns
+}
+
 fn moved(axis: AxisName, dof: usize) -> Target {
     if axis.is_rotary() { Target::OwnLine { axis, after: false, dof } } else { Target::Axis { axis, after: true, dof } }
 }
@@ -172,7 +210,7 @@ fn pitch(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
     vec![
         Parameter::at(format!("E{axis}{axis}c"), Um, target, Shape::PitchCosine(axis, period)),
         Parameter::at(format!("E{axis}{axis}s"), Um, target, Shape::PitchSine(axis, period)),
-        Parameter::setting(&own, Mm, Some(PITCH_MM)).alias("pitch"),
+        Parameter::setting(&own, Mm).alias("pitch"),
     ]
 }
 

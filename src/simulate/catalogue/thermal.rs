@@ -26,7 +26,7 @@ pub fn ids(_: &Machine) -> Vec<String> {
 /// Parameters of an id of this family.
 pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
     let tau = settings("spindle_tau").or_else(|| settings("tau")).unwrap_or(TAU_H);
-    let tau_row = |name: &str| Parameter::setting(name, H, Some(TAU_H)).alias("tau_h");
+    let tau_row = |name: &str| Parameter::setting(name, H).alias("tau_h");
     let ball = |prefix: &'static str, unit, shape| {
         (0..3).map(move |i| {
             let letter = dof_letter(i).to_ascii_lowercase();
