@@ -7,7 +7,7 @@ use super::as_written::{EffectAsWritten, Grid, Placed, Scan, ShapeAsWritten, Ter
 pub const FARTHEST_MM: f64 = 400.0;
 
 /// Distances that are tried between −400 and 400 mm: what lies between them is found by refining the best.
-const TRIED: usize = 17;
+const TRIED: usize = 9;
 
 /// Puts the lever arm of a row with `arm` into its terms and shapes: a turn of θ about r̂ through a point at a·d̂ is the same turn
 /// through the origin and a displacement of −a·θ·(r̂ × d̂).
