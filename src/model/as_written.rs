@@ -53,6 +53,9 @@ pub struct EffectAsWritten {
     /// `line`: constant errors of a rotary axis turn about its own line, as its error motions always do. `ball`: rotations
     /// of a linear axis that bears the workpiece are stated at the ball's centre at zero, not at the origin of R.
     pub about: Option<About>,
+    /// `x`, `y` or `z`: its rotations act about a point at an unknown distance along this direction, mm (`arm_` and the id, with _).
+    #[schemars(with = "Option<String>")]
+    pub arm: Option<Placed>,
     /// Letters of further axes that the machine must have (on that side).
     #[serde(default)]
     #[schemars(with = "Vec<String>")]

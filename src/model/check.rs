@@ -112,6 +112,10 @@ impl<'a> Check<'a> {
     /// One effect; `None` where it is unusable.
     pub(super) fn effect(&mut self, w: &EffectAsWritten) -> Option<Effect> {
         let before = self.findings.0.len();
+        if let Some(arm) = w.arm.as_ref().filter(|arm| !["x", "y", "z"].contains(&arm.get_ref().as_str())) {
+            let message = format!("{:?} is no direction of a lever arm", arm.get_ref());
+            self.error(&arm.span(), "effects::arm", message, "write \"x\", \"y\" or \"z\"");
+        }
         let mut parameters: Vec<Parameter> = Vec::new();
         for t in &w.terms {
             self.factor(w, t, &mut parameters);

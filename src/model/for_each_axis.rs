@@ -1,6 +1,7 @@
 //! A row of effects with `axes` stands for one row of each axis: letters in braces follow the axis ([`AxisName::fill_in`]).
 
 use super::as_written::{EffectAsWritten, Placed, Typical};
+use super::lever_arm::with_arm;
 use crate::axes::AxisName;
 
 /// The rows of a file, one for each axis. Rows with `with_previous` are repeated together with the row before them.
@@ -12,10 +13,10 @@ pub(super) fn expand(
     for together in rows.chunk_by(|_, next| next.with_previous) {
         let letters = together.first().map(|row| axes(&row.axes)).unwrap_or_default();
         if letters.is_empty() {
-            out.extend_from_slice(together);
+            out.extend(together.iter().cloned().map(with_arm));
         }
         for (number, axis) in letters.into_iter().enumerate() {
-            out.extend(together.iter().map(|row| row.for_axis(axis, number)));
+            out.extend(together.iter().map(|row| with_arm(row.for_axis(axis, number))));
         }
     }
     out
@@ -27,7 +28,8 @@ impl EffectAsWritten {
         let Self { name, says, look, mends, .. } = &mut row;
         [name, says, look, mends].into_iter().for_each(|text| *text = axis.fill_in(text));
         let placed = |word: &mut Placed| *word.get_mut() = axis.fill_in(word.get_ref());
-        [&mut row.id, &mut row.at].into_iter().chain(&mut row.needs).chain(&mut row.unless).for_each(placed);
+        let words = [&mut row.id, &mut row.at].into_iter().chain(&mut row.arm);
+        words.chain(&mut row.needs).chain(&mut row.unless).for_each(placed);
         for term in &mut row.terms {
             let always = [&mut term.parameter, &mut term.dof, &mut term.formula];
             always.into_iter().chain(&mut term.at).for_each(placed);

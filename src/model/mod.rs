@@ -12,6 +12,7 @@ mod for_each_axis;
 pub mod formula;
 pub mod formula_errors;
 mod formula_parser;
+pub mod lever_arm;
 mod operators;
 pub mod predict;
 pub mod reference_points;

@@ -214,8 +214,8 @@ impl Scenario {
                     let base = unit.base(value.value);
                     terms.extend(acts.iter().map(|&(target, shape, f)| Term { target, shape, amount: f * base }));
                 }
-                Role::Setting(_) if value.value > 0.0 => {}
-                Role::Setting(_) => bad(
+                Role::Setting { positive } if !positive || value.value > 0.0 => {}
+                Role::Setting { .. } => bad(
                     "scenario::setting",
                     format!("{} of {id:?} is {}, expected more than 0", row.name, Plain(value.value)),
                     "write a positive number".to_owned(),
@@ -341,7 +341,7 @@ impl Parameter {
 
     fn setting_named(name: &str) -> Self {
         let aliases = vec![format!("{name}_h"), format!("{name}_mm")];
-        Self { name: name.to_owned(), aliases, unit: Unit::One, role: Role::Setting(None) }
+        Self { name: name.to_owned(), aliases, unit: Unit::One, role: Role::Setting { positive: true } }
     }
 }
 

@@ -146,6 +146,15 @@ pub enum Shape {
     PitchSine(AxisName, f64),
     /// The sense of an axis's last motion.
     Sense(AxisName),
+    /// +1 or -1: to which side of upright a rotary axis stands; 0 upright.
+    SideOfUpright(AxisName),
+    /// Square of the approach's part along +x or -x (+y or -y) of the probe; 0 where it goes the other way.
+    ApproachTo {
+        /// 0: x, 1: y.
+        component: usize,
+        /// To the positive side.
+        positive: bool,
+    },
     /// Square of the approach's part along the stylus.
     AxialApproach,
     /// ρ·cos(k·φ), φ the direction of the approach about the stylus, ρ its part across the stylus.
@@ -204,6 +213,14 @@ impl Shape {
             Self::PitchCosine(axis, period) => (turn * q(axis) / period).cos(),
             Self::PitchSine(axis, period) => (turn * q(axis) / period).sin(),
             Self::Sense(axis) => touch.sense[axis.index()],
+            Self::SideOfUpright(axis) => {
+                let sine = q(axis).sin();
+                if sine == 0.0 { 0.0 } else { sine.signum() }
+            }
+            Self::ApproachTo { component, positive } => {
+                let part = touch.approach_probe[component];
+                if (part > 0.0) == positive { part * part } else { 0.0 }
+            }
             Self::AxialApproach => dot(touch.approach_probe, touch.stylus_axis).powi(2),
             Self::LobeCosine(k) => lobe(touch.approach_probe, k).1,
             Self::LobeSine(k) => lobe(touch.approach_probe, k).0,

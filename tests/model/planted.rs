@@ -21,6 +21,8 @@ const WITHOUT_TRACE: [(&str, &str, &str); 0] = [];
 /// A random value of a parameter, in its unit: usual size, shape parameters in their range.
 fn random_value(effect: &Effect, p: &Parameter, rng: &mut ChaCha8Rng) -> f64 {
     match p.shape {
+        // a place may lie on either side of nothing
+        Some((0.0, low, high)) => rng.random_range(low..high) / 4.0,
         Some((start, ..)) => start * rng.random_range(0.8..1.2),
         // a supposition is planted as a trace: at its full size no touch would meet its face
         None if effect.discrete => 1e-4 * rng.random_range(-1.0..1.0),

@@ -5,7 +5,7 @@
 //! before the axis's motion (it does not turn with it), on the axis's own line and in the axis's own frame; for linear
 //! axes after, in R (lever arms are counted in the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
-use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
+use super::unit::Unit::{H, Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
@@ -30,14 +30,17 @@ pub fn ids(_: &Machine) -> Vec<String> {
         out.extend([format!("scale-{l}"), format!("positioning-{l}-2"), format!("pitch-{l}"), format!("backlash-{l}")]);
         out.extend(LINEAR.into_iter().filter(|&d| d != l).map(|d| format!("straightness-{d}{l}")));
         out.extend(ROTARY.map(|d| format!("angular-{d}{l}")));
+        out.push(format!("lost-position-{l}"));
     }
     for r in ROTARY {
         for family in ["radial", "axial", "tilt", "positioning"] {
             out.extend((1..=3).map(|k| format!("{family}-{r}-{k}")));
         }
-        out.extend([format!("positioning-{r}-linear"), format!("backlash-{r}")]);
+        out.extend([format!("positioning-{r}-linear"), format!("backlash-{r}"), format!("lost-position-{r}")]);
     }
-    out.push("sign-or-axis-swap".to_owned());
+    out.extend(
+        ["clamp-play-a", "clamp-play-b", "carriage-sag-x", "carriage-sag-y", "sign-or-axis-swap"].map(str::to_owned),
+    );
     out
 }
 
@@ -49,6 +52,23 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     if let Some(found) = axis_of(id, "backlash", machine) {
         return Ok(vec![backlash(found?.1)]);
     }
+    if let Some(found) = axis_of(id, "lost-position", machine) {
+        return lost_position(found?.1, settings);
+    }
+    if let Some(found) = axis_of(id, "clamp-play", machine) {
+        let axis = found?.1;
+        let shape = Shape::SideOfUpright(axis);
+        return match axis {
+            AxisName::A | AxisName::B => {
+                let name = format!("clamp_play_{axis}");
+                Ok(vec![Parameter::new(name, Urad, [(Target::Reading(axis), shape, 0.5)])])
+            }
+            _ => Err(Refusal::Unknown),
+        };
+    }
+    if let Some(found) = axis_of(id, "carriage-sag", machine) {
+        return carriage_sag(found?.1, id, machine, settings);
+    }
     let (family, rest) = id.split_once('-').ok_or(Refusal::Unknown)?;
     if let Some((letter, k)) = rest.split_once('-') {
         let axis = axis_in(letter)?;
@@ -57,6 +77,9 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
             ("positioning", "linear") if axis.is_rotary() => {
                 axis_here(axis, machine)?;
                 Ok(vec![rotary_scale(axis)])
+            }
+            ("tilt", _) if axis.is_rotary() => {
+                Ok(about_a_point(harmonic(family, axis, k, machine)?, id, along(axis), settings))
             }
             _ if axis.is_rotary() => harmonic(family, axis, k, machine),
             _ => Err(Refusal::Unknown),
@@ -84,7 +107,13 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
             if dof < 3 {
                 Err(Refusal::Unknown)
             } else {
-                Ok(vec![at_the_ball(polynomial(axis, dof, 1, false), machine)])
+                let arm_along = match (dof, axis) {
+                    (5, AxisName::Y) => 0,
+                    (5, _) => 1,
+                    _ => 2,
+                };
+                let turn = at_the_ball(polynomial(axis, dof, 1, false), machine);
+                Ok(about_a_point(vec![turn], id, arm_along, settings))
             }
         }
         _ => Err(Refusal::Unknown),
@@ -138,6 +167,70 @@ pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)>
     vec![(Target::Axis { axis, after, dof: m }, arm[n]), (Target::Axis { axis, after, dof: n }, -arm[m])]
 }
 
+/// Turns that act about a point at `arm_…` mm along a direction (0, 1, 2: x, y, z): each point of what is turned moves less, or more,
+/// by the turn times that distance.
+fn about_a_point(mut turns: Vec<Parameter>, id: &str, along: usize, settings: Settings<'_>) -> Vec<Parameter> {
+    let name = format!("arm_{}", id.replace('-', "_"));
+    let arm = settings(&name).unwrap_or(0.0);
+    for turn in &mut turns {
+        let Role::Amount(acts) = &mut turn.role else { continue };
+        let Some(&(target, shape, factor)) = acts.first() else { continue };
+        let (dof, at): (usize, &dyn Fn(usize) -> Target) = match target {
+            Target::OwnLine { axis, after, dof } => (dof, &move |dof| Target::OwnLine { axis, after, dof }),
+            Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
+            _ => continue,
+        };
+        // rx: y goes to z and z to -y; ry: z to x, x to -z; rz: x to y, y to -x. The point itself stays where it is
+        let (to, way) = match (dof, along) {
+            (3, 1) => (2, 1.0),
+            (3, 2) => (1, -1.0),
+            (4, 2) => (0, 1.0),
+            (4, 0) => (2, -1.0),
+            (5, 0) => (1, 1.0),
+            (5, 1) => (0, -1.0),
+            _ => continue,
+        };
+        acts.push((at(to), shape, -factor * way * arm));
+    }
+    turns.push(Parameter::signed_setting(&name, Mm).alias("arm"));
+    turns
+}
+
+/// A coupling slips at some hour: from then on the axis is elsewhere by one amount.
+fn lost_position(axis: AxisName, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
+    let when = format!("lost_h_{axis}");
+    let Some(hour) = settings(&when).or_else(|| settings("from_h")) else {
+        return Err(Refusal::NotHere(format!("it must say when: {when} (hours)")));
+    };
+    let unit = if axis.is_rotary() { Urad } else { Um };
+    let lost = Parameter::new(format!("lost_{axis}"), unit, [(Target::Reading(axis), Shape::FromHour(hour), 1.0)]);
+    Ok(vec![lost, Parameter::setting(&when, H).alias("from_h")])
+}
+
+/// A carriage on a guideway that is bowed upwards: at q from its middle it is lower by (q/300)² of the sag, and it leans
+/// outwards by the slope of the guideway there, 2q/300².
+fn carriage_sag(
+    axis: AxisName,
+    id: &str,
+    machine: &Machine,
+    settings: Settings<'_>,
+) -> Result<Vec<Parameter>, Refusal> {
+    // outwards and down: about +y where it runs along x, about -x where it runs along y
+    let (about, way) = match axis {
+        AxisName::X => (4, 1.0),
+        AxisName::Y => (3, -1.0),
+        _ => return Err(Refusal::Unknown),
+    };
+    let name = format!("carriage_sag_{axis}");
+    let lean = [(moved(axis, about), Shape::Power(axis, SPAN_MM, 1), way * 2.0 / SPAN_MM)];
+    let lean = at_the_ball(Parameter::new(name, Um, lean), machine);
+    let mut both = about_a_point(vec![lean], id, 2, settings);
+    if let Some(Parameter { role: Role::Amount(acts), .. }) = both.first_mut() {
+        acts.push((moved(axis, 2), Shape::Power(axis, SPAN_MM, 2), -1.0));
+    }
+    Ok(both)
+}
+
 fn moved(axis: AxisName, dof: usize) -> Target {
     if axis.is_rotary() { Target::OwnLine { axis, after: false, dof } } else { Target::Axis { axis, after: true, dof } }
 }
@@ -172,7 +265,7 @@ fn pitch(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
     vec![
         Parameter::at(format!("E{axis}{axis}c"), Um, target, Shape::PitchCosine(axis, period)),
         Parameter::at(format!("E{axis}{axis}s"), Um, target, Shape::PitchSine(axis, period)),
-        Parameter::setting(&own, Mm, Some(PITCH_MM)).alias("pitch"),
+        Parameter::setting(&own, Mm).alias("pitch"),
     ]
 }
 

@@ -106,7 +106,7 @@ fn slip(settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
     let names = ["dx", "dy", "dz", "rx", "ry", "rz"];
     let mut rows: Vec<Parameter> =
         (0..6).map(|i| Parameter::at(names[i], if i < 3 { Um } else { Urad }, Target::Block(i), shape)).collect();
-    rows.push(Parameter::setting("from_touch", One, None));
-    rows.push(Parameter::setting("from_h", H, None));
+    rows.push(Parameter::setting("from_touch", One));
+    rows.push(Parameter::setting("from_h", H));
     Ok(rows)
 }

@@ -33,7 +33,10 @@ pub enum Role {
     /// Its value times each factor (in the unit's base: mm, rad, hours …) acts at each target with each shape.
     Amount(Vec<(Target, Shape, f64)>),
     /// A constant inside the shapes, with what is taken when it is not given.
-    Setting(Option<f64>),
+    Setting {
+        /// A time, a pitch: only more than 0 makes sense.
+        positive: bool,
+    },
 }
 
 impl Parameter {
@@ -47,8 +50,13 @@ impl Parameter {
         Self::new(name, unit, [(target, shape, 1.0)])
     }
 
-    fn setting(name: &str, unit: Unit, default: Option<f64>) -> Self {
-        Self { name: name.to_owned(), aliases: Vec::new(), unit, role: Role::Setting(default) }
+    fn setting(name: &str, unit: Unit) -> Self {
+        Self { name: name.to_owned(), aliases: Vec::new(), unit, role: Role::Setting { positive: true } }
+    }
+
+    /// A place: on either side of nothing.
+    fn signed_setting(name: &str, unit: Unit) -> Self {
+        Self { role: Role::Setting { positive: false }, ..Self::setting(name, unit) }
     }
 
     fn alias(mut self, name: impl Into<String>) -> Self {

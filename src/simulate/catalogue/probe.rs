@@ -8,7 +8,16 @@ use crate::units::s_from_h;
 
 /// Ids of this family.
 pub fn ids(_: &Machine) -> Vec<String> {
-    let all = ["pretravel", "pretravel-axial", "lobing-2", "lobing-3", "tip-eccentricity", "stylus-sag", "latency"];
+    let all = [
+        "pretravel",
+        "pretravel-axial",
+        "pretravel-directions",
+        "lobing-2",
+        "lobing-3",
+        "tip-eccentricity",
+        "stylus-sag",
+        "latency",
+    ];
     all.map(str::to_owned).to_vec()
 }
 
@@ -18,6 +27,13 @@ pub fn parameters(id: &str, _: &Machine, _: Settings<'_>) -> Result<Vec<Paramete
         "pretravel" => vec![Parameter::at("pretravel", Mm, Target::Late, Shape::Constant)],
         "pretravel-axial" => {
             vec![Parameter::at("pretravel_axial", Um, Target::Late, Shape::AxialApproach).alias("k")]
+        }
+        "pretravel-directions" => {
+            let row = |(name, component, positive)| {
+                Parameter::at(name, Um, Target::Late, Shape::ApproachTo { component, positive })
+            };
+            let all = [("xp", 0, true), ("xm", 0, false), ("yp", 1, true), ("ym", 1, false)];
+            all.map(|(side, component, positive)| row((format!("pretravel_{side}"), component, positive))).to_vec()
         }
         "lobing-2" => lobing(2.0, 2),
         "lobing-3" => lobing(3.0, 3),

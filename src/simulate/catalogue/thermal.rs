@@ -1,7 +1,7 @@
 //! What time and temperature do.
 
 use super::unit::Unit::{H, PpmPerK, Um, UmPerH, UmPerK};
-use super::{Parameter, Refusal, Settings, along, dof_letter, must_stand_on};
+use super::{Parameter, Refusal, Settings, dof_letter, must_stand_on};
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
 use crate::simulate::terms::{Shape, Target};
@@ -26,7 +26,7 @@ pub fn ids(_: &Machine) -> Vec<String> {
 /// Parameters of an id of this family.
 pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
     let tau = settings("spindle_tau").or_else(|| settings("tau")).unwrap_or(TAU_H);
-    let tau_row = |name: &str| Parameter::setting(name, H, Some(TAU_H)).alias("tau_h");
+    let tau_row = |name: &str| Parameter::setting(name, H).alias("tau_h");
     let ball = |prefix: &'static str, unit, shape| {
         (0..3).map(move |i| {
             let letter = dof_letter(i).to_ascii_lowercase();
@@ -44,8 +44,8 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         }
         "ambient-scale" => {
             let axes = machine.axes.iter().map(|a| a.name).filter(|a| !a.is_rotary());
-            let acts =
-                axes.map(|axis| (Target::Axis { axis, after: true, dof: along(axis) }, Shape::WarmthTimes(axis), 1.0));
+            // a scale that has grown shows less than the way that the axis has gone, whatever it bears
+            let acts = axes.map(|axis| (Target::Reading(axis), Shape::WarmthTimes(axis), 1.0));
             vec![Parameter::new("expansion", PpmPerK, acts).alias("alpha")]
         }
         "centre-drift-c" => {

@@ -240,7 +240,7 @@ fn time_and_temperature_move_things() {
             [0.0, -5.0 * (1.0 - (-1.0_f64).exp()), -5.0 * (1.0 - (-2.0_f64).exp())],
         ),
         ("ambient-bending", &[("qx", 2.0)], [0.0, -2.0, -4.0]),
-        ("ambient-scale", &[("expansion", 10.0)], [0.0, 0.38, 0.76]),
+        ("ambient-scale", &[("expansion", 10.0)], [0.0, -0.38, -0.76]),
         ("artefact-growth", &[("growth", 5.0)], [0.0, 5.0, 10.0]),
         ("block-temperature", &[("alpha", 100.0)], [0.0, 0.5, 1.0]),
         ("centre-drift-c", &[("vx", 5.0)], [0.0, 0.0, 0.0]),
@@ -258,6 +258,30 @@ fn time_and_temperature_move_things() {
     let (raw, _) = run(&machine, &plan, &scenario, None).unwrap();
     assert_eq!(raw[1].time_s, Some(3707.0));
     assert!(raw.iter().all(|r| r.temperature_deg_c.is_none()));
+}
+
+/// A ruler that is longer by 2e-5 (10 ppm/K, 2 K) shows 100 mm as 99.998 mm, whether its axis carries the table or the head. The
+/// contact is on the side of the ball that looks to the block, so that a reading too small by d is −d along the outward normal's axis.
+#[test]
+fn warm_scales_read_every_distance_too_short_on_both_sides_of_the_chain() {
+    for name in ["swivel-head", "trunnion"] {
+        let machine = machine_named(name);
+        let mounting = if name == "trunnion" { "table" } else { "head" };
+        let mut plan = empty_plan(&machine, mounting);
+        let zero = machine.rotary().map(|a| (a.name, 0.0)).collect::<Vec<_>>();
+        let block = plan.blocks[0].clone();
+        let faces = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for n in faces {
+            add_touch(&mut plan, &machine, &block.name, plus(block.centre, 5.0, n), n, pose(&zero));
+            plan.touches.last_mut().unwrap().time_s = Some(7200.0);
+        }
+        let mut scenario = Scenario::flawless().with(&machine, "ambient-scale", &[("expansion", 10.0)]).unwrap();
+        scenario.temperature = vec![(0.0, 22.0), (9.0, 22.0)];
+        let found = readings(&machine, &plan, &scenario, None);
+        for ((e, touch), axis) in found.iter().zip(&plan.touches).zip([AxisName::X, AxisName::Y, AxisName::Z]) {
+            close(*e, -2e-5 * touch.nominal.get(axis).unwrap(), SECOND_ORDER);
+        }
+    }
 }
 
 #[test]
