@@ -541,7 +541,7 @@ fn few_digits_under_the_transformation() {
         let answer: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
         assert_eq!(answer["verdict"], "adequate", "{controller} {lines}");
         axiscal(at)
-            .args(["identify", "study.toml"])
+            .args(["identify", "study.toml", "--verbose"])
             .assert()
             .success()
             .stdout(predicate::str::contains("from the digits of the log"));

@@ -51,7 +51,7 @@ fn rooms_import_only_what_stands_before_them() {
 const READS_FOREIGN_TEXT: [(&str, &str); 7] = [
     ("check/", "reads NC programs back"),
     ("tables/control/backup.rs", "reads a control's backup"),
-    ("cli/export.rs", "recognises the backup among its own files"),
+    ("workflow/export/old_values.rs", "recognises the backup among its own files"),
     ("study/mod.rs", "the error of the TOML reader has no other form"),
     ("words/diagnose.rs", "names of variables: `C before`"),
     ("page/", "the page's template"),

@@ -50,7 +50,7 @@ const CASES: &[Case] = &[
     case("bad/second-run-stopped.log", Some("1 2 3"), &["log::runs 1:1"], "the log holds 2 runs: run 1 is taken, the last complete one"),
     case("bad/status-two.log", Some("1 3"), &["log::status 3:6", "log::missing"], "status S is 1 (hit) or 0 (miss); the line is not used"),
     case("bad/status.csv", Some("1"), &["log::not_understood 3:10", "log::missing"], "expected the status hit or miss, found \"yes\"; the line is not used"),
-    case("bad/swapped-columns.csv", None, &["log::swapped 2:1"], "2 of 3 touches are far from their places, and 3 would be right if the"),
+    case("bad/swapped-columns.csv", None, &["log::swapped 2:1"], "2 of 3 touches are far from their planned positions, and 3 would be right if the"),
     case("bad/touch-twice.log", Some("1 2 3"), &["log::twice 4:1"], "touch 2 stands twice, in lines 3 and 4: the later one is used"),
     case("bad/truncated-in-a-line.log", Some("1"), &["log::cut_line 3:30", "log::truncated 2:1", "log::missing"], "the log is cut off in line 3: \"Z8.00\" has 2 decimals, this controller"),
     case("bad/truncated-in-the-end.log", Some("1 2 3"), &["log::cut_line 5:3", "log::truncated 4:1"], "the log is cut off in line 5: the end of a run is `E N` and the count"),

@@ -79,6 +79,9 @@ fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -
         state[slot::AXES + name.index()] = position.mm_or_rad(name);
         state[slot::SENSES + name.index()] = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
     }
+    for k in 0..3 {
+        state[slot::NORMAL_IN_PROBE + k] = rng.random_range(-1.0..1.0);
+    }
     state[slot::HOURS] = rng.random_range(0.1..2.0);
     state[slot::TEMPERATURE] = rng.random_range(15.0..30.0);
     state[slot::FEED] = rng.random_range(30.0..200.0);

@@ -292,7 +292,8 @@ fn ten_readings_by_hand() {
     ByHand {
         planted: "[effects.tilt-c-1]\nEAC1c = 1000.0",
         effect: "tilt-c-1",
-        theta: vec![1000.0, 0.0, 0.0, 0.0],
+        // the last is the lever arm
+        theta: vec![1000.0, 0.0, 0.0, 0.0, 0.0],
         normal: Z,
         c_deg: 0.0,
         ball: [0.0, 5.0, -194.684],

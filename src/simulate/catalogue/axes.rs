@@ -5,7 +5,7 @@
 //! before the axis's motion (it does not turn with it), on the axis's own line and in the axis's own frame; for linear
 //! axes after, in R (lever arms are counted in the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
-use super::unit::Unit::{H, Mm, One, Um, UmPerM, Urad};
+use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
@@ -30,13 +30,12 @@ pub fn ids(_: &Machine) -> Vec<String> {
         out.extend([format!("scale-{l}"), format!("positioning-{l}-2"), format!("pitch-{l}"), format!("backlash-{l}")]);
         out.extend(LINEAR.into_iter().filter(|&d| d != l).map(|d| format!("straightness-{d}{l}")));
         out.extend(ROTARY.map(|d| format!("angular-{d}{l}")));
-        out.push(format!("lost-position-{l}"));
     }
     for r in ROTARY {
         for family in ["radial", "axial", "tilt", "positioning"] {
             out.extend((1..=3).map(|k| format!("{family}-{r}-{k}")));
         }
-        out.extend([format!("positioning-{r}-linear"), format!("backlash-{r}"), format!("lost-position-{r}")]);
+        out.extend([format!("positioning-{r}-linear"), format!("backlash-{r}")]);
     }
     out.extend(
         ["clamp-play-a", "clamp-play-b", "carriage-sag-x", "carriage-sag-y", "sign-or-axis-swap"].map(str::to_owned),
@@ -51,9 +50,6 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     }
     if let Some(found) = axis_of(id, "backlash", machine) {
         return Ok(vec![backlash(found?.1)]);
-    }
-    if let Some(found) = axis_of(id, "lost-position", machine) {
-        return lost_position(found?.1, settings);
     }
     if let Some(found) = axis_of(id, "clamp-play", machine) {
         let axis = found?.1;
@@ -194,17 +190,6 @@ fn about_a_point(mut turns: Vec<Parameter>, id: &str, along: usize, settings: Se
     }
     turns.push(Parameter::signed_setting(&name, Mm).alias("arm"));
     turns
-}
-
-/// A coupling slips at some hour: from then on the axis is elsewhere by one amount.
-fn lost_position(axis: AxisName, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
-    let when = format!("lost_h_{axis}");
-    let Some(hour) = settings(&when).or_else(|| settings("from_h")) else {
-        return Err(Refusal::NotHere(format!("it must say when: {when} (hours)")));
-    };
-    let unit = if axis.is_rotary() { Urad } else { Um };
-    let lost = Parameter::new(format!("lost_{axis}"), unit, [(Target::Reading(axis), Shape::FromHour(hour), 1.0)]);
-    Ok(vec![lost, Parameter::setting(&when, H).alias("from_h")])
 }
 
 /// A carriage on a guideway that is bowed upwards: at q from its middle it is lower by (q/300)² of the sag, and it leans

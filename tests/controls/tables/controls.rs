@@ -451,6 +451,12 @@ fn every_position_dependent_parameter_comes_back() {
                 if known.shapes.is_empty() && known.across.is_empty() {
                     continue;
                 }
+                // a step at one angle lies between two points of a table: it is refused, not smoothed
+                if effect.starts_with("clamp-play") {
+                    let refused = control::export(&machine, "sinumerik", &tables("sinumerik"), &known, &accepting());
+                    assert_eq!(refused.unwrap_err().0[0].code, "tables::too_coarse", "{name} {effect}");
+                    continue;
+                }
                 let export = export(&machine, "sinumerik", &planted, &accepting());
                 let grids = &export.compensation.tables.as_ref().unwrap().grids;
                 let scenario = scenario(&machine, &planted);
