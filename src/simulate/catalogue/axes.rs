@@ -103,13 +103,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
             if dof < 3 {
                 Err(Refusal::Unknown)
             } else {
-                let arm_along = match (dof, axis) {
-                    (5, AxisName::Y) => 0,
-                    (5, _) => 1,
-                    _ => 2,
-                };
-                let turn = at_the_ball(polynomial(axis, dof, 1, false), machine);
-                Ok(about_a_point(vec![turn], id, arm_along, settings))
+                Ok(vec![at_the_ball(polynomial(axis, dof, 1, false), machine)])
             }
         }
         _ => Err(Refusal::Unknown),

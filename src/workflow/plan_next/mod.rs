@@ -347,7 +347,7 @@ fn not_worth_it(chosen: &Chosen, questions: &Questions, of_room: bool, request: 
     );
     let room = "what goes with the temperature and what goes with time stay one while the room goes on as it did: measure again \
                 when its temperature has turned";
-    let none = "nothing is written: give more time (--minutes), let the blocks be put up anew (--moved), or confirm one of them \
+    let none = "nothing is written: give more time (--minutes), mount the blocks again (--moved), or confirm one of them \
                 at the machine";
     let advice = of_room.then_some(room).into_iter().chain([none]).map(str::to_owned).collect();
     Some(NoProgram { says, advice: Advice::Says(advice) })
