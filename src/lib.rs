@@ -1,4 +1,4 @@
-//! axiscal: a five-axis machine measures itself with its own touch probe, learns what is wrong with it, and is put right.
+//! axiscal: a five-axis machine tool measures its errors with its own touch probe, finds their cause, and compensates them.
 //!
 //! One direction of flow: machine → program → log → model → fit → diagnosis → tables. The map of the rooms and the
 //! invariants are in `ARCHITECTURE.md`; frames and signs in `docs/conventions.md`.

@@ -68,7 +68,7 @@
 //!
 //! let fit = loaded.fit(&loaded.settings())?;
 //! let found = loaded.diagnose(&loaded.settings(), &fit, &DiagnosisOptions::default())?;
-//! assert_eq!(found.verdict, Verdict::MissingEffect);
+//! assert!(found.verdict.is_missing_effect());
 //! let missing = [found.candidates[0].effect.clone()];
 //!
 //! let changed = change_study(study, Edit::Add(&missing), None, false, &files)?;
@@ -82,6 +82,8 @@
 //! ```
 
 pub use crate::diag::{Failure, Finding, Result, Severity};
+pub use crate::diagnose::next_step::NextStep;
+pub use crate::diagnose::verdict::{Missing, NotNamed, TooLittle, Unexplained};
 pub use crate::diagnose::{Diagnosis, Options as DiagnosisOptions, Verdict};
 pub use crate::fit::{Fit, Settings};
 pub use crate::machine::Machine;

@@ -137,7 +137,7 @@
       ? `${d.tested} known effects were tested on the residual, and none is found. These would be the next best; they do not pass.`
       : view.headline.detail || d.says);
     if (d.where.length && !view.headline.detail.includes(d.where[0].says)) s.append(make('p', {}, d.where[0].says));
-    if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it goes with (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
+    if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it depends on (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
     if (d.candidates.length) {
       const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: explains no more than noise could. Diamond: cross-validated error.');
       plot(div, () => P.candidates(div, view));
@@ -152,12 +152,12 @@
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('remaining error', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
             ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
-            ...fact('chance alone does as well', `${p} (${least}, all ${d.tested} effects counted in)`),
+            ...fact('probability by noise alone', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(alike(c).length ? fact('cannot be separated from', alike(c).join('; ')) : []),
             ...(c.tell_apart ? fact('what separates them', c.tell_apart) : []),
             ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
-          make('p', {}, c.says), c.look ? make('p', {}, make('strong', {}, 'Look: '), c.look) : null, mends ? make('p', {}, make('strong', {}, 'Mends it: '), mends) : null));
+          make('p', {}, c.says), c.look ? make('p', {}, make('strong', {}, 'Check at the machine: '), c.look) : null, mends ? make('p', {}, make('strong', {}, 'How to correct it: '), mends) : null));
       });
       s.append(f, cards);
     }
@@ -200,7 +200,7 @@
       make('span.noprint', {}, 'after: '), select('model shown as after', state.to, change('to')), ...toggles), chosen);
     const grid = make('div.grid');
     for (const v of [...view.variables].sort((a, b) => (b.share ?? -1) - (a.share ?? -1))) {
-      const share = v.share !== null && d.verdict !== 'adequate' && v.share >= 0.05 ? `${Math.round(100 * v.share)} % of what the model does not explain goes with this` : '';
+      const share = v.share !== null && d.verdict !== 'adequate' && v.share >= 0.05 ? `${Math.round(100 * v.share)} % of what the model does not explain depends on this` : '';
       const [f, div] = figure(`residual-${v.id}`, share);
       const job = () => P.residuals(div, view, v, state);
       plots.push(() => { if (!waiting.has(div)) job(); });

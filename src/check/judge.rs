@@ -368,7 +368,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             self.say("check::unknown_start", at, "from an unknown place one axis moves at a time".into(), "");
         } else if !at_top && !goes_up {
             let says = format!(
-                "the first move must take {} to its top ({} mm): nobody knows where the machine stands",
+                "the first move must take {} to its top ({} mm): its position is unknown",
                 lift.axis,
                 Plain(lift.top + self.case.machine.origin.get(lift.axis).unwrap_or(0.0))
             );

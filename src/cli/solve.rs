@@ -188,9 +188,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
 /// The model's cross-validated error, in words.
 fn cross_validated(found: &Diagnosis) -> String {
     let Some(rms_um) = found.held_out_rms_um else { return String::new() };
-    let se = found.held_out_se_um;
+    let se = found.held_out_se_um.filter(|se| *se > 1e-6 * rms_um);
     let doubt = se.map_or_else(String::new, |se| format!(" ± {} (one standard error)", digits(se, Some(se))));
-    format!(", cross-validated {}{doubt} µm", digits(rms_um, se))
+    let rms = se.map_or_else(|| significant(rms_um), |se| digits(rms_um, Some(se)));
+    format!(", cross-validated {rms}{doubt} µm")
 }
 
 /// Why the loop ended, in words.
@@ -315,7 +316,7 @@ fn ask(first: &Candidate, yes: bool) -> Result<Option<String>> {
         return Ok(Some(first.effect.clone()));
     }
     if !std::io::stdin().is_terminal() {
-        return Err(Failure::new("solve::nobody", "the input is not a terminal: no one can agree to the proposal")
+        return Err(Failure::new("solve::nobody", "the input is not a terminal: the proposal cannot be confirmed")
             .help("call with --yes to agree to everything that is proposed"));
     }
     let members: Vec<&String> = std::iter::once(&first.effect).chain(&first.same_as).collect();

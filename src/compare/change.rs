@@ -70,7 +70,7 @@ pub fn change(before: &Outcome, after: &Outcome, fall: Option<(f64, f64)>) -> Ch
         }
     }
     if let Some((fall, se)) = fall.filter(|f| f.0 < -WORTH_SAYING * after.rms_um) {
-        let much = if -fall > se { "" } else { ", which may be chance" };
+        let much = if -fall > se { "" } else { ", which is within its standard error" };
         remarks.push(format!("the cross-validated error rises by {:.3} ± {se:.3} µm{much}", -fall));
     }
     for u in after.undetermined.iter().filter(|u| !before.undetermined.iter().any(|b| b.says == u.says)) {

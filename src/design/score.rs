@@ -100,7 +100,7 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     let not_for = if excused.is_empty() {
         not_for
     } else {
-        format!("; whatever is touched, {}: known no better than that{not_for}", excused.join(", "))
+        format!("; no touches separate these: {}{not_for}", excused.join(", "))
     };
     let equal = |id: &str| a.parameters.iter().any(|p| p.holds.iter().any(|h| h == id));
     let invisible = a.effects.iter().filter(|e| !e.visible && e.typical_um > 0.0 && !equal(&e.effect)).count();

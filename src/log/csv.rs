@@ -82,7 +82,8 @@ fn header(line: &[u8], start: usize, separator: u8, places: &Places<'_>) -> Resu
         at += field.len() + 1;
         match Column::named(&name) {
             Some(column) if columns.contains(&column) => findings.push(
-                places.at(Finding::error("log::column_twice", format!("column {name} stands twice")).help(FORM), range),
+                places
+                    .at(Finding::error("log::column_twice", format!("column {name} appears twice")).help(FORM), range),
             ),
             Some(column) => columns.push(column),
             None => findings.push(

@@ -71,10 +71,10 @@ pub(super) fn match_at(
         if let Some(older) = known.insert(id, touch) {
             twice.push(|| {
                 let message =
-                    format!("touch {id} stands twice, in lines {} and {line}: the later one is used", older.line);
+                    format!("touch {id} appears twice, in lines {} and {line}: the later one is used", older.line);
                 at(
                     Finding::warning("log::twice", message)
-                        .help("this is as it should be where a set-up was started again: a line H with its number U stands between"),
+                        .help("this is normal after a restart at a set-up: a line H with its number U stands between"),
                     line,
                 )
             });

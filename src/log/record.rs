@@ -131,7 +131,7 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
             return Err(Fault::at(line, word, 1, "log::unknown_word", format!("unknown word {}", show(word))));
         }
         if std::mem::replace(&mut seen[usize::from(*letter)], true) {
-            let message = format!("the word {} stands twice", *letter as char);
+            let message = format!("the word {} appears twice", *letter as char);
             return Err(Fault::at(line, word, 1, "log::word_twice", message));
         }
         let (tail, value) = value(line, after, rule)?;

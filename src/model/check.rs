@@ -239,7 +239,7 @@ impl<'a> Check<'a> {
                 "effects::twice_inside",
                 format!(
                     "{name} stands in its own formula of {id:?}: the term is {name} times the formula, so that it acts with \
-                     the square of {name}, and a small {name} leaves no trace that a test could find"
+                     the square of {name}, and a small {name} has no effect that a test can detect"
                 ),
                 format!(
                     "leave {name} out of the formula; what bends with a size of its own gets a name of its own under shape"

@@ -339,7 +339,7 @@ fn standing(k: &crate::diagnose::answer::Candidate) -> &'static str {
     } else if k.p_adjusted < FAMILY_LEVEL {
         "explains part"
     } else {
-        "no more than chance"
+        "no more than noise"
     }
 }
 
@@ -357,7 +357,7 @@ fn candidates(view: &View) -> Chart {
     let standings = [
         ("proposed", Shape::Circle, true),
         ("explains part", Shape::Circle, false),
-        ("no more than chance", Shape::Square, false),
+        ("no more than noise", Shape::Square, false),
     ];
     for (name, shape, filled) in standings {
         let of = |(i, k): (usize, &crate::diagnose::answer::Candidate)| {

@@ -143,7 +143,7 @@ impl Check<'_> {
                 span,
                 "post::no_source",
                 format!("[{entry}] does not say where it comes from"),
-                "write `source = \"manual, page\"`, or `unverified = \"why\"` where nobody has tried it",
+                "write `source = \"manual, page\"`, or `unverified = \"why\"` where it is not verified",
             ),
         }
     }

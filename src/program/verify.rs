@@ -288,10 +288,7 @@ impl<'a> Walk<'a, '_> {
         if protected || only.len() != 1 {
             self.violation(i, "from an unknown place one axis moves at a time".to_owned());
         } else if !at_top && only != [(lift.axis, lift.top)] {
-            self.violation(
-                i,
-                format!("the first move must take {} to its top: nobody knows where the machine stands", lift.axis),
-            );
+            self.violation(i, format!("the first move must take {} to its top: its position is unknown", lift.axis));
         } else if at_top && !self.clear_anywhere() {
             self.violation(i, "the way from an unknown place is not proven clear".to_owned());
         }

@@ -289,7 +289,7 @@ impl Collector<'_> {
                 Finding::warning(
                     "tables::combination",
                     format!(
-                        "only a combination of {} can be measured with these touches: none of them is exported",
+                        "only a combination of {} can be measured with these touches: they are not exported",
                         names.join(", ")
                     ),
                 )
@@ -330,7 +330,7 @@ impl Collector<'_> {
                 return self.leave_out(p, false, "held by the user, not identified");
             }
             Status::PriorDominated => return self.leave_out(p, false, "known from its prior, not from the data"),
-            Status::Undetermined => return self.leave_out(p, false, "the data cannot tell it"),
+            Status::Undetermined => return self.leave_out(p, false, "these touches cannot determine it"),
         }
         if !p.value.is_finite() {
             return self.error(

@@ -31,7 +31,7 @@ async function opensFromDisk(t) {
     return [...document.querySelectorAll(".card h3 .badge")].map((b, k) => [b.textContent, candidates[k].proposed, candidates[k].p_adjusted < 0.05]);
   });
   holds(cards.length > 1 && cards[0][0] === "proposed", JSON.stringify(cards));
-  for (const [word, proposed, passes] of cards) equal([word === "proposed", word === "no more than chance"], [proposed, !passes], word);
+  for (const [word, proposed, passes] of cards) equal([word === "proposed", word === "no more than noise"], [proposed, !passes], word);
   holds(!(await page.textContent("#compensation-title >> xpath=..")).includes("The remaining error is then"), "the figure of another model");
   await page.screenshot({ path: join(out, "report-whole.png"), fullPage: true });
   equal(seen.errors, [], "errors in the console");

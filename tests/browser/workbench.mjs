@@ -124,7 +124,7 @@ async function touchesAreTakenOut(t) {
   // chosen in the table by keyboard, taken out with a reason
   await page.locator("#touch-table input").first().focus();
   await page.keyboard.press("Space");
-  equal(await page.textContent("#chosen"), "1 touch is chosen");
+  equal(await page.textContent("#chosen"), "1 touch is selected");
   await page.click("#take-out");
   holds((await page.textContent("#chosen")).includes("why"), "a touch went without a reason");
   equal(text(folder), before);
@@ -144,7 +144,7 @@ async function touchesAreTakenOut(t) {
   await page.mouse.move(area.x + area.width / 3, area.y + area.height / 2, { steps: 5 });
   await page.mouse.move(area.x + area.width - 5, area.y + area.height - 5, { steps: 5 });
   await page.mouse.up();
-  await page.waitForFunction(() => /^\d\d+ touches are chosen/.test(document.querySelector("#chosen").textContent));
+  await page.waitForFunction(() => /^\d\d+ touches are selected/.test(document.querySelector("#chosen").textContent));
   await page.click("#choose-none");
   // and back in
   await after(page, () => page.click("#undo"));

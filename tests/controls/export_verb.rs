@@ -688,7 +688,10 @@ fn only_what_was_identified_is_written() {
     assert!(terms.contains(&"EX0B") && !terms.iter().any(|t| t.ends_with("0C")), "{terms:?}");
     let readme = text(at, "comp/README.txt");
     for name in ["EX0C", "EY0C", "EA0C", "EB0C"] {
-        assert!(readme.contains(&format!("Not exported: {name} (location-c): the data cannot tell it")), "{readme}");
+        assert!(
+            readme.contains(&format!("Not exported: {name} (location-c): these touches cannot determine it")),
+            "{readme}"
+        );
     }
     // the table axis stays where the description has it, but for the shift that the head's own offset makes in X
     let record: Value = serde_json::from_str(&text(at, "comp/compensation.json")).unwrap();

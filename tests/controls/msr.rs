@@ -45,7 +45,7 @@ fn the_public_files_give_what_their_own_tests_expect() {
     let cases = [
         ("Culture-Agnostic.msr", Read(1)),
         ("Empty-File.msr", Refused("log::empty", "", "the log is empty")),
-        ("Extra-Ordinate.msr", Refused("log::word_twice", "36:28", "the word Y stands twice")),
+        ("Extra-Ordinate.msr", Refused("log::word_twice", "36:28", "the word Y appears twice")),
         ("G330-Detransformed.msr", Read(81)),
         ("G330-Untransformed.msr", Read(81)),
         (

@@ -23,7 +23,7 @@ function toggle(effect, isOn, disabled) {
 
 /** How an effect stands to the test with all of them counted in, and beside the first candidate. */
 function standing(id, score) {
-  if (!score.passes) return "no more than chance";
+  if (!score.passes) return "no more than noise";
   const found = state.behind?.diagnosis;
   if (candidate(id)?.proposed) return "passes the test: proposed";
   const first = found?.candidates[0];
@@ -71,9 +71,9 @@ function details(effect, isOn) {
   const box = element("div", { class: "details" });
   const line = (word, text) => text && box.append(element("p", {}, element("strong", {}, `${word}: `), text));
   line("What it is", effect.says);
-  line("How to confirm it", effect.look);
-  line("What mends it", effect.mends);
-  line("What would tell", found?.tell_apart);
+  line("Check at the machine", effect.look);
+  line("How to correct it", effect.mends);
+  line("What separates them", found?.tell_apart);
   const preview = state.preview;
   if (!isOn && preview?.effect === effect.id) {
     const sizes = preview.parameters.map((p) => sized(p)).join(", ");
@@ -178,7 +178,7 @@ on("preview", (preview) => {
   const box = byId("previewed");
   box.hidden = !preview;
   box.textContent = preview
-    ? `Curve: what ${preview.effect} would take away, ${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS (Escape hides it)`
+    ? `Curve: what ${preview.effect} would explain, ${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS (Escape hides it)`
     : "";
   later("effects", draw);
 });

@@ -59,7 +59,7 @@ function verdict() {
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` It cannot be separated from ${[...first.same_as, ...(first.or_else ? [first.or_else] : [])].join(", ")}: a further program can.` : ""}`
     : found.faint ? "The residual is as small as the noise, except for a weak pattern: write the program that shows whether it is real."
-    : open.size ? "Measure further poses: write the program that tells more, or run the full program."
+    : open.size ? "Measure further poses: write a program that separates more, or run the full program."
     : found.verdict === "unexplained" ? "No known effect explains the residual: try a formula of your own, or check the outliers."
     : found.verdict === "adequate" ? "The model is complete as far as these touches can measure: write the compensation." : "There are too few touches to judge: write a further program.");
   const t = live.tolerance;

@@ -62,7 +62,7 @@ function count() {
   const n = chosen().size;
   const masked = new Set(state.live?.masked ?? []);
   const back = [...chosen()].filter((i) => masked.has(i)).length;
-  show("chosen", n === 0 ? "no touch is chosen" : `${n} ${n === 1 ? "touch is" : "touches are"} chosen`);
+  show("chosen", n === 0 ? "no touch is selected" : `${n} ${n === 1 ? "touch is" : "touches are"} selected`);
   byId("take-out").disabled = n === back;
   byId("take-back").disabled = back === 0;
   byId("choose-none").disabled = n === 0;
@@ -76,7 +76,7 @@ byId("mask").addEventListener("submit", async (e) => {
   if (!reason) {
     byId("reason").setAttribute("aria-invalid", "true");
     byId("reason").focus();
-    show("chosen", "say why these touches are taken out: it stands in the study");
+    show("chosen", "say why these touches are excluded: the reason is written into the study");
     return;
   }
   byId("reason").removeAttribute("aria-invalid");

@@ -121,7 +121,7 @@ fn words(line: &[u8], mut rest: &[u8], known: &[u8], form: &PointsForm) -> Resul
         }
         let slot = &mut out.0[usize::from(letter - b'A')];
         if slot.is_some() {
-            let message = format!("the word {} stands twice", *letter as char);
+            let message = format!("the word {} appears twice", *letter as char);
             return Err(Fault::at(line, rest, 1, "log::word_twice", message));
         }
         let Some((tail, n)) = number(form.mark)(after).ok().filter(|(_, n)| n.value.is_finite()) else {

@@ -383,7 +383,7 @@ pub fn export(
                 "tables::nothing",
                 "no parameter of status \"identified\" that a table of this control can hold",
             )
-            .help("`axiscal identify` says what the data cannot tell"),
+            .help("`axiscal identify` says what these touches cannot determine"),
         );
     }
     let ((), findings) = findings.finish(())?;

@@ -169,8 +169,9 @@ pub fn export(machine: &Machine, correction: &Correction, options: &Options) -> 
     };
     if correction.terms.is_empty() && correction.shapes.is_empty() {
         findings.push(
-            Finding::warning("tables::nothing", "no parameter of status \"identified\" that a table can hold")
-                .help("`axiscal identify` says what the data cannot tell; `axiscal effects` lists the effects"),
+            Finding::warning("tables::nothing", "no parameter of status \"identified\" that a table can hold").help(
+                "`axiscal identify` says what these touches cannot determine; `axiscal effects` lists the effects",
+            ),
         );
     }
     let (joints, findings) = findings.finish(joints)?;

@@ -119,7 +119,9 @@ fn only_what_was_identified_is_written() {
     let set: Vec<_> = hal.iter().filter(|l| !l.ends_with(" 0") && !l.ends_with("mm-per-unit 1")).collect();
     assert_eq!(set.len(), 1, "{set:?}");
     let readme = files["README.txt"];
-    for word in ["the data cannot tell it", "held by the user", "from its prior", "block-setup (1)", "pretravel (1)"] {
+    for word in
+        ["these touches cannot determine it", "held by the user", "from its prior", "block-setup (1)", "pretravel (1)"]
+    {
         assert!(readme.contains(word), "{word}\n{readme}");
     }
 }
