@@ -99,7 +99,7 @@ fn too_large(path: &Path, most: u64) -> Failure {
         .help("is this the right file? If it is, give a larger limit with --max-input, for example --max-input 8G")
 }
 
-/// Memory that one touch takes at most in any command (measured: docs/testing.md), bytes.
+/// Memory that one touch takes at most in a command that reads a study (measured: docs/testing.md), bytes.
 const BYTES_PER_TOUCH: u64 = 30_000;
 
 /// Refuses so many touches that the system would end the process for want of memory. Only Linux says how much is free.

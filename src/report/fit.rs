@@ -32,9 +32,8 @@ pub fn number(text: impl ToString) -> Cell {
 /// Value and uncertainty with the digits that the uncertainty leaves: two significant ones of it.
 #[must_use]
 pub fn digits(value: f64, sigma: Option<f64>) -> String {
-    // an uncertainty that is only rounding leaves all digits
     let decimals = match sigma {
-        Some(s) if s > 1e-9 * value.abs() && s.is_finite() => (1 - s.log10().floor() as i32).clamp(0, 12) as usize,
+        Some(s) if s > 0.0 && s.is_finite() => (1 - s.log10().floor() as i32).clamp(0, 12) as usize,
         _ => 6,
     };
     unsigned_zero(format!("{value:.decimals$}"))

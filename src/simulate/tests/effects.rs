@@ -90,6 +90,10 @@ fn harmonics_of_the_turntable_stand_still_while_it_turns() {
     on_the_paper_machine("axial-c-3", &[("EZC3s", 5.0)], (0.0, 90.0), "table", [0.0, 0.0, -5.0]);
     // 100 µrad about machine X lift what stands 30 mm out along +Y; the block stands at the height where the lean is stated
     on_the_paper_machine("tilt-c-1", &[("EAC1s", 100.0)], (0.0, 90.0), "table", [0.0, 0.0, 3.0]);
+    // about a point 200 mm below it the block also goes 200 mm · 100 µrad = 0.02 mm towards -Y, away from where its +x face looks;
+    // the ball then meets its upper face 0.02 mm further out: (30 + 0.02) mm · 100 µrad
+    let below = [("EAC1s", 100.0), ("arm_tilt_c_1", -200.0)];
+    on_the_paper_machine("tilt-c-1", &below, (0.0, 90.0), "table", [-20.0, 0.0, 3.002]);
     // about its own axis: the tangential face, 30 mm out
     on_the_paper_machine("positioning-c-2", &[("ECC2c", 100.0)], (0.0, 0.0), "table", [0.0, -3.0, 0.0]);
 }
