@@ -112,6 +112,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             std::iter::once(what).chain(sketchable.then(sketch)).collect()
         }
         NextStep::RicherProgram => richer_program(loaded).map(|call| format!("next: {call}")).into_iter().collect(),
+        NextStep::CheckSize(o) => vec![format!("next: {}", crate::words::diagnose::check_size(o))],
         NextStep::Nothing => Vec::new(),
     }
 }

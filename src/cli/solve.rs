@@ -30,6 +30,9 @@ pub struct Args {
     /// Most effects that are added
     #[arg(long, value_name = "N", default_value_t = 6)]
     pub at_most: usize,
+    /// Accept an effect of up to so many times its usual size
+    #[arg(long, value_name = "N", default_value_t = PLAUSIBLE)]
+    pub at_most_size: f64,
     /// All that stays open, not the first three only
     #[arg(long, short)]
     pub verbose: bool,
@@ -151,7 +154,7 @@ impl Host for Terminal<'_> {
 /// When the study is unusable, or nobody is there to agree.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, &io.inner())?;
-    let ending = loaded.solve(args.at_most, &mut Terminal { args, io })?;
+    let ending = loaded.solve((args.at_most, args.at_most_size), &mut Terminal { args, io })?;
     let Ending { state: State { fit, found }, models, added, dropped, taken_back, stop } = ending;
     if load_study(&args.study, &io.inner())?.study.effects != fit.outcome.effects {
         return Err(Failure::new("study::changed", format!("{} was changed meanwhile", args.study.display()))
@@ -202,8 +205,8 @@ fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
             format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}")
         }
         Stop::TooLarge(effect) => format!(
-            "the first proposal ({effect}) would be more than {PLAUSIBLE:.0} times its usual size: another effect may look like it. \
-             `axiscal add` adds it all the same"
+            "the first proposal ({effect}) would be larger than usual by more than --at-most-size allows ({PLAUSIBLE:.0} times without it): another effect may look \
+             like it. `axiscal add` adds it all the same"
         ),
         Stop::AtMost(n) => format!("{n} effects were added, as many as --at-most allows"),
         Stop::Refused(refusal) => not_credible(refusal),

@@ -59,6 +59,9 @@ pub struct Diagnosis {
     /// By how much each result could be wrong because of what is missing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub consequences: Vec<super::consequence::Consequence>,
+    /// Parameters of the model that are far larger than usual, the largest in usual sizes first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub oversized: Vec<super::oversized::Oversized>,
     /// What is left open, for a further program.
     #[serde(skip)]
     pub open: super::unresolved_pairs::Open,
@@ -199,6 +202,9 @@ pub struct Candidate {
     pub moves_sigma_um: Option<f64>,
     /// Effects that these touches cannot tell from it.
     pub same_as: Vec<String>,
+    /// Another effect that is named together with it: no one effect explains what both do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub together_with: Option<String>,
     /// What else would do the same to these touches and is no effect with a name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub or_else: Option<String>,
@@ -212,6 +218,8 @@ pub struct Candidate {
     pub look: String,
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
+    /// The largest expected size, in usual sizes.
+    pub times_usual: f64,
     /// Are the expected sizes usual ones?
     pub plausible: bool,
     /// Parameters that are positive by nature (lost motion, sag) and would be negative: only a compensation that is set too
@@ -314,12 +322,14 @@ pub(crate) mod tests {
             parameters: Vec::new(),
             not_told: Vec::new(),
             same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
+            together_with: None,
             or_else: None,
             tell_apart: String::new(),
             never_parted: false,
             says: String::new(),
             look: String::new(),
             share: 0.9,
+            times_usual: 1.0,
             plausible: true,
             wrong_sign: Vec::new(),
             weakens: Vec::new(),
@@ -332,6 +342,7 @@ pub(crate) mod tests {
             verdict: Verdict::Unexplained(Unexplained { why, check: MachineCheck::NoFormula, sketchable: true }),
             says: String::new(),
             consequences: Vec::new(),
+        oversized: Vec::new(),
             rms_um: 5.0,
             held_out_rms_um: None,
             held_out_se_um: None,

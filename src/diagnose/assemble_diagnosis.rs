@@ -149,7 +149,7 @@ pub(super) fn put_together(
     // as the splits of `compare` and the sentences count: of what the noise does not explain
     let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
-        c.share = beyond_the_noise(seen.evidence, c.share, seen.order.scores[group.first()].n_parameters);
+        c.share = beyond_the_noise(seen.evidence, c.share, seen.search.scores[group.first()].n_parameters);
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
@@ -179,11 +179,6 @@ pub(super) fn put_together(
             // where an effect is named, its own words say what does that
             kind: if candidates.iter().any(|c| c.proposed) { String::new() } else { words::kind(d, fit) },
         })
-    });
-    let outliers = fit.rejected.iter().filter(|(_, reason)| reason.is_outlier()).map(|(&i, reason)| {
-        let o = &fit.data.observations[i];
-        let Origin { block, face, .. } = fit.data.origins[i].clone();
-        Outlier { id: o.id, run: o.run + 1, reason: reason.says(), block, face, comes_back: false }
     });
     let unexplained = decided == Decided::Unexplained;
     let first_by = depends.first().map_or("", |w| w.by.as_str());
@@ -230,6 +225,7 @@ pub(super) fn put_together(
         verdict,
         says: String::new(),
         consequences: Vec::new(),
+        oversized: Vec::new(),
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
         held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
@@ -242,7 +238,7 @@ pub(super) fn put_together(
         shape,
         candidates,
         gross,
-        outliers: outliers.collect(),
+        outliers: outliers(fit),
         tested: seen.search.scores.iter().filter(|s| s.visible()).count(),
         power: powers,
         needs_temperature,
@@ -298,13 +294,13 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
     let of_blocks = effect.id == first.effect && jumps && effect.terms.iter().all(|t| t.place == Place::Block);
     let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
-    let at_h = seen.ordered.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
+    let at_h = seen.named.library.candidates()[chosen].variants[seen.search.scores[chosen].variant].shape;
     let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
     let n = features.block.len();
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
     let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
     let columns = seen.evidence.whiten(raw_mm);
-    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
+    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.search.columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }
@@ -388,11 +384,9 @@ fn beside_the_tests(depends: &mut Vec<Where>, seen: &Examination, fit: &Fit, (be
 /// Noise and scatter with their sources, and what the tests take of it.
 fn noise_says(seen: &Examination, fit: &Fit) -> String {
     let mut out = fit.noise.says();
-    if seen.evidence.tau_mm < fit.noise.tau_mm {
-        out += &format!(
-            "; what is found explains this, and the tests use the declared {:.2} µm",
-            um_from_mm(seen.evidence.tau_mm)
-        );
+    if (seen.evidence.tau_mm - fit.noise.tau_mm).abs() > 0.1 * fit.noise.tau_mm {
+        let tau_um = um_from_mm(seen.evidence.tau_mm);
+        out += &format!("; the tests use {tau_um:.2} µm, the scatter that is left with what is found");
     }
     out
 }
@@ -417,12 +411,14 @@ fn candidate(
 ) -> Candidate {
     let chosen = group.first();
     // sizes and what is left come from the order, probabilities from the tests
-    let score = &seen.order.scores[chosen];
+    let score = &seen.search.scores[chosen];
     let tests = || group.members.iter().map(|m| &seen.search.scores[m.candidate]);
     let p = tests().map(|s| s.p).fold(1.0, f64::min);
-    let p_adjusted = tests().map(|s| s.p_adjusted).fold(1.0, f64::min);
+    // two effects that are named together pass their test together
+    let both = seen.both.filter(|_| first);
+    let p_adjusted = tests().map(|s| s.p_adjusted).chain(both.map(|b| b.p_adjusted)).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
-    let held = if first && seen.search.leader().is_some() {
+    let held = if first && seen.search.leader().is_some() && both.is_none() {
         seen.folds.chosen(seen.evidence, seen.named, &seen.nested)
     } else {
         seen.folds.given(seen.evidence, seen.named, chosen)
@@ -458,14 +454,14 @@ fn candidate(
     if let Some(scanned) = &seen.named.scanned[chosen] {
         parameters.push(Parameter {
             name: scanned.name.clone(),
-            value: seen.ordered.library.candidates()[chosen].variants[score.variant].shape,
+            value: seen.named.library.candidates()[chosen].variants[score.variant].shape,
             unit: scanned.unit.clone(),
             sigma: None,
         });
     }
     let raw_um = seen.raw_um(chosen);
     let moves = moves(seen, score, &raw_um);
-    let question = seen.order.question;
+    let question = seen.search.question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
     let raw_mm = raw_um.map(mm_from_um);
     Candidate {
@@ -490,12 +486,14 @@ fn candidate(
             .filter(|m| m.candidate != chosen)
             .map(|m| seen.named.effects[m.candidate].id.clone())
             .collect(),
+        together_with: both.and_then(|_| seen.first_names().get(1).map(|id| (*id).to_owned())),
         or_else: None,
         tell_apart: String::new(),
         never_parted: false,
         says,
         look: effect.look.clone(),
         share: score.delta_ss / total,
+        times_usual: score.relative_size(),
         plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,
         wrong_sign: {
             let names = &seen.named.columns[chosen];
@@ -558,6 +556,16 @@ fn weakened(fit: &Fit, first_order: &FirstOrder, raw_mm: &DMatrix<f64>) -> Vec<W
 }
 
 /// Touches that are used again with the first candidate in the model.
+/// Outliers of a fit.
+pub(super) fn outliers(fit: &Fit) -> Vec<Outlier> {
+    let each = fit.rejected.iter().filter(|(_, reason)| reason.is_outlier()).map(|(&i, reason)| {
+        let o = &fit.data.observations[i];
+        let Origin { block, face, .. } = fit.data.origins[i].clone();
+        Outlier { id: o.id, run: o.run + 1, reason: reason.says(), block, face, comes_back: false }
+    });
+    each.collect()
+}
+
 pub(super) fn outliers_again(out: &mut Diagnosis, before: &Fit, after: &Fit) {
     for (&i, _) in before.rejected.iter().filter(|(i, _)| after.weight[**i] > 0.0) {
         let o = &before.data.observations[i];

@@ -10,7 +10,7 @@ use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation, Unknown};
 use crate::search::library::Make;
 use crate::search::pattern_tests::Rows;
-use crate::search::{self, Library, Origin, Search};
+use crate::search::{self, Change, Library, Origin, Search};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -306,6 +306,12 @@ impl<'c> Named<'c> {
         }
         let weight = fit.weight.clone();
         Self { effects, library, columns, scanned, left_out, source, weight }
+    }
+
+    /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
+    pub(super) fn changed(&self, change: Change) -> Option<Self> {
+        let library = self.library.changed(change)?;
+        Some(Self { library, ..self.clone() })
     }
 
     /// Columns of some variants of candidates (both by index) before whitening, µm per typical size; touches that are not used

@@ -103,7 +103,7 @@ impl Evidence {
             variance: (found_mm / fit.noise.sigma_mm).powi(2),
             dof,
             within: true,
-            floor: tau_mm > 0.0,
+            floor: fit.noise.tau_test_mm > 0.0,
         };
         Self {
             base: Basis::new(&jacobian),

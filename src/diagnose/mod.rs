@@ -20,15 +20,18 @@ mod first_order;
 pub mod folds;
 mod missed_touches;
 pub mod next_step;
+pub mod oversized;
 mod no_usable_touches;
 mod not_identifiable;
 mod outlying_groups;
+mod pairs;
 mod separating_touches;
 pub mod setup_mistakes;
 pub mod sketch;
 pub mod solving;
 pub mod unresolved_pairs;
 pub mod verdict;
+mod visit_scatter;
 
 use crate::design::Planned;
 use crate::diag::Result;
@@ -39,7 +42,7 @@ use crate::search::dependence::{Dependence, dependences};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
-use crate::search::{LackOfFit, Question, Search, lack_of_fit};
+use crate::search::{LackOfFit, Pair, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::Diagnosis;
 use candidate_effects::Named;
@@ -87,12 +90,6 @@ pub struct Examination<'a> {
     pub named: &'a Named<'a>,
     /// Their tests.
     pub search: Search<'a>,
-    /// The same for sizes and order: see [`Ordering`].
-    pub order: Search<'a>,
-    /// The effects as in `order`: their scans have values of their own.
-    pub ordered: &'a Named<'a>,
-    /// Whitened Jacobian of the base model as in `order`.
-    pub jacobian: &'a DMatrix<f64>,
     /// What these touches cannot tell apart, best first.
     pub groups: Vec<Group>,
     /// On what the misfit depends, best first.
@@ -103,6 +100,8 @@ pub struct Examination<'a> {
     pub nested: HeldOut,
     /// ... or, where that bears nothing out, the first finding behind it that held-out touches bear out by itself.
     pub given: bool,
+    /// Two effects that are named together.
+    pub both: Option<Pair>,
     /// What cross-validated errors are worked out from.
     pub folds: folds::Folds,
 }
@@ -110,47 +109,13 @@ pub struct Examination<'a> {
 impl Examination<'_> {
     /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
     fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
-        self.ordered.raw_um(&[(candidate, self.order.scores[candidate].variant)]).remove(0)
-    }
-}
-
-/// The same touches with index visits that come back exactly.
-///
-/// Where the scatter of visits is only declared, tests must allow for it, and it takes most of what a plan with few
-/// visits says. Which effect it is that the touches speak for is another question: where one effect explains all of the
-/// misfit without any scatter of visits, these touches order the candidates.
-pub struct Ordering<'c> {
-    evidence: Evidence,
-    named: Named<'c>,
-}
-
-impl<'c> Ordering<'c> {
-    /// Where the scatter of visits is only declared.
-    #[must_use]
-    pub fn for_fit(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Option<Self> {
-        let declared = fit.noise.visit_source == VisitSource::Declared && fit.noise.tau_test_mm > 0.0;
-        declared.then(|| {
-            let evidence = Evidence::with_visits(fit, 0.0);
-            Self { named: Named::for_fit(fit, &evidence, machine, catalogue), evidence }
-        })
+        self.named.raw_um(&[(candidate, self.search.scores[candidate].variant)]).remove(0)
     }
 
-    /// The tests, if one effect explains all and tests that allow for scatter do not speak for another one.
-    fn search<'a>(&'a self, tested: &Search) -> Option<Search<'a>> {
-        let question = self.evidence.question();
-        let search = Search::new(question, &self.named.library);
-        let &first = search.ranking().first()?;
-        let mut base = self.evidence.base.clone();
-        base.extend(&search.columns(first), crate::search::KEPT);
-        let with = lack_of_fit(&Question { base: &base, ..question });
-        let agrees = match tested.leader() {
-            None => true,
-            Some(_) => {
-                let group = search.group_of(first, &search.ranking());
-                group.members.iter().any(|m| tested.scores[m.candidate].proposed())
-            }
-        };
-        (with.p > 0.05 && agrees).then_some(search)
+    /// Ids of the effect that is named first, or of the two that are named together.
+    fn first_names(&self) -> Vec<&str> {
+        let named = if self.both.is_some() { 2 } else { 1 };
+        self.groups.iter().take(named).map(|group| self.named.effects[group.first()].id.as_str()).collect()
     }
 }
 
@@ -160,29 +125,23 @@ pub fn examine<'a>(
     fit: &Fit,
     evidence: &'a Evidence,
     named: &'a Named<'a>,
-    ordering: Option<&'a Ordering<'a>>,
     features: &Features,
     generics: &Generics,
     at_most: usize,
 ) -> Examination<'a> {
     let question = evidence.question();
     let search = Search::new(question, &named.library);
-    let (order, ordered, jacobian) = ordering
-        .and_then(|o| Some((o.search(&search)?, &o.named, &o.evidence.jacobian)))
-        .unwrap_or_else(|| (search.clone(), named, &evidence.jacobian));
     let nested = held_out(question, &named.library, &evidence.visits, Choice::Redone);
-    let mut groups = order.groups(at_most);
+    let mut groups = search.groups(at_most);
     let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
     let given = behind.is_some();
     Examination {
         groups,
-        order,
-        ordered,
-        jacobian,
         dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),
         nested: behind.unwrap_or(nested),
         given,
+        both: None,
         folds: folds::Folds::new(fit, evidence),
         evidence,
         named,
@@ -214,37 +173,6 @@ fn borne_out_behind(groups: &mut [Group], search: &Search, visits: &[usize], nes
     None
 }
 
-/// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
-/// explain all of it: what drifts or jumps between two visits of one pose looks like scatter of the visits, and would
-/// widen the tests until they are blind to it. Scatter that nothing explains stays scatter.
-fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Features>) -> Option<Evidence> {
-    const AT_MOST: usize = 4;
-    let declared_mm = declared_tau_mm(machine, &fit.data.observations);
-    // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
-    if fit.noise.visit_source != VisitSource::Revisits || declared_mm == 0.0 || fit.noise.tau_mm <= declared_mm {
-        return None;
-    }
-    let evidence = Evidence::with_visits(fit, declared_mm);
-    let mut library = Named::for_fit(fit, &evidence, machine, catalogue).library;
-    // groups of visits are the scatter itself
-    library.append(features::shapes(&evidence, features).without("visit"));
-    let question = evidence.question();
-    let (mut basis, mut residual) = (question.base.clone(), question.base.project(question.residual));
-    for _ in 0..AT_MOST {
-        let search = Search::new(Question { residual: &residual, base: &basis, ..question }, &library);
-        let passed = [search.leader(), search.leading_shape()].into_iter().flatten();
-        let best = passed.min_by(|&a, &b| search.scores[a].ln_p.total_cmp(&search.scores[b].ln_p))?;
-        if basis.extend(&search.columns(best), crate::search::KEPT) == 0 {
-            return None;
-        }
-        residual = basis.project(&residual);
-        if lack_of_fit(&Question { residual: &residual, base: &basis, ..question }).p > 0.05 {
-            return Some(evidence);
-        }
-    }
-    None
-}
-
 /// Scatter of index visits that revisits show, that is far above what the machine file declares, and that nothing else
 /// explains: τ and the declared one, mm.
 fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f64)> {
@@ -255,8 +183,8 @@ fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f6
     let noise = &fit.noise;
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     let usual_mm = if declared_mm > 0.0 { declared_mm } else { noise.sigma_mm };
-    // where an effect explains it the tests were made with the declared one
-    let explained = evidence.tau_mm < noise.tau_mm;
+    // where an effect explains it the tests were made with less
+    let explained = evidence.tau_mm <= TIMES * usual_mm;
     let dof = noise.visit_dof.filter(|d| noise.visit_source == VisitSource::Revisits && *d > 1.0 && !explained)?;
     let times = noise.tau_mm / usual_mm;
     let p = crate::search::distributions::p_of_chi2(dof * times * times, dof);
@@ -273,23 +201,40 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         return Ok(no_usable_touches::used(subject, options));
     }
     let features = Arc::new(features::features(fit, machine));
-    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::from_fit(fit));
-    let named = Named::for_fit(fit, &evidence, machine, catalogue);
+    let (evidence, named) = visit_scatter::regression(fit, machine, catalogue, &features);
     let generics = features::shapes(&evidence, &features);
-    let ordering = Ordering::for_fit(fit, machine, catalogue);
-    let seen = examine(fit, &evidence, &named, ordering.as_ref(), &features, &generics, options.at_most);
+    let mut seen = examine(fit, &evidence, &named, &features, &generics, options.at_most);
     let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
         Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first()),
         None => effects_versus_patterns::Weighed::default(),
     };
-    let beside = decide::OtherEvidence {
+    let mut beside = decide::OtherEvidence {
         shapes_win: weighed.shapes_win,
         // a shape that goes with the first by probability says nothing against the one that is borne out behind it
         better: weighed.better.filter(|_| !seen.given).map(|shape| generics.shapes[shape].depends_on.clone()),
         gathered: clustered_rejections::gathered(fit, &features),
         scatter: scatter(fit, machine, &evidence),
     };
-    let decision = decide::decide(&seen, &beside);
+    if beside.gathered.is_some()
+        && let Some(answer) = with_all_touches(subject, options)?
+    {
+        return Ok(answer);
+    }
+    let mut decision = decide::decide(&seen, &beside);
+    if let Some(pair) = pairs::both(&seen, &decision) {
+        pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
+        (seen.both, seen.given) = (Some(pair), true);
+        (beside.shapes_win, beside.better) = (false, None);
+        decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
+    }
+    let refitted = match options.refit && decision.confirmed && fit.outcome.rms_um <= setup_mistakes::GROSS_UM {
+        true => Some(with_effects(subject, &seen.first_names())?),
+        false => None,
+    };
+    if refitted.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
+        // a name with which the error grows is none
+        (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
+    }
     let mut gross =
         if fit.outcome.rms_um > setup_mistakes::GROSS_UM { setup_mistakes::hypotheses(subject) } else { Vec::new() };
     if let Some(supposed) = setup_mistakes::of_log(subject) {
@@ -310,7 +255,10 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         && (first.proposed || fit.rejected.values().any(Reason::is_outlier))
         && fit.outcome.rms_um <= setup_mistakes::GROSS_UM
     {
-        let again = with_effects(subject, &[first.effect.as_str()])?;
+        let again = match refitted {
+            Some(again) if first.proposed => again,
+            _ => with_effects(subject, &[first.effect.as_str()])?,
+        };
         if first.proposed {
             first.rms_after_um = again.outcome.rms_um;
             first.remains = Some(still_fails(&again, machine, catalogue));
@@ -319,8 +267,37 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
     }
     decide::where_most_touches_are_unusable(&mut out, subject);
     not_identifiable::where_nothing_is_determined(&mut out, subject);
+    out.oversized = oversized::oversized(fit, machine, catalogue);
     out.says = crate::words::diagnose::verdict(&out, fit);
     Ok(out)
+}
+
+/// Does the error of the touches that a fit uses grow with the effects that another one has besides?
+fn raises_the_error(before: &Fit, after: &Fit) -> bool {
+    let squares = |fit: &Fit| -> f64 {
+        fit.residual_mm.iter().zip(&before.weight).filter(|(_, weight)| **weight > 0.0).map(|(r, _)| r * r).sum()
+    };
+    squares(after) > squares(before)
+}
+
+/// The answer with all touches in, where touches that were not used lie together and one effect explains them as well: the only
+/// index position at another feed is no heap of bad touches.
+fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagnosis>> {
+    /// The error comes down to so many times the noise.
+    const EXPLAINS: f64 = 1.25;
+    if subject.settings.all_in {
+        return Ok(None);
+    }
+    let settings = Settings { all_in: true, ..subject.settings.clone() };
+    let fit = identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings)?;
+    let mut answer = diagnose(Subject { settings: &settings, fit: &fit, ..subject }, options)?;
+    let explains = |c: &answer::Candidate| c.proposed && c.rms_after_um <= EXPLAINS * answer.noise_um;
+    if !answer.candidates.first().is_some_and(explains) {
+        return Ok(None);
+    }
+    answer.outliers = assemble_diagnosis::outliers(subject.fit);
+    assemble_diagnosis::outliers_again(&mut answer, subject.fit, &fit);
+    Ok(Some(answer))
 }
 
 /// The fit with further effects.
@@ -338,9 +315,7 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
 /// Does a fit still miss something, by the tests of the first step?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let features = Arc::new(features::features(fit, machine));
-    // as the diagnosis of that model would see it: what else acts may look like scatter of the visits
-    let evidence = calm(fit, machine, catalogue, &features).unwrap_or_else(|| Evidence::from_fit(fit));
-    let named = Named::for_fit(fit, &evidence, machine, catalogue);
+    let (evidence, named) = visit_scatter::regression(fit, machine, catalogue, &features);
     let question = evidence.question();
     if Search::new(question, &named.library).leader().is_some() {
         return true;

@@ -1,6 +1,7 @@
 //! What to do after a diagnosis. The terminal, the page and the workbench say the same decision.
 
 use super::answer::{Candidate, Diagnosis, Finding, Where};
+use super::oversized::Oversized;
 use super::verdict::{NotNamed, Verdict};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +24,8 @@ pub enum NextStep<'d> {
     Sketch,
     /// Measure with a program of more poses: these touches are too few to judge.
     RicherProgram,
+    /// The model fits, and a value in it is far larger than machines have it: check what makes it so large.
+    CheckSize(&'d Oversized),
     /// Nothing that a diagnosis asks for.
     Nothing,
 }
@@ -79,7 +82,7 @@ impl Diagnosis {
                 }
             }
             Verdict::TooLittleData(_) => NextStep::RicherProgram,
-            Verdict::Adequate => NextStep::Nothing,
+            Verdict::Adequate => self.oversized.first().map_or(NextStep::Nothing, NextStep::CheckSize),
         }
     }
 }

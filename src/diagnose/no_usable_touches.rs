@@ -14,6 +14,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         verdict: Verdict::TooLittleData(TooLittle::NoneUsed { excluded: fit.data.observations.len() }),
         says: String::new(),
         consequences: Vec::new(),
+        oversized: Vec::new(),
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: None,
         held_out_se_um: None,

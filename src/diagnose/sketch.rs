@@ -2,7 +2,6 @@
 
 use super::Subject;
 use super::error_locations;
-use super::evidence::Evidence;
 use super::features::{features, shapes};
 use crate::diag::{Failure, Result};
 use crate::fit::Fit;
@@ -33,8 +32,7 @@ pub struct Sketch {
 /// When nothing significant is left, or what is left has no formula.
 pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> {
     let features = std::sync::Arc::new(features(subject.fit, subject.machine));
-    let evidence = super::calm(subject.fit, subject.machine, subject.catalogue, &features)
-        .unwrap_or_else(|| Evidence::from_fit(subject.fit));
+    let (evidence, _) = super::visit_scatter::regression(subject.fit, subject.machine, subject.catalogue, &features);
     let generics = shapes(&evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let best = best(&all, subject.fit)?;

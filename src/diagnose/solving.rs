@@ -13,7 +13,6 @@ use crate::fit::{Fit, Settings, held_out};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::distributions::{ln_p_of_f, p_of_chi2};
-use crate::search::groups::PLAUSIBLE;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -31,6 +30,8 @@ pub struct Request<'a> {
     pub options: Options<'a>,
     /// Most effects that are added.
     pub at_most: usize,
+    /// A proposal may have so many times its usual size.
+    pub at_most_size: f64,
 }
 
 /// A model, fitted and diagnosed.
@@ -75,7 +76,7 @@ pub struct Added {
 pub enum Stop {
     /// A set-up mistake comes first.
     Mistake(String),
-    /// A proposal would need more than [`PLAUSIBLE`] times its usual size.
+    /// A proposal would need more times its usual size than it may have.
     TooLarge(String),
     /// As many effects were added as were asked for.
     AtMost(usize),
@@ -217,26 +218,31 @@ pub fn solve(request: Request, host: &mut dyn Host) -> Result<Ending> {
     let (mut added, mut taken_back, mut dropped): (Vec<Added>, Vec<String>, Vec<String>) = Default::default();
     let stop = loop {
         host.looked(&state, &added)?;
-        let proposal = match proposed(&state.found, added.len(), request.at_most) {
+        let proposal = match proposed(&state.found, added.len(), &request) {
             Ok(proposal) => proposal.clone(),
             Err(stop) => break stop,
         };
         let Some(id) = host.agree(&proposal)? else { break Stop::ByUser };
         host.change(&Change::Add(id.clone(), proposal.held_out_after_um.filter(|_| proposal.nested)), &added)?;
-        let more = [&effects[..], std::slice::from_ref(&id)].concat();
+        // two effects that are named together are added together
+        let news: Vec<String> = std::iter::once(id).chain(proposal.together_with.clone()).collect();
+        for other in &news[1..] {
+            host.change(&Change::Add(other.clone(), None), &added)?;
+        }
+        let more = [&effects[..], &news[..]].concat();
         let after = (request.fit)(&request.settings_of(&more))?;
-        let ids: Vec<&str> = added.iter().map(|a| a.id.as_str()).chain([id.as_str()]).collect();
-        if let Some(refusal) = refused(&after, &ids) {
-            host.change(&Change::Remove(vec![id.clone()], Why::Refused(refusal.clone())), &added)?;
-            taken_back.push(id);
+        let ids: Vec<&str> = added.iter().map(|a| a.id.as_str()).chain(news.iter().map(String::as_str)).collect();
+        if let Some(refusal) = refused(&after, &ids, request.at_most_size) {
+            host.change(&Change::Remove(news.clone(), Why::Refused(refusal.clone())), &added)?;
+            taken_back.extend(news);
             break Stop::Refused(refusal);
         }
-        added.push(Added {
+        added.extend(news.into_iter().map(|id| Added {
             id,
-            proposal,
+            proposal: proposal.clone(),
             name_in_doubt: state.found.verdict.name_in_doubt(),
             rms_um: (state.fit.outcome.rms_um, after.outcome.rms_um),
-        });
+        }));
         effects = more;
         let before = std::mem::replace(&mut state, request.diagnosed(after)?);
         first.get_or_insert(before);
@@ -270,15 +276,15 @@ pub fn solve(request: Request, host: &mut dyn Host) -> Result<Ending> {
 }
 
 /// The effect that is proposed next, or why the loop ends.
-fn proposed(found: &Diagnosis, added: usize, at_most: usize) -> std::result::Result<&Candidate, Stop> {
+fn proposed<'d>(found: &'d Diagnosis, added: usize, request: &Request) -> std::result::Result<&'d Candidate, Stop> {
     if let Some(mistake) = found.mistake() {
         return Err(Stop::Mistake(mistake));
     }
     match (&found.verdict, found.candidates.first()) {
         (Verdict::MissingEffect(_), Some(first)) if first.proposed => {
-            if !first.plausible {
+            if first.times_usual > request.at_most_size {
                 Err(Stop::TooLarge(first.effect.clone()))
-            } else if added >= at_most {
+            } else if added >= request.at_most {
                 Err(Stop::AtMost(added))
             } else {
                 Ok(first)
@@ -349,7 +355,7 @@ fn p_without(without: &Fit, with: &Fit) -> f64 {
 const TOGETHER: f64 = 0.99;
 
 /// Why a model with these added effects is not to be believed, after the full fit.
-fn refused(fit: &Fit, added: &[&str]) -> Option<Refusal> {
+fn refused(fit: &Fit, added: &[&str], at_most_size: f64) -> Option<Refusal> {
     // where a combination leaves no trace the values of its members are a convention, and no sizes
     let is_told = |i: usize| {
         let u = &fit.model.unknowns[i];
@@ -368,7 +374,7 @@ fn refused(fit: &Fit, added: &[&str]) -> Option<Refusal> {
         let u = &fit.model.unknowns[i];
         let times = (fit.theta[i] / u.typical).abs();
         let sure = fit.theta[i].abs() > 2.0 * fit.covariance[(i, i)].max(0.0).sqrt();
-        if u.typical > 0.0 && sure && times > PLAUSIBLE {
+        if u.typical > 0.0 && sure && times > at_most_size {
             return Some(Refusal::TooLarge { effect: (*last).to_owned(), parameter: u.name.clone(), times });
         }
     }

@@ -33,6 +33,7 @@ pub mod span;
 mod start_values;
 mod type_b;
 pub mod uncertainty;
+pub mod visit_scatter;
 pub mod whitening;
 
 pub use knowledge::{effects_of, every_formula_has_a_value};
@@ -56,6 +57,7 @@ use outcome::Outcome;
 use outlier_loop::OutlierLoop;
 use shape_search::{Asked, ShapeSearch};
 use std::collections::BTreeMap;
+use visit_scatter::VisitPart;
 
 /// Fits a model to runs.
 ///
@@ -133,6 +135,7 @@ fn identify_from(
         priors,
         knowledge,
         type_b: Vec::new(),
+        visits: VisitPart { tau_mm: 0.0, dof: None, more: DMatrix::zeros(0, 0), variance: DVector::zeros(0) },
         noise: found.noise,
         outliers_beyond: found.outliers_beyond,
         other_values: BTreeMap::new(),
@@ -141,9 +144,10 @@ fn identify_from(
         remarks: Vec::new(),
         outcome: Outcome::default(),
     };
+    let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
+    fit.visits = VisitPart::new(&fit, is_small && !settings.quick && !settings.bare);
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
-    let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
     let with_catalogue = !settings.quick && !settings.bare && is_small;
     let left_out = with_catalogue.then(|| uncertainty::LeftOut::new(&fit.model, machine, catalogue, &fit.data));
     let asked = Asked { machine, effects, search };

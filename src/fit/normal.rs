@@ -6,7 +6,7 @@
 //! block; the Gram matrix is collected per block and spread out at the end.
 
 use super::solve::{Normal, Problem};
-use super::whitening::{Visit, Whitening};
+use super::whitening::{VisitNormals, Visit, Whitening};
 use crate::model::batch::{At, Batch, Scratch};
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -181,6 +181,15 @@ impl<'a> Touches<'a> {
     pub fn whitening(&self) -> Whitening {
         let all: Vec<usize> = (0..self.batch.len()).collect();
         self.whitening_of(&all)
+    }
+
+    /// What a scatter of visits does to rows of the touches that are used.
+    #[must_use]
+    pub fn visit_normals(&self) -> VisitNormals {
+        let used: Vec<usize> = (0..self.batch.len()).filter(|&i| self.weight[i] > 0.0).collect();
+        let normals: Vec<Vector3<f64>> = used.iter().map(|&i| self.normal_in_r(i) * self.weight[i].sqrt()).collect();
+        let visits: Vec<usize> = used.iter().map(|&i| self.visits[i]).collect();
+        VisitNormals::new(&visits, &normals, self.sigma_mm)
     }
 
     fn whitening_of(&self, touches: &[usize]) -> Whitening {

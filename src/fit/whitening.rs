@@ -98,3 +98,60 @@ impl Whitening {
         }
     }
 }
+
+/// Normals of the touches that are used, by index visit: what a supposed scatter of visits does to rows of unit noise.
+#[derive(Debug, Clone)]
+pub struct VisitNormals {
+    pub(super) visits: Vec<Directions>,
+    sigma_mm: f64,
+}
+
+/// Normals of a visit's touches and the principal axes of their squares.
+#[derive(Debug, Clone)]
+pub(super) struct Directions {
+    pub normals: Vec<Vector3<f64>>,
+    pub squares: Vector3<f64>,
+    pub axes: Matrix3<f64>,
+}
+
+impl VisitNormals {
+    /// Of touches in their order: their visits, and their outward normals in R, each times the root of its weight.
+    pub fn new(visits: &[usize], normals: &[Vector3<f64>], sigma_mm: f64) -> Self {
+        let mut at = 0;
+        let of = |visit: &[usize]| {
+            let own = normals[at..at + visit.len()].to_vec();
+            at += visit.len();
+            let eigen = own.iter().fold(Matrix3::zeros(), |sum, n| sum + n * n.transpose()).symmetric_eigen();
+            Directions { normals: own, squares: eigen.eigenvalues, axes: eigen.eigenvectors }
+        };
+        Self { visits: visits.chunk_by(|a, b| a == b).map(of).collect(), sigma_mm }
+    }
+
+    /// Variance along a principal axis in units of a touch's, where each component of a visit's displacement scatters by τ.
+    fn variance(&self, square: f64, tau_mm: f64) -> f64 {
+        1.0 + (tau_mm / self.sigma_mm).powi(2) * square.max(0.0)
+    }
+
+    /// What turns rows that were whitened with one scatter of visits (mm) into those that another one makes.
+    #[must_use]
+    pub fn change(&self, from_mm: f64, to_mm: f64) -> Whitening {
+        let of = |visit: &Directions| {
+            let mut root = Matrix3::zeros();
+            for (&square, axis) in visit.squares.iter().zip(visit.axes.column_iter()) {
+                // an axis that no touch looks along changes nothing
+                if square > 1e-12 {
+                    let kept = (self.variance(square, from_mm) / self.variance(square, to_mm)).sqrt();
+                    root += axis * axis.transpose() * ((1.0 - kept) / square);
+                }
+            }
+            Visit { normals: visit.normals.clone(), root }
+        };
+        Whitening { root: Vec::new(), visits: self.visits.iter().map(of).collect(), sigma_mm: 1.0 }
+    }
+
+    /// Logarithm of the determinant of the touches' covariance, in units of a touch's variance.
+    #[must_use]
+    pub fn ln_det(&self, tau_mm: f64) -> f64 {
+        self.visits.iter().flat_map(|v| v.squares.iter()).map(|s| self.variance(*s, tau_mm).ln()).sum()
+    }
+}

@@ -45,6 +45,9 @@ pub struct EffectAsWritten {
     /// What mends it.
     #[serde(default)]
     pub mends: String,
+    /// What usually makes it far larger than machines have it.
+    #[serde(default)]
+    pub too_large: String,
     /// An axis of the chain, or base, tool, workpiece, block, trigger, reading.
     #[schemars(with = "String")]
     pub at: Placed,

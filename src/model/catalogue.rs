@@ -86,6 +86,8 @@ pub struct Effect {
     /// How to confirm it.
     pub look: String,
     pub mends: String,
+    /// What usually makes it far larger than machines have it; may be empty.
+    pub too_large: String,
     /// Applies where its axes stand on this side only.
     pub side: Option<Side>,
     /// The axes that it needs.

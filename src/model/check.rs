@@ -153,6 +153,7 @@ impl<'a> Check<'a> {
             says: w.says.clone(),
             look: w.look.clone(),
             mends: w.mends.clone(),
+            too_large: w.too_large.clone(),
             side: w.side.map(|s| if s == SideAsWritten::Tool { Side::Tool } else { Side::Workpiece }),
             needs,
             unless,

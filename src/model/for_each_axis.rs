@@ -25,8 +25,8 @@ pub(super) fn expand(
 impl EffectAsWritten {
     fn for_axis(&self, axis: AxisName, number: usize) -> Self {
         let mut row = self.clone();
-        let Self { name, says, look, mends, .. } = &mut row;
-        [name, says, look, mends].into_iter().for_each(|text| *text = axis.fill_in(text));
+        let Self { name, says, look, mends, too_large, .. } = &mut row;
+        [name, says, look, mends, too_large].into_iter().for_each(|text| *text = axis.fill_in(text));
         let placed = |word: &mut Placed| *word.get_mut() = axis.fill_in(word.get_ref());
         let words = [&mut row.id, &mut row.at].into_iter().chain(&mut row.arm);
         words.chain(&mut row.needs).chain(&mut row.unless).for_each(placed);

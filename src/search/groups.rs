@@ -14,8 +14,8 @@ const RIVAL: f64 = 0.5;
 /// Expected sizes above this many typical sizes are implausible.
 pub const PLAUSIBLE: f64 = 5.0;
 
-/// Logarithms of p-values closer than this make no difference (a factor of 3).
-pub const AS_LIKELY: f64 = 1.0;
+/// Logarithms of p-values closer than this make no difference (a factor of 20): it takes more to name the less simple effect.
+pub const AS_LIKELY: f64 = 3.0;
 
 /// A size of the wrong sign counts as a thousand times less likely: it takes more than a machine that wears.
 const WRONG_SIGN: f64 = 7.0;

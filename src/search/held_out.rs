@@ -15,13 +15,17 @@ use std::collections::HashMap;
 /// Touches whose prediction has a variance above this (in variances of a touch) judge nothing.
 pub const LARGEST_VARIANCE: f64 = 9.0;
 
+/// Logarithms of p-values that differ by less (a factor of 20) do not separate two candidates.
+const NOT_SEPARATED: f64 = super::groups::AS_LIKELY;
+
 /// Directions of the base of which a training set keeps less than this share of the information are lost to it.
 const LOST: f64 = 1e-8;
 
 /// Which term is put to the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Choice<'a> {
-    /// The choice is redone in each training set: the leader with a name that passes Holm, or none.
+    /// The choice is redone in each training set: the leader with a name that passes Holm, or none. Where it cannot be separated
+    /// from the leader of all touches, that one.
     Redone,
     /// A given candidate, with the variant that fits the training set best; the choice is not tested.
     Given(usize),
@@ -114,6 +118,10 @@ pub fn held_out_in(
 ) -> HeldOut {
     let moments = Moments::new(question.residual, question.base, library);
     let residual = question.base.project(question.residual);
+    let first = match choice {
+        Choice::Redone => leader(&score(&moments, library, question.pure), library, false),
+        _ => None,
+    };
     let mut numbers: Vec<usize> = groups.to_vec();
     numbers.sort_unstable();
     numbers.dedup();
@@ -121,7 +129,7 @@ pub fn held_out_in(
         .par_iter()
         .map(|&group| {
             let rows: Vec<usize> = (0..groups.len()).filter(|&i| groups[i] == group).collect();
-            fold(question, library, (&moments, &residual), (group, &rows), choice, colours)
+            fold(question, library, (&moments, &residual), (group, &rows), choice, (colours, first))
         })
         .collect();
     let scored: usize = results.iter().map(|r| r.fold.scored).sum();
@@ -161,7 +169,7 @@ fn fold(
     (whole, residual): (&Moments, &DVector<f64>),
     (group, rows): (usize, &[usize]),
     choice: Choice,
-    colours: &Colours,
+    (colours, first): (&Colours, Option<usize>),
 ) -> Result {
     let base: &Basis = question.base;
     let p = base.rank();
@@ -201,7 +209,10 @@ fn fold(
     let training = Moments { n: whole.n - rows.len(), p: into.nrows(), rr: rr.max(0.0), jr, qj, blocks };
     let scores = score(&training, library, question.pure);
     let chosen = match choice {
-        Choice::Redone => leader(&scores, library, false),
+        // a training set that cannot separate the leader of all touches from its rival chooses the same
+        Choice::Redone => leader(&scores, library, false).map(|c| {
+            first.filter(|&f| scores[f].visible() && scores[f].ln_p - scores[c].ln_p < NOT_SEPARATED).unwrap_or(c)
+        }),
         Choice::Given(c) => scores[c].visible().then_some(c),
         Choice::AsIn(folds) => {
             folds.iter().find(|f| f.group == group).and_then(|f| f.chosen).filter(|&c| scores[c].visible())

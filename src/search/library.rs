@@ -309,6 +309,21 @@ impl Library {
         Self { candidates: self.candidates.clone(), ..Self::kept(n_rows, data) }
     }
 
+    /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
+    #[must_use]
+    pub fn changed(&self, change: super::Change) -> Option<Self> {
+        let changed = |part: &Part| match &part.columns {
+            Columns::Kept(data) => {
+                let mut columns = DMatrix::from_column_slice(self.n_rows, part.span.len(), data);
+                change(&mut columns);
+                Some(Part { span: part.span.clone(), columns: Columns::Kept(columns.data.into()) })
+            }
+            Columns::Made { .. } => None,
+        };
+        let parts = self.parts.iter().map(changed).collect::<Option<_>>()?;
+        Some(Self { n_rows: self.n_rows, parts, candidates: self.candidates.clone() })
+    }
+
     /// A library of one of the candidates, with all its variants.
     #[must_use]
     pub fn only(&self, candidate: usize) -> Self {

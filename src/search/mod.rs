@@ -3,7 +3,7 @@
 //! A [`Question`] is one linearised regression, a [`Library`] the candidates with their columns. [`Search`] tests all
 //! of them at once, [`groups`] says which of them these data cannot tell apart, [`held_out`] redoes the choice without
 //! the touches that judge it, [`distinguishability`] is the criterion by which two effects are separated, [`power`] says before any
-//! measurement what a plan can see, and [`pattern_tests`] and [`dependence`] say on what the misfit depends where no candidate explains it.
+//! measurement what a plan can see, `scatter` estimates the scatter of groups of rows under each hypothesis, and [`pattern_tests`] and [`dependence`] say on what the misfit depends where no candidate explains it.
 
 pub mod basis;
 pub mod dependence;
@@ -14,8 +14,10 @@ pub mod held_out;
 pub mod library;
 mod moments;
 pub mod multiplicity;
+mod pairs;
 pub mod pattern_tests;
 pub mod power;
+mod scatter;
 pub mod score;
 #[cfg(test)]
 mod shape_tests;
@@ -27,5 +29,7 @@ mod tests;
 
 pub use basis::Basis;
 pub use library::{Candidate, Library, Origin, Variant, without_rounding};
-pub use moments::KEPT;
+pub use pairs::Pair;
+pub use moments::{Change, KEPT};
+pub use scatter::{Supposed, scatter_that_fits};
 pub use score::{LackOfFit, PureError, Question, Score, Search, lack_of_fit};

@@ -14,6 +14,9 @@ use std::ops::Range;
 /// A direction of a candidate of which less than this share is left after projection leaves no trace.
 pub const KEPT: f64 = 1e-3;
 
+/// What turns rows of a library into those of another regression of the same touches.
+pub type Change<'a> = &'a (dyn Fn(&mut DMatrix<f64>) + Sync);
+
 /// Inner products of a regression and its candidates.
 #[derive(Debug, Clone)]
 pub(super) struct Moments {
@@ -34,6 +37,15 @@ pub(super) struct Moments {
 impl Moments {
     /// Of a residual and a library over a base.
     pub fn new(residual: &DVector<f64>, base: &Basis, library: &Library) -> Self {
+        Self::of(residual, base, library, None)
+    }
+
+    /// The same where the residual and the base are of rows that a change makes of the library's.
+    pub fn changed(residual: &DVector<f64>, base: &Basis, library: &Library, change: Change) -> Self {
+        Self::of(residual, base, library, Some(change))
+    }
+
+    fn of(residual: &DVector<f64>, base: &Basis, library: &Library, change: Option<Change>) -> Self {
         let r = base.project(residual);
         let variants: Vec<_> =
             library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone()).collect();
@@ -41,6 +53,12 @@ impl Moments {
             let from = variants.partition_point(|v| v.start < span.start);
             let own = variants[from..].iter().take_while(|v| v.end <= span.end);
             library.with(span.clone(), |j| {
+                let changed = change.map(|change| {
+                    let mut own = j.into_owned();
+                    change(&mut own);
+                    own
+                });
+                let j = changed.as_ref().map_or(j, DMatrix::as_view);
                 let jr: Vec<f64> = j.column_iter().map(|column| column.dot(&r)).collect();
                 let qj = base.transposed() * j;
                 let blocks: Vec<DMatrix<f64>> = own.map(|v| block(j.columns(v.start - span.start, v.len()))).collect();
@@ -134,6 +152,11 @@ impl Block {
             scale(i) * eigen.eigenvectors[(i, seen[k])] / eigen.eigenvalues[seen[k]].sqrt()
         });
         Self { whitener, kept }
+    }
+
+    /// Logarithm of the determinant of JᵀPJ, as far as it is seen.
+    pub fn ln_det(&self) -> f64 {
+        -self.whitener.tr_mul(&self.whitener).determinant().ln()
     }
 
     /// Rank q.

@@ -81,6 +81,8 @@ pub struct Score {
     pub noncentrality: f64,
     /// Sum of squares taken away by each variant: a periodogram, where the scan is one of frequencies.
     pub scan: Vec<f64>,
+    /// Logarithm of the determinant of what is left of each variant's columns; infinite where nothing is left.
+    pub ln_left: Vec<f64>,
 }
 
 impl Score {
@@ -209,6 +211,7 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
     for (c, candidate) in library.candidates().iter().enumerate() {
         let n_scanned = if candidate.variants.len() > 1 { candidate.n_scanned } else { 0 };
         let mut scan = Vec::with_capacity(candidate.variants.len());
+        let mut ln_left = Vec::with_capacity(candidate.variants.len());
         let mut ln_each = Vec::with_capacity(candidate.variants.len());
         let mut best: Option<(usize, Block, DVector<f64>, f64)> = None;
         for (v, variant) in candidate.variants.iter().enumerate() {
@@ -218,6 +221,7 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
             let dof = free - (q + n_scanned) as f64;
             if q == 0 || dof < 1.0 {
                 scan.push(0.0);
+                ln_left.push(f64::INFINITY);
                 continue;
             }
             let along = block.whitener.tr_mul(&moments.jr.rows(variant.columns.start, variant.columns.len()));
@@ -225,6 +229,7 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
             let delta = along.norm_squared().min(moments.rr);
             let ln_p = ln_p_of_f(delta, q as f64, held_against(pure, total - delta, dof), dof);
             scan.push(delta);
+            ln_left.push(block.ln_det());
             ln_each.push(ln_p);
             // of values that these touches cannot tell apart the first stands, and not the one that rounding favours
             const ROUNDING: f64 = 1e-9;
@@ -262,6 +267,7 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
                     kept: block.kept,
                     noncentrality: (delta_ss / variance - q as f64).max(0.0),
                     scan,
+                    ln_left,
                 }
             }
             None => {
@@ -282,19 +288,23 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
                     kept: 0.0,
                     noncentrality: 0.0,
                     scan,
+                    ln_left,
                 }
             }
         });
     }
-    multiplicity::adjust(&mut scores, |s| {
-        let candidate = &library.candidates()[s.candidate];
-        match (candidate.origin == Origin::Generic, candidate.expected) {
-            (false, _) => Family::Named,
-            (true, false) => Family::Generic,
-            (true, true) => Family::Expected,
-        }
-    });
+    multiplicity::adjust(&mut scores, |s| family(library, s.candidate));
     scores
+}
+
+/// The family of tests that a candidate belongs to.
+pub(super) fn family(library: &Library, candidate: usize) -> Family {
+    let candidate = &library.candidates()[candidate];
+    match (candidate.origin == Origin::Generic, candidate.expected) {
+        (false, _) => Family::Named,
+        (true, false) => Family::Generic,
+        (true, true) => Family::Expected,
+    }
 }
 
 /// Does the base model fit at all? For display: a test against everything sees little of one effect.

@@ -74,7 +74,13 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
             }
             (_, false) => unexplained(m, u, &mut out),
         },
-        Verdict::Adequate => settled(m, headline, parameters, c, controller, &mut out),
+        Verdict::Adequate => {
+            if let NextStep::CheckSize(o) = d.next_step() {
+                let how = capital(&crate::words::diagnose::check_size(o));
+                out.push(Next::new(format!("Check {}: it is far too large", o.parameter), how, ""));
+            }
+            settled(m, headline, parameters, c, controller, &mut out);
+        }
     }
     if !m.fit.outcome.undetermined.is_empty() && (d.verdict == Verdict::Adequate || d.verdict.is_weak_pattern()) {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();

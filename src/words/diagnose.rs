@@ -2,6 +2,7 @@
 
 use crate::diagnose::features::direction_words;
 use crate::diagnose::next_step::MachineCheck;
+use crate::diagnose::oversized::Oversized;
 use crate::diagnose::verdict::{Missing, NameDoubt, NotNamed, TooLittle, Unexplained, Verdict};
 use crate::diagnose::{Diagnosis, Subject, setup_mistakes};
 use crate::fit::{Fit, VisitSource};
@@ -234,6 +235,31 @@ fn against(d: &Diagnosis) -> String {
 
 /// The verdict, the first sentence as the answer.
 pub(crate) fn verdict(d: &Diagnosis, fit: &Fit) -> String {
+    let says = answer(d, fit);
+    // beside a set-up mistake nothing else counts
+    match d.oversized.first().filter(|_| d.mistake().is_none()) {
+        None => says,
+        Some(o) => format!("{says} {}", oversized(o)),
+    }
+}
+
+/// A value that is far larger than machines have it.
+fn oversized(o: &Oversized) -> String {
+    let cause = if o.cause.is_empty() { String::new() } else { format!(" Probable cause: {}.", o.cause) };
+    let (value, unit, effect) = (o.value, &o.unit, &o.effect);
+    match o.wrong_sign {
+        true => format!("But {} = {value:.3} {unit}: {effect} cannot be negative.{cause}", o.parameter),
+        false => format!("But {} = {value:.3} {unit} is {:.0} times the usual size of {effect}.{cause}", o.parameter, o.times),
+    }
+}
+
+/// What to do about it.
+#[must_use]
+pub fn check_size(o: &Oversized) -> String {
+    format!("check {} before you use these values. {}", o.effect, o.check)
+}
+
+fn answer(d: &Diagnosis, fit: &Fit) -> String {
     match &d.verdict {
         Verdict::Adequate => adequate(d),
         Verdict::MissingEffect(missing) => missing_effect(d, missing),
@@ -272,9 +298,13 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
         Missing::Effect(doubt) => {
             let Some(c) = d.candidates.first() else { return String::new() };
             let or_else = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
-            let what = match &c.same_as[..] {
-                [] => format!("{} ({}){or_else}", c.name, c.effect),
-                others => format!("{}{or_else}", one_of(&c.effect, others)),
+            let what = match (&c.same_as[..], &c.together_with) {
+                (_, Some(other)) => {
+                    let first = one_of(&c.effect, &c.same_as);
+                    format!("{first}, and together with it {other}: no single effect explains both")
+                }
+                ([], _) => format!("{} ({}){or_else}", c.name, c.effect),
+                (others, _) => format!("{}{or_else}", one_of(&c.effect, others)),
             };
             let which = match c.same_as.is_empty() && c.or_else.is_none() {
                 true => "",
@@ -293,8 +323,9 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
                     c.effect
                 ),
             };
+            let it = if c.together_with.is_some() { "both" } else { "it" };
             format!(
-                "Missing: {what}.{which} With it the error falls from {:.2} to {:.2} µm RMS; the probe noise is {:.2} µm.{rest}{doubt}",
+                "Missing: {what}.{which} With {it} the error falls from {:.2} to {:.2} µm RMS; the probe noise is {:.2} µm.{rest}{doubt}",
                 d.rms_um, c.rms_after_um, d.noise_um
             )
         }
@@ -325,7 +356,7 @@ fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit) -> String 
                 false => "Several patterns that no listed effect explains fit clearly better together",
             };
             format!(
-                "{missing} No listed effect explains it: {} would explain {:.0} %. {patterns}.{cause}",
+                "{missing} No listed effect explains all of it. A part of it looks like {} ({:.0} %). {patterns}.{cause}",
                 candidate_names(d),
                 d.candidates.first().map_or(0.0, |c| (100.0 * c.share).round())
             )

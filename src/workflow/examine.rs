@@ -41,7 +41,7 @@ impl Loaded {
     ///
     /// # Errors
     /// When a fit is impossible, or the host's own.
-    pub fn solve(&self, at_most: usize, host: &mut dyn Host) -> Result<Ending> {
+    pub fn solve(&self, (at_most, at_most_size): (usize, f64), host: &mut dyn Host) -> Result<Ending> {
         let (settings, planned) = (self.settings(), self.planned());
         let request = solving::Request {
             machine: &self.machine,
@@ -50,6 +50,7 @@ impl Loaded {
             fit: &|settings| self.fit(settings),
             options: Options { planned: Some(&planned), ..Options::default() },
             at_most,
+            at_most_size,
         };
         solving::solve(request, host)
     }

@@ -118,6 +118,7 @@ impl Bench {
             settings: &settings,
             fit: &|s| fit::identify_data(&self.machine, &self.catalogue, data.clone(), s),
             options: LEAN,
+            at_most_size: 5.0,
             at_most: 6,
         };
         let mut host = Yes { effects: base };

@@ -1,0 +1,54 @@
+//! Two effects at once, before an effect of many parameters is named and before nothing is.
+
+use super::decide::{Decision, Kind, bears_out};
+use super::Examination;
+use crate::search::groups::Group;
+use crate::search::held_out::{Choice, held_out};
+use crate::search::{Library, Origin, Pair};
+
+/// So many of the most significant groups are paired: effects that these touches cannot separate fill no list.
+const AMONG: usize = 10;
+
+/// The criterion of two effects must be lower than that of one by so much: strong evidence (Raftery, Sociological Methodology 25
+/// (1995) 111).
+const CLEARLY: f64 = 10.0;
+
+/// The pair that is to be named in place of what the tests of single effects decide: together they explain what no one does, and
+/// held-out touches bear them out.
+pub(super) fn both(seen: &Examination, decision: &Decision) -> Option<Pair> {
+    if decision.kind == Kind::TooFewTouches || decision.kind == Kind::Adequate {
+        return None;
+    }
+    let search = &seen.search;
+    let among: Vec<usize> = search.groups(AMONG).iter().map(Group::first).collect();
+    let best = among.iter().map(|&c| search.bic(c)).fold(f64::INFINITY, f64::min);
+    let pair = search.best_pair(&among).filter(|pair| pair.bic < best - CLEARLY)?;
+    if decision.confirmed {
+        // the first effect of two is found by itself, and the other one after it
+        let leader: &Group = seen.groups.first()?;
+        let simpler = pair.n_parameters <= search.scores[leader.first()].n_parameters;
+        if leader.holds(pair.first) || leader.holds(pair.second) || !simpler {
+            return None;
+        }
+    }
+    let mut library = Library::new(search.library.n_rows());
+    let columns = [pair.first, pair.second].map(|c| search.columns(c));
+    let width = columns[0].ncols() + columns[1].ncols();
+    let mut joint = columns[0].clone().resize_horizontally(width, 0.0);
+    joint.columns_mut(columns[0].ncols(), columns[1].ncols()).copy_from(&columns[1]);
+    library.push("both", Origin::Catalogue, &joint);
+    let held = held_out(search.question, &library, &seen.evidence.visits, Choice::Given(0));
+    bears_out(&held).then_some(pair)
+}
+
+/// The groups with those of the pair in front.
+pub(super) fn in_front(groups: &mut Vec<Group>, seen: &crate::search::Search, pair: &Pair, at_most: usize) {
+    let ranking = seen.ranking();
+    let first = seen.group_of(pair.first, &ranking);
+    let rest: Vec<usize> = ranking.iter().copied().filter(|c| !first.holds(*c)).collect();
+    let second = seen.group_of(pair.second, &rest);
+    groups.retain(|g| ![g.first(), g.leader].iter().any(|c| first.holds(*c) || second.holds(*c)));
+    groups.insert(0, second);
+    groups.insert(0, first);
+    groups.truncate(at_most);
+}

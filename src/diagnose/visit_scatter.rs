@@ -1,0 +1,88 @@
+//! The regression that all tests share, with the scatter of index positions that is the most likely once what is missing is in
+//! the model.
+//!
+//! An effect that the model lacks looks like scatter of the index positions, and tests that allow for it are blind to the
+//! effect. So the scatter is estimated with each candidate in the model (`search::scatter_that_fits`).
+
+use super::candidate_effects::Named;
+use super::evidence::Evidence;
+use super::features;
+use crate::fit::visit_scatter::known_beforehand;
+use crate::fit::{Fit, VisitSource, declared_tau_mm};
+use crate::machine::Machine;
+use crate::model::catalogue::Catalogue;
+use crate::search::pattern_tests::Features;
+use crate::search::{Basis, Change, Supposed, scatter_that_fits};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Most effects or patterns that are supposed to be there at once.
+const AT_MOST: usize = 4;
+
+/// The scatter is looked for up to so many times the declared one: more is no scatter of an axis.
+const MOST_TIMES: f64 = 3.0;
+
+/// Supposed scatters, in units of the largest.
+const SUPPOSED: [f64; 6] = [0.0, 0.12, 0.25, 0.42, 0.65, 1.0];
+
+/// The regression of a fit and the candidates.
+pub(super) fn regression<'c>(
+    fit: &Fit,
+    machine: &Machine,
+    catalogue: &'c Catalogue,
+    features: &Arc<Features>,
+) -> (Evidence, Named<'c>) {
+    let first = Evidence::from_fit(fit);
+    let named = Named::for_fit(fit, &first, machine, catalogue);
+    let Some(tau_mm) = estimated(fit, machine, &first, &named, features) else { return (first, named) };
+    let evidence = Evidence::with_visits(fit, tau_mm);
+    let change = fit.visit_normals().change(first.tau_mm, tau_mm);
+    let named = named.changed(&|columns| change.apply(columns));
+    let named = named.unwrap_or_else(|| Named::for_fit(fit, &evidence, machine, catalogue));
+    (evidence, named)
+}
+
+/// The scatter of index positions, mm; `None` where it is known or of no account.
+fn estimated(
+    fit: &Fit,
+    machine: &Machine,
+    first: &Evidence,
+    named: &Named,
+    features: &Arc<Features>,
+) -> Option<f64> {
+    let declared_mm = declared_tau_mm(machine, &fit.data.observations);
+    let most_mm = match fit.noise.visit_source {
+        VisitSource::Declared => MOST_TIMES * declared_mm,
+        VisitSource::Revisits => (MOST_TIMES * declared_mm).max(fit.noise.tau_test_mm),
+        _ => 0.0,
+    };
+    if most_mm <= 0.0 {
+        return None;
+    }
+    let normals = fit.visit_normals();
+    // groups of visits are the scatter itself
+    let mut library = named.library.clone();
+    library.append(features::shapes(first, features).without("visit"));
+    let changes: Vec<(f64, _)> = SUPPOSED
+        .iter()
+        .map(|part| {
+            let tau_mm = part * most_mm;
+            let change = normals.change(first.tau_mm, tau_mm);
+            (tau_mm, move |columns: &mut DMatrix<f64>| change.apply(columns))
+        })
+        .collect();
+    let base = first.base.transposed().transpose();
+    let supposed = changes.iter().map(|(tau_mm, change)| {
+        let (mut own, mut residual) = (base.clone(), DMatrix::from_columns(&[first.residual.clone()]));
+        change(&mut own);
+        change(&mut residual);
+        Supposed {
+            tau: *tau_mm,
+            residual: residual.column(0).into_owned(),
+            base: Basis::new(&own),
+            ln_det: normals.ln_det(*tau_mm) + own.tr_mul(&own).determinant().ln() + known_beforehand(*tau_mm, declared_mm),
+            change: change as Change,
+        }
+    });
+    Some(scatter_that_fits(supposed.collect(), &library, first.pure, AT_MOST))
+}
