@@ -70,7 +70,7 @@ pub struct EffectAsWritten {
     /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
     #[serde(default)]
     pub discrete: bool,
-    /// `block`: a set of parameters for each block.
+    /// `block`: a set of parameters for each block. `run`: one for each run after the first.
     pub per: Option<Per>,
     /// Solved for, but no result.
     #[serde(default)]
@@ -111,6 +111,8 @@ pub enum About {
 pub enum Per {
     /// Each block of each mounting.
     Block,
+    /// Each run after the first.
+    Run,
 }
 
 /// The sign that a size has by its nature.

@@ -5,6 +5,7 @@ use super::as_written::File;
 use super::check::Check;
 use super::for_each_axis::expand;
 use super::formula::Formula;
+pub use super::lever_arm::Arm;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source};
 use crate::keys::not_of_form;
@@ -98,8 +99,12 @@ pub struct Effect {
     pub discrete: bool,
     /// About which point its rotations are stated, where the place does not say it.
     pub about: Option<About>,
+    /// Its turns act about a point at an unknown distance.
+    pub arm: Option<Arm>,
     /// One set of parameters for each block.
     pub per_block: bool,
+    /// One set of parameters for each run after the first: how it differs from that one.
+    pub per_run: bool,
     /// Solved for, but no result.
     pub nuisance: bool,
     /// A parameter set of the paper.
@@ -125,6 +130,12 @@ impl Effect {
     #[must_use]
     pub fn acts_on(&self, machine: &Machine) -> bool {
         !self.paper && !self.discrete && self.applies_to(machine)
+    }
+
+    /// True when it has as many sets of parameters as there are blocks, or runs.
+    #[must_use]
+    pub fn is_repeated(&self) -> bool {
+        self.per_block || self.per_run
     }
 
     /// True when no machine can have both: rows of one id must differ so.

@@ -17,5 +17,6 @@ mod paper;
 mod planted;
 mod recover;
 mod shapes;
+mod sides;
 mod told_honestly;
 mod what_is_said;

@@ -46,8 +46,13 @@ fn scenario_text(effect: &Effect, mounting: &Mounting, set_ups: &[SetUp], theta:
         return text;
     }
     text += &format!("[effects.{}]\n", effect.id);
-    for (p, value) in effect.parameters.iter().zip(theta) {
-        text += &format!("{} = {{ value = {value:?}, unit = {:?} }}\n", p.name, p.unit);
+    // what blocks have for themselves is given for each of them
+    let blocks: Vec<Option<&SetUp>> = if effect.per_block { set_ups.iter().map(Some).collect() } else { vec![None] };
+    for (block, own) in blocks.iter().zip(theta.chunks(effect.parameters.len())) {
+        for (p, value) in effect.parameters.iter().zip(own) {
+            let name = block.map_or_else(|| p.name.clone(), |b| format!("{}@{}", p.name, b.label));
+            text += &format!("{name:?} = {{ value = {value:?}, unit = {:?} }}\n", p.unit);
+        }
     }
     text
 }
@@ -66,15 +71,21 @@ fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaC
     let plan = random_plan(machine, mounting, 40, rng);
     // an errorless run says which blocks there are
     let touches = touch(machine, &plan, &Scenario::flawless(), None);
-    let run = |touches| Run { plan: &plan, touches, mounting: None, started_s: None };
-    let set_ups = assemble(machine, &[run(&touches)]).set_ups;
+    let run = |touches| Run { plan: &plan, touches, mounting: Some(mounting.name.as_str()), started_s: Some(0.0) };
+    // what a later run has for itself is planted in the second of two, on the same blocks
+    let flawless = touches.clone();
+    let runs = |touches| {
+        let first = effect.per_run.then(|| run(&flawless));
+        assemble(machine, &first.into_iter().chain([run(touches)]).collect::<Vec<_>>())
+    };
+    let set_ups = runs(&touches).set_ups;
     let n_sets = if effect.per_block { set_ups.len() } else { 1 };
     let parameters: Vec<&Parameter> = (0..n_sets).flat_map(|_| &effect.parameters).collect();
     let theta: Vec<f64> = parameters.iter().map(|p| random_value(effect, p, rng)).collect();
     let text = scenario_text(effect, mounting, &set_ups, &theta);
     let (scenario, _) = simulate::scenario::parse(&source("planted", &text), machine).map_err(|e| e.to_string())?;
     let touches = touch(machine, &plan, &scenario, None);
-    let data = assemble(machine, &[run(&touches)]);
+    let data = runs(&touches);
     assert_eq!(data.set_ups, set_ups);
     let model = Model::new(machine, &[effect], &data.set_ups, machine.reference.pivot);
     // without the effect: its parameters are zero, but those inside its formulas stay
