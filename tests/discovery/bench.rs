@@ -104,14 +104,28 @@ impl Bench {
 
     /// The logs of all runs on a machine with `acts`, matched to the plans. `touch_um`, `visit_um`: scatter of a touch and of the ball
     /// from one index position to the next. `warm`: does the log have temperatures?
-    pub fn measure(&self, acts: &[&Act], touch_um: f64, visit_um: f64, warm: bool, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+    pub fn measure(
+        &self,
+        acts: &[&Act],
+        touch_um: f64,
+        visit_um: f64,
+        warm: bool,
+        rng: &mut ChaCha8Rng,
+    ) -> Vec<Vec<Touch>> {
         let raw = self.raw(acts, touch_um, visit_um, warm, rng);
         let plans = self.runs.iter().map(|(plan, _)| plan);
         plans.zip(raw).map(|(plan, raw)| match_to_plan(&self.machine, plan, raw).unwrap().0).collect()
     }
 
     /// The same as the control wrote them.
-    pub fn raw(&self, acts: &[&Act], touch_um: f64, visit_um: f64, warm: bool, rng: &mut ChaCha8Rng) -> Vec<Vec<RawTouch>> {
+    pub fn raw(
+        &self,
+        acts: &[&Act],
+        touch_um: f64,
+        visit_um: f64,
+        warm: bool,
+        rng: &mut ChaCha8Rng,
+    ) -> Vec<Vec<RawTouch>> {
         let mut out = Vec::new();
         let mut blocks: Vec<String> = Vec::new();
         for (run, (plan, began)) in self.runs.iter().enumerate() {
@@ -225,10 +239,8 @@ impl Bench {
     pub fn ordinary(&self, rng: &mut ChaCha8Rng) -> Box<Act> {
         let mut location: [(V, V); 6] = [(V::zeros(), V::zeros()); 6];
         for slot in &mut location {
-            *slot = (
-                V::from_fn(|_, _| rng.random_range(-0.02..0.02)),
-                V::from_fn(|_, _| rng.random_range(-4e-5..4e-5)),
-            );
+            *slot =
+                (V::from_fn(|_, _| rng.random_range(-0.02..0.02)), V::from_fn(|_, _| rng.random_range(-4e-5..4e-5)));
         }
         let late = rng.random_range(0.002..0.01);
         let stands: Vec<(V, V)> = (0..64)

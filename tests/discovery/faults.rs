@@ -318,7 +318,11 @@ fn leaning_carriage(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
     let to = (turn + rng.random_range(1..3usize)) % 3;
     let about = bench.machine.reference.ball + unit(to) * arm;
     let expects = [format!("angular-{}{}", ['a', 'b', 'c'][turn], small(name))];
-    let what = format!("turn of the carriage of {name} about {}, {arm:.0} mm away along {}", ["X", "Y", "Z"][turn], ["X", "Y", "Z"][to]);
+    let what = format!(
+        "turn of the carriage of {name} about {}, {arm:.0} mm away along {}",
+        ["X", "Y", "Z"][turn],
+        ["X", "Y", "Z"][to]
+    );
     Some(Fault::new(what, &[&expects[0]], move |at, size, wrong| {
         let angle = TURN * size * at.q[name.index()] / 150.0;
         wrong.after[name.index()].push(Slip::turn(unit(turn) * angle, about));
@@ -336,15 +340,19 @@ fn bowed_guideway(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
     let way = carried(axis);
     let about = bench.machine.reference.ball + V::z() * arm;
     let expects = [format!("carriage-sag-{}", small(name))];
-    Some(Fault::new(format!("bowed guideway of {name}, {:.0} mm below the ball", -arm), &[&expects[0]], move |at, size, wrong| {
-        // where the carriage stands in R
-        let u = way * at.q[name.index()] / 150.0;
-        let slope = -2.0 * u / 150.0;
-        // what leans along its way by dz/du turns about the other horizontal direction
-        let turn = unit(name.index()).cross(&V::z()) * (4.0 * UM * size * slope);
-        let shift = V::z() * (-4.0 * UM * size * u * u);
-        wrong.after[name.index()].push(Slip { shift, turn, about });
-    }))
+    Some(Fault::new(
+        format!("bowed guideway of {name}, {:.0} mm below the ball", -arm),
+        &[&expects[0]],
+        move |at, size, wrong| {
+            // where the carriage stands in R
+            let u = way * at.q[name.index()] / 150.0;
+            let slope = -2.0 * u / 150.0;
+            // what leans along its way by dz/du turns about the other horizontal direction
+            let turn = unit(name.index()).cross(&V::z()) * (4.0 * UM * size * slope);
+            let shift = V::z() * (-4.0 * UM * size * u * u);
+            wrong.after[name.index()].push(Slip { shift, turn, about });
+        },
+    ))
 }
 
 /// The table sinks towards the ends of its travel, as a bowl.

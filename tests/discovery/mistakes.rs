@@ -2,9 +2,9 @@
 //! believes.
 
 use super::bench::{Act, At, Bench};
-use super::faults::Fault;
 use super::forward::{V, Wrong};
 use axiscal::axes::AxisName;
+use axiscal::diag::Result;
 use axiscal::log::{Touch, match_to_plan};
 use axiscal::machine::Side;
 use axiscal::units::mm_from_inch;
@@ -14,8 +14,8 @@ use rand_chacha::ChaCha8Rng;
 pub struct Mistake {
     pub what: &'static str,
     pub expects: &'static [&'static str],
-    /// The logs that the program reads.
-    pub make: fn(&Bench, &Act, &mut ChaCha8Rng) -> Vec<Vec<Touch>>,
+    /// The logs that the program reads, or why it refuses them.
+    pub make: fn(&Bench, &Act, &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>>,
 }
 
 /// Scatter of a touch and of an index position, µm.
@@ -48,18 +48,23 @@ pub const MISTAKES: [Mistake; 8] = [
     Mistake { what: "log in inches", expects: &["inch", "sign-or-axis-swap"], make: inches },
 ];
 
-fn with(bench: &Bench, base: &Act, act: impl Fn(&At, &mut Wrong) + Send + Sync, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
-    bench.measure(&[base, &act], TOUCH_UM, 0.0, true, rng)
+fn with(
+    bench: &Bench,
+    base: &Act,
+    act: impl Fn(&At, &mut Wrong) + Send + Sync + 'static,
+    rng: &mut ChaCha8Rng,
+) -> Result<Vec<Vec<Touch>>> {
+    matched(bench, bench.raw(&[base, &act], TOUCH_UM, 0.0, true, rng))
 }
 
 /// The real ball is smaller than the plan's: contact comes later.
-fn ball_radius(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn ball_radius(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     with(bench, base, |_, wrong| wrong.late += 0.05, rng)
 }
 
 /// In a head the ball hangs 0.5 mm lower under the axis than the file says, whatever its tool's length is; a table's axis lies 0.5 mm
 /// lower.
-fn pivot(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn pivot(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     let mut real = bench.clone();
     let head = real.machine.axes.iter().any(|a| a.side == Side::Tool && a.name.is_rotary());
     for axis in real.machine.axes.iter_mut().filter(|a| a.name != AxisName::C && a.name.is_rotary()) {
@@ -69,16 +74,16 @@ fn pivot(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
     matched(bench, raw)
 }
 
-fn tool_length(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn tool_length(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     let down = -bench.machine.tool.direction.into_inner();
     with(bench, base, move |_, wrong| wrong.in_head += down * 0.3, rng)
 }
 
-fn oversize(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn oversize(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     with(bench, base, |_, wrong| wrong.longer += V::repeat(0.05), rng)
 }
 
-fn turned_block(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn turned_block(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     let act = |at: &At, wrong: &mut Wrong| {
         if at.block == 0 {
             wrong.block_turn.z += 2f64.to_radians();
@@ -87,16 +92,16 @@ fn turned_block(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touc
     with(bench, base, act, rng)
 }
 
-fn wrong_probe(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn wrong_probe(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     with(bench, base, |_, wrong| wrong.late += 0.5, rng)
 }
 
-fn no_temperature(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn no_temperature(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     let bends = |at: &At, wrong: &mut Wrong| wrong.tool += V::new(0.6, -0.4, 0.7) * (5e-3 * at.kelvin);
-    bench.measure(&[base, &bends], TOUCH_UM, 0.0, false, rng)
+    matched(bench, bench.raw(&[base, &bends], TOUCH_UM, 0.0, false, rng))
 }
 
-fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
+fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
     let mut raw = bench.raw(&[base], TOUCH_UM, 0.0, true, rng);
     for touch in raw.iter_mut().flatten() {
         touch.position.0[..3].iter_mut().for_each(|mm| *mm /= mm_from_inch(1.0));
@@ -104,12 +109,7 @@ fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Vec<Vec<Touch>> {
     matched(bench, raw)
 }
 
-fn matched(bench: &Bench, raw: Vec<Vec<axiscal::log::RawTouch>>) -> Vec<Vec<Touch>> {
+fn matched(bench: &Bench, raw: Vec<Vec<axiscal::log::RawTouch>>) -> Result<Vec<Vec<Touch>>> {
     let plans = bench.runs.iter().map(|(plan, _)| plan);
-    plans.zip(raw).map(|(plan, raw)| match_to_plan(&bench.machine, plan, raw).unwrap().0).collect()
-}
-
-/// The names of all faults that a set-up mistake could be taken for: none of them is planted here.
-pub fn none() -> Fault {
-    Fault::new("nothing", &[], |_, _, _| {})
+    plans.zip(raw).map(|(plan, raw)| Ok(match_to_plan(&bench.machine, plan, raw)?.0)).collect()
 }

@@ -137,7 +137,9 @@ fn larger_blocks(_: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
 fn blocks_of_many_sizes(_: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
     let cubes = rng.random_bool(0.5);
     let own: Vec<V> = (0..64)
-        .map(|_| if cubes { V::repeat(rng.random_range(-1.0..1.0)) } else { V::from_fn(|_, _| rng.random_range(-1.0..1.0)) })
+        .map(|_| {
+            if cubes { V::repeat(rng.random_range(-1.0..1.0)) } else { V::from_fn(|_, _| rng.random_range(-1.0..1.0)) }
+        })
         .collect();
     Some(Fault::new("every block of a size of its own", &["block-own-size"], move |at, size, wrong| {
         wrong.longer += own[at.block % own.len()] * (6.0 * UM * size);

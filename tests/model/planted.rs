@@ -5,8 +5,9 @@ use crate::common;
 use axiscal::diag::source;
 use axiscal::machine::{Machine, Mounting};
 use axiscal::model::catalogue::{Catalogue, Effect, Parameter};
-use axiscal::model::data::{Run, assemble};
+use axiscal::model::data::{Run, assemble_with_spindle};
 use axiscal::model::predict::{Model, SetUp};
+use axiscal::model::spindle::SpindleStretch;
 use axiscal::simulate::{self, Scenario};
 use common::more_machines::all_machines;
 use common::random::random_plan;
@@ -30,9 +31,14 @@ fn random_value(effect: &Effect, p: &Parameter, rng: &mut ChaCha8Rng) -> f64 {
     }
 }
 
+/// When the spindle ran, s and rpm: before the first touch, with pauses, at two speeds, and once when no touch is made any more.
+const SPINDLE: [[f64; 3]; 4] =
+    [[-900.0, 300.0, 8000.0], [3000.0, 7200.0, 12000.0], [7200.0, 9000.0, 4000.0], [90_000.0, 91_000.0, 12000.0]];
+
 /// The scenario of an effect: in `[effects]`, or for the set-up of blocks, which has values for each, in `[[block]]`.
 fn scenario_text(effect: &Effect, mounting: &Mounting, set_ups: &[SetUp], theta: &[f64]) -> String {
-    let mut text = "[temperature]\nprofile = [[0.0, 19.0], [3.0, 24.0], [8.0, 21.0]]\n".to_owned();
+    let mut text = if effect.id == "spindle-growth" { format!("spindle = {SPINDLE:?}\n") } else { String::new() };
+    text += "[temperature]\nprofile = [[0.0, 19.0], [3.0, 24.0], [8.0, 21.0]]\n";
     if effect.id == "block-setup" {
         for (set_up, six) in set_ups.iter().zip(theta.chunks(6)) {
             let name = set_up.label.rsplit('/').next().unwrap();
@@ -76,7 +82,11 @@ fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaC
     let flawless = touches.clone();
     let runs = |touches| {
         let first = effect.per_run.then(|| run(&flawless));
-        assemble(machine, &first.into_iter().chain([run(touches)]).collect::<Vec<_>>())
+        let all: Vec<Run> = first.into_iter().chain([run(touches)]).collect();
+        let stretch = |&[from_s, to_s, rpm]: &[f64; 3]| SpindleStretch { from_s, to_s, rpm };
+        let spindle: Vec<SpindleStretch> =
+            SPINDLE.iter().filter(|_| effect.id == "spindle-growth").map(stretch).collect();
+        assemble_with_spindle(machine, &all, &spindle)
     };
     let set_ups = runs(&touches).set_ups;
     let n_sets = if effect.per_block { set_ups.len() } else { 1 };
