@@ -1,7 +1,7 @@
 //! Faults that a generator of its own plants (`tests/discovery`), at counts that a test can afford. The full counts:
 //! `cargo run --release --example discovery -- faults 400`.
 
-use crate::generator::bench::Bench;
+use crate::generator::bench::{At, Bench};
 use crate::generator::judge::{self, Conditions, planted, rate};
 use crate::generator::mistakes::MISTAKES;
 use crate::generator::{faults, forward};
@@ -59,6 +59,40 @@ fn every_family_expects_effects_that_exist() {
 fn a_quarter_turn_takes_x_to_y() {
     let turned = forward::turned(forward::V::z() * std::f64::consts::FRAC_PI_2) * forward::V::x();
     assert!((turned - forward::V::y()).norm() < 1e-15);
+}
+
+/// C of the paper's machine leans by 150 µrad to and fro once per turn, about a bearing 180 mm below the blocks: at the ball that is
+/// 27 µm of sideways motion, and no run-out.
+#[test]
+fn a_wobble_says_where_its_bearing_is() {
+    let bench = Bench::of("swivel-head", true);
+    let about = bench.machine.reference.ball - forward::V::z() * 180.0;
+    let wobble = move |at: &At, wrong: &mut forward::Wrong| {
+        let turn = forward::V::new(at.q[5].cos(), 0.4 * at.q[5].sin(), 0.0) * 150e-6;
+        wrong.before[5].push(forward::Slip::turn(turn, about));
+    };
+    let d = judge::diagnosis(&bench, &[&wobble], 5);
+    let first = &d.candidates[0];
+    assert_eq!(first.effect, "tilt-c-1", "{}", d.says);
+    let says = &first.says;
+    assert!(
+        says.contains("wobble of C about a point 1") && says.contains(" mm below the ball: the bearing, not run-out"),
+        "{says}"
+    );
+    let arm = first.parameters.iter().find(|p| p.name == "arm_tilt_c_1").unwrap();
+    assert!((arm.value + 180.0).abs() < 40.0, "{}", arm.value);
+}
+
+/// The axis has another zero in the second of two runs, 0.03 degrees: the blocks of each run stand for themselves.
+#[test]
+fn an_axis_that_was_homed_again_is_named() {
+    let bench = Bench::of("trunnion", false);
+    let homed = |at: &At, wrong: &mut forward::Wrong| wrong.joint[3] += 0.03f64.to_radians() * at.run as f64;
+    let d = judge::diagnosis(&bench, &[&homed], 6);
+    assert!(d.verdict.is_missing_effect(), "{}", d.says);
+    assert_eq!(d.candidates[0].effect, "rehomed-a", "{}", d.says);
+    let size = d.candidates[0].parameters.iter().find(|p| p.name == "rehomed_A@run2").unwrap();
+    assert!((size.value - 0.03).abs() < 0.003, "{}", size.value);
 }
 
 #[test]

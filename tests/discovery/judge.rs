@@ -55,6 +55,15 @@ fn fit(bench: &Bench, touches: &[Vec<Touch>], more: &[String]) -> (Fit, Settings
     (identify_data(&bench.machine, &catalogue, assemble(&bench.machine, &runs), &settings).unwrap(), settings)
 }
 
+/// What the program says of a machine with these faults, at 1 µm of noise.
+pub fn diagnosis(bench: &Bench, acts: &[&Act], seed: u64) -> Diagnosis {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let base = bench.ordinary(&mut rng);
+    let all: Vec<&Act> = std::iter::once(&*base).chain(acts.iter().copied()).collect();
+    let (fit, settings) = fit(bench, &bench.measure(&all, 1.0, 0.0, true, &mut rng), &[]);
+    ask(bench, &fit, &settings)
+}
+
 fn ask(bench: &Bench, fit: &Fit, settings: &Settings) -> Diagnosis {
     let catalogue = Catalogue::built_in().unwrap();
     diagnose(Subject { machine: &bench.machine, catalogue: &catalogue, settings, fit }, &LEAN).unwrap()
@@ -192,7 +201,11 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         let told = |id: &&str| {
             let of = fit.model.unknowns.iter().filter(|u| u.effect == **id).map(|u| u.own_name().to_owned());
             let names: Vec<String> = of.chain([(*id).to_owned()]).collect();
-            d.warnings.iter().chain([&d.says]).any(|w| names.iter().any(|n| w.contains(n.as_str())))
+            d.warnings
+                .iter()
+                .chain(&fit.outcome.warnings)
+                .chain([&d.says])
+                .any(|w| names.iter().any(|n| w.contains(n.as_str())))
         };
         led |= named || gross || mistake.expects.iter().any(|id| told(&id));
         let first_name = first.map(|g| g[0].clone());

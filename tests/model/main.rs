@@ -18,5 +18,6 @@ mod planted;
 mod recover;
 mod shapes;
 mod sides;
+mod spindle;
 mod told_honestly;
 mod what_is_said;
