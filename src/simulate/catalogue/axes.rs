@@ -18,7 +18,7 @@ const PITCH_MM: f64 = 10.0;
 
 /// Angle after a reversal at which an axis is wound up to 63 %, when none is given, rad.
 const WINDUP_RAD: f64 = std::f64::consts::PI / 18.0;
-/// Radius of an encoder's ring, mm.
+/// Radius of an encoder's ring when none is given, mm.
 const RING_MM: f64 = 100.0;
 
 /// Pairs of linear axes that wiring can swap.
@@ -317,17 +317,20 @@ fn wind_up(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
 
 /// The centre of the axis wanders once per turn, and the reading head, past which the ring of the encoder moves by as much, takes
 /// the part along the ring for an angle: the control turns the axis back by it.
-fn run_out_that_is_read(axis: AxisName, _: Settings<'_>) -> Vec<Parameter> {
+fn run_out_that_is_read(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
+    let ring = format!("ring_{axis}");
+    let radius_mm = settings(&ring).unwrap_or(RING_MM);
     let mut out = Vec::new();
     for (number, dof) in across(axis).enumerate() {
         for (letter, shape) in [('c', Shape::Cosine(axis, 1.0)), ('s', Shape::Sine(axis, 1.0))] {
             let mut acts = vec![(moved(axis, dof), shape, 1.0)];
             if number == 1 {
-                acts.push((moved(axis, along(axis) + 3), shape, -1.0 / RING_MM));
+                acts.push((moved(axis, along(axis) + 3), shape, -1.0 / radius_mm));
             }
             out.push(Parameter::new(format!("runout_{}{axis}{letter}", dof_letter(dof)), Um, acts));
         }
     }
+    out.push(Parameter::setting(&ring, Mm));
     out
 }
 
