@@ -64,6 +64,10 @@ pub struct EffectAsWritten {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub unless: Vec<Placed>,
+    /// Ids of effects that are special cases of it: no touches separate them from it.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub includes: Vec<Placed>,
     /// Short word that groups effects in lists.
     #[serde(default)]
     pub family: String,

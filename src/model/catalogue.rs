@@ -93,6 +93,8 @@ pub struct Effect {
     pub needs: Vec<AxisName>,
     /// The axes without which it applies only.
     pub unless: Vec<AxisName>,
+    /// Ids of effects that are special cases of it: no touches separate them from it.
+    pub includes: Vec<String>,
     /// Short word that groups effects in lists.
     pub family: String,
     /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
@@ -249,6 +251,7 @@ mod tests {
             let said = [&e.name, &e.says, &e.look, &e.mends, &e.family];
             assert!(said.iter().all(|text| !text.is_empty()), "{}", e.id);
             assert!(e.parameters.iter().all(|p| !p.source.is_empty()), "{}", e.id);
+            assert!(e.includes.iter().all(|id| catalogue.knows(id)), "{}: {:?}", e.id, e.includes);
             let shapes: Vec<f64> = e.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
             for t in &e.terms {
                 assert!(t.formula.eval(&[0.5; VARIABLES.len()], &shapes).is_finite(), "{} {}", e.id, t.formula.text());

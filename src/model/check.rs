@@ -158,6 +158,7 @@ impl<'a> Check<'a> {
             side: w.side.map(|s| if s == SideAsWritten::Tool { Side::Tool } else { Side::Workpiece }),
             needs,
             unless,
+            includes: w.includes.iter().map(|id| id.get_ref().clone()).collect(),
             family: if w.family.is_empty() { "own".to_owned() } else { w.family.clone() },
             discrete: w.discrete,
             about: w.about,

@@ -9,6 +9,9 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+/// A fault at a size.
+type Sizable = dyn Fn(&At, f64, &mut Wrong) + Send + Sync;
+
 /// A hidden fault.
 #[derive(Clone)]
 pub struct Fault {
@@ -17,7 +20,7 @@ pub struct Fault {
     /// Ids under which the program may name it.
     pub expects: Vec<String>,
     /// The fault at size 1, which is some µm at the ball.
-    act: Arc<dyn Fn(&At, f64, &mut Wrong) + Send + Sync>,
+    act: Arc<Sizable>,
 }
 
 impl Fault {

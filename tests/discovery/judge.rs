@@ -198,16 +198,16 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         let named = first.is_some_and(|g| g.iter().any(|id| mistake.expects.contains(&id.as_str())));
         let gross = d.mistake().is_some_and(|says| mistake.expects.iter().any(|id| says.contains(id)));
         // a finding about a size that no machine has: it names the effect or its parameters
-        let told = |id: &&str| {
-            let of = fit.model.unknowns.iter().filter(|u| u.effect == **id).map(|u| u.own_name().to_owned());
-            let names: Vec<String> = of.chain([(*id).to_owned()]).collect();
+        let told = |id: &str| {
+            let of = fit.model.unknowns.iter().filter(|u| u.effect == id).map(|u| u.own_name().to_owned());
+            let names: Vec<String> = of.chain([id.to_owned()]).collect();
             d.warnings
                 .iter()
                 .chain(&fit.outcome.warnings)
                 .chain([&d.says])
                 .any(|w| names.iter().any(|n| w.contains(n.as_str())))
         };
-        led |= named || gross || mistake.expects.iter().any(|id| told(&id));
+        led |= named || gross || mistake.expects.iter().any(|id| told(id));
         let first_name = first.map(|g| g[0].clone());
         said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));
         match first_name.filter(|id| id != "sign-or-axis-swap") {

@@ -10,12 +10,15 @@ use axiscal::machine::Side;
 use axiscal::units::mm_from_inch;
 use rand_chacha::ChaCha8Rng;
 
+/// The touches of all runs, or why the program refuses them.
+pub type Logs = Result<Vec<Vec<Touch>>>;
+
 /// A mistake with the ids of the effects whose size gives it away.
 pub struct Mistake {
     pub what: &'static str,
     pub expects: &'static [&'static str],
     /// The logs that the program reads, or why it refuses them.
-    pub make: fn(&Bench, &Act, &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>>,
+    pub make: fn(&Bench, &Act, &mut ChaCha8Rng) -> Logs,
 }
 
 /// Scatter of a touch and of an index position, µm.
@@ -53,18 +56,18 @@ fn with(
     base: &Act,
     act: impl Fn(&At, &mut Wrong) + Send + Sync + 'static,
     rng: &mut ChaCha8Rng,
-) -> Result<Vec<Vec<Touch>>> {
+) -> Logs {
     matched(bench, bench.raw(&[base, &act], TOUCH_UM, 0.0, true, rng))
 }
 
 /// The real ball is smaller than the plan's: contact comes later.
-fn ball_radius(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn ball_radius(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     with(bench, base, |_, wrong| wrong.late += 0.05, rng)
 }
 
 /// In a head the ball hangs 0.5 mm lower under the axis than the file says, whatever its tool's length is; a table's axis lies 0.5 mm
 /// lower.
-fn pivot(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn pivot(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     let mut real = bench.clone();
     let head = real.machine.axes.iter().any(|a| a.side == Side::Tool && a.name.is_rotary());
     for axis in real.machine.axes.iter_mut().filter(|a| a.name != AxisName::C && a.name.is_rotary()) {
@@ -74,16 +77,16 @@ fn pivot(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touc
     matched(bench, raw)
 }
 
-fn tool_length(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn tool_length(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     let down = -bench.machine.tool.direction.into_inner();
     with(bench, base, move |_, wrong| wrong.in_head += down * 0.3, rng)
 }
 
-fn oversize(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn oversize(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     with(bench, base, |_, wrong| wrong.longer += V::repeat(0.05), rng)
 }
 
-fn turned_block(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn turned_block(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     let act = |at: &At, wrong: &mut Wrong| {
         if at.block == 0 {
             wrong.block_turn.z += 2f64.to_radians();
@@ -92,16 +95,16 @@ fn turned_block(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<V
     with(bench, base, act, rng)
 }
 
-fn wrong_probe(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn wrong_probe(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     with(bench, base, |_, wrong| wrong.late += 0.5, rng)
 }
 
-fn no_temperature(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn no_temperature(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     let bends = |at: &At, wrong: &mut Wrong| wrong.tool += V::new(0.6, -0.4, 0.7) * (5e-3 * at.kelvin);
     matched(bench, bench.raw(&[base, &bends], TOUCH_UM, 0.0, false, rng))
 }
 
-fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Touch>>> {
+fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     let mut raw = bench.raw(&[base], TOUCH_UM, 0.0, true, rng);
     for touch in raw.iter_mut().flatten() {
         touch.position.0[..3].iter_mut().for_each(|mm| *mm /= mm_from_inch(1.0));
@@ -109,7 +112,7 @@ fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Result<Vec<Vec<Tou
     matched(bench, raw)
 }
 
-fn matched(bench: &Bench, raw: Vec<Vec<axiscal::log::RawTouch>>) -> Result<Vec<Vec<Touch>>> {
+fn matched(bench: &Bench, raw: Vec<Vec<axiscal::log::RawTouch>>) -> Logs {
     let plans = bench.runs.iter().map(|(plan, _)| plan);
     plans.zip(raw).map(|(plan, raw)| Ok(match_to_plan(&bench.machine, plan, raw)?.0)).collect()
 }

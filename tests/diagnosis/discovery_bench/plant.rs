@@ -208,6 +208,7 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
             _ if p.name.starts_with("pitch") => {
                 (*[5.0, 8.0, 10.0, 12.0, 16.0].get(rng.random_range(0..5)).unwrap(), true)
             }
+            _ if p.scan.is_empty() => (rng.random_range(0.5..1.5) * p.shape.map_or(1.0, |s| s.0), true),
             _ => (p.scan[rng.random_range(0..p.scan.len())], true),
         };
         let name =
