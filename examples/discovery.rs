@@ -1,6 +1,8 @@
 //! Hidden effects at full count: `cargo run --release --example discovery [-- PART COUNT]`. The table stands in
 //! docs/discovery.md. Parts: planted (paper, full), clean (clean-paper,
 //! clean-paper-visits, clean-full, clean-full-visits), two, strange; all of them without an argument.
+//! Planted by the generator of tests/discovery on all machines: faults (faults-paper, faults-full, faults-weak), faultless
+//! (faultless-paper, faultless-full), mistakes.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a measurement that cannot be made shall stop
 #![allow(missing_docs)]
 
@@ -8,11 +10,16 @@
 mod common;
 #[path = "../tests/diagnosis/discovery_bench/mod.rs"]
 mod discovery;
+#[path = "../tests/discovery/mod.rs"]
+mod generator;
 
 use axiscal::diagnose::Verdict;
 use discovery::measure::{Clean, Outcome, both_named, clean, planted, two};
 use discovery::plant::Bench;
 use discovery::strange::{self, Seen};
+use generator::bench::Bench as Machines;
+use generator::judge::{self, Conditions};
+use generator::mistakes::MISTAKES;
 use std::collections::BTreeMap;
 
 fn percent(part: usize, of: usize) -> String {
@@ -111,11 +118,79 @@ fn report_strange(name: &str, seen: &[Seen]) {
     }
 }
 
+/// One line for each case, then the rates with their 95 % intervals.
+fn report_faults(name: &str, outcomes: &[judge::Outcome]) {
+    println!("faults, {name}: {} cases", outcomes.len());
+    for o in outcomes {
+        println!(
+            "  {} | {} | {} | noncentrality {:.0} | rank {} | {} | {:?}",
+            if o.rank == Some(1) { "ok    " } else { "MISSED" },
+            o.bench,
+            o.what,
+            o.noncentrality,
+            o.rank.map_or("-".to_owned(), |r| r.to_string()),
+            o.verdict,
+            o.groups
+        );
+    }
+    let of = |what: &dyn Fn(&judge::Outcome) -> bool| {
+        judge::rate(outcomes.iter().filter(|o| what(o)).count(), outcomes.len())
+    };
+    println!("  first group {}", of(&|o| o.rank == Some(1)));
+    println!("  first three {}", of(&|o| o.rank.is_some()));
+    println!("  by name     {}", of(&|o| o.by_name));
+    println!("  proposed    {}", of(&|o| o.proposed));
+}
+
+/// The parts that the generator of tests/discovery plants.
+fn of_the_generator(part: &str, count: &dyn Fn(usize) -> usize) {
+    let wanted = |name: &str| part == "all" || part == name || name.starts_with(&format!("{part}-"));
+    let plain = Conditions { visit_um: 0.0, noncentrality: None };
+    for (name, full, seed) in [("faults-paper", false, 51), ("faults-full", true, 52)] {
+        if wanted(name) {
+            report_faults(name, &judge::planted(&Machines::all(full), plain, count(400), seed));
+        }
+    }
+    if wanted("faults-weak") {
+        let weak = Conditions { noncentrality: Some(45.0), ..plain };
+        report_faults("noncentrality 45, full", &judge::planted(&Machines::all(true), weak, count(200), 53));
+    }
+    for (name, full, seed) in [("faultless-paper", false, 54), ("faultless-full", true, 55)] {
+        for visit_um in [0.0, 0.3, 0.7] {
+            if wanted(name) {
+                let verdicts = judge::clean(&Machines::all(full), visit_um, count(2000), seed);
+                let adequate = verdicts.iter().filter(|v| v.1 == "adequate").count();
+                println!(
+                    "{name}, scatter {visit_um} um: not adequate {}",
+                    judge::rate(verdicts.len() - adequate, verdicts.len())
+                );
+            }
+        }
+    }
+    if wanted("mistakes") {
+        for full in [false, true] {
+            for bench in Machines::all(full) {
+                for mistake in &MISTAKES {
+                    let led = judge::mistake(&bench, mistake, 56);
+                    println!(
+                        "{} | {} | {} | {}",
+                        if led.led { "led   " } else { "NOT LED" },
+                        led.bench,
+                        led.what,
+                        led.said.join("; ")
+                    );
+                }
+            }
+        }
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let part = arguments.first().map_or("all", String::as_str);
     let count = |full: usize| arguments.get(1).map_or(full, |n| n.parse().unwrap());
     let wanted = |name: &str| part == "all" || part == name;
+    of_the_generator(part, &count);
     let began = std::time::Instant::now();
     if wanted("planted") || part == "paper" {
         report_planted("paper's plan", &planted(&Bench::paper(), count(400), 1));

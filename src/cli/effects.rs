@@ -223,6 +223,7 @@ fn show(e: &Effect, machines: &[Machine]) -> String {
     let mut kinds = vec![e.family.as_str()];
     kinds.extend(e.nuisance.then_some("solved for, but no result"));
     kinds.extend(e.per_block.then_some("one set of parameters for each block"));
+    kinds.extend(e.per_run.then_some("one set of parameters for each run after the first"));
     kinds.extend(e.discrete.then_some("a set-up mistake, 0 or 1, tried where the error is very large"));
     out += &entry("family", &kinds.join("; "));
     for (i, p) in e.parameters.iter().enumerate() {
@@ -273,7 +274,7 @@ fn as_json(e: &Effect) -> serde_json::Value {
     };
     json!({ "id": e.id, "family": e.family, "name": e.name, "says": e.says, "look": e.look, "mends": e.mends,
         "side": side, "needs": letters(&e.needs), "unless": letters(&e.unless), "nuisance": e.nuisance,
-        "per_block": e.per_block, "discrete": e.discrete, "paper": e.paper, "built_in": e.built_in,
+        "per_block": e.per_block, "per_run": e.per_run, "discrete": e.discrete, "paper": e.paper, "built_in": e.built_in,
         "parameters": e.parameters.iter().map(parameter).collect::<Vec<_>>(),
         "terms": e.terms.iter().map(term).collect::<Vec<_>>() })
 }

@@ -11,8 +11,9 @@ use crate::fit::{design_jacobian, every_formula_has_a_value, free_in_a_design, j
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
-use crate::model::data::{Data, Run, assemble};
+use crate::model::data::{Data, Run, assemble_with_spindle};
 use crate::model::predict::Model;
+use crate::model::spindle::SpindleStretch;
 use crate::program::plan::{Plan, PlanTouch};
 use crate::search::{Basis, KEPT, Library, Origin, without_rounding};
 use crate::units::um_from_mm;
@@ -78,6 +79,8 @@ pub struct Planned {
     pub made: BTreeMap<u64, Made>,
     /// What the room does during touches that are not made yet.
     pub room: Room,
+    /// When the spindle ran, in all runs of the study.
+    pub spindle: Vec<SpindleStretch>,
 }
 
 /// The circumstances of a touch that was made.
@@ -93,7 +96,14 @@ impl Planned {
     /// A run of a plan.
     #[must_use]
     pub fn new(plan: Plan) -> Self {
-        Self { plan, mounting: None, started_s: None, made: BTreeMap::new(), room: Room::default() }
+        Self {
+            plan,
+            mounting: None,
+            started_s: None,
+            made: BTreeMap::new(),
+            room: Room::default(),
+            spindle: Vec::new(),
+        }
     }
 
     /// Of a run that was made.
@@ -106,6 +116,7 @@ impl Planned {
             started_s: run.started_s,
             made: run.touches.iter().map(of).collect(),
             room: Room::GoesOn,
+            spindle: Vec::new(),
         }
     }
 }
@@ -217,7 +228,8 @@ impl LinearisedPlan {
     pub fn new(task: &Task, runs: &[Planned], known: &[Known], noise: Noise) -> Result<Self> {
         let mut view = Self::of_model(task, runs, known, noise)?;
         let candidates = unmodelled_by(&view.model.unknowns, task.machine, task.catalogue);
-        let usual: Vec<(&Effect, Option<f64>)> = candidates.into_iter().map(|e| (e, None)).collect();
+        let candidates = candidates.into_iter().filter(|e| view.model.has_parameters_of(e));
+        let usual: Vec<(&Effect, Option<f64>)> = candidates.map(|e| (e, None)).collect();
         view.add(task, &usual);
         Ok(view)
     }
@@ -452,6 +464,7 @@ fn nominal(task: &Task, runs: &[Planned]) -> (Data, f64) {
             .collect();
         touched.push((started_s, touches));
     }
+    let spindle = runs.iter().map(|run| &run.spindle[..]).find(|spindle| !spindle.is_empty()).unwrap_or_default();
     let runs: Vec<Run> = runs
         .iter()
         .zip(&touched)
@@ -462,7 +475,7 @@ fn nominal(task: &Task, runs: &[Planned]) -> (Data, f64) {
             started_s: Some(*started_s),
         })
         .collect();
-    (assemble(task.machine, &runs), clock_s)
+    (assemble_with_spindle(task.machine, &runs, spindle), clock_s)
 }
 
 /// When each touch is made, s after the program's begin: the plan's prediction, else ordinary times.

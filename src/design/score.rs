@@ -20,6 +20,16 @@ const MOST_INVISIBLE: usize = 4;
 /// … and at most so many pairs of effects that cannot be told apart, for each effect.
 const PAIRS_PER_EFFECT: f64 = 0.5;
 
+/// Pairs of which one is a special case of the other: they say nothing of the plan.
+fn special_cases(a: &Assessment, task: &Task) -> usize {
+    let includes = |by: &String, id: &String| {
+        task.catalogue.get(by, task.machine).is_some_and(|effect| effect.includes.contains(id))
+    };
+    let of =
+        |e: &super::record::Seen| e.same_as.iter().chain(&e.contained_in).filter(|by| includes(by, &e.effect)).count();
+    a.effects.iter().map(of).sum()
+}
+
 /// Score and reason.
 pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     // an axis that no touch sees is not what this plan is for
@@ -107,8 +117,9 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     if invisible > MOST_INVISIBLE {
         reasons.push(traceless(a, &equal));
     }
-    if a.alias_pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
-        reasons.push(format!("{} pairs of effects cannot be separated", a.alias_pairs));
+    let pairs = a.alias_pairs.saturating_sub(special_cases(a, task));
+    if pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
+        reasons.push(format!("{pairs} pairs of effects cannot be separated"));
     }
     if reasons.is_empty() {
         // a trace is not enough: at its usual size an effect must be larger than what would just be found

@@ -60,6 +60,7 @@ pub(super) fn put_together(
         }));
     }
     candidates.truncate(options.at_most);
+    super::turning_points::say(subject, &mut candidates);
     let found: Vec<&Group> = seen
         .groups
         .iter()

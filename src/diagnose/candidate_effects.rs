@@ -131,9 +131,9 @@ impl Chosen {
 pub fn missing<'c>(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue) -> Vec<&'c Effect> {
     let held = |e: &Effect| {
         fit.model.unknowns.iter().any(|u| u.effect == e.id)
-            || (!e.per_block && e.parameters.iter().any(|p| fit.model.unknowns.iter().any(|u| u.name == p.name)))
+            || (!e.is_repeated() && e.parameters.iter().any(|p| fit.model.unknowns.iter().any(|u| u.name == p.name)))
     };
-    catalogue.acting_on(machine).filter(|e| !held(e)).collect()
+    catalogue.acting_on(machine).filter(|e| !held(e) && fit.model.has_parameters_of(e)).collect()
 }
 
 /// Index of the scanned shape among an effect's shape parameters, with the values.

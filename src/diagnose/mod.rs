@@ -29,6 +29,7 @@ mod separating_touches;
 pub mod setup_mistakes;
 pub mod sketch;
 pub mod solving;
+mod turning_points;
 pub mod unresolved_pairs;
 pub mod verdict;
 mod visit_scatter;

@@ -1,7 +1,7 @@
 //! Puts the result of a fit together: values with their uncertainty, what cannot be determined, and the remarks.
 
 use super::nonlinear_scan::{self, NOT_CREDIBLE};
-use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TypeBRow};
+use super::outcome::{FORMAT, Outcome, Parameter, Rejected, Residual, Status, TurnsAbout, TypeBRow};
 use super::profile::{Ends, Intervals};
 use super::remark::Remark;
 use super::shape_search::Asked;
@@ -9,7 +9,10 @@ use super::solve::{Problem as _, Solution};
 use super::type_b::TypeB;
 use super::uncertainty::{LeftOut, Unmodelled};
 use super::{Fit, contradictions, held_out, null_space, outliers, poorly_determined, profile, uncertainty};
+use crate::machine::Machine;
+use crate::model::catalogue::Effect;
 use crate::model::data::UnusableReason;
+use crate::model::lever_arm::turning_point;
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use crate::words::fit as words;
@@ -108,6 +111,7 @@ pub(super) fn assemble_result(
         visit_source: fit.noise.visit_source,
         noise_says: words::noise(&fit.noise),
         chi2_per_dof: if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN },
+        turns_about: turns_about(fit, asked.machine, effects, &status),
         undetermined,
         parted_together: Vec::new(),
         never_determined: 0,
@@ -133,6 +137,19 @@ pub(super) fn assemble_result(
     remarks.sort_by_key(Remark::rank);
     outcome.warnings = remarks.iter().map(words::remark).collect();
     Assembled { outcome, remarks, other_values: evidence.other_values }
+}
+
+/// The points about which axes turn, as far as the touches show them.
+fn turns_about(fit: &Fit, machine: &Machine, effects: &[&Effect], status: &[Status]) -> Vec<TurnsAbout> {
+    let one = |effect: &&Effect| {
+        let name = &effect.parameters.get(effect.arm?.parameter)?.name;
+        let i = fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == *name)?;
+        let known = matches!(status[i], Status::Identified | Status::Fixed);
+        let point = turning_point(machine, effect, fit.theta[i]).filter(|_| known)?;
+        let says = words::turning_point(&point);
+        Some(TurnsAbout { effect: effect.id.clone(), parameter: name.clone(), says })
+    };
+    effects.iter().filter_map(one).collect()
 }
 
 /// All that the status and the uncertainty of a parameter are made of. `c` is a place among the free unknowns, `i` among all.

@@ -69,7 +69,7 @@ pub fn identify(machine: &Machine, catalogue: &Catalogue, runs: &[Run], settings
 }
 
 /// What a formula may depend on that is not the same in two visits of one pose.
-const MOVING: [&str; 5] = ["t", "T", "wA", "wB", "wC"];
+const MOVING: [&str; 8] = ["t", "T", "wA", "wB", "wC", "wayA", "wayB", "wayC"];
 
 /// Fits a model from given starts.
 fn identify_from(

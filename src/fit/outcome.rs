@@ -62,6 +62,9 @@ pub struct Outcome {
     pub noise_says: String,
     /// Reduced chi-square.
     pub chi2_per_dof: f64,
+    /// Points about which axes turn where they should not, each in a sentence.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub turns_about: Vec<TurnsAbout>,
     /// Combinations that the data cannot tell.
     pub undetermined: Vec<Undetermined>,
     /// What would tell all of them together: variations of the touches, chosen one after the other.
@@ -235,6 +238,16 @@ pub struct Parameter {
     pub holds: Vec<String>,
     /// Is the value a result?
     pub status: Status,
+}
+
+/// The point about which an effect turns its axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TurnsAbout {
+    /// Id of the effect.
+    pub effect: String,
+    /// Name of the parameter that says how far it is.
+    pub parameter: String,
+    pub says: String,
 }
 
 /// Residual of one touch.

@@ -56,7 +56,7 @@ fn per_kelvin_of_all(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> DVe
     let mut column = DVector::zeros(fit.data.observations.len());
     let (cold, warm) = (warmer(fit, 0.0), warmer(fit, 1.0));
     let with_t = |e: &&Effect| e.terms.iter().any(|t| t.formula.variables().contains(&"T"));
-    let effects = catalogue.acting_on(machine).filter(|e| !e.per_block);
+    let effects = catalogue.acting_on(machine).filter(|e| !e.is_repeated());
     for effect in effects.filter(with_t).filter(|e| without_value(e, &warm).is_empty()) {
         let at = |o: &[Observation]| columns(machine, &[effect], &fit.data, o, fit.model.reference, None);
         let (before, after) = (at(&cold), at(&warm));

@@ -137,7 +137,7 @@ impl LeftOut {
     /// What `model` leaves out.
     pub(super) fn new(model: &Model, machine: &Machine, catalogue: &Catalogue, data: &Data) -> Self {
         let mut effects = unmodelled_by(&model.unknowns, machine, catalogue);
-        effects.retain(|e| !e.per_block);
+        effects.retain(|e| !e.is_repeated());
         let (effects, without_value) = with_values(effects, &data.observations);
         let model = Model::new(machine, &effects, &data.set_ups, model.reference);
         Self { model, without_value }

@@ -72,6 +72,13 @@ impl Axis {
         if self.name.is_rotary() { [low, high] } else { [low + END_RESERVE_MM, high - END_RESERVE_MM] }
     }
 
+    /// Which way a linear axis moves what it carries as its NC coordinate grows: an NC coordinate says where the tool is over the
+    /// workpiece, so that a table moves the other way. The one place where the side of the chain gives a sign.
+    #[must_use]
+    pub fn travel_sign(&self) -> f64 {
+        if self.side == Side::Workpiece { -1.0 } else { 1.0 }
+    }
+
     /// The motion of what the axis carries, in R.
     #[must_use]
     pub fn motion(&self, at: &Position) -> Transform {
@@ -79,9 +86,7 @@ impl Axis {
         if self.name.is_rotary() {
             rotation_about(&self.point, &self.direction, self.sense * q)
         } else {
-            // an NC coordinate says where the tool is over the workpiece: a table moves the other way
-            let sign = if self.side == Side::Workpiece { -1.0 } else { 1.0 };
-            translation(self.direction.into_inner() * (sign * q))
+            translation(self.direction.into_inner() * (self.travel_sign() * q))
         }
     }
 }

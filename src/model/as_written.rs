@@ -67,13 +67,17 @@ pub struct EffectAsWritten {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub unless: Vec<Placed>,
+    /// Ids of effects that are special cases of it: no touches separate them from it.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub includes: Vec<Placed>,
     /// Short word that groups effects in lists.
     #[serde(default)]
     pub family: String,
     /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
     #[serde(default)]
     pub discrete: bool,
-    /// `block`: a set of parameters for each block.
+    /// `block`: a set of parameters for each block. `run`: one for each run after the first.
     pub per: Option<Per>,
     /// Solved for, but no result.
     #[serde(default)]
@@ -114,6 +118,8 @@ pub enum About {
 pub enum Per {
     /// Each block of each mounting.
     Block,
+    /// Each run after the first.
+    Run,
 }
 
 /// The sign that a size has by its nature.

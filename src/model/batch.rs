@@ -11,7 +11,7 @@ use super::predict::{Active, Changes, Model, Observation};
 use super::rigid_motions::{Centre, Placed, Rigid};
 use crate::axes::AxisName;
 use crate::geometry::Displacement;
-use crate::machine::{Axis, Side};
+use crate::machine::Axis;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
@@ -114,7 +114,7 @@ impl Model {
     ) -> Batch<'a> {
         let mut batch = self.prepare_places(observations);
         let mut alike: HashMap<(&str, usize), usize> = HashMap::new();
-        for (i, a) in self.active.iter().enumerate().filter(|(_, a)| a.term.formula.constant().is_none()) {
+        for (i, a) in self.active.iter().enumerate().filter(|(_, a)| a.constant().is_none()) {
             let formula = &a.term.formula;
             if (0..a.count).all(|shape| !formula.holds(shape) || held(a.first + shape)) {
                 batch.varying.push(i);
@@ -131,7 +131,7 @@ impl Model {
             let mut before: Option<(&str, usize, f64)> = None;
             for &i in &batch.varying {
                 let a = &self.active[i];
-                if a.set_up.is_some_and(|s| s != o.set_up) {
+                if !a.acts_on(o) {
                     batch.coefficients.push(0.0);
                     continue;
                 }
@@ -169,7 +169,7 @@ impl Model {
             component: a.component as u32,
             at: (self.layout.place(a.unknown) + if a.set_up.is_some() { n_common } else { 0 }) as u32,
             active: i as u32,
-            coefficient: a.term.formula.constant().map_or(f64::NAN, |value| a.factor * value),
+            coefficient: a.constant().map_or(f64::NAN, |value| a.factor * value),
         };
         let of = |s: usize| self.active.iter().enumerate().filter(move |(_, a)| a.set_up.is_none_or(|own| own == s));
         let entries = (0..self.set_ups().len()).map(|s| of(s).map(entry).collect()).collect();
@@ -248,7 +248,7 @@ impl Batch<'_> {
         // the common displacements, then a copy of them for each block with the block's own added
         let mut displacement = vec![Displacement::default(); n_slots];
         for a in model.active.iter().filter(|a| a.set_up.is_none()) {
-            if let Some(value) = a.term.formula.constant() {
+            if let Some(value) = a.constant() {
                 displacement[a.slot].add(a.component, theta[a.unknown] * a.factor * value);
             }
         }
@@ -257,7 +257,7 @@ impl Batch<'_> {
             all.extend_from_slice(&displacement);
         }
         for a in &model.active {
-            if let (Some(s), Some(value)) = (a.set_up, a.term.formula.constant()) {
+            if let (Some(s), Some(value)) = (a.set_up, a.constant()) {
                 all[(1 + s) * n_slots + a.slot].add(a.component, theta[a.unknown] * a.factor * value);
             }
         }
@@ -291,11 +291,10 @@ impl At<'_> {
         }
         for group in &self.batch.shaped {
             let a = &model.active[group[0]];
-            let offset = match a.set_up {
-                Some(s) if s != o.set_up => continue,
-                Some(_) => model.layout.common.len(),
-                None => 0,
-            };
+            if !a.acts_on(o) {
+                continue;
+            }
+            let offset = if a.set_up.is_some() { model.layout.common.len() } else { 0 };
             let all = group.iter().map(|&i| &model.active[i]);
             let amount: f64 =
                 all.map(|a| scratch.gradient[a.slot][a.component] * self.theta[a.unknown] * a.factor).sum();
@@ -332,7 +331,9 @@ impl At<'_> {
         }
         for group in &batch.shaped {
             let first = &model.active[group[0]];
-            if first.set_up.is_none_or(|s| s == o.set_up) {
+            if !first.acts_on(o) {
+                group.iter().for_each(|&i| scratch.coefficient[i] = 0.0);
+            } else {
                 let value = first.term.formula.eval(&o.state, &self.theta[first.first..first.first + first.count]);
                 for (&i, a) in group.iter().map(|i| (i, &model.active[*i])) {
                     scratch.coefficient[i] = a.factor * value;
@@ -384,10 +385,8 @@ impl At<'_> {
             let by_reading = if batch.roles.reading.is_some() { turned[axis.name.index()].as_ref() } else { None };
             by_reading.unwrap_or(&pose[at])
         };
-        let travel = |axis: &Axis| -> Vector3<f64> {
-            let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
-            axis.direction.into_inner() * (sign * shown.get(axis.name))
-        };
+        let travel =
+            |axis: &Axis| -> Vector3<f64> { axis.direction.into_inner() * (axis.travel_sign() * shown.get(axis.name)) };
         // --- the ball from the tool's frame to R
         moved.clear();
         let mut point = o.ball_at_zero;
@@ -534,7 +533,6 @@ fn motion_slope(axis: &Axis, g: &Vector3<f64>, moved: &Vector3<f64>) -> f64 {
     if axis.name.is_rotary() {
         axis.sense * g.dot(&direction.cross(&(moved - axis.point)))
     } else {
-        let sign = if axis.side == Side::Workpiece { -1.0 } else { 1.0 };
-        sign * g.dot(&direction)
+        axis.travel_sign() * g.dot(&direction)
     }
 }

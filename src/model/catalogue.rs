@@ -5,6 +5,7 @@ use super::as_written::File;
 use super::check::Check;
 use super::for_each_axis::expand;
 use super::formula::Formula;
+pub use super::lever_arm::Arm;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source};
 use crate::keys::not_of_form;
@@ -94,14 +95,20 @@ pub struct Effect {
     pub needs: Vec<AxisName>,
     /// The axes without which it applies only.
     pub unless: Vec<AxisName>,
+    /// Ids of effects that are special cases of it: no touches separate them from it.
+    pub includes: Vec<String>,
     /// Short word that groups effects in lists.
     pub family: String,
     /// Its parameters are 0 or 1: a supposition that is tried where the error is gross.
     pub discrete: bool,
     /// About which point its rotations are stated, where the place does not say it.
     pub about: Option<About>,
+    /// Its turns act about a point at an unknown distance.
+    pub arm: Option<Arm>,
     /// One set of parameters for each block.
     pub per_block: bool,
+    /// One set of parameters for each run after the first: how it differs from that one.
+    pub per_run: bool,
     /// Solved for, but no result.
     pub nuisance: bool,
     /// A parameter set of the paper.
@@ -127,6 +134,12 @@ impl Effect {
     #[must_use]
     pub fn acts_on(&self, machine: &Machine) -> bool {
         !self.paper && !self.discrete && self.applies_to(machine)
+    }
+
+    /// True when it has as many sets of parameters as there are blocks, or runs.
+    #[must_use]
+    pub fn is_repeated(&self) -> bool {
+        self.per_block || self.per_run
     }
 
     /// True when no machine can have both: rows of one id must differ so.
@@ -240,6 +253,7 @@ mod tests {
             let said = [&e.name, &e.says, &e.look, &e.mends, &e.family];
             assert!(said.iter().all(|text| !text.is_empty()), "{}", e.id);
             assert!(e.parameters.iter().all(|p| !p.source.is_empty()), "{}", e.id);
+            assert!(e.includes.iter().all(|id| catalogue.knows(id)), "{}: {:?}", e.id, e.includes);
             let shapes: Vec<f64> = e.parameters.iter().map(|p| p.shape.map_or(0.0, |s| s.0)).collect();
             for t in &e.terms {
                 assert!(t.formula.eval(&[0.5; VARIABLES.len()], &shapes).is_finite(), "{} {}", e.id, t.formula.text());

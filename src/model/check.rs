@@ -6,6 +6,7 @@ use super::as_written::{
 use super::catalogue::{Effect, Parameter, Place, Term};
 use super::formula::{CONSTANTS, FUNCTIONS, Formula, VARIABLES};
 use super::formula_errors::MOST_SHAPES;
+use super::lever_arm::arm_of;
 use super::{degrees_in_formula, formula_errors};
 use crate::axes::AxisName;
 use crate::diag::{Finding, Findings, Severity, Source};
@@ -147,6 +148,7 @@ impl<'a> Check<'a> {
         if self.findings.0[before..].iter().any(|f| f.severity == Severity::Error) {
             return None;
         }
+        let arm = arm_of(w, &names);
         Some(Effect {
             id: w.id.get_ref().clone(),
             name: if w.name.is_empty() { w.id.get_ref().clone() } else { w.name.clone() },
@@ -157,10 +159,13 @@ impl<'a> Check<'a> {
             side: w.side.map(|s| if s == SideAsWritten::Tool { Side::Tool } else { Side::Workpiece }),
             needs,
             unless,
+            includes: w.includes.iter().map(|id| id.get_ref().clone()).collect(),
             family: if w.family.is_empty() { "own".to_owned() } else { w.family.clone() },
             discrete: w.discrete,
             about: w.about,
+            arm,
             per_block: w.per == Some(Per::Block),
+            per_run: w.per == Some(Per::Run),
             nuisance: w.nuisance,
             paper: w.paper,
             parameters,

@@ -2,12 +2,13 @@
 
 use super::formula::{State, VARIABLES, slot};
 use super::predict::{Observation, SetUp};
+use super::spindle::{self, SpindleStretch};
 use super::temperatures::TemperatureGap;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Numbered, Plan, PlanBlock, PlanTouch};
-use crate::units::{hours_from_s, rad_from_deg};
+use crate::units::{hours_from_s, rad_from_deg, s_from_h};
 use nalgebra::Vector3;
 
 /// One measurement run.
@@ -120,6 +121,12 @@ impl Data {
 /// Assembles runs. Positions mm and deg in R, lengths mm.
 #[must_use]
 pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
+    assemble_with_spindle(machine, runs, &[])
+}
+
+/// The same where it is known when the spindle ran.
+#[must_use]
+pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[SpindleStretch]) -> Data {
     let mut data = Data::default();
     // they are large: each goes straight to where it stays
     let n_touches = runs.iter().map(|r| r.touches.len()).sum();
@@ -138,6 +145,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
         let mut previous: Option<&PlanTouch> = None;
         let mut last_sense = [0.0; 6];
         let mut before = Before::default();
+        let mut way = WaySinceReversal::default();
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
         let of_log = run.touches.iter().find_map(|t| t.digit_mm);
@@ -159,6 +167,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
             earliest_h = f64::min(earliest_h, t);
             senses(&mut last_sense, planned, previous);
             before.next(planned);
+            way.next(planned);
             previous = Some(planned);
             let reason = match touch.status {
                 Status::Miss => Some(UnusableReason::NoTrigger),
@@ -187,9 +196,13 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                 (None, mounting) => format!("{mounting}/{}", planned.block),
             };
             let set_up = data.set_ups.iter().position(|s| s.label == set_up_label).unwrap_or_else(|| {
-                data.set_ups.push(SetUp { label: set_up_label, carrier, centre: block.centre.into() });
+                let (centre, runs) = (block.centre.into(), Vec::new());
+                data.set_ups.push(SetUp { label: set_up_label, carrier, centre, runs });
                 data.set_ups.len() - 1
             });
+            if data.set_ups[set_up].runs.last() != Some(&index) {
+                data.set_ups[set_up].runs.push(index);
+            }
             let point: Vector3<f64> = planned.point.into();
             let normal = Vector3::from(planned.normal).normalize();
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
@@ -218,6 +231,7 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
                     temperature_deg_c,
                     senses: &last_sense,
                     before: &before.earlier,
+                    way: &way.way,
                     length_mm,
                 }
                 .state(),
@@ -240,6 +254,10 @@ pub fn assemble(machine: &Machine, runs: &[Run]) -> Data {
     if earliest_h < 0.0 {
         // the runs are not listed in the order in which they were made: hours count from the first touch all the same
         data.observations.iter_mut().chain(&mut data.nominal).for_each(|o| o.state[slot::HOURS] -= earliest_h);
+    }
+    let first_s = first_touch_s.unwrap_or(0.0) + s_from_h(earliest_h);
+    for o in data.observations.iter_mut().chain(&mut data.nominal) {
+        spindle::put_into(&mut o.state, spindle, first_s);
     }
     data
 }
@@ -342,6 +360,35 @@ impl Before {
     }
 }
 
+/// So far a program goes past a pose to come to it in a direction that its `from` asks for: what plans do not say, deg.
+const PAST_THE_POSE_DEG: f64 = 5.0;
+
+/// How far each rotary axis has gone since it last changed its direction, in one run.
+#[derive(Debug, Default)]
+struct WaySinceReversal {
+    now: [Option<f64>; 3],
+    /// rad, with the sign of the motion; 0 until the axis has moved.
+    way: [f64; 3],
+}
+
+impl WaySinceReversal {
+    fn next(&mut self, touch: &PlanTouch) {
+        let pose = touch.pose.position();
+        for (i, name) in [AxisName::A, AxisName::B, AxisName::C].into_iter().enumerate() {
+            let at = rad_from_deg(pose.get(name));
+            let moved = self.now[i].map_or(0.0, |last| at - last);
+            let moved = if moved.abs() > 1e-9 { moved } else { 0.0 };
+            let goes_on = moved * self.way[i] >= 0.0;
+            let natural = if goes_on { self.way[i] + moved } else { moved };
+            let wanted = touch.from.get(name).unwrap_or(0.0);
+            // it came from the other side: past the pose, and back to it
+            let came_back = wanted != 0.0 && wanted * natural <= 0.0;
+            self.way[i] = if came_back { wanted.signum() * rad_from_deg(PAST_THE_POSE_DEG) } else { natural };
+            self.now[i] = Some(at);
+        }
+    }
+}
+
 /// What the state of a touch is made of.
 struct Circumstances<'a> {
     machine: &'a Machine,
@@ -355,6 +402,8 @@ struct Circumstances<'a> {
     senses: &'a [f64; 6],
     /// Where the rotary axes stood before, rad.
     before: &'a [f64; 3],
+    /// How far the rotary axes have gone since their last reversal, rad.
+    way: &'a [f64; 3],
     /// Pivot to ball, mm.
     length_mm: f64,
 }
@@ -368,6 +417,7 @@ impl Circumstances<'_> {
         }
         state[slot::SENSES..slot::SENSES + 6].copy_from_slice(c.senses);
         state[slot::BEFORE..slot::BEFORE + 3].copy_from_slice(c.before);
+        state[slot::WAY..slot::WAY + 3].copy_from_slice(c.way);
         state[slot::HOURS] = c.hours;
         state[slot::TEMPERATURE] = c.temperature_deg_c.unwrap_or(20.0);
         state[slot::FEED] = c.planned.feed_mm_min.unwrap_or(c.machine.probe.slow_feed);

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt;
 
 /// Angles among the variables of a formula, rad.
-const ANGLES: [&str; 7] = ["A", "B", "C", "wA", "wB", "wC", "S"];
+const ANGLES: [&str; 10] = ["A", "B", "C", "wA", "wB", "wC", "wayA", "wayB", "wayC", "S"];
 
 /// A part of a formula that looks as if an angle were in degrees.
 #[derive(Debug, Clone, PartialEq)]

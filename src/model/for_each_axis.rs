@@ -29,7 +29,7 @@ impl EffectAsWritten {
         [name, says, look, mends, too_large].into_iter().for_each(|text| *text = axis.fill_in(text));
         let placed = |word: &mut Placed| *word.get_mut() = axis.fill_in(word.get_ref());
         let words = [&mut row.id, &mut row.at].into_iter().chain(&mut row.arm);
-        words.chain(&mut row.needs).chain(&mut row.unless).for_each(placed);
+        words.chain(&mut row.needs).chain(&mut row.unless).chain(&mut row.includes).for_each(placed);
         for term in &mut row.terms {
             let always = [&mut term.parameter, &mut term.dof, &mut term.formula];
             always.into_iter().chain(&mut term.at).for_each(placed);

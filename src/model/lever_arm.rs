@@ -2,6 +2,11 @@
 //! is displaced in proportion to the distance. Nobody knows that distance, so that it is a parameter of the shape.
 
 use super::as_written::{EffectAsWritten, Grid, Placed, Scan, ShapeAsWritten, TermAsWritten};
+use super::catalogue::{Effect, Place};
+use super::reference_points::own_point;
+use crate::axes::AxisName;
+use crate::machine::{Machine, Side};
+use nalgebra::Vector3;
 
 /// How far from where rotations are stated a bearing or a carriage may be, mm.
 pub const FARTHEST_MM: f64 = 400.0;
@@ -13,7 +18,7 @@ const TRIED: usize = 9;
 /// through the origin and a displacement of −a·θ·(r̂ × d̂).
 pub(super) fn with_arm(mut row: EffectAsWritten) -> EffectAsWritten {
     let Some(along) = row.arm.as_ref().and_then(|word| component(word.get_ref())) else { return row };
-    let name = format!("arm_{}", row.id.get_ref().replace('-', "_"));
+    let name = arm_name(row.id.get_ref());
     let displaced = |term: &TermAsWritten| {
         let about = component(term.dof.get_ref().strip_prefix('r')?)?;
         let (to, sign) = cross(about, along)?;
@@ -39,6 +44,68 @@ pub(super) fn with_arm(mut row: EffectAsWritten) -> EffectAsWritten {
     row
 }
 
+/// The distance at which the turns of an effect act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arm {
+    /// Which of the effect's parameters it is.
+    pub parameter: usize,
+    /// 0, 1, 2: along x, y, z.
+    pub along: usize,
+}
+
+/// The arm of a row whose parameters have these names.
+pub(super) fn arm_of(row: &EffectAsWritten, names: &[String]) -> Option<Arm> {
+    let along = row.arm.as_ref().and_then(|word| component(word.get_ref()))?;
+    let name = arm_name(row.id.get_ref());
+    Some(Arm { parameter: names.iter().position(|n| *n == name)?, along })
+}
+
+fn arm_name(id: &str) -> String {
+    format!("arm_{}", id.replace('-', "_"))
+}
+
+/// About which point an axis turns where it should not turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurningPoint {
+    /// The axis that turns.
+    pub axis: AxisName,
+    /// 0, 1, 2: the point lies along x, y, z from there.
+    pub along: usize,
+    /// So far, mm.
+    pub mm: f64,
+    /// From where.
+    pub from: From,
+}
+
+/// From where the distance of a point counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum From {
+    /// The ball at zero, where the artefact stands.
+    Ball,
+    /// The point of a head's axis.
+    Pivot,
+}
+
+/// Where the point lies about which an effect turns its axis, for a value of its arm, mm.
+#[must_use]
+pub fn turning_point(machine: &Machine, effect: &Effect, arm_mm: f64) -> Option<TurningPoint> {
+    let arm = effect.arm?;
+    let (Place::Before(name) | Place::After(name)) = effect.terms.first()?.place else { return None };
+    let axis = machine.axis(name)?;
+    let ball = machine.reference.ball;
+    let (stated, from) = match (name.is_rotary(), axis.side) {
+        (true, Side::Tool) => {
+            return Some(TurningPoint { axis: name, along: arm.along, mm: arm_mm, from: From::Pivot });
+        }
+        (true, Side::Workpiece) => (own_point(machine, axis), From::Ball),
+        (false, Side::Workpiece) => (ball, From::Ball),
+        // a head's carriage: its own coordinates begin at the origin of R
+        (false, Side::Tool) => (Vector3::zeros(), From::Ball),
+    };
+    let mm = stated[arm.along] - ball[arm.along] + arm_mm;
+    Some(TurningPoint { axis: name, along: arm.along, mm, from })
+}
+
 fn component(letter: &str) -> Option<usize> {
     ["x", "y", "z"].iter().position(|l| *l == letter)
 }
@@ -58,6 +125,26 @@ mod tests {
     use crate::model::catalogue::Catalogue;
 
     #[test]
+    fn the_point_is_told_from_the_ball_or_from_the_pivot() {
+        use super::{From, TurningPoint, turning_point};
+        use crate::axes::AxisName;
+        let catalogue = Catalogue::built_in().unwrap();
+        let at = |machine: &str, id: &str, arm_mm: f64| {
+            let machine = crate::machine::built_in(machine).unwrap().unwrap();
+            turning_point(&machine, catalogue.get(id, &machine).unwrap(), arm_mm)
+        };
+        // C of the table: its arm counts from the height of the ball
+        let below = TurningPoint { axis: AxisName::C, along: 2, mm: -180.0, from: From::Ball };
+        assert_eq!(at("swivel-head", "tilt-c-1", -180.0), Some(below));
+        let aside = TurningPoint { axis: AxisName::B, along: 1, mm: 90.0, from: From::Pivot };
+        assert_eq!(at("swivel-head", "tilt-b-2", 90.0), Some(aside));
+        // X carries the spindle: its arm counts from R, and the ball is 202.684 mm below that
+        let above = at("trunnion", "carriage-sag-x", 0.0).unwrap();
+        assert!((above.mm - 202.684).abs() < 1e-12 && above.from == From::Ball, "{above:?}");
+        assert_eq!(at("trunnion", "zero-a", 0.0), None);
+    }
+
+    #[test]
     fn a_turn_about_a_point_below_shifts_what_is_above_it() {
         // about y through a point 100 mm below: what stands at the origin goes to +x with a positive turn
         let text = "[[effect]]\nid = \"my-lean\"\nat = \"X\"\narm = \"z\"\nterms = [{ parameter = \"lean\", unit = \"urad\", \
@@ -69,6 +156,7 @@ mod tests {
         assert_eq!(names, ["lean", "arm_my_lean"]);
         let shift = &effect.terms[1];
         assert_eq!((shift.component, shift.formula.text()), (0, "-arm_my_lean*(X/300)"));
+        assert_eq!(effect.arm, Some(super::Arm { parameter: 1, along: 2 }));
         let wrong = Catalogue::default().add_file(&source("my.toml", text.replace("\"z\"", "\"q\""))).unwrap_err();
         assert_eq!(wrong.0[0].code, "effects::arm");
     }

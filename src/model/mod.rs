@@ -18,4 +18,5 @@ pub mod predict;
 pub mod reference_points;
 mod rigid_motions;
 pub mod sensitivities;
+pub mod spindle;
 pub mod temperatures;

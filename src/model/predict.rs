@@ -75,6 +75,19 @@ pub struct SetUp {
     pub carrier: Carrier,
     /// Its nominal centre in the carrier's frame, mm.
     pub centre: Vector3<f64>,
+    /// The runs in which it was touched, from 0.
+    pub runs: Vec<usize>,
+}
+
+/// How the parameters of a run are called, behind `@`: runs are counted from 1.
+fn run_label(run: usize) -> String {
+    format!("run{}", run + 1)
+}
+
+/// Is this the name of a parameter of one run?
+#[must_use]
+pub fn is_of_a_run(name: &str) -> bool {
+    name.split_once("@run").is_some_and(|(_, number)| number.parse::<usize>().is_ok())
 }
 
 /// One usable touch, ready for the model. Lengths mm, carrier's frame where not said otherwise.
@@ -117,6 +130,48 @@ pub(super) struct Active {
     pub term: Term,
     /// The block that it is of.
     pub set_up: Option<usize>,
+    /// The run that it is of.
+    pub run: Option<usize>,
+}
+
+impl Active {
+    /// Does it act on a touch?
+    #[inline]
+    pub fn acts_on(&self, touch: &Observation) -> bool {
+        self.set_up.is_none_or(|own| own == touch.set_up) && self.run.is_none_or(|own| own == touch.run)
+    }
+
+    /// Its formula's value where that is one number at all touches of its block.
+    #[inline]
+    pub fn constant(&self) -> Option<f64> {
+        self.term.formula.constant().filter(|_| self.run.is_none())
+    }
+}
+
+/// One set of an effect's parameters: of all touches, of a block, or of a run.
+#[derive(Debug, Clone, Copy, Default)]
+struct Instance {
+    set_up: Option<usize>,
+    run: Option<usize>,
+}
+
+/// The runs in which blocks were touched, in order.
+fn runs_of(set_ups: &[SetUp]) -> Vec<usize> {
+    let mut runs: Vec<usize> = set_ups.iter().flat_map(|s| s.runs.iter().copied()).collect();
+    runs.sort_unstable();
+    runs.dedup();
+    runs
+}
+
+/// The sets of parameters that an effect has where these blocks stand.
+fn instances_of(effect: &Effect, set_ups: &[SetUp]) -> Vec<Instance> {
+    if effect.per_block {
+        return (0..set_ups.len()).map(|s| Instance { set_up: Some(s), run: None }).collect();
+    }
+    if effect.per_run {
+        return runs_of(set_ups).into_iter().skip(1).map(|run| Instance { set_up: None, run: Some(run) }).collect();
+    }
+    vec![Instance::default()]
 }
 
 /// A place where displacements act.
@@ -238,12 +293,10 @@ impl Model {
             instances: Vec::new(),
         };
         for effect in effects {
-            let instances: Vec<Option<usize>> =
-                if effect.per_block { (0..set_ups.len()).map(Some).collect() } else { vec![None] };
             let mut own = Vec::new();
-            for set_up in instances {
+            for instance in instances_of(effect, set_ups) {
                 own.push((model.n_unknowns(), effect.parameters.len()));
-                model.put(machine, effect, set_up);
+                model.put(machine, effect, instance);
             }
             model.instances.push(own);
         }
@@ -257,7 +310,7 @@ impl Model {
         model
     }
 
-    fn put(&mut self, machine: &Machine, effect: &Effect, set_up: Option<usize>) {
+    fn put(&mut self, machine: &Machine, effect: &Effect, Instance { set_up, run }: Instance) {
         let first = self.unknowns.len();
         for (i, p) in effect.parameters.iter().enumerate() {
             let at_reference =
@@ -269,9 +322,10 @@ impl Model {
             self.layout.at.push(list.len());
             list.push(self.unknowns.len());
             self.unknowns.push(Unknown {
-                name: match set_up {
-                    Some(s) => format!("{}@{}", p.name, self.set_ups[s].label),
-                    None => p.name.clone(),
+                name: match (set_up, run) {
+                    (Some(s), _) => format!("{}@{}", p.name, self.set_ups[s].label),
+                    (None, Some(run)) => format!("{}@{}", p.name, run_label(run)),
+                    (None, None) => p.name.clone(),
                 },
                 alias: p.alias.clone(),
                 effect: effect.id.clone(),
@@ -287,7 +341,7 @@ impl Model {
         }
         for term in &effect.terms {
             let slot = self.slot(machine, term.place, stated(machine, effect, term));
-            let changes = match (term.formula.constant(), set_up) {
+            let changes = match (term.formula.constant().filter(|_| run.is_none()), set_up) {
                 (None, _) => Changes::WithTouch,
                 (Some(_), Some(_)) => Changes::WithSetUp,
                 (Some(_), None) => Changes::Never,
@@ -304,6 +358,7 @@ impl Model {
                     factor,
                     term: term.clone(),
                     set_up,
+                    run,
                 });
             };
             act(term.component, factor);
@@ -370,6 +425,12 @@ impl Model {
         self.tool.iter().chain(&self.workpiece[..carried]).any(|l| l.axis.name == axis)
     }
 
+    /// Can an effect be told apart from nothing in these runs? One that says how a run differs from the first needs two.
+    #[must_use]
+    pub fn has_parameters_of(&self, effect: &Effect) -> bool {
+        !instances_of(effect, &self.set_ups).is_empty()
+    }
+
     /// The set-ups of the blocks.
     #[must_use]
     pub fn set_ups(&self) -> &[SetUp] {
@@ -422,7 +483,7 @@ impl Model {
             }
             // a constant tilt w about the reference moves the middle by w × (middle − reference)
             let lever = self.reference - sum / n;
-            let constant = |a: &&Active| a.slot == slot && a.set_up.is_none() && a.term.formula.constant().is_some();
+            let constant = |a: &&Active| a.slot == slot && a.set_up.is_none() && a.constant().is_some();
             for tilt in self.active.iter().filter(constant).filter(|a| a.component >= 3) {
                 let mut axis = Vector3::zeros();
                 axis[tilt.component - 3] = tilt.factor;

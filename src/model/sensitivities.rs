@@ -75,7 +75,7 @@ impl<'a> Sensitivities<'a> {
                 // all terms of one block's effect belong to that block: the other touches are not looked at
                 None => shaped.entry(formula.text()).or_insert_with(|| {
                     let all = || self.batch.observations().iter();
-                    let here = |o: &&Observation| active.set_up.is_none_or(|own| own == o.set_up);
+                    let here = |o: &&Observation| active.acts_on(o);
                     let mut own = formula.eval_each(all().filter(here).map(|o| &o.state), shapes).into_iter();
                     all().map(|o| if here(&o) { own.next().unwrap_or_default() } else { 0.0 }).collect()
                 }),
@@ -84,10 +84,10 @@ impl<'a> Sensitivities<'a> {
         }
     }
 
-    /// Adds amounts to a column; of one block's effect only those of its touches.
+    /// Adds amounts to a column; of the effect of one block or run only those of its touches.
     fn add(&self, column: &mut [f64], active: &Active, amounts: impl Iterator<Item = f64>) {
         for ((into, amount), touch) in column.iter_mut().zip(amounts).zip(self.batch.observations()) {
-            if active.set_up.is_none_or(|own| own == touch.set_up) {
+            if active.acts_on(touch) {
                 *into += active.factor * amount;
             }
         }

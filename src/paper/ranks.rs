@@ -71,7 +71,7 @@ fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &
                 .ok_or_else(|| Failure::new("paper::unknown", format!("{id} does not apply to {}", machine.name)))
         })
         .collect::<Result<_>>()?;
-    let set_up = SetUp { label: "datum".into(), carrier: Carrier::Table, centre: Vector3::zeros() };
+    let set_up = SetUp { label: "datum".into(), carrier: Carrier::Table, centre: Vector3::zeros(), runs: vec![0] };
     let model = Model::new(machine, &effects, std::slice::from_ref(&set_up), machine.reference.pivot);
     let mut jacobian = DMatrix::zeros(measured.len(), model.n_unknowns());
     let mut row = vec![0.0; model.n_unknowns()];

@@ -97,7 +97,7 @@ pub fn first_remarks(remarks: &[String], verbose: bool) -> String {
 /// The answer: what is determined, how well the model fits, and the table; at most three remarks where all are not asked for.
 #[must_use]
 pub fn outcome(o: &Outcome, paper: Paper, verbose: bool) -> String {
-    let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !p.name.contains('@')).collect();
+    let results: Vec<&Parameter> = o.parameters.iter().filter(|p| !is_of_a_block(&p.name)).collect();
     let mut out = answer(o, &results);
     if verbose {
         out += &fit_details(o);
@@ -105,6 +105,9 @@ pub fn outcome(o: &Outcome, paper: Paper, verbose: bool) -> String {
     out.push('\n');
     let (table, left_out) = results_table(&results, paper, verbose);
     out += &table;
+    for point in &o.turns_about {
+        out += &format!("{}: {}\n", point.parameter, point.says);
+    }
     if verbose {
         let shown = |head: &str| !left_out.iter().any(|h| h == head);
         out += &legend(&results, &shown);
@@ -212,10 +215,15 @@ fn legend(results: &[&Parameter], shown: &dyn Fn(&str) -> bool) -> String {
     out
 }
 
+/// Is it a number of a block, which no table of results shows?
+fn is_of_a_block(name: &str) -> bool {
+    name.contains('@') && !crate::model::predict::is_of_a_run(name)
+}
+
 /// What stands beside the table.
 fn result_details(o: &Outcome) -> String {
     let mut out = String::new();
-    let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| p.name.contains('@')).collect();
+    let blocks: Vec<&Parameter> = o.parameters.iter().filter(|p| is_of_a_block(&p.name)).collect();
     if !blocks.is_empty() {
         let n_known = blocks.iter().filter(|p| p.status == Status::Identified).count();
         out += &format!("block positions: {n_known} of {} unknowns determined (--json lists them)\n", blocks.len());

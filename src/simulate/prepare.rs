@@ -52,6 +52,8 @@ pub struct Ready {
     pub half: Vec3,
     /// Planned place and size less real ones.
     pub wrong: Option<BlockError>,
+    /// How much longer its half edges are than the plan says, beside that, mm.
+    pub longer_half: Vec3,
     /// Outward normal of the face in the carrier's frame.
     pub normal: Vec3,
     pub state: TouchState,
@@ -92,8 +94,16 @@ pub fn bench<'a>(
     for axis in &machine.axes {
         present[axis.name.index()] = true;
     }
+    let first_touch_s = first_touch_s(plan, scenario);
+    let spindle: std::sync::Arc<[[f64; 3]]> = scenario
+        .spindle
+        .iter()
+        .map(|&[from, to, rpm]| [from, to, rpm])
+        .map(|[from, to, rpm]| [hours_from_s(from - first_touch_s), hours_from_s(to - first_touch_s), rpm])
+        .collect();
     let mut senses = Senses::default();
     let mut came_from = CameFrom::default();
+    let mut turned = Turned::default();
     let mut visits = Visits::default();
     let mut touches = Vec::with_capacity(plan.touches.len());
     let mut no_value: Vec<u64> = Vec::new();
@@ -107,8 +117,10 @@ pub fn bench<'a>(
                 if let Some(degrees) = ready.temperature_deg_c {
                     ready.state.temperature_deg_c = degrees;
                 }
+                ready.state.spindle = spindle.clone();
                 ready.state.sense = senses.next(touch, &ready);
                 ready.state.stood_before_rad = came_from.next(touch);
+                ready.state.since_reversal_rad = turned.next(touch);
                 ready.visit = visits.next(touch, plan, &ready);
                 if !terms.finite(&ready.state, &ready.start) {
                     no_value.push(touch.id);
@@ -157,6 +169,12 @@ fn times(plan: &Plan, scenario: &Scenario, needed: bool, findings: &mut Findings
     }
     let first = scenario.clock.first_touch_s.or(own.first().map(|t| t.1)).unwrap_or(0.0);
     own.into_iter().map(|(logged, at)| (logged, hours_from_s(at - first))).collect()
+}
+
+/// When the first touch of the study is made, s on its clock.
+fn first_touch_s(plan: &Plan, scenario: &Scenario) -> f64 {
+    let own = plan.touches.first().map_or(0.0, |t| scenario.clock.started_s + t.time_s.unwrap_or(TOUCH_S));
+    scenario.clock.first_touch_s.unwrap_or(own)
 }
 
 fn ready(
@@ -211,6 +229,7 @@ fn ready(
         return Err("its spindle orientation is not a number".to_owned());
     }
     let n_links = chain.links_to(carrier);
+    let state = state(machine, plan, chain, (touch, block), (&start, &end), n_links, stylus);
     Ok(Ready {
         id: touch.id,
         number: 0,
@@ -222,8 +241,9 @@ fn ready(
         centre: block.centre,
         half: block.size.map(|s| 0.5 * s),
         wrong: wrong_block(machine, plan, scenario, touch),
+        longer_half: longer_half(scenario, &state.label),
         normal: touch.normal,
-        state: state(machine, plan, chain, (touch, block), (&start, &end), n_links, stylus),
+        state,
         visit: 0,
         time_s: None,
         temperature_deg_c: None,
@@ -242,6 +262,16 @@ fn wrong_block(machine: &Machine, plan: &Plan, scenario: &Scenario, touch: &Plan
         b.name == touch.block && same_mounting
     });
     found.cloned()
+}
+
+/// How much longer the half edges of a block are, mm.
+fn longer_half(scenario: &Scenario, label: &str) -> Vec3 {
+    let mut out = [0.0; 3];
+    let name = label.rsplit('/').next();
+    for edge in scenario.edges.iter().filter(|e| e.block == label || Some(e.block.as_str()) == name) {
+        out[edge.along] += edge.half_mm;
+    }
+    out
 }
 
 /// Everything that the errors of a touch may depend on besides axis positions; senses and time come later.
@@ -267,6 +297,7 @@ fn state(
     TouchState {
         sense: [0.0; 6],
         stood_before_rad: [0.0; 3],
+        since_reversal_rad: [0.0; 3],
         feed_mm_min: feed,
         hours: 0.0,
         stylus_ratio: stylus.length_mm / machine.tool.length_mm,
@@ -338,6 +369,37 @@ impl CameFrom {
                 (*left, *pose) = (*pose, here);
             }
             crate::units::rad_from_deg(*left)
+        })
+    }
+}
+
+/// How far each rotary axis has turned since it last turned back.
+#[derive(Default)]
+struct Turned {
+    /// Of each letter: where it is, and where it last turned back, deg.
+    axes: BTreeMap<char, (f64, f64)>,
+}
+
+impl Turned {
+    fn next(&mut self, touch: &PlanTouch) -> [f64; 3] {
+        /// How far past its goal an axis goes that must come from a given side.
+        const PAST_DEG: f64 = 5.0;
+        ['A', 'B', 'C'].map(|letter| {
+            let name = AxisName::from_letter(letter);
+            let goal = name.and_then(|n| touch.pose.get(n)).unwrap_or(0.0);
+            let (at, turned_back) = self.axes.entry(letter).or_insert((goal, goal));
+            let turns_back = (goal - *at) * (*at - *turned_back) < 0.0 && (goal - *at).abs() > 1e-7;
+            if turns_back {
+                *turned_back = *at;
+            }
+            *at = goal;
+            // asked to come from a side that is not the one it comes from: past its goal and back
+            if let Some(side) = name.and_then(|n| touch.from.get(n)).filter(|s| *s != 0.0)
+                && (goal - *turned_back) * side <= 0.0
+            {
+                *turned_back = goal - side.signum() * PAST_DEG;
+            }
+            rad_from_deg(goal - *turned_back)
         })
     }
 }

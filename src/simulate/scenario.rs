@@ -5,7 +5,7 @@ use super::catalogue::{self, Parameter, Refusal, Role};
 use super::own::formula::Formula;
 use super::own::{Own, converted};
 use super::rigid::Vec3;
-use super::terms::Term;
+use super::terms::{Target, Term};
 use crate::axes::AxisName;
 use crate::diag::{Failure, Findings, Result, Source, enough};
 use crate::machine::Machine;
@@ -29,10 +29,14 @@ pub struct Scenario {
     pub effects_files: Vec<String>,
     /// Blocks that stand elsewhere or have another size than the plan says.
     pub blocks: Vec<BlockError>,
+    /// How much longer edges of single blocks are.
+    pub(super) edges: Vec<LongerEdge>,
     /// Scatter.
     pub noise: Noise,
     /// When the run takes place.
     pub clock: Clock,
+    /// When the spindle ran: from, to (s on the study's clock), rpm; one after the other. Empty: since the first touch.
+    pub spindle: Vec<[f64; 3]>,
     /// Temperature over time: hours since the study's first touch, °C; straight between the points. Empty: not measured.
     pub temperature: Vec<(f64, f64)>,
 }
@@ -62,6 +66,17 @@ pub struct BlockError {
     pub tilt_rad: Vec3,
     /// How much longer its edges are, mm.
     pub size_mm: Vec3,
+}
+
+/// An edge of one block that is longer than the plan says.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LongerEdge {
+    /// `mounting/block`, or `block`.
+    pub block: String,
+    /// 0, 1, 2: along x, y, z of the block.
+    pub along: usize,
+    /// By how much its half is longer, mm.
+    pub half_mm: f64,
 }
 
 /// Scatter of touches; all 1 sigma in mm.
@@ -141,7 +156,8 @@ impl Scenario {
                 let row = Parameter::setting_named(name);
                 row.is_called(v.name)
             };
-            values.iter().find(called).map(Value::base)
+            let unit = catalogue::unit_of_setting(name);
+            values.iter().find(called).map(|v| Value { unit: v.unit.or(unit), ..*v }.base())
         };
         let rows = catalogue::parameters(id, machine, &settings).map_err(|refusal| {
             vec![match refusal {
@@ -166,13 +182,15 @@ impl Scenario {
         })?;
         let mut misfits = Vec::new();
         let mut terms = Vec::new();
+        let mut edges = Vec::new();
         let mut planted = Vec::new();
         for (i, value) in values.iter().enumerate() {
             let similar = !enough(misfits.iter().map(|m: &Misfit| m.code), "scenario::parameter");
             let mut bad = |code, message: String, help: String| {
                 misfits.push(Misfit { value: Some(i), code, message, help });
             };
-            let Some(row) = rows.iter().find(|r| r.is_called(value.name)) else {
+            let (name, block) = catalogue::name_and_block(id, value.name);
+            let Some(row) = rows.iter().find(|r| r.is_called(name)) else {
                 // those with the nearest names, as they are written
                 let names = if similar { rows.iter().map(|r| r.name.clone()).collect() } else { Vec::new() };
                 let near = nearest(value.name, names);
@@ -187,7 +205,18 @@ impl Scenario {
                 );
                 continue;
             };
-            if values[..i].iter().any(|earlier| row.is_called(earlier.name)) {
+            let same = |earlier: &Value<'_>| {
+                let (name, of) = catalogue::name_and_block(id, earlier.name);
+                row.is_called(name) && of == block
+            };
+            if let Some(block) = block.filter(|b| !has_block(machine, b)) {
+                bad(
+                    "scenario::block",
+                    format!("no mounting has a block {block:?}"),
+                    format!("{:?} has: {}", machine.name, blocks_of(machine)),
+                );
+            }
+            if values[..i].iter().any(same) {
                 bad(
                     "scenario::parameter_twice",
                     format!("parameter {} of {id:?} is given twice", row.name),
@@ -212,7 +241,14 @@ impl Scenario {
             match &row.role {
                 Role::Amount(acts) => {
                     let base = unit.base(value.value);
-                    terms.extend(acts.iter().map(|&(target, shape, f)| Term { target, shape, amount: f * base }));
+                    for &(target, shape, f) in acts {
+                        match (target, block) {
+                            (Target::HalfSize(along), Some(block)) => {
+                                edges.push(LongerEdge { block: block.to_owned(), along, half_mm: f * base });
+                            }
+                            _ => terms.push(Term { target, shape, amount: f * base }),
+                        }
+                    }
                 }
                 Role::Setting { positive } if !positive || value.value > 0.0 => {}
                 Role::Setting { .. } => bad(
@@ -221,11 +257,12 @@ impl Scenario {
                     "write a positive number".to_owned(),
                 ),
             }
-            let name = row.name.clone();
+            let name = block.map_or_else(|| row.name.clone(), |block| format!("{}@{block}", row.name));
             planted.push(Planted { effect: id.to_owned(), parameter: name, value: value.value, unit: unit.word() });
         }
         if misfits.is_empty() {
             self.terms.extend(terms);
+            self.edges.extend(edges);
             self.planted.extend(planted);
             Ok(())
         } else {
@@ -294,6 +331,25 @@ impl Scenario {
             self.formulas.extend(formulas);
         }
         Ok(())
+    }
+
+    /// How far the spindle has gone towards its growth at the highest speed, for a time constant: it nears that of each speed, and
+    /// nothing while it stands. `hours` and the stretches count from one moment.
+    pub(super) fn spindle_warmth(stretches: &[[f64; 3]], hours: f64, tau: f64) -> f64 {
+        let highest = stretches.iter().fold(0.0, |most: f64, s| most.max(s[2]));
+        let (mut grown, mut at) = (0.0, f64::NEG_INFINITY);
+        let mut settle = |until: f64, goal: f64| {
+            if until > at {
+                grown = if at.is_finite() { goal + (grown - goal) * (-(until - at) / tau).exp() } else { 0.0 };
+                at = until;
+            }
+        };
+        for &[from, to, rpm] in stretches {
+            settle(from.min(hours), 0.0);
+            settle(to.min(hours), rpm / highest);
+        }
+        settle(hours, 0.0);
+        grown
     }
 
     /// The temperature at a time (hours), °C; outside the profile it stays as at its end.

@@ -13,6 +13,8 @@ pub struct TouchState {
     pub sense: [f64; 6],
     /// Where A, B and C stood before they came to their pose, rad; 0 while an axis has not moved.
     pub stood_before_rad: [f64; 3],
+    /// How far A, B and C have turned since they last turned back, rad, with the sign of the turn.
+    pub since_reversal_rad: [f64; 3],
     /// Feed of the search, mm/min.
     pub feed_mm_min: f64,
     /// Hours since the first touch.
@@ -49,6 +51,8 @@ pub struct TouchState {
     pub outward: Vec3,
     /// Planned edge of the block along the normal, mm.
     pub edge_mm: f64,
+    /// When the spindle runs: from, to (hours since the first touch), rpm.
+    pub spindle: Arc<[[f64; 3]]>,
     /// `mounting/block`.
     pub label: Arc<str>,
 }
@@ -58,6 +62,7 @@ impl Default for TouchState {
         Self {
             sense: [0.0; 6],
             stood_before_rad: [0.0; 3],
+            since_reversal_rad: [0.0; 3],
             feed_mm_min: 0.0,
             hours: 0.0,
             temperature_deg_c: 20.0,
@@ -76,6 +81,7 @@ impl Default for TouchState {
             point: [0.0; 3],
             outward: [0.0; 3],
             edge_mm: 0.0,
+            spindle: Arc::from([]),
             label: Arc::from(""),
         }
     }
@@ -146,6 +152,8 @@ pub enum Shape {
     PitchSine(AxisName, f64),
     /// The sense of an axis's last motion.
     Sense(AxisName),
+    /// How much a rotary axis is wound up, from -1 to 1: it nears the sense of its turn over an angle, rad.
+    WoundUp(AxisName, f64),
     /// +1 or -1: to which side of upright a rotary axis stands; 0 upright.
     SideOfUpright(AxisName),
     /// Square of the approach's part along +x or -x (+y or -y) of the probe; 0 where it goes the other way.
@@ -171,6 +179,8 @@ pub enum Shape {
     Hours,
     /// 1 - exp(-t/τ), τ in hours.
     WarmUp(f64),
+    /// Growth of the spindle as a part of what it reaches at its highest speed, time constant in hours.
+    SpindleWarmth(f64),
     /// Temperature over 20 °C, K.
     Warmth,
     /// The same times the position of an axis.
@@ -199,7 +209,15 @@ impl Shape {
         if let Self::Formula(i) = self {
             return formulas.get(*i).is_some_and(Formula::timed);
         }
-        matches!(self, Self::Hours | Self::WarmUp(_) | Self::Warmth | Self::WarmthTimes(_) | Self::FromHour(_))
+        matches!(
+            self,
+            Self::Hours
+                | Self::WarmUp(_)
+                | Self::SpindleWarmth(_)
+                | Self::Warmth
+                | Self::WarmthTimes(_)
+                | Self::FromHour(_)
+        )
     }
 
     fn value(&self, formulas: &[Formula], touch: &TouchState, joints: &Position) -> f64 {
@@ -213,6 +231,10 @@ impl Shape {
             Self::PitchCosine(axis, period) => (turn * q(axis) / period).cos(),
             Self::PitchSine(axis, period) => (turn * q(axis) / period).sin(),
             Self::Sense(axis) => touch.sense[axis.index()],
+            Self::WoundUp(axis, over) => {
+                let turned = touch.since_reversal_rad[axis.index() % 3];
+                -(-turned.abs() / over).exp_m1().copysign(-turned)
+            }
             Self::SideOfUpright(axis) => {
                 let sine = q(axis).sin();
                 if sine == 0.0 { 0.0 } else { sine.signum() }
@@ -232,6 +254,8 @@ impl Shape {
             Self::Tilt => norm([touch.tool_axis[0], touch.tool_axis[1], 0.0]),
             Self::Hours => touch.hours,
             Self::WarmUp(tau) => -(-touch.hours / tau).exp_m1(),
+            Self::SpindleWarmth(tau) if touch.spindle.is_empty() => -(-touch.hours / tau).exp_m1(),
+            Self::SpindleWarmth(tau) => super::scenario::Scenario::spindle_warmth(&touch.spindle, touch.hours, tau),
             Self::Warmth => touch.temperature_deg_c - REFERENCE_DEG_C,
             Self::WarmthTimes(axis) => (touch.temperature_deg_c - REFERENCE_DEG_C) * q(axis),
             Self::FromHour(h) => f64::from(touch.hours >= h),

@@ -133,6 +133,7 @@ fn commanded(ready: &Ready, s: f64) -> Position {
 /// The frame of the real block in its carrier (origin at its centre, axes along its edges) and its half edges, mm.
 fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Vec3) {
     let mut half = plus(plus(ready.half, shifts.half_size_ratio, ready.half), 1.0, shifts.half_size);
+    half = plus(half, 1.0, ready.longer_half);
     let mut frame = Rigid::shift(ready.centre);
     if shifts.block_outward != 0.0 {
         let outward = bench.chain.outward_from_centre(ready.n_links, ready.centre);

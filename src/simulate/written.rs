@@ -68,6 +68,7 @@ pub fn parse_with(
             "harmonic" => reader.each(node, "harmonic", |r, t, at| r.harmonic(&mut out, t, at)),
             "noise" => reader.noise(&mut out, node),
             "time" => reader.time(&mut out, node),
+            "spindle" => reader.spindle(&mut out, node),
             "temperature" => reader.temperature(&mut out, node),
             other => {
                 let message = format!("a scenario has no {other:?}");
@@ -75,7 +76,7 @@ pub fn parse_with(
                     key.span(),
                     "scenario::unknown",
                     message,
-                    "it has: seed, effects_file, effects, block, harmonic, noise, time, temperature",
+                    "it has: seed, effects_file, effects, block, harmonic, noise, time, spindle, temperature",
                 );
             }
         }
@@ -492,6 +493,24 @@ impl Reader<'_> {
                 "started_s" => out.clock.started_s = self.within(node, word, CLOCK_S, clock).unwrap_or(0.0),
                 "first_touch_s" => out.clock.first_touch_s = self.within(node, word, CLOCK_S, clock),
                 other => self.unknown_key(key.span(), "time", other, "started_s, first_touch_s"),
+            }
+        }
+    }
+
+    /// `spindle = [[start_s, end_s, rpm], …]`
+    fn spindle(&mut self, out: &mut Scenario, node: &Node<'_>) {
+        let help = "write spindle = [[0, 1800, 12000], [3600, 5400, 8000]]: start and end in s on the study's clock, one after the other, and the speed";
+        let rows: Vec<&Node<'_>> = node.get_ref().as_array().map_or_else(Vec::new, |a| a.iter().collect());
+        if rows.is_empty() {
+            self.error(node.span(), "scenario::spindle", "spindle holds no stretches", help);
+        }
+        for row in rows {
+            let three = self.three(row, "a stretch of the spindle", LARGEST_NUMBER);
+            let follows = out.spindle.last().is_none_or(|last| last[1] <= three[0]);
+            if three[0] < three[1] && three[2] > 0.0 && follows {
+                out.spindle.push(three);
+            } else {
+                self.error(row.span(), "scenario::spindle", "a stretch of the spindle is not usable", help);
             }
         }
     }

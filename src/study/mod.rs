@@ -14,6 +14,7 @@ pub mod tolerance;
 use crate::diag::{Failure, Finding, Findings, Result, Source};
 use crate::fit::{Knowledge, Mask, Settings};
 use crate::keys::not_of_form;
+use crate::model::spindle::{MOST_STRETCHES, SpindleStretch};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -93,6 +94,9 @@ pub struct DataAsWritten {
     pub mounting: Option<String>,
     /// The compensation that the control applied during this run: the directory or file that `export` wrote.
     pub compensation: Option<String>,
+    /// When the spindle ran: `[[start_s, end_s, rpm], …]`, s on the study's clock (default: since the first touch).
+    #[schemars(with = "Option<Vec<[f64; 3]>>")]
+    pub spindle: Option<Spanned<Vec<[f64; 3]>>>,
 }
 
 /// The model as written.
@@ -176,12 +180,33 @@ pub struct DataEntry {
     pub mounting: Option<String>,
     /// The compensation that was active.
     pub compensation: Option<String>,
+    /// When the spindle ran; nothing where the study does not say it.
+    pub spindle: Vec<SpindleStretch>,
 }
 
 /// A word of the whole study that stands in one of its tables: what follows a `[[data]]` belongs to it.
 fn misplaced(error: &toml::de::Error) -> Option<&'static str> {
     let word = error.message().strip_prefix("unknown field `")?.split('`').next()?;
     ["effects_file", "machine", "machines"].into_iter().find(|key| *key == word)
+}
+
+/// The stretches of a run in which the spindle ran.
+fn spindle_of(run: &DataAsWritten, source: &Source, findings: &mut Findings) -> Vec<SpindleStretch> {
+    let Some(written) = &run.spindle else { return Vec::new() };
+    let mut out: Vec<SpindleStretch> = Vec::new();
+    for &[from_s, to_s, rpm] in written.get_ref() {
+        let usable = [from_s, to_s, rpm].iter().all(|x| x.is_finite()) && from_s < to_s && rpm > 0.0;
+        if !usable || out.last().is_some_and(|last| last.to_s > from_s) {
+            findings.push(
+                Finding::error("study::spindle", "a stretch of the spindle is not usable")
+                    .help("write spindle = [[0, 1800, 12000], [3600, 5400, 8000]]: start and end in s on the study's clock, one after the other, and the speed, greater than 0")
+                    .at(source, written.span()),
+            );
+            break;
+        }
+        out.push(SpindleStretch { from_s, to_s, rpm });
+    }
+    out
 }
 
 impl Study {
@@ -231,7 +256,15 @@ impl Study {
                 run: d.run,
                 mounting: d.mounting.clone(),
                 compensation: d.compensation.clone(),
+                spindle: spindle_of(d, source, &mut findings),
             });
+        }
+        let stretches: usize = data.iter().map(|d| d.spindle.len()).sum();
+        if stretches > MOST_STRETCHES {
+            let place = w.data.iter().filter_map(|d| d.spindle.as_ref()).next_back().map_or(0..0, Spanned::span);
+            let message = format!("the spindle ran in {stretches} stretches; at most {MOST_STRETCHES} are used");
+            let help = "join stretches with short pauses, and leave out those that ended hours before the first touch";
+            findings.push(Finding::error("study::spindle", message).help(help).at(source, place));
         }
         let mut knowledge = BTreeMap::new();
         for (name, spanned) in &w.model.parameters {
@@ -331,7 +364,7 @@ impl Study {
     /// # Errors
     /// Never for strings that TOML can hold; the text is read back before it is returned.
     pub fn fresh(&self) -> Result<String> {
-        use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, value};
+        use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value, value};
         let mut doc = DocumentMut::new();
         if let Some(machines) = &self.machines {
             doc["machines"] = value(machines);
@@ -354,6 +387,10 @@ impl Study {
             }
             if let Some(m) = &entry.mounting {
                 run["mounting"] = value(m);
+            }
+            if !entry.spindle.is_empty() {
+                let stretch = |s: &SpindleStretch| Value::from_iter([s.from_s, s.to_s, s.rpm]);
+                run["spindle"] = value(Value::from_iter(entry.spindle.iter().map(stretch)));
             }
             if let Some(c) = &entry.compensation {
                 run["compensation"] = value(c);
@@ -408,6 +445,7 @@ mod tests {
                 run: None,
                 mounting: None,
                 compensation: None,
+                spindle: vec![],
             }],
             effects: vec!["location-b".into(), "block-setup".into()],
             knowledge: BTreeMap::new(),

@@ -305,8 +305,8 @@ impl Collector<'_> {
         let named = effect.parameters.iter().position(|known| known.name == p.name);
         let meaning = match named {
             Some(index) => meaning(effect, index, self.machine),
-            // a parameter per block carries the block in its name
-            None if effect.per_block => Meaning::Measurement,
+            // a parameter of a block or a run carries it in its name
+            None if effect.is_repeated() => Meaning::Measurement,
             None => {
                 return self.error(
                     "tables::unknown_parameter",

@@ -119,7 +119,10 @@ pub enum Meaning {
 /// direction that depends on nothing but its own position and sense is an error of that position.
 #[must_use]
 pub fn meaning(effect: &Effect, parameter: usize, machine: &Machine) -> Meaning {
-    if effect.nuisance || effect.per_block || effect.terms.iter().all(|t| matches!(t.place, At::Block | At::Trigger)) {
+    if effect.nuisance
+        || effect.is_repeated()
+        || effect.terms.iter().all(|t| matches!(t.place, At::Block | At::Trigger))
+    {
         return Meaning::Measurement;
     }
     let terms: Vec<&Term> = effect.terms.iter().filter(|t| t.parameter == parameter).collect();

@@ -461,6 +461,11 @@ fn harmonic(d: &Dependence) -> String {
     if form(d) == "order" { turns(d.scanned) } else { "smoothly over the turn".to_owned() }
 }
 
+/// What an effect is, with the point about which it turns its axis.
+pub(crate) fn turning(says: &str, point: &crate::model::lever_arm::TurningPoint) -> String {
+    format!("{}. Here it is a {}", says.trim_end_matches('.'), super::fit::turning_point(point))
+}
+
 /// What kind of thing makes such a misfit.
 #[must_use]
 pub fn kind(d: &Dependence, fit: &Fit) -> String {

@@ -5,6 +5,7 @@ use crate::fit::noise::Noise;
 use crate::fit::null_space::{Combined, Kind, NullDirection};
 use crate::fit::outliers::MOST_SHARE;
 use crate::fit::{Contradiction, Found, NoiseSource, Reason, Remark, VisitSource};
+use crate::model::lever_arm::{From, TurningPoint};
 use crate::model::temperatures::{NEAR_H, TemperatureGap};
 use crate::units::{mm_from_um, significant, um_from_mm};
 
@@ -28,6 +29,27 @@ pub(crate) fn reason(reason: &Reason) -> String {
                 um_from_mm(*off_mm)
             )
         }
+    }
+}
+
+/// About which point an axis turns, and what that means.
+pub(crate) fn turning_point(point: &TurningPoint) -> String {
+    const NEAR_MM: f64 = 20.0;
+    let from = if point.from == From::Ball { "ball" } else { "pivot" };
+    let mm = point.mm.abs();
+    let place = match (point.along, point.mm > 0.0) {
+        _ if mm < NEAR_MM => format!("near the {from}"),
+        (2, true) => format!("{mm:.0} mm above the {from}"),
+        (2, false) => format!("{mm:.0} mm below the {from}"),
+        (along, up) => {
+            let letter = ["X", "Y"][along.min(1)];
+            format!("{mm:.0} mm from the {from} to {}{letter}", if up { "+" } else { "-" })
+        }
+    };
+    if point.axis.is_rotary() {
+        format!("wobble of {} about a point {place}: the bearing, not run-out", point.axis)
+    } else {
+        format!("turn of the carriage of {} about a point {place}: the guideway, not straightness or scale", point.axis)
     }
 }
 

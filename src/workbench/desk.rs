@@ -2,7 +2,6 @@
 
 use super::{Answered, Opened, Place, Verb};
 use crate::diag::{Failure, Result};
-use crate::model::data::assemble;
 use crate::post::Postprocessor;
 use crate::study::Study;
 use crate::workflow::history::{history_path, read_history};
@@ -51,7 +50,7 @@ impl Desk {
             return Err(Failure::new("study::changed", "the study was changed while it was read"));
         }
         Ok(Opened {
-            data: Arc::new(assemble(&loaded.machine, &loaded.runs())),
+            data: Arc::new(loaded.data()),
             history: read_history(&self.study, &self.files)?.unwrap_or_default(),
             remarks,
             loaded,

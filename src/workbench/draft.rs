@@ -381,6 +381,21 @@ pub const MEANING: [(&str, &str); VARIABLES.len()] = [
     ("wA", "where A stood before it came to this place, radians"),
     ("wB", "the same of B"),
     ("wC", "the same of C"),
+    ("wayA", "how far A has gone since it last reversed, radians, with the sign of its direction"),
+    ("wayB", "the same of B"),
+    ("wayC", "the same of C"),
+    ("speed1", "speed of the spindle in the latest stretch in which it ran, over the highest of the study"),
+    ("on1", "when that stretch began, hours after the first touch"),
+    ("off1", "when it ended, hours; now, while it runs"),
+    ("speed2", "the same of the stretch before"),
+    ("on2", "the same of the stretch before"),
+    ("off2", "the same of the stretch before"),
+    ("speed3", "the same of the third last"),
+    ("on3", "the same of the third last"),
+    ("off3", "the same of the third last"),
+    ("speed4", "the same of the fourth last"),
+    ("on4", "the same of the fourth last"),
+    ("off4", "the same of the fourth last"),
 ];
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use crate::fit::{self, Fit, Settings};
 use crate::log::Touch;
 use crate::machine::{self, Machine};
 use crate::model::catalogue::Catalogue;
-use crate::model::data::Run;
+use crate::model::data::{Data, Run, assemble_with_spindle};
+use crate::model::spindle::SpindleStretch;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
 use crate::study::Study;
@@ -53,7 +54,7 @@ impl Loaded {
     /// # Errors
     /// When the model or the touches are unusable.
     pub fn fit(&self, settings: &Settings) -> Result<Fit> {
-        fit::identify(&self.machine, &self.catalogue, &self.runs(), settings)
+        fit::identify_data(&self.machine, &self.catalogue, self.data(), settings)
             .map_err(|failure| placed(failure, &source(self.path.display().to_string(), self.text())))
     }
 
@@ -93,6 +94,18 @@ impl Loaded {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
+    /// When the spindle ran, as the study says.
+    #[must_use]
+    pub fn spindle(&self) -> Vec<SpindleStretch> {
+        self.study.data.iter().flat_map(|run| run.spindle.iter().copied()).collect()
+    }
+
+    /// All touches, ready for the model.
+    #[must_use]
+    pub fn data(&self) -> Data {
+        assemble_with_spindle(&self.machine, &self.runs(), &self.spindle())
+    }
+
     /// The runs as the fit takes them.
     #[must_use]
     pub fn runs(&self) -> Vec<Run<'_>> {
@@ -110,7 +123,8 @@ impl Loaded {
     /// The runs as they were planned.
     #[must_use]
     pub fn planned(&self) -> Vec<Planned> {
-        self.runs().iter().map(Planned::from_run).collect()
+        let spindle = self.spindle();
+        self.runs().iter().map(|run| Planned { spindle: spindle.clone(), ..Planned::from_run(run) }).collect()
     }
 
     /// The same with the touches that a fit could use: only what was measured tells anything.

@@ -56,6 +56,7 @@ impl NewStudy<'_> {
                 run: None,
                 mounting: None,
                 compensation: compensation.as_ref().map(|c| relative(c, self.folder)),
+                spindle: Vec::new(),
             });
         }
         let study = Study {

@@ -255,10 +255,10 @@ fn alias_sets_of_the_papers_plan() {
     let head = assessed(&["head"]);
     assert!(of(&head, "block-shape").same_as.iter().any(|e| e == "lobing-2"), "{:?}", of(&head, "block-shape"));
     // on the turntable it goes round, and the probe does not: at C = 90 the block's x faces look along Y. It stays one with the
-    // size of the block, of which it is a part
+    // size of the block, of which it is a part, and of one block its own size is that of all
     let table = assessed(&["table"]);
     let turns = of(&table, "block-shape");
-    assert!(turns.visible && turns.same_as == ["block-size"], "{turns:?}");
+    assert!(turns.visible && turns.same_as == ["block-size", "block-own-size"], "{turns:?}");
     for fixed in ["lobing-2", "backlash-x", "backlash-y", "pitch-x", "pitch-y"] {
         assert!(!turns.contained_in.iter().any(|e| e == fixed), "{turns:?}");
         assert!(!of(&table, fixed).same_as.iter().any(|e| e == "block-shape"), "{fixed}");
@@ -386,15 +386,15 @@ const SAG: Blind = ("stylus-sag", "gx = gy = 0 where the spindle never leans");
 /// What `full` cannot see on each machine. Nothing else may be blind, least of all an axis's own motions.
 #[test]
 fn full_leaves_only_what_no_touch_can_show() {
-    // pairs: as many as there are today with the noise of the touches alone; a further one is looked at
-    for (name, location, expected, most_pairs) in [
+    // pairs: as many as there are today with the noise of the touches alone, without and with LATER rows; a further one is looked at
+    for (name, location, expected, [most_pairs, with_later]) in [
         (
             "swivel-head",
             ["location-b", "location-c"],
             // the ball stands at Ry(B)·(EX0B, 0, EZ0B − L), L longer with every stylus by the same amount. B's own zero is seen: it
             // moves the ball by L across the tool, and two styli have two L; nothing stands between B and the tool
             &[ZERO_C, BACKLASH_Z, TABLE_LOAD, ("tool-length", "−EZ0B: behind the rotation of B, along the tool")][..],
-            26,
+            [26, 36],
         ),
         (
             "double-head",
@@ -406,7 +406,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 BACKLASH_Z,
                 ("tool-length", "−EZ0A: behind the rotation of A, along the tool"),
             ],
-            32,
+            [32, 47],
         ),
         (
             "trunnion",
@@ -427,7 +427,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 YAW[1],
                 SAG,
             ],
-            29,
+            [29, 38],
         ),
         (
             "swivel-table-b",
@@ -446,7 +446,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 YAW[1],
                 SAG,
             ],
-            27,
+            [27, 36],
         ),
         (
             "nutating-b",
@@ -464,7 +464,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 YAW[1],
                 SAG,
             ],
-            25,
+            [25, 34],
         ),
         (
             "trunnion-offset",
@@ -482,7 +482,7 @@ fn full_leaves_only_what_no_touch_can_show() {
                 YAW[1],
                 SAG,
             ],
-            28,
+            [28, 37],
         ),
     ] {
         let machine = common::machine(name);
@@ -502,7 +502,16 @@ fn full_leaves_only_what_no_touch_can_show() {
             a.effects.iter().filter(|e| e.typical_um <= 1e-9).map(|e| e.effect.as_str()).collect();
         let upright = expected.iter().map(|e| e.0).filter(|id| [YAW[0], YAW[1], SAG].iter().any(|b| b.0 == *id));
         assert_eq!(still, upright.collect(), "{name}");
-        assert!(a.alias_pairs <= most_pairs, "{name}: {:?}", a.alias_groups);
+        // those of rows that came later are counted by themselves
+        let later = |id: &str| LATER.iter().any(|family| id.starts_with(family));
+        let pairs_of = |both: &dyn Fn(&str, &str) -> bool| -> usize {
+            let each =
+                a.effects.iter().flat_map(|e| e.same_as.iter().chain(&e.contained_in).map(move |x| (&e.effect, x)));
+            each.filter(|(x, y)| both(x.as_str(), y.as_str())).count()
+        };
+        let without_later = pairs_of(&|x, y| !later(x) && !later(y));
+        assert!(without_later <= most_pairs, "{name}: {:?}", a.alias_groups);
+        assert!(a.alias_pairs <= with_later, "{name}: {} {:?}", a.alias_pairs, a.alias_groups);
         assert_eq!(a.score, Score::Good, "{name}: {}", a.says);
         // a value that holds another effect with any touches is no fault of the plan, but it is named
         for p in a.parameters.iter().filter(|p| !p.holds.is_empty()) {
@@ -512,6 +521,10 @@ fn full_leaves_only_what_no_touch_can_show() {
         }
     }
 }
+
+/// Rows of which some are special cases of one (a run-out with and without an encoder that reads it) and one nears another where a
+/// plan lets the axes go far before each pose (a wind-up and a backlash): more pairs, and no fault of the plan.
+const LATER: [&str; 4] = ["windup-", "encoder-eccentricity-", "block-own-size", "rehomed-"];
 
 /// Several combinations are open: touches that tell all of them are chosen together, in a fit and before the first touch.
 #[test]

@@ -9,6 +9,9 @@ mod diagnose_verbs;
 mod discovery;
 mod discovery_bench;
 mod full;
+#[path = "../discovery/mod.rs"]
+mod generator;
+mod hidden_faults;
 mod loop_verbs;
 mod next_steps;
 mod plan_next;

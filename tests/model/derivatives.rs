@@ -88,7 +88,7 @@ fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -
     let unit = |rng: &mut ChaCha8Rng| {
         Vector3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(0.1..1.0)).normalize()
     };
-    Observation {
+    let mut touch = Observation {
         run: 0,
         id: 1,
         set_up: rng.random_range(0..carriers.len()),
@@ -99,7 +99,9 @@ fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -
         position,
         state,
         has_temperature: true,
-    }
+    };
+    touch.run = touch.set_up % 2;
+    touch
 }
 
 /// A parameter inside formulas: its step must be small against its own size.
@@ -121,7 +123,12 @@ fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_mach
         let set_ups: Vec<SetUp> = carriers
             .iter()
             .enumerate()
-            .map(|(i, c)| SetUp { label: format!("b{i}"), carrier: *c, centre: Vector3::new(30.0, -10.0, -200.0) })
+            .map(|(i, c)| SetUp {
+                label: format!("b{i}"),
+                carrier: *c,
+                centre: Vector3::new(30.0, -10.0, -200.0),
+                runs: vec![0, 1],
+            })
             .collect();
         for effect in catalogue.iter().filter(|e| e.applies_to(machine)) {
             let model = Model::new(machine, &[effect], &set_ups, machine.reference.pivot);

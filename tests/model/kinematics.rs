@@ -21,7 +21,7 @@ fn gap(
     normal: Vector3<f64>,
 ) -> (f64, f64) {
     let catalogue = Catalogue::built_in().unwrap();
-    let set_up = SetUp { label: "block".into(), carrier, centre: Vector3::zeros() };
+    let set_up = SetUp { label: "block".into(), carrier, centre: Vector3::zeros(), runs: vec![0] };
     let model = Model::new(machine, &[catalogue.get(effect, machine).unwrap()], &[set_up], machine.reference.pivot);
     let theta: Vec<f64> = model
         .unknowns

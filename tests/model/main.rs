@@ -17,5 +17,7 @@ mod paper;
 mod planted;
 mod recover;
 mod shapes;
+mod sides;
+mod spindle;
 mod told_honestly;
 mod what_is_said;

@@ -5,8 +5,9 @@ use crate::common;
 use axiscal::diag::source;
 use axiscal::machine::{Machine, Mounting};
 use axiscal::model::catalogue::{Catalogue, Effect, Parameter};
-use axiscal::model::data::{Run, assemble};
+use axiscal::model::data::{Run, assemble_with_spindle};
 use axiscal::model::predict::{Model, SetUp};
+use axiscal::model::spindle::SpindleStretch;
 use axiscal::simulate::{self, Scenario};
 use common::more_machines::all_machines;
 use common::random::random_plan;
@@ -30,9 +31,14 @@ fn random_value(effect: &Effect, p: &Parameter, rng: &mut ChaCha8Rng) -> f64 {
     }
 }
 
+/// When the spindle ran, s and rpm: before the first touch, with pauses, at two speeds, and once when no touch is made any more.
+const SPINDLE: [[f64; 3]; 4] =
+    [[-900.0, 300.0, 8000.0], [3000.0, 7200.0, 12000.0], [7200.0, 9000.0, 4000.0], [90_000.0, 91_000.0, 12000.0]];
+
 /// The scenario of an effect: in `[effects]`, or for the set-up of blocks, which has values for each, in `[[block]]`.
 fn scenario_text(effect: &Effect, mounting: &Mounting, set_ups: &[SetUp], theta: &[f64]) -> String {
-    let mut text = "[temperature]\nprofile = [[0.0, 19.0], [3.0, 24.0], [8.0, 21.0]]\n".to_owned();
+    let mut text = if effect.id == "spindle-growth" { format!("spindle = {SPINDLE:?}\n") } else { String::new() };
+    text += "[temperature]\nprofile = [[0.0, 19.0], [3.0, 24.0], [8.0, 21.0]]\n";
     if effect.id == "block-setup" {
         for (set_up, six) in set_ups.iter().zip(theta.chunks(6)) {
             let name = set_up.label.rsplit('/').next().unwrap();
@@ -46,8 +52,13 @@ fn scenario_text(effect: &Effect, mounting: &Mounting, set_ups: &[SetUp], theta:
         return text;
     }
     text += &format!("[effects.{}]\n", effect.id);
-    for (p, value) in effect.parameters.iter().zip(theta) {
-        text += &format!("{} = {{ value = {value:?}, unit = {:?} }}\n", p.name, p.unit);
+    // what blocks have for themselves is given for each of them
+    let blocks: Vec<Option<&SetUp>> = if effect.per_block { set_ups.iter().map(Some).collect() } else { vec![None] };
+    for (block, own) in blocks.iter().zip(theta.chunks(effect.parameters.len())) {
+        for (p, value) in effect.parameters.iter().zip(own) {
+            let name = block.map_or_else(|| p.name.clone(), |b| format!("{}@{}", p.name, b.label));
+            text += &format!("{name:?} = {{ value = {value:?}, unit = {:?} }}\n", p.unit);
+        }
     }
     text
 }
@@ -66,15 +77,25 @@ fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaC
     let plan = random_plan(machine, mounting, 40, rng);
     // an errorless run says which blocks there are
     let touches = touch(machine, &plan, &Scenario::flawless(), None);
-    let run = |touches| Run { plan: &plan, touches, mounting: None, started_s: None };
-    let set_ups = assemble(machine, &[run(&touches)]).set_ups;
+    let run = |touches| Run { plan: &plan, touches, mounting: Some(mounting.name.as_str()), started_s: Some(0.0) };
+    // what a later run has for itself is planted in the second of two, on the same blocks
+    let flawless = touches.clone();
+    let runs = |touches| {
+        let first = effect.per_run.then(|| run(&flawless));
+        let all: Vec<Run> = first.into_iter().chain([run(touches)]).collect();
+        let stretch = |&[from_s, to_s, rpm]: &[f64; 3]| SpindleStretch { from_s, to_s, rpm };
+        let spindle: Vec<SpindleStretch> =
+            SPINDLE.iter().filter(|_| effect.id == "spindle-growth").map(stretch).collect();
+        assemble_with_spindle(machine, &all, &spindle)
+    };
+    let set_ups = runs(&touches).set_ups;
     let n_sets = if effect.per_block { set_ups.len() } else { 1 };
     let parameters: Vec<&Parameter> = (0..n_sets).flat_map(|_| &effect.parameters).collect();
     let theta: Vec<f64> = parameters.iter().map(|p| random_value(effect, p, rng)).collect();
     let text = scenario_text(effect, mounting, &set_ups, &theta);
     let (scenario, _) = simulate::scenario::parse(&source("planted", &text), machine).map_err(|e| e.to_string())?;
     let touches = touch(machine, &plan, &scenario, None);
-    let data = assemble(machine, &[run(&touches)]);
+    let data = runs(&touches);
     assert_eq!(data.set_ups, set_ups);
     let model = Model::new(machine, &[effect], &data.set_ups, machine.reference.pivot);
     // without the effect: its parameters are zero, but those inside its formulas stay

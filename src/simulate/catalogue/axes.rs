@@ -5,7 +5,7 @@
 //! before the axis's motion (it does not turn with it), on the axis's own line and in the axis's own frame; for linear
 //! axes after, in R (lever arms are counted in the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
-use super::unit::Unit::{Mm, One, Um, UmPerM, Urad};
+use super::unit::Unit::{Deg, Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
@@ -15,6 +15,11 @@ use crate::simulate::terms::{Shape, Target};
 pub const SPAN_MM: f64 = 300.0;
 /// Pitch of a ball screw when none is given, mm.
 const PITCH_MM: f64 = 10.0;
+
+/// Angle after a reversal at which an axis is wound up to 63 %, when none is given, rad.
+const WINDUP_RAD: f64 = std::f64::consts::PI / 18.0;
+/// Radius of an encoder's ring when none is given, mm.
+const RING_MM: f64 = 100.0;
 
 /// Pairs of linear axes that wiring can swap.
 const SWAPS: [(AxisName, AxisName); 3] =
@@ -35,7 +40,10 @@ pub fn ids(_: &Machine) -> Vec<String> {
         for family in ["radial", "axial", "tilt", "positioning"] {
             out.extend((1..=3).map(|k| format!("{family}-{r}-{k}")));
         }
-        out.extend([format!("positioning-{r}-linear"), format!("backlash-{r}")]);
+        out.extend(
+            ["positioning-{r}-linear", "backlash-{r}", "windup-{r}", "encoder-eccentricity-{r}", "rehomed-{r}"]
+                .map(|id| id.replace("{r}", &r.to_string())),
+        );
     }
     out.extend(
         ["clamp-play-a", "clamp-play-b", "carriage-sag-x", "carriage-sag-y", "sign-or-axis-swap"].map(str::to_owned),
@@ -50,6 +58,16 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     }
     if let Some(found) = axis_of(id, "backlash", machine) {
         return Ok(vec![backlash(found?.1)]);
+    }
+    for (prefix, of) in [
+        ("windup", wind_up as fn(AxisName, Settings<'_>) -> Vec<Parameter>),
+        ("encoder-eccentricity", run_out_that_is_read),
+        ("rehomed", homed_again),
+    ] {
+        if let Some(found) = axis_of(id, prefix, machine) {
+            let axis = found?.1;
+            return if axis.is_rotary() { Ok(of(axis, settings)) } else { Err(Refusal::Unknown) };
+        }
     }
     if let Some(found) = axis_of(id, "clamp-play", machine) {
         let axis = found?.1;
@@ -194,6 +212,9 @@ fn carriage_sag(
     machine: &Machine,
     settings: Settings<'_>,
 ) -> Result<Vec<Parameter>, Refusal> {
+    let here = axis_here(axis, machine)?;
+    // a carriage that bears the workpiece stands on the other side of its middle than its coordinate says
+    let stands = if here.side == Side::Workpiece { -1.0 } else { 1.0 };
     // outwards and down: about +y where it runs along x, about -x where it runs along y
     let (about, way) = match axis {
         AxisName::X => (4, 1.0),
@@ -201,7 +222,7 @@ fn carriage_sag(
         _ => return Err(Refusal::Unknown),
     };
     let name = format!("carriage_sag_{axis}");
-    let lean = [(moved(axis, about), Shape::Power(axis, SPAN_MM, 1), way * 2.0 / SPAN_MM)];
+    let lean = [(moved(axis, about), Shape::Power(axis, SPAN_MM, 1), stands * way * 2.0 / SPAN_MM)];
     let lean = at_the_ball(Parameter::new(name, Um, lean), machine);
     let mut both = about_a_point(vec![lean], id, 2, settings);
     if let Some(Parameter { role: Role::Amount(acts), .. }) = both.first_mut() {
@@ -284,6 +305,39 @@ fn backlash(axis: AxisName) -> Parameter {
     let unit = if axis.is_rotary() { Urad } else { Um };
     let acts = [(Target::Reading(axis), Shape::Sense(axis), -0.5)];
     Parameter::new(format!("backlash_{axis}"), unit, acts).alias("backlash").alias(format!("b_{axis}"))
+}
+
+/// The same, but the lag grows from nothing after each reversal.
+fn wind_up(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
+    let name = format!("windup_way_{axis}");
+    let over = settings(&name).unwrap_or(WINDUP_RAD);
+    let acts = [(Target::Reading(axis), Shape::WoundUp(axis, over), -0.5)];
+    vec![Parameter::new(format!("windup_{axis}"), Urad, acts), Parameter::setting(&name, Deg)]
+}
+
+/// The centre of the axis wanders once per turn, and the reading head, past which the ring of the encoder moves by as much, takes
+/// the part along the ring for an angle: the control turns the axis back by it.
+fn run_out_that_is_read(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter> {
+    let ring = format!("ring_{axis}");
+    let radius_mm = settings(&ring).unwrap_or(RING_MM);
+    let mut out = Vec::new();
+    for (number, dof) in across(axis).enumerate() {
+        for (letter, shape) in [('c', Shape::Cosine(axis, 1.0)), ('s', Shape::Sine(axis, 1.0))] {
+            let mut acts = vec![(moved(axis, dof), shape, 1.0)];
+            if number == 1 {
+                acts.push((moved(axis, along(axis) + 3), shape, -1.0 / radius_mm));
+            }
+            out.push(Parameter::new(format!("runout_{}{axis}{letter}", dof_letter(dof)), Um, acts));
+        }
+    }
+    out.push(Parameter::setting(&ring, Mm));
+    out
+}
+
+/// In this run the axis has another zero than in the first.
+fn homed_again(axis: AxisName, _: Settings<'_>) -> Vec<Parameter> {
+    let zero = Target::OwnLine { axis, after: false, dof: along(axis) + 3 };
+    vec![Parameter::at(format!("rehomed_{axis}"), Deg, zero, Shape::Constant)]
 }
 
 /// The control counts this axis the wrong way round (value 1).

@@ -10,7 +10,7 @@ use crate::simulate::terms::{Shape, Target};
 /// Ids of this family.
 pub fn ids(_: &Machine) -> Vec<String> {
     let weight = ["head-sag", "head-tilt", "table-sag", "table-load"];
-    let artefact = ["block-size", "block-shape", "block-slip", "block-temperature"];
+    let artefact = ["block-size", "block-own-size", "block-shape", "block-slip", "block-temperature"];
     weight.into_iter().chain(artefact).map(str::to_owned).collect()
 }
 
@@ -33,6 +33,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         "table-sag" => table_sag(machine),
         "table-load" => table_load(machine),
         "block-size" => Ok((0..3).map(size).collect()),
+        "block-own-size" => Ok((0..3).map(own_size).collect()),
         "block-shape" => {
             let acts = [(Target::HalfSize(0), Shape::Constant, 0.5), (Target::HalfSize(1), Shape::Constant, -0.5)];
             Ok(vec![Parameter::new("dXY", Um, acts)])
@@ -92,6 +93,12 @@ fn table_load(machine: &Machine) -> Result<Vec<Parameter>, Refusal> {
 fn size(i: usize) -> Parameter {
     let acts = [(Target::HalfSize(i), Shape::Constant, 0.5)];
     Parameter::new(format!("size_{}", dof_letter(i)), Um, acts).alias(format!("s{}", dof_letter(i)))
+}
+
+/// The same of one block, which the value names; of all blocks where it names none.
+fn own_size(i: usize) -> Parameter {
+    let acts = [(Target::HalfSize(i), Shape::Constant, 0.5)];
+    Parameter::new(format!("own_size_{}", dof_letter(i)), Um, acts)
 }
 
 /// All blocks slip on their carrier at one moment.

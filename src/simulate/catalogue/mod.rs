@@ -101,6 +101,24 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     Err(Refusal::Unknown)
 }
 
+/// Has an effect values for each block? Their names end in `@mounting/block`, or `@block`.
+fn is_of_blocks(id: &str) -> bool {
+    id == "block-own-size"
+}
+
+/// The name of a parameter, and the block that it is of.
+pub fn name_and_block<'a>(id: &str, name: &'a str) -> (&'a str, Option<&'a str>) {
+    match name.split_once('@').filter(|_| is_of_blocks(id)) {
+        Some((name, block)) => (name, Some(block)),
+        None => (name, None),
+    }
+}
+
+/// What a bare number means for a constant inside the shapes, where that is not what the shapes count in.
+pub fn unit_of_setting(name: &str) -> Option<Unit> {
+    name.starts_with("windup_way").then_some(Unit::Deg)
+}
+
 /// All ids that can be planted in a machine.
 pub fn ids(machine: &Machine) -> Vec<String> {
     all(machine).filter(|id| parameters(id, machine, &|_| Some(1.0)).is_ok()).collect()

@@ -39,7 +39,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         "ambient-bending" => ball("q", UmPerK, Shape::Warmth).collect(),
         // the spindle grows out of the head: the ball moves away from it
         "spindle-growth" => {
-            let row = Parameter::at("spindle_growth", Um, Target::Length, Shape::WarmUp(tau)).alias("growth");
+            let row = Parameter::at("spindle_growth", Um, Target::Length, Shape::SpindleWarmth(tau)).alias("growth");
             vec![row.alias("A"), tau_row("spindle_tau").alias("tau")]
         }
         "ambient-scale" => {

@@ -6,7 +6,8 @@ use crate::simulate::terms::TouchState;
 
 /// Words for the state of a touch, as messages list them.
 pub const STATE_WORDS: &str = "X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB sC feed S gx gy gz L L0 bx by bz px py pz \
-    ox oy oz edge wA wB wC";
+    ox oy oz edge wA wB wC wayA wayB wayC speed1 on1 off1 speed2 on2 off2 \
+    speed3 on3 off3 speed4 on4 off4";
 
 /// Functions, as messages list them.
 pub const FUNCTION_WORDS: &str = "sin cos tan asin acos atan atan2 exp ln sqrt abs sign floor mod step";
@@ -31,6 +32,8 @@ enum Word {
     Sense(AxisName),
     /// Where a rotary axis stood before, rad.
     Before(usize),
+    /// How far a rotary axis has turned since it last turned back, rad.
+    SinceReversal(usize),
     Hours,
     Temperature,
     NormalInMachine(usize),
@@ -44,6 +47,8 @@ enum Word {
     Point(usize),
     Outward(usize),
     Edge,
+    /// Of the stretch in which the spindle ran last (0), of the one before (1) …: its speed over the highest, its begin, its end.
+    Spun(usize, usize),
     /// A parameter of the effect, by its number.
     Parameter(usize),
 }
@@ -69,6 +74,10 @@ impl Word {
             "edge" => Self::Edge,
             _ if axis(text).is_some() => Self::Axis(axis(text)?),
             _ if text.starts_with('s') && axis(&text[1..]).is_some() => Self::Sense(axis(&text[1..])?),
+            "wayA" => Self::SinceReversal(0),
+            "wayB" => Self::SinceReversal(1),
+            "wayC" => Self::SinceReversal(2),
+            _ if spun(text).is_some() => spun(text)?,
             "wA" => Self::Before(0),
             "wB" => Self::Before(1),
             "wC" => Self::Before(2),
@@ -93,6 +102,7 @@ impl Word {
             Self::Axis(name) => joints.mm_or_rad(name),
             Self::Sense(name) => touch.sense[name.index()],
             Self::Before(i) => touch.stood_before_rad[i],
+            Self::SinceReversal(i) => touch.since_reversal_rad[i],
             Self::Hours => touch.hours,
             Self::Temperature => touch.temperature_deg_c,
             Self::NormalInMachine(i) => plain(touch.normal_machine[i]),
@@ -106,9 +116,33 @@ impl Word {
             Self::Point(i) => touch.point[i],
             Self::Outward(i) => plain(touch.outward[i]),
             Self::Edge => touch.edge_mm,
+            Self::Spun(which, part) => spun_at(touch, which)[part],
             Self::Parameter(i) => parameters.get(i).copied().unwrap_or(f64::NAN),
         }
     }
+}
+
+/// `speed2`, `on2`, `off2`: of the last stretch but one.
+fn spun(text: &str) -> Option<Word> {
+    let word = text.trim_end_matches(|c: char| c.is_ascii_digit());
+    let part = ["speed", "on", "off"].iter().position(|w| *w == word)?;
+    match &text[word.len()..] {
+        "1" => Some(Word::Spun(0, part)),
+        "2" => Some(Word::Spun(1, part)),
+        "3" => Some(Word::Spun(2, part)),
+        "4" => Some(Word::Spun(3, part)),
+        _ => None,
+    }
+}
+
+/// Speed, begin and end of the last stretch of the spindle (0) or one before; nothing where there is none.
+fn spun_at(touch: &TouchState, which: usize) -> [f64; 3] {
+    if touch.spindle.is_empty() {
+        return if which == 0 { [1.0, 0.0, touch.hours] } else { [0.0; 3] };
+    }
+    let highest = touch.spindle.iter().fold(0.0, |most: f64, s| most.max(s[2]));
+    let begun = touch.spindle.iter().rev().filter(|s| s[0] < touch.hours);
+    begun.skip(which).map(|&[from, to, rpm]| [rpm / highest, from, to.min(touch.hours)]).next().unwrap_or_default()
 }
 
 /// A part of a direction: a millionth of a millionth is what sines leave of 0, and a formula may jump with its sign.

@@ -54,6 +54,8 @@ struct OwnEffect {
     _mends: String,
     #[serde(default, rename = "family")]
     _family: String,
+    #[serde(rename = "includes")]
+    _includes: Option<toml::Value>,
     #[serde(rename = "per")]
     _per: Option<toml::Value>,
     #[serde(rename = "nuisance")]

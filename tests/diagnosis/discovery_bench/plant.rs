@@ -95,16 +95,7 @@ pub fn base(bench: &Bench, rng: &mut ChaCha8Rng) -> String {
         }
     }
     let _ = writeln!(out, "[effects.pretravel]\npretravel = {:?}", rng.random_range(0.002..0.01));
-    let mut stood: Vec<(String, String)> = Vec::new();
-    for (plan, _) in &bench.plans {
-        for t in &plan.touches {
-            let at = (t.mounting.clone().unwrap_or_else(|| plan.mounting.clone()), t.block.to_string());
-            if !stood.contains(&at) {
-                stood.push(at);
-            }
-        }
-    }
-    for (mounting, block) in stood {
+    for (mounting, block) in stood(bench) {
         let mut three = |size: f64| -> Vec<f64> { (0..3).map(|_| rng.random_range(-size..size)).collect() };
         let _ = writeln!(
             out,
@@ -114,6 +105,20 @@ pub fn base(bench: &Bench, rng: &mut ChaCha8Rng) -> String {
         );
     }
     out
+}
+
+/// The blocks of all runs: mounting and name.
+fn stood(bench: &Bench) -> Vec<(String, String)> {
+    let mut stood: Vec<(String, String)> = Vec::new();
+    for (plan, _) in &bench.plans {
+        for t in &plan.touches {
+            let at = (t.mounting.clone().unwrap_or_else(|| plan.mounting.clone()), t.block.to_string());
+            if !stood.contains(&at) {
+                stood.push(at);
+            }
+        }
+    }
+    stood
 }
 
 /// Something hidden: which effect it is, and how it is written for the virtual machine at a size.
@@ -179,7 +184,9 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 pub fn ids(machine: &Machine) -> Vec<String> {
     let catalogue = Catalogue::built_in().unwrap();
     let base = ["location-b", "location-c", "block-setup", "pretravel", "sign-or-axis-swap"];
-    let ids = catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !base.contains(&e.id.as_str()));
+    // what differs from run to run cannot be written once for all runs: tests/discovery plants it
+    let ids =
+        catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.per_run && !base.contains(&e.id.as_str()));
     ids.map(|e| e.id.clone()).collect()
 }
 
@@ -188,7 +195,9 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
     let catalogue = Catalogue::built_in().unwrap();
     let effect = catalogue.get(id, &bench.machine).unwrap();
     let mut values = Vec::new();
-    for p in &effect.parameters {
+    let blocks: Vec<Option<(String, String)>> =
+        if effect.per_block { stood(bench).into_iter().map(Some).collect() } else { vec![None] };
+    for (block, p) in blocks.iter().flat_map(|b| effect.parameters.iter().map(move |p| (b, p))) {
         let (value, is_shape) = match id {
             _ if p.shape.is_none() => {
                 let size = p.typical * normal(rng);
@@ -199,9 +208,12 @@ pub fn hidden(bench: &Bench, id: &str, rng: &mut ChaCha8Rng) -> Hidden {
             _ if p.name.starts_with("pitch") => {
                 (*[5.0, 8.0, 10.0, 12.0, 16.0].get(rng.random_range(0..5)).unwrap(), true)
             }
+            _ if p.scan.is_empty() => (rng.random_range(0.5..1.5) * p.shape.map_or(1.0, |s| s.0), true),
             _ => (p.scan[rng.random_range(0..p.scan.len())], true),
         };
-        values.push((p.name.clone(), value, p.unit.clone(), is_shape));
+        let name =
+            block.as_ref().map_or(p.name.clone(), |(mounting, block)| format!("\"{}@{mounting}/{block}\"", p.name));
+        values.push((name, value, p.unit.clone(), is_shape));
     }
     Hidden {
         truth: id.to_owned(),

@@ -1,0 +1,18 @@
+//! Says of candidates about which point they turn their axis: a wobble about a bearing far away looks like run-out at the ball.
+
+use super::Subject;
+use super::answer::Candidate;
+use crate::model::lever_arm::turning_point;
+use crate::words::diagnose as words;
+
+/// Adds the point to what is said of each candidate that has one.
+pub(super) fn say(subject: Subject, candidates: &mut [Candidate]) {
+    for candidate in candidates {
+        let Some(effect) = subject.catalogue.get(&candidate.effect, subject.machine) else { continue };
+        let name = effect.arm.and_then(|arm| effect.parameters.get(arm.parameter)).map(|p| &p.name);
+        let arm = name.and_then(|name| candidate.parameters.iter().find(|p| p.name == *name));
+        if let Some(point) = arm.and_then(|arm| turning_point(subject.machine, effect, arm.value)) {
+            candidate.says = words::turning(&candidate.says, &point);
+        }
+    }
+}

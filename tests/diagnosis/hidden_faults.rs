@@ -1,0 +1,121 @@
+//! Faults that a generator of its own plants (`tests/discovery`), at counts that a test can afford. The full counts:
+//! `cargo run --release --example discovery -- faults 400`.
+
+use crate::generator::bench::{At, Bench};
+use crate::generator::judge::{self, Conditions, planted, rate};
+use crate::generator::mistakes::MISTAKES;
+use crate::generator::{faults, forward};
+use axiscal::log::Status;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+const PLAIN: Conditions = Conditions { visit_um: 0.0, noncentrality: None };
+
+/// The generator and the program have no arithmetic in common: an errorless machine of the one has no residuals in the other.
+#[test]
+fn an_errorless_machine_of_the_generator_reads_as_planned() {
+    for full in [false, true] {
+        for bench in Bench::all(full) {
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            for (run, (plan, _)) in bench.measure(&[], 0.0, 0.0, true, &mut rng).iter().zip(&bench.runs) {
+                assert_eq!(run.len(), plan.touches.len());
+                for (touch, planned) in run.iter().zip(&plan.touches) {
+                    assert_eq!(touch.status, Status::Hit, "{} {}", bench.name, touch.id);
+                    let off = touch.position.xyz_mm() - planned.nominal_position().xyz_mm();
+                    assert!(off.norm() < 1e-9, "{} {}: {off}", bench.name, touch.id);
+                }
+            }
+        }
+    }
+}
+
+/// Every family has faults on some machine, and the ids that it expects exist.
+#[test]
+fn every_family_expects_effects_that_exist() {
+    let catalogue = axiscal::model::catalogue::Catalogue::built_in().unwrap();
+    let benches: Vec<Bench> = Bench::all(false);
+    for (number, draw) in faults::families().into_iter().enumerate() {
+        let mut found = 0;
+        for bench in &benches {
+            for seed in 0..8 {
+                let Some(fault) = draw(bench, &mut ChaCha8Rng::seed_from_u64(seed)) else { continue };
+                found += 1;
+                let here = |id: &String| catalogue.get(id, &bench.machine).is_some();
+                assert!(
+                    fault.expects.iter().any(here),
+                    "{number}: {} expects {:?} on {}",
+                    fault.what,
+                    fault.expects,
+                    bench.name
+                );
+            }
+        }
+        assert!(found > 0, "family {number}");
+    }
+}
+
+/// A turn by hand: 90 degrees about Z takes X to Y.
+#[test]
+fn a_quarter_turn_takes_x_to_y() {
+    let turned = forward::turned(forward::V::z() * std::f64::consts::FRAC_PI_2) * forward::V::x();
+    assert!((turned - forward::V::y()).norm() < 1e-15);
+}
+
+/// C of the paper's machine leans by 150 µrad to and fro once per turn, about a bearing 180 mm below the blocks: at the ball that is
+/// 27 µm of sideways motion, and no run-out.
+#[test]
+fn a_wobble_says_where_its_bearing_is() {
+    let bench = Bench::of("swivel-head", true);
+    let about = bench.machine.reference.ball - forward::V::z() * 180.0;
+    let wobble = move |at: &At, wrong: &mut forward::Wrong| {
+        let turn = forward::V::new(at.q[5].cos(), 0.4 * at.q[5].sin(), 0.0) * 150e-6;
+        wrong.before[5].push(forward::Slip::turn(turn, about));
+    };
+    let d = judge::diagnosis(&bench, &[&wobble], 5);
+    let first = &d.candidates[0];
+    assert_eq!(first.effect, "tilt-c-1", "{}", d.says);
+    let says = &first.says;
+    assert!(
+        says.contains("wobble of C about a point 1") && says.contains(" mm below the ball: the bearing, not run-out"),
+        "{says}"
+    );
+    let arm = first.parameters.iter().find(|p| p.name == "arm_tilt_c_1").unwrap();
+    assert!((arm.value + 180.0).abs() < 40.0, "{}", arm.value);
+}
+
+/// The axis has another zero in the second of two runs, 0.03 degrees: the blocks of each run stand for themselves.
+#[test]
+fn an_axis_that_was_homed_again_is_named() {
+    let bench = Bench::of("trunnion", false);
+    let homed = |at: &At, wrong: &mut forward::Wrong| wrong.joint[3] += 0.03f64.to_radians() * at.run as f64;
+    let d = judge::diagnosis(&bench, &[&homed], 6);
+    assert!(d.verdict.is_missing_effect(), "{}", d.says);
+    assert_eq!(d.candidates[0].effect, "rehomed-a", "{}", d.says);
+    let size = d.candidates[0].parameters.iter().find(|p| p.name == "rehomed_A@run2").unwrap();
+    assert!((size.value - 0.03).abs() < 0.003, "{}", size.value);
+}
+
+#[test]
+fn hidden_faults_are_in_the_first_groups() {
+    let benches: Vec<Bench> = [true, false].into_iter().flat_map(Bench::all).collect();
+    let outcomes = planted(&benches, PLAIN, 24, 41);
+    let first = outcomes.iter().filter(|o| o.rank == Some(1)).count();
+    let three = outcomes.iter().filter(|o| o.rank.is_some()).count();
+    for o in outcomes.iter().filter(|o| o.rank != Some(1)) {
+        println!(
+            "{}: {} {:?}, noncentrality {:.0}: {:?} {}",
+            o.bench, o.what, o.expects, o.noncentrality, o.groups, o.verdict
+        );
+    }
+    println!("first group {}, first three {}", rate(first, outcomes.len()), rate(three, outcomes.len()));
+    assert!(judge::wilson(first, outcomes.len()).1 > 0.90, "{first} of {}", outcomes.len());
+}
+
+/// The log in inches is the coarsest of the set-up mistakes and is named today; the others are counted by the example.
+#[test]
+fn a_log_in_inches_is_named() {
+    let bench = Bench::of("trunnion", false);
+    let inches = MISTAKES.iter().find(|m| m.what == "log in inches").unwrap();
+    let led = judge::mistake(&bench, inches, 3);
+    assert!(led.led, "{led:?}");
+}

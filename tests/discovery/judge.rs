@@ -1,0 +1,249 @@
+//! Asks the program what is missing, and compares its answer with what was planted.
+
+use super::bench::{Act, Bench};
+use super::faults::{self, Fault};
+use super::mistakes::Mistake;
+use axiscal::diagnose::evidence::Evidence;
+use axiscal::diagnose::{Diagnosis, Options, Subject, diagnose};
+use axiscal::fit::{Fit, Settings, identify_data};
+use axiscal::log::Touch;
+use axiscal::model::catalogue::Catalogue;
+use axiscal::model::data::{Run, assemble};
+use nalgebra::DVector;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// What is asked of each case.
+#[derive(Debug, Clone, Copy)]
+pub struct Conditions {
+    /// Scatter of the ball from one index position to the next, µm.
+    pub visit_um: f64,
+    /// The noncentrality that every fault is given; without it its peak is 3 to 10 µm and its noncentrality 25 or more.
+    pub noncentrality: Option<f64>,
+}
+
+/// What came of a case.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    pub bench: String,
+    pub what: String,
+    pub expects: Vec<String>,
+    pub noncentrality: f64,
+    pub verdict: String,
+    /// Number of the group, from 1, that holds a right name.
+    pub rank: Option<usize>,
+    /// The group's first name is right.
+    pub by_name: bool,
+    pub groups: Vec<Vec<String>>,
+    /// Over the noise, with the first right or first named effect in the model.
+    pub proposed: bool,
+}
+
+pub const LEAN: Options = Options { at_most: 3, refit: false, power: false, planned: None };
+
+fn fit(bench: &Bench, touches: &[Vec<Touch>], more: &[String]) -> (Fit, Settings) {
+    let runs: Vec<Run> = bench
+        .runs
+        .iter()
+        .zip(touches)
+        .map(|((plan, began), touches)| Run { plan, touches, mounting: None, started_s: Some(*began) })
+        .collect();
+    let effects = bench.base_model().into_iter().chain(more.iter().cloned()).collect();
+    let settings = Settings { effects, quick: true, ..Settings::default() };
+    let catalogue = Catalogue::built_in().unwrap();
+    (identify_data(&bench.machine, &catalogue, assemble(&bench.machine, &runs), &settings).unwrap(), settings)
+}
+
+/// What the program says of a machine with these faults, at 1 µm of noise.
+pub fn diagnosis(bench: &Bench, acts: &[&Act], seed: u64) -> Diagnosis {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let base = bench.ordinary(&mut rng);
+    let all: Vec<&Act> = std::iter::once(&*base).chain(acts.iter().copied()).collect();
+    let (fit, settings) = fit(bench, &bench.measure(&all, 1.0, 0.0, true, &mut rng), &[]);
+    ask(bench, &fit, &settings)
+}
+
+fn ask(bench: &Bench, fit: &Fit, settings: &Settings) -> Diagnosis {
+    let catalogue = Catalogue::built_in().unwrap();
+    diagnose(Subject { machine: &bench.machine, catalogue: &catalogue, settings, fit }, &LEAN).unwrap()
+}
+
+pub fn groups(d: &Diagnosis) -> Vec<Vec<String>> {
+    d.candidates.iter().map(|c| std::iter::once(c.effect.clone()).chain(c.same_as.iter().cloned()).collect()).collect()
+}
+
+/// Readings without noise, less what the errorless fit leaves, µm.
+fn gaps(bench: &Bench, acts: &[&Act]) -> (DVector<f64>, Fit) {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let (fit, _) = fit(bench, &bench.measure(acts, 0.0, 0.0, true, &mut rng), &[]);
+    let free: DVector<f64> = DVector::zeros(fit.free.len());
+    (fit.with_touches(0.0, |t| DVector::from_vec(t.gaps(&free))) * 1000.0, fit)
+}
+
+/// The size of a fault, and its noncentrality at 1 µm of noise; `None` where the base model takes all of it.
+fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
+    let (without, fit) = gaps(bench, &[base]);
+    let (with, _) = gaps(bench, &[base, &*fault.at_size(1.0)]);
+    if with.len() != without.len() {
+        return None;
+    }
+    let difference = with - without;
+    let jacobian = fit.linear(0.0).jacobian;
+    let touches = axiscal::search::Basis::new(&jacobian.rows(0, difference.len()).into_owned());
+    let seen = touches.project(&difference).norm_squared();
+    let size = match conditions.noncentrality {
+        Some(wanted) => (wanted / seen).sqrt(),
+        None => peak_um / difference.amax(),
+    };
+    // what must be made huge to be seen is no fault of a machine
+    (size.is_finite() && size < 40.0 && size * size * seen >= 25.0).then_some((size, size * size * seen))
+}
+
+/// Cases until `count` of them can be seen.
+pub fn planted(benches: &[Bench], conditions: Conditions, count: usize, seed: u64) -> Vec<Outcome> {
+    let mut out = Vec::new();
+    let mut drawn = 0u64;
+    while out.len() < count {
+        let batch = 4 * rayon::current_num_threads() as u64;
+        let more: Vec<Option<Outcome>> = (drawn..drawn + batch)
+            .into_par_iter()
+            .map(|i| {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(i));
+                let bench = &benches[i as usize % benches.len()];
+                let base = bench.ordinary(&mut rng);
+                let fault = faults::draw(bench, &mut rng);
+                let peak_um = rng.random_range(3.0..10.0);
+                let (size, noncentrality) = sized(bench, &base, &fault, conditions, peak_um)?;
+                Some(one(bench, &base, &fault, size, noncentrality, conditions, &mut rng))
+            })
+            .collect();
+        out.extend(more.into_iter().flatten());
+        drawn += batch;
+    }
+    out.truncate(count);
+    out
+}
+
+fn one(
+    bench: &Bench,
+    base: &Act,
+    fault: &Fault,
+    size: f64,
+    noncentrality: f64,
+    conditions: Conditions,
+    rng: &mut ChaCha8Rng,
+) -> Outcome {
+    let touches = bench.measure(&[base, &*fault.at_size(size)], 1.0, conditions.visit_um, true, rng);
+    let (fit, settings) = fit(bench, &touches, &[]);
+    let d = ask(bench, &fit, &settings);
+    let groups = groups(&d);
+    let right = |id: &String| fault.expects.contains(id);
+    Outcome {
+        bench: bench.name.clone(),
+        what: fault.what.clone(),
+        expects: fault.expects.clone(),
+        noncentrality,
+        verdict: d.verdict.as_str().to_owned(),
+        rank: groups.iter().position(|g| g.iter().any(right)).map(|i| i + 1),
+        by_name: groups.first().is_some_and(|g| right(&g[0])),
+        proposed: d.candidates.first().is_some_and(|c| c.proposed),
+        groups,
+    }
+}
+
+/// Verdicts on machines without a fault.
+pub fn clean(benches: &[Bench], visit_um: f64, count: usize, seed: u64) -> Vec<(String, String)> {
+    (0..count as u64)
+        .into_par_iter()
+        .map(|i| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(i));
+            let bench = &benches[i as usize % benches.len()];
+            let base = bench.ordinary(&mut rng);
+            let (fit, settings) = fit(bench, &bench.measure(&[&*base], 1.0, visit_um, true, &mut rng), &[]);
+            let d = ask(bench, &fit, &settings);
+            (bench.name.clone(), d.verdict.as_str().to_owned())
+        })
+        .collect()
+}
+
+/// What came of a mistake.
+#[derive(Debug)]
+pub struct Led {
+    pub bench: String,
+    pub what: &'static str,
+    /// After one or two steps the answer names one of the expected effects or mistakes.
+    pub led: bool,
+    pub said: Vec<String>,
+}
+
+/// Is a user who made a mistake led to its cause within two steps?
+pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let base = bench.ordinary(&mut rng);
+    let touches = match (mistake.make)(bench, &base, &mut rng) {
+        Ok(touches) => touches,
+        Err(refused) => {
+            let said: Vec<String> = refused.0.into_iter().map(|finding| finding.message).collect();
+            let led = said.iter().any(|message| mistake.expects.iter().any(|word| message.contains(word)));
+            return Led { bench: bench.name.clone(), what: mistake.what, led, said };
+        }
+    };
+    let (mut more, mut said, mut led) = (Vec::new(), Vec::new(), false);
+    for _ in 0..2 {
+        let (fit, settings) = fit(bench, &touches, &more);
+        let d = ask(bench, &fit, &settings);
+        let groups = groups(&d);
+        let first = groups.first().filter(|_| d.verdict.is_missing_effect());
+        let named = first.is_some_and(|g| g.iter().any(|id| mistake.expects.contains(&id.as_str())));
+        let gross = d.mistake().is_some_and(|says| mistake.expects.iter().any(|id| says.contains(id)));
+        // a finding about a size that no machine has: it names the effect or its parameters
+        let told = |id: &str| {
+            let of = fit.model.unknowns.iter().filter(|u| u.effect == id).map(|u| u.own_name().to_owned());
+            let names: Vec<String> = of.chain([id.to_owned()]).collect();
+            d.warnings
+                .iter()
+                .chain(&fit.outcome.warnings)
+                .chain([&d.says])
+                .any(|w| names.iter().any(|n| w.contains(n.as_str())))
+        };
+        led |= named || gross || mistake.expects.iter().any(|id| told(id));
+        let first_name = first.map(|g| g[0].clone());
+        said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));
+        match first_name.filter(|id| id != "sign-or-axis-swap") {
+            Some(id) => more.push(id),
+            None => break,
+        }
+    }
+    Led { bench: bench.name.clone(), what: mistake.what, led, said }
+}
+
+/// Wilson's interval of a rate, 95 %.
+pub fn wilson(hits: usize, of: usize) -> (f64, f64) {
+    let (n, z) = (of.max(1) as f64, 1.959_963_984_540_054);
+    let p = hits as f64 / n;
+    let (middle, half) = (
+        (p + z * z / (2.0 * n)) / (1.0 + z * z / n),
+        z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt(),
+    );
+    (middle - half, middle + half)
+}
+
+/// `97.5 % (390 of 400; 95.5 to 98.6 %)`
+pub fn rate(hits: usize, of: usize) -> String {
+    let (low, high) = wilson(hits, of);
+    let percent = |x: f64| 100.0 * x;
+    format!(
+        "{:.1} % ({hits} of {of}; {:.1} to {:.1} %)",
+        percent(hits as f64 / of.max(1) as f64),
+        percent(low),
+        percent(high)
+    )
+}
+
+/// Reduced RMS: what a fit leaves, over the noise of a touch.
+pub fn reduced_rms(fit: &Fit) -> f64 {
+    let evidence = Evidence::from_fit(fit);
+    let ss = evidence.base.project(&evidence.residual).norm_squared();
+    (ss / evidence.dof() as f64).sqrt()
+}

@@ -1,0 +1,277 @@
+//! Which way an axis moves what it carries: the same effect on an axis of the table and on one of the head, with readings worked out
+//! by hand, for the virtual machine and for the model.
+//!
+//! A coordinate says where the tool is over the workpiece. Head: the ball goes along with it. Table: the block goes the other way.
+//! What is written of a coordinate (a scale, a play, a screw) therefore acts alike on both sides; what is written of a place (a part
+//! sinks, leans, lies to one side) does not. `trunnion` has X, Y and Z in the head, `swivel-head` has X and Y in the table.
+//!
+//! A reading is recorded less nominal along the outward normal: positive where the ball stops early.
+
+use crate::common::{self, matched};
+use axiscal::axes::{AxisName, Position};
+use axiscal::diag::source;
+use axiscal::machine::Machine;
+use axiscal::model::catalogue::Catalogue;
+use axiscal::model::data::{Run, assemble};
+use axiscal::model::predict::Model;
+use axiscal::program::plan::{Plan, PlanTouch};
+use axiscal::simulate::{self, scenario};
+use serde_json::json;
+
+/// What is of second order is left out below: turns of 2e-5 squared times 200 mm are 8e-8.
+const BY_HAND_MM: f64 = 1e-7;
+
+/// A touch of a block of 10 mm with a ball of 3 mm, all rotary axes at 0 but C.
+struct Touch {
+    carrier: &'static str,
+    /// Centre of the block in the carrier's frame.
+    centre: [f64; 3],
+    normal: [f64; 3],
+    c_deg: f64,
+}
+
+impl Touch {
+    fn of_c(centre: [f64; 3], normal: [f64; 3], c_deg: f64) -> Self {
+        Self { carrier: "C", centre, normal, c_deg }
+    }
+
+    fn pose(&self, machine: &Machine) -> Position {
+        let mut pose = Position::default();
+        if machine.axis(AxisName::C).is_some() {
+            pose.set(AxisName::C, self.c_deg);
+        }
+        pose
+    }
+}
+
+fn plan(machine: &Machine, touches: &[Touch], mounting: &str) -> Plan {
+    let mut blocks = Vec::new();
+    let mut rows = Vec::new();
+    for (i, t) in touches.iter().enumerate() {
+        let along = |off: f64| -> [f64; 3] { std::array::from_fn(|k| t.centre[k] + t.normal[k] * off) };
+        let name = format!("b{i}");
+        blocks.push(json!({"name": name, "carrier": t.carrier, "centre": t.centre, "size": [10.0, 10.0, 10.0]}));
+        let at = |off: f64| {
+            let ball = nalgebra::Vector3::from(along(8.0 + off));
+            let p = machine
+                .linear_for_ball(machine.carrier(t.carrier).unwrap(), &t.pose(machine), &ball, machine.tool.length_mm)
+                .unwrap();
+            json!({"X": p.0[0], "Y": p.0[1], "Z": p.0[2]})
+        };
+        let mut pose = serde_json::Map::new();
+        machine.rotary().for_each(|a| drop(pose.insert(a.name.to_string(), json!(t.pose(machine).get(a.name)))));
+        rows.push(json!({
+            "id": i + 1, "stage": "s", "repeat": 1, "carrier": t.carrier, "block": name, "face": "f", "point": along(5.0),
+            "normal": t.normal, "pose": pose, "start": at(2.0), "nominal": at(0.0), "end": at(-2.0), "time_s": 10.0 * (i + 1) as f64,
+        }));
+    }
+    serde_json::from_value(json!({
+        "format": "axiscal-plan/1", "machine": machine.name, "program": "by-hand", "mounting": mounting, "ball_radius_mm": 3.0,
+        "tool_length_mm": machine.tool.length_mm, "blocks": blocks, "touches": rows,
+    }))
+    .unwrap()
+}
+
+/// One effect on one touch: both programs against the number on paper.
+fn check(machine: &Machine, touch: Touch, effect: &str, values: &[(&str, f64)], more: &str, by_hand_mm: f64) {
+    check_last(machine, &[touch], effect, values, more, by_hand_mm);
+}
+
+/// The same of the last of some touches.
+fn check_last(machine: &Machine, touches: &[Touch], effect: &str, values: &[(&str, f64)], more: &str, by_hand_mm: f64) {
+    let plan = plan(machine, touches, "m");
+    let last = plan.touches.last().unwrap();
+    let values_text: String = values.iter().map(|(name, value)| format!("{name} = {value:?}\n")).collect();
+    let text = format!("{more}[effects.{effect}]\n{values_text}");
+    let place = format!("{effect} {values:?} on {}", machine.name);
+    let scenario = scenario::parse(&source("by-hand", &text), machine).unwrap().0;
+    let (raw, _) = simulate::run(machine, &plan, &scenario, None).unwrap();
+    let mut log: Vec<_> = raw.iter().map(matched).collect();
+    let outward = outward(last);
+    let off = log.last().unwrap().position.xyz_mm() - last.nominal_position().xyz_mm();
+    let reading = off.dot(&outward);
+    assert!(
+        (reading - by_hand_mm).abs() < BY_HAND_MM,
+        "virtual machine, {place}: {reading:.9}, by hand {by_hand_mm:.9}"
+    );
+    // the model finds no gap in a log that shows the reading by hand
+    let position = &mut log.last_mut().unwrap().position;
+    *position = last.nominal_position();
+    for name in [AxisName::X, AxisName::Y, AxisName::Z] {
+        position.set(name, position.get(name) + by_hand_mm * outward[name.index()]);
+    }
+    let data = assemble(machine, &[Run { plan: &plan, touches: &log, mounting: None, started_s: None }]);
+    let catalogue = Catalogue::built_in().unwrap();
+    let row = catalogue.get(effect, machine).unwrap();
+    let model = Model::new(machine, &[row], &data.set_ups, machine.reference.pivot);
+    let theta: Vec<f64> = row
+        .parameters
+        .iter()
+        .map(|p| {
+            let given = values.iter().find(|(name, _)| name.split('@').next() == Some(p.name.as_str()));
+            given.map_or(p.shape.map_or(0.0, |s| s.0), |v| v.1)
+        })
+        .collect();
+    let gap = model.gap(data.observations.last().unwrap(), &theta);
+    assert!(gap.abs() < BY_HAND_MM, "model, {place}: {gap:e} mm");
+}
+
+/// The normal of the face in R: C turns it, right-handed about Z.
+fn outward(touch: &PlanTouch) -> nalgebra::Vector3<f64> {
+    let (s, c) = touch.pose.get(AxisName::C).unwrap_or(0.0).to_radians().sin_cos();
+    let [x, y, z] = touch.normal;
+    nalgebra::Vector3::new(c * x - s * y, s * x + c * y, z)
+}
+
+const X: [f64; 3] = [1.0, 0.0, 0.0];
+const MINUS_X: [f64; 3] = [-1.0, 0.0, 0.0];
+const Y: [f64; 3] = [0.0, 1.0, 0.0];
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
+
+fn head() -> Machine {
+    common::machine("trunnion")
+}
+
+fn table() -> Machine {
+    common::machine("swivel-head")
+}
+
+/// What bears the blocks of each machine: C of the trunnion, the linear axes' table of the other.
+fn on(machine: &Machine, centre: [f64; 3], normal: [f64; 3]) -> Touch {
+    let carrier = if machine.name == "trunnion" { "C" } else { "table" };
+    Touch { carrier, centre, normal, c_deg: 0.0 }
+}
+
+#[test]
+fn what_is_written_of_a_coordinate_acts_alike_on_both_sides() {
+    const WARM: &str = "[temperature]\nprofile = [[0.0, 30.0], [9.0, 30.0]]\n";
+    for machine in [head(), table()] {
+        // The face +X of a block at x = 92 is met by the ball's centre at x = 92 + 5 + 3 = 100. Scales that have grown by 10 K times
+        // 10 ppm/K show 100 mm less a part of 1e-4 where the axis has gone 100: 100 / 1.0001 = 99.990 001 000. Met 9.998 µm early in
+        // the coordinate, which is along the normal: -0.009 999 000.
+        let at_100 = || on(&machine, [92.0, 0.0, -202.684], X);
+        check(&machine, at_100(), "ambient-scale", &[("expansion", 10.0)], WARM, -0.009_999_000);
+        // the same in Z, which is a head's on both machines: the top of a block 92 mm higher is met at Z = 100
+        let above = on(&machine, [0.0, 0.0, -202.684 + 92.0], Z);
+        check(&machine, above, "ambient-scale", &[("expansion", 10.0)], WARM, -0.009_999_000);
+        // 8 µm of lost motion: the face +X is touched in the direction of -X, the axis lags by 4 µm and stands at +4 µm of what it
+        // shows: met 4 µm later in the coordinate, at -0.004.
+        check(&machine, at_100(), "backlash-x", &[("backlash_X", 8.0)], "", -0.004);
+        // the face -X is touched in +X: it lags to -4 µm, and shows +0.004, along the normal -X: -0.004
+        let minus = on(&machine, [108.0, 0.0, -202.684], MINUS_X);
+        check(&machine, minus, "backlash-x", &[("backlash_X", 8.0)], "", -0.004);
+    }
+}
+
+#[test]
+fn what_is_written_of_a_place_depends_on_the_side() {
+    let (head, table) = (head(), table());
+    let at_100 = |machine: &Machine| on(machine, [92.0, 0.0, -202.684], X);
+    // scale-x, dx = 100 µm/m of the coordinate 100: what X carries lies 0.010 mm towards +X of where it should. Head: the ball is
+    // ahead and meets the face early, shown 100 - 0.010 (and less 1e-4 of that): 100 / 1.0001. Table: the block is ahead, the ball
+    // must follow: it is met where X - 1e-4 X = 100, at 100 / 0.9999 = 100.010 001 000.
+    check(&head, at_100(&head), "scale-x", &[("EXX", 100.0)], "", -0.009_999_000);
+    check(&table, at_100(&table), "scale-x", &[("EXX", 100.0)], "", 0.010_001_000);
+    // squareness-xy, dx = -Y * 100 µrad at Y = 50: what Y carries lies 0.005 mm towards -X. Head: the ball is behind, it meets +X
+    // 0.005 later: shown further out. Table: the block has gone back, met 0.005 further in.
+    let beside = |machine: &Machine| on(machine, [0.0, 50.0, -202.684], X);
+    check(&head, beside(&head), "squareness-xy", &[("EC0Y", 100.0)], "", 0.005);
+    check(&table, beside(&table), "squareness-xy", &[("EC0Y", 100.0)], "", -0.005);
+    // straightness-zx, dz = 4 µm * (X/300)² at X = 150: what X carries is 1 µm higher. Head: the ball must go 1 µm lower. Table: the
+    // block is met 1 µm higher.
+    let middle = |machine: &Machine| on(machine, [150.0, 0.0, -202.684], Z);
+    check(&head, middle(&head), "straightness-zx", &[("EZX2", 4.0)], "", -0.001);
+    check(&table, middle(&table), "straightness-zx", &[("EZX2", 4.0)], "", 0.001);
+}
+
+/// A guideway that is bowed upwards, z = -4 µm (u/300)² at the place u of the carriage: at 150 from its middle it has sunk by 1 µm,
+/// and its slope is 2 * 4 µm * 150/300² = 13.333 333 nm/mm, down to the outside.
+#[test]
+fn a_carriage_sinks_and_leans_outwards_on_both_sides() {
+    let (head, table) = (head(), table());
+    let sag = [("carriage_sag_X", 4.0), ("arm_carriage_sag_x", 0.0)];
+    // Head, X = 150, u = +150. It leans about the moving origin of R, 202.684 mm above the ball: what hangs below goes inwards by
+    // 202.684 * 13.333 333e-6 = 0.002 702 453, to -X. The face +X is met that much later in the coordinate: +0.002 702 453.
+    check(&head, on(&head, [142.0, 0.0, -202.684], X), "carriage-sag-x", &sag, "", 0.002_702_453);
+    // With the bearing at the ball's height nothing goes inwards.
+    let at_ball = [("carriage_sag_X", 4.0), ("arm_carriage_sag_x", -202.684)];
+    check(&head, on(&head, [142.0, 0.0, -202.684], X), "carriage-sag-x", &at_ball, "", 0.0);
+    // The ball itself has sunk by 1 µm: the top is met 1 µm early, and for its distance of 8 mm from the ball's height at zero
+    // (Z = 8) nothing more, because the turn moves it sideways only.
+    check(&head, on(&head, [150.0, 0.0, -202.684], Z), "carriage-sag-x", &sag, "", 0.001);
+    // Table, X = 150: it stands at u = -150 and has sunk by 1 µm. It leans outwards, to -X, about the ball's place at zero. The block
+    // under the ball is 150 mm from there to the inside: lifted by 150 * 13.333 333e-6 = 2 µm. Together +1 µm, which is where the
+    // tangent of the guideway at u = -150 passes over its middle: -1 + 2.
+    check(&table, on(&table, [150.0, 0.0, -202.684], Z), "carriage-sag-x", &sag, "", 0.001);
+    // Y of the table in the same way.
+    let sag_y = [("carriage_sag_Y", 4.0), ("arm_carriage_sag_y", 0.0)];
+    check(&table, on(&table, [0.0, 150.0, -202.684], Z), "carriage-sag-y", &sag_y, "", 0.001);
+    check(&head, on(&head, [0.0, 142.0, -202.684], Y), "carriage-sag-y", &sag_y, "", 0.002_702_453);
+}
+
+#[test]
+fn the_new_rows_by_hand() {
+    let (head, table) = (head(), table());
+    // block-own-size: the edge along x of this block is 6 µm longer, its face +X 3 µm further out; another block's size says nothing
+    let b0 = on(&table, [0.0, 0.0, -202.684], X);
+    // (blocks of a scenario are those of the machine: the value without a block is that of every block)
+    check(&table, b0, "block-own-size", &[("own_size_X", 6.0)], "", 0.003);
+    // encoder-eccentricity-c at C = 0: cos = 1. The centre goes 2 µm to +Y, and the head, on the side where the ring moves along +Y,
+    // takes that for 2 µm / 100 mm = 20 µrad: C is turned back by so much about its own line through (0, 0). The block at x = 50 goes
+    // to -Y by 50 * 20e-6 = 0.001. Face +Y: 0.002 - 0.001. The ball touches it on the line x = 50 of the block's middle; the turn of
+    // the face about itself is nothing to first order (8 * 2e-10).
+    let aside = Touch::of_c([50.0, 0.0, -202.684], Y, 0.0);
+    check(&table, aside, "encoder-eccentricity-c", &[("runout_YCc", 2.0)], "", 0.001);
+    // on the trunnion C's line passes through the same point
+    let aside = Touch::of_c([50.0, 0.0, -202.684], Y, 0.0);
+    check(&head, aside, "encoder-eccentricity-c", &[("runout_YCc", 2.0)], "", 0.001);
+    // windup-c: C comes from 0 to 10 degrees, in one direction. Wound up over 10 degrees it lags by half of 40 µrad times
+    // (1 - 1/e) = 0.632 120 559, that is by 12.642 411 µrad. The block's face +Y, 50 mm out, is that much behind:
+    // 50 * 12.642 411e-6 = 0.000 632 121 against its normal.
+    let way = |to: f64| [Touch::of_c([50.0, 0.0, -202.684], Y, 0.0), Touch::of_c([50.0, 0.0, -202.684], Y, to)];
+    let wound = [("windup_C", 40.0), ("windup_way_C", 10.0)];
+    check_last(&table, &way(10.0), "windup-c", &wound, "", -0.000_632_121);
+    // the other way round it lags to the other side
+    check_last(&table, &way(-10.0), "windup-c", &wound, "", 0.000_632_121);
+    // back from 10 to 5 degrees: 5 degrees since the reversal, 1 - exp(-1/2) = 0.393 469 340; 20 µrad * 50 mm * that = 0.000 393 469
+    let back = [0.0, 10.0, 5.0].map(|c| Touch::of_c([50.0, 0.0, -202.684], Y, c));
+    check_last(&table, &back, "windup-c", &wound, "", 0.000_393_469);
+}
+
+/// C was homed again before the second run, 1 mrad further: the first run is as it was; in the second the face +Y of a block 50 mm
+/// out has gone on by 50 * tan(1 mrad) = 0.050 000 017, and its plane, 8 mm from the line through C, is met 8 * 5e-7 further out.
+#[test]
+fn a_later_run_has_a_zero_of_its_own() {
+    let machine = table();
+    let plan = plan(&machine, &[Touch::of_c([50.0, 0.0, -202.684], Y, 0.0)], "m");
+    let catalogue = Catalogue::built_in().unwrap();
+    let row = catalogue.get("rehomed-c", &machine).unwrap();
+    let at = |off: f64| {
+        let mut position = plan.touches[0].nominal_position();
+        position.set(AxisName::Y, position.get(AxisName::Y) + off);
+        let raw = simulate::run(&machine, &plan, &simulate::Scenario::flawless(), None).unwrap().0;
+        let mut touch = matched(&raw[0]);
+        touch.position = position;
+        vec![touch]
+    };
+    let (first, second) = (at(0.0), at(0.050_004_017));
+    let run = |touches| Run { plan: &plan, touches, mounting: Some("m"), started_s: Some(0.0) };
+    let data = assemble(&machine, &[run(&first), run(&second)]);
+    let model = Model::new(&machine, &[row], &data.set_ups, machine.reference.pivot);
+    assert_eq!(model.unknowns.len(), 1);
+    assert_eq!(model.unknowns[0].name, "rehomed_C@run2");
+    let mrad_in_deg = [1e-3_f64.to_degrees()];
+    for o in &data.observations {
+        let gap = model.gap(o, &mrad_in_deg);
+        assert!(gap.abs() < BY_HAND_MM, "run {}: {gap:e}", o.run);
+    }
+    // the virtual machine plants it in the run of its scenario
+    let text = "[effects.rehomed-c]\nrehomed_C = { value = 1.0, unit = \"mrad\" }\n";
+    let scenario = scenario::parse(&source("by-hand", text), &machine).unwrap().0;
+    let made = matched(&simulate::run(&machine, &plan, &scenario, None).unwrap().0[0]);
+    let reading = made.position.get(AxisName::Y) - plan.touches[0].nominal_position().get(AxisName::Y);
+    assert!((reading - 0.050_004_017).abs() < BY_HAND_MM, "{reading}");
+    // in a study of one run it has no parameter
+    let alone = assemble(&machine, &[run(&first)]);
+    assert_eq!(Model::new(&machine, &[row], &alone.set_ups, machine.reference.pivot).unknowns.len(), 0);
+}
