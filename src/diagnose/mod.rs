@@ -22,6 +22,7 @@ mod missed_touches;
 pub mod next_step;
 mod no_usable_touches;
 mod not_identifiable;
+pub mod odd_block;
 mod outlying_groups;
 mod separating_touches;
 pub mod setup_mistakes;
