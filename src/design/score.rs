@@ -119,7 +119,7 @@ pub(super) fn score(a: &Assessment, task: &Task) -> (Score, String) {
     }
     let pairs = a.alias_pairs.saturating_sub(special_cases(a, task));
     if pairs as f64 > PAIRS_PER_EFFECT * a.effects.len() as f64 {
-        reasons.push(format!("{pairs} pairs of effects cannot be separated"));
+        reasons.push(format!("{} pairs of effects cannot be separated", a.alias_pairs));
     }
     if reasons.is_empty() {
         // a trace is not enough: at its usual size an effect must be larger than what would just be found

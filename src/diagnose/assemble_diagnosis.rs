@@ -447,6 +447,10 @@ fn candidate(
         .collect();
     let says = match &not_told[..] {
         [] => effect.says.clone(),
+        _ if effect.per_block => {
+            let odd = super::odd_block::odd_block(&seen.named.columns[chosen], score.estimate.as_slice());
+            words::differences_of_blocks(&effect.says, odd.as_ref())
+        }
         some => {
             let says = effect.says.trim_end_matches('.');
             format!("{says}. Its {} cannot be determined with this plan", words::list(some))

@@ -23,6 +23,7 @@ pub mod next_step;
 pub mod oversized;
 mod no_usable_touches;
 mod not_identifiable;
+pub mod odd_block;
 mod outlying_groups;
 mod pairs;
 mod separating_touches;

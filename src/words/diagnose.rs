@@ -461,6 +461,21 @@ fn harmonic(d: &Dependence) -> String {
     if form(d) == "order" { turns(d.scanned) } else { "smoothly over the turn".to_owned() }
 }
 
+/// What an effect of each block is, where only the differences between blocks are determined; with the block that differs most.
+pub(crate) fn differences_of_blocks(says: &str, odd: Option<&crate::diagnose::odd_block::OddBlock>) -> String {
+    let says = format!("{}. Only the differences between blocks can be determined", says.trim_end_matches('.'));
+    match odd {
+        Some(odd) => {
+            let (by, more) = (crate::units::significant(odd.by.abs(), 3), if odd.by > 0.0 { "more" } else { "less" });
+            format!(
+                "{says}: block {} differs most, its {} is {by} {} {more} than that of the others",
+                odd.block, odd.parameter, odd.unit
+            )
+        }
+        None => says,
+    }
+}
+
 /// What an effect is, with the point about which it turns its axis.
 pub(crate) fn turning(says: &str, point: &crate::model::lever_arm::TurningPoint) -> String {
     format!("{}. Here it is a {}", says.trim_end_matches('.'), super::fit::turning_point(point))

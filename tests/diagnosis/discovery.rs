@@ -219,23 +219,31 @@ fn what_would_be_left_is_what_a_refit_leaves() {
     assert!((first.left_um / after - 1.0).abs() < 0.02, "{} said, {after} found\n{}", first.left_um, made.toml);
 }
 
-/// One block of another size: that block is named, and no innocent face however large the fault is.
+/// One block of another size: that block is named, with the edge and by how much, however large the fault is. The size is that of one
+/// step from the model without it, where the largest misfits count less.
 #[test]
-fn the_faces_of_one_block_of_another_size_are_named_alone() {
+fn one_block_of_another_size_is_named() {
     for size_um in [4.0, 12.0] {
         let wrong = format!("[[block]]\nmounting = \"full\"\nname = \"b\"\nsize_um = [{size_um:?}, 0.0, 0.0]\n");
         let d = said_of_a_block(&wrong);
-        assert!(matches!(d.verdict, Verdict::Unexplained(_)), "{size_um}: {}", d.says);
-        let mut faces = d.verdict.faces().to_vec();
-        faces.sort();
-        assert_eq!(faces, ["full/b +X", "full/b -X"], "{size_um}: {}", d.says);
+        assert!(d.verdict.is_missing_effect(), "{size_um}: {}", d.says);
+        let first = &d.candidates[0];
+        assert_eq!(first.effect, "block-own-size", "{size_um}: {}", d.says);
+        let named = first.says.split("block full/b differs most, its own_size_X is ").nth(1);
+        let by: f64 = named.and_then(|s| s.split(' ').next()).and_then(|s| s.parse().ok()).unwrap_or_default();
+        assert!(
+            (by - size_um).abs() < 0.5 + 0.2 * size_um && first.says.contains(" um more than"),
+            "{size_um}: {}",
+            first.says
+        );
     }
     let d = said_of_a_block("[[block]]\nmounting = \"full\"\nname = \"b\"\nsize_um = [6.0, 6.0, 6.0]\n");
+    let first = &d.candidates[0];
     assert!(
-        d.verdict.blocks() == ["full/b"]
-            || (!d.verdict.faces().is_empty() && d.verdict.faces().iter().all(|f| f.starts_with("full/b "))),
-        "{}",
-        d.says
+        first.effect == "block-own-size" && first.says.contains("block full/b differs most"),
+        "{}: {}",
+        d.says,
+        first.says
     );
 }
 
