@@ -20,6 +20,7 @@ use discovery::strange::{self, Seen};
 use generator::bench::Bench as Machines;
 use generator::judge::{self, Conditions};
 use generator::mistakes::MISTAKES;
+use generator::peers::{self, Cases};
 use std::collections::BTreeMap;
 
 fn percent(part: usize, of: usize) -> String {
@@ -185,9 +186,28 @@ fn of_the_generator(part: &str, count: &dyn Fn(usize) -> usize) {
     }
 }
 
+/// Cases for other methods: `-- cases FOLDER [COUNT]`, then `benches/discovery/peers.py FOLDER`.
+fn cases(folder: &std::path::Path, count: usize) {
+    let at = |visit_um: f64, noncentrality: Option<f64>| Conditions { visit_um, noncentrality };
+    let of = |name, faulty, conditions| Cases { name, faulty, conditions };
+    let all = [
+        of("planted", true, at(0.0, None)),
+        of("weak", true, at(0.0, Some(45.0))),
+        of("clean", false, at(0.0, None)),
+        of("scatter", false, at(0.7, None)),
+    ];
+    for (k, cases) in all.iter().enumerate() {
+        peers::write(&Machines::all(false), cases, count, 60 + k as u64, folder);
+    }
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let part = arguments.first().map_or("all", String::as_str);
+    if part == "cases" {
+        let count = arguments.get(2).map_or(100, |n| n.parse().unwrap());
+        return cases(std::path::Path::new(&arguments[1]), count);
+    }
     let count = |full: usize| arguments.get(1).map_or(full, |n| n.parse().unwrap());
     let wanted = |name: &str| part == "all" || part == name;
     of_the_generator(part, &count);

@@ -342,7 +342,7 @@ pub(crate) mod tests {
             verdict: Verdict::Unexplained(Unexplained { why, check: MachineCheck::NoFormula, sketchable: true }),
             says: String::new(),
             consequences: Vec::new(),
-        oversized: Vec::new(),
+            oversized: Vec::new(),
             rms_um: 5.0,
             held_out_rms_um: None,
             held_out_se_um: None,

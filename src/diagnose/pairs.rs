@@ -1,7 +1,7 @@
 //! Two effects at once, before an effect of many parameters is named and before nothing is.
 
-use super::decide::{Decision, Kind, bears_out};
 use super::Examination;
+use super::decide::{Decision, Kind, bears_out};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
 use crate::search::{Library, Origin, Pair};

@@ -43,13 +43,7 @@ pub(super) fn regression<'c>(
 }
 
 /// The scatter of index positions, mm; `None` where it is known or of no account.
-fn estimated(
-    fit: &Fit,
-    machine: &Machine,
-    first: &Evidence,
-    named: &Named,
-    features: &Arc<Features>,
-) -> Option<f64> {
+fn estimated(fit: &Fit, machine: &Machine, first: &Evidence, named: &Named, features: &Arc<Features>) -> Option<f64> {
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     let most_mm = match fit.noise.visit_source {
         VisitSource::Declared => MOST_TIMES * declared_mm,
@@ -80,7 +74,9 @@ fn estimated(
             tau: *tau_mm,
             residual: residual.column(0).into_owned(),
             base: Basis::new(&own),
-            ln_det: normals.ln_det(*tau_mm) + own.tr_mul(&own).determinant().ln() + known_beforehand(*tau_mm, declared_mm),
+            ln_det: normals.ln_det(*tau_mm)
+                + own.tr_mul(&own).determinant().ln()
+                + known_beforehand(*tau_mm, declared_mm),
             change: change as Change,
         }
     });

@@ -320,7 +320,8 @@ impl<'a> Evidence<'a> {
             sigma,
             expanded,
             interval,
-            sigma_noise: known.map(|c| (self.variance(c) - self.fit.visits.variance[c] - self.prior_variance(c)).max(0.0).sqrt()),
+            sigma_noise: known
+                .map(|c| (self.variance(c) - self.fit.visits.variance[c] - self.prior_variance(c)).max(0.0).sqrt()),
             sigma_type_b: known.filter(|_| self.has_type_b).map(|c| self.by_type_b[c].sqrt()),
             moves_with_unseen: known.map(|c| self.moves[c]).filter(|m| *m > 0.0),
             sigma_with_unmodelled: with_unmodelled.filter(|s| s.is_finite()),

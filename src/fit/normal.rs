@@ -6,7 +6,7 @@
 //! block; the Gram matrix is collected per block and spread out at the end.
 
 use super::solve::{Normal, Problem};
-use super::whitening::{VisitNormals, Visit, Whitening};
+use super::whitening::{Visit, VisitNormals, Whitening};
 use crate::model::batch::{At, Batch, Scratch};
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;

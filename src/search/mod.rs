@@ -29,7 +29,7 @@ mod tests;
 
 pub use basis::Basis;
 pub use library::{Candidate, Library, Origin, Variant, without_rounding};
-pub use pairs::Pair;
 pub use moments::{Change, KEPT};
+pub use pairs::Pair;
 pub use scatter::{Supposed, scatter_that_fits};
 pub use score::{LackOfFit, PureError, Question, Score, Search, lack_of_fit};

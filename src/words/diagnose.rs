@@ -249,7 +249,10 @@ fn oversized(o: &Oversized) -> String {
     let (value, unit, effect) = (o.value, &o.unit, &o.effect);
     match o.wrong_sign {
         true => format!("But {} = {value:.3} {unit}: {effect} cannot be negative.{cause}", o.parameter),
-        false => format!("But {} = {value:.3} {unit} is {:.0} times the usual size of {effect}.{cause}", o.parameter, o.times),
+        false => format!(
+            "But {} = {value:.3} {unit} is {:.0} times the usual size of {effect}.{cause}",
+            o.parameter, o.times
+        ),
     }
 }
 

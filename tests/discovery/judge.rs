@@ -42,7 +42,7 @@ pub struct Outcome {
 
 pub const LEAN: Options = Options { at_most: 3, refit: false, power: false, planned: None };
 
-fn fit(bench: &Bench, touches: &[Vec<Touch>], more: &[String]) -> (Fit, Settings) {
+pub fn fit(bench: &Bench, touches: &[Vec<Touch>], more: &[String]) -> (Fit, Settings) {
     let runs: Vec<Run> = bench
         .runs
         .iter()
@@ -64,7 +64,7 @@ pub fn diagnosis(bench: &Bench, acts: &[&Act], seed: u64) -> Diagnosis {
     ask(bench, &fit, &settings)
 }
 
-fn ask(bench: &Bench, fit: &Fit, settings: &Settings) -> Diagnosis {
+pub fn ask(bench: &Bench, fit: &Fit, settings: &Settings) -> Diagnosis {
     let catalogue = Catalogue::built_in().unwrap();
     diagnose(Subject { machine: &bench.machine, catalogue: &catalogue, settings, fit }, &LEAN).unwrap()
 }
@@ -82,7 +82,7 @@ fn gaps(bench: &Bench, acts: &[&Act]) -> (DVector<f64>, Fit) {
 }
 
 /// The size of a fault, and its noncentrality at 1 µm of noise; `None` where the base model takes all of it.
-fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
+pub fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
     let (without, fit) = gaps(bench, &[base]);
     let (with, _) = gaps(bench, &[base, &*fault.at_size(1.0)]);
     if with.len() != without.len() {

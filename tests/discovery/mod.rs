@@ -2,7 +2,7 @@
 //! `effects.toml` nor the virtual machine (`src/simulate`): a mistake that these share with the model would stay hidden otherwise.
 //!
 //! `forward` moves the machine, `faults` and `more_faults` say what is wrong with it, `mistakes` what the user did wrong, `bench` makes
-//! the logs, `judge` asks the program and compares its answer with what was planted.
+//! the logs, `peers` writes cases for other methods, `judge` asks the program and compares its answer with what was planted.
 #![allow(dead_code)] // the example and the tests use parts of it
 
 pub mod bench;
@@ -11,3 +11,4 @@ pub mod forward;
 pub mod judge;
 pub mod mistakes;
 pub mod more_faults;
+pub mod peers;
