@@ -26,7 +26,7 @@ pub struct Oversized {
     pub check: String,
 }
 
-/// Of a fit, the largest in usual sizes first. Where blocks stand is no error of the machine, however far it is.
+/// Of a fit, those of the machine first, the largest in usual sizes first. Where blocks stand is no error, however far it is.
 pub(super) fn oversized(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> Vec<Oversized> {
     let mut out: Vec<Oversized> = fit
         .outcome
@@ -40,7 +40,9 @@ pub(super) fn oversized(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> 
             let positive = effect.parameters.iter().any(|e| e.name == u.own_name() && e.positive);
             let wrong_sign = positive && p.value < 0.0;
             let most = if wrong_sign { u.typical } else { PLAUSIBLE * u.typical };
-            if u.shape || u.is_set_up() || u.typical <= 0.0 || p.value.abs() - 2.0 * sigma <= most {
+            // a block that stands elsewhere is no matter; one that is turned may be another block
+            let is_place = u.is_set_up() && u.unit != "deg";
+            if u.shape || is_place || u.typical <= 0.0 || p.value.abs() - 2.0 * sigma <= most {
                 return None;
             }
             Some(Oversized {
@@ -56,6 +58,7 @@ pub(super) fn oversized(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> 
             })
         })
         .collect();
-    out.sort_by(|a, b| b.times.total_cmp(&a.times));
+    let of_block = |o: &Oversized| o.parameter.contains('@');
+    out.sort_by(|a, b| of_block(a).cmp(&of_block(b)).then(b.times.total_cmp(&a.times)));
     out
 }

@@ -1,10 +1,11 @@
 //! Two effects at once, before an effect of many parameters is named and before nothing is.
 
 use super::Examination;
-use super::decide::{Decision, Kind, bears_out};
+use super::decide::{Decision, Kind, LACK_OF_FIT, bears_out};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
-use crate::search::{Library, Origin, Pair};
+use crate::search::pattern_tests::Generics;
+use crate::search::{KEPT, Library, Origin, Pair, Question, Search, lack_of_fit};
 
 /// So many of the most significant groups are paired: effects that these touches cannot separate fill no list.
 const AMONG: usize = 10;
@@ -13,9 +14,9 @@ const AMONG: usize = 10;
 /// (1995) 111).
 const CLEARLY: f64 = 10.0;
 
-/// The pair that is to be named in place of what the tests of single effects decide: together they explain what no one does, and
-/// held-out touches bear them out.
-pub(super) fn both(seen: &Examination, decision: &Decision) -> Option<Pair> {
+/// The pair that is to be named in place of what the tests of single effects decide: together they explain all that no one does, no
+/// pattern says it with less, and held-out touches bear them out.
+pub(super) fn both(seen: &Examination, decision: &Decision, generics: &Generics) -> Option<Pair> {
     if decision.kind == Kind::TooFewTouches || decision.kind == Kind::Adequate {
         return None;
     }
@@ -31,11 +32,21 @@ pub(super) fn both(seen: &Examination, decision: &Decision) -> Option<Pair> {
             return None;
         }
     }
+    // a pattern without a name that says it with less is no pair of names
+    let patterns = Search::new(search.question, &generics.library);
+    if patterns.leading_shape().is_some_and(|shape| patterns.bic(shape) < pair.bic) {
+        return None;
+    }
     let mut library = Library::new(search.library.n_rows());
     let columns = [pair.first, pair.second].map(|c| search.columns(c));
     let width = columns[0].ncols() + columns[1].ncols();
     let mut joint = columns[0].clone().resize_horizontally(width, 0.0);
     joint.columns_mut(columns[0].ncols(), columns[1].ncols()).copy_from(&columns[1]);
+    let mut base = search.question.base.clone();
+    base.extend(&joint, KEPT);
+    if lack_of_fit(&Question { base: &base, ..search.question }).p < LACK_OF_FIT {
+        return None;
+    }
     library.push("both", Origin::Catalogue, &joint);
     let held = held_out(search.question, &library, &seen.evidence.visits, Choice::Given(0));
     bears_out(&held).then_some(pair)

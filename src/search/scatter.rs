@@ -42,8 +42,8 @@ impl Tested {
     }
 }
 
-/// An upper bound of the scatter once the candidates are in the model that pass their test, each averaged over the scatters that are likely with
-/// it, one after the other, `at_most` of them.
+/// The scatter that is to be expected once the candidates are in the model that pass their test, each averaged over the scatters that are likely with
+/// it, one after the other, `at_most` of them. Where none passes, an upper bound.
 #[must_use]
 pub fn scatter_that_fits(
     mut supposed: Vec<Supposed>,
@@ -55,7 +55,8 @@ pub fn scatter_that_fits(
     for step in 0.. {
         let tested: Vec<Tested> = supposed.par_iter().map(|s| tested(s, library, pure)).collect();
         let deviance: Vec<f64> = tested.iter().map(|t| t.deviance).collect();
-        let bound = upper(&weights(&taus, &deviance), &taus);
+        // with nothing in the model tests must not be sure of a scatter that is not
+        let bound = root_mean_square(&weights(&taus, &deviance), &taus, if step == 0 { 1.0 } else { 0.0 });
         if step == at_most {
             return bound;
         }
@@ -72,11 +73,11 @@ pub fn scatter_that_fits(
     0.0
 }
 
-/// The root of the mean square and one standard deviation of it: tests must not be sure of a scatter that is not.
-fn upper(weights: &[f64], taus: &[f64]) -> f64 {
+/// The root of the mean square and some standard deviations of it.
+fn root_mean_square(weights: &[f64], taus: &[f64], deviations: f64) -> f64 {
     let mean = |of: &dyn Fn(f64) -> f64| weights.iter().zip(taus).map(|(w, tau)| w * of(tau * tau)).sum::<f64>();
     let square = mean(&|t| t);
-    (square + mean(&|t| (t - square).powi(2)).sqrt()).sqrt()
+    (square + deviations * mean(&|t| (t - square).powi(2)).sqrt()).sqrt()
 }
 
 fn tested(supposed: &Supposed, library: &Library, pure: Option<PureError>) -> Tested {
