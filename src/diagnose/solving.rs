@@ -237,9 +237,10 @@ pub fn solve(request: Request, host: &mut dyn Host) -> Result<Ending> {
             taken_back.extend(news);
             break Stop::Refused(refusal);
         }
-        added.extend(news.into_iter().map(|id| Added {
+        let of = |id: &String| state.found.candidates.iter().find(|c| c.effect == *id).unwrap_or(&proposal).clone();
+        added.extend(news.into_iter().enumerate().map(|(k, id)| Added {
+            proposal: if k == 0 { proposal.clone() } else { of(&id) },
             id,
-            proposal: proposal.clone(),
             name_in_doubt: state.found.verdict.name_in_doubt(),
             rms_um: (state.fit.outcome.rms_um, after.outcome.rms_um),
         }));
