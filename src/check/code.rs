@@ -146,8 +146,14 @@ pub enum Instruction {
         most: usize,
         text: Text,
     },
-    /// A subroutine: the number of its first statement.
-    Call(usize),
+    /// A subroutine: the number of its first statement, and what its own variables are given.
+    Call {
+        to: usize,
+        /// By variable of the subroutine; those that are not named have no value.
+        gives: Vec<(Var, Expr)>,
+        /// It is a step of the program's body: what happens within is told at the place of the call.
+        is_step: bool,
+    },
     /// Back to where it was called.
     Return(Option<Expr>),
     /// A message to the operator.
@@ -234,6 +240,20 @@ impl Code {
     /// Notes what is not known, and what of it.
     pub fn is_unknown_of(&mut self, kind: UnknownKind, at: Range<usize>, name: impl Into<String>) {
         self.unknown.push(Unknown { at, name: name.into(), kind });
+    }
+
+    /// Lets a jump or a call lead to a statement.
+    pub fn aim(&mut self, statement: usize, target: usize) {
+        if let Some(Instruction::Jump(to) | Instruction::JumpUnless(_, to) | Instruction::Call { to, .. }) =
+            self.statements.get_mut(statement).map(|s| &mut s.what)
+        {
+            *to = target;
+        }
+    }
+
+    /// Lets a jump lead to the statement that comes next.
+    pub fn aim_here(&mut self, statement: usize) {
+        self.aim(statement, self.statements.len());
     }
 
     /// Adds a statement and gives its place.

@@ -504,6 +504,13 @@ pub struct Check {
     /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
     #[schemars(with = "String")]
     pub from: Spanned<String>,
+    /// The variable with the feed of positioning, which a person may lower; a line near the top of the program sets it.
+    pub feed: Option<String>,
+    /// The variable with the height of the dry run: 0 measures, more lifts all moves by so much and measures nothing.
+    pub dry_run: Option<String>,
+    /// Blocks that a person may put in anywhere, e.g. `M88`: what they switch moves nothing and is not the probe's.
+    #[serde(default)]
+    pub harmless: Vec<String>,
     /// What the macros of a package do, which a program calls (G65): only of Fanuc and Haas.
     #[serde(default)]
     pub call: Vec<CallRule>,

@@ -62,6 +62,9 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         CheckRule {
             dialect: c.dialect,
             from: c.from.get_ref().clone(),
+            feed: c.feed.clone(),
+            dry_run: c.dry_run.clone(),
+            harmless: c.harmless.clone(),
             leaves: c.leaves.clone(),
             stays_on: c.stays_on.clone(),
             further_offsets: c.further_offsets.as_ref().map_or(FANUC_OFFSETS, |g| {
@@ -110,6 +113,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         unverified: std::mem::take(&mut check.unverified),
         tables: file.tables.clone(),
         releases: file.release.clone(),
+        dry_run_mm: 0.0,
         text: text.clone(),
         templates,
     };
@@ -513,6 +517,16 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
             return Err(minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what));
         }
         Ok(words.join(" "))
+    });
+    env.add_filter("values", |words: minijinja::Value, before: String, behind: String| -> Result<String, minijinja::Error> {
+        let one = |w: minijinja::Value| w.get_attr("value").map(|value| format!("{before}{value}{behind}"));
+        let values: Vec<String> = words.try_iter()?.map(one).collect::<Result<_, _>>()?;
+        // a mistyped name would leave arguments of a call away
+        if values.is_empty() || values.iter().any(|v| v.contains("undefined")) {
+            let what = "`values` was given nothing: is the name before it mistyped?";
+            return Err(minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what));
+        }
+        Ok(values.join(" "))
     });
     let rule = comment.clone();
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {

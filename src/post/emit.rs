@@ -1,5 +1,6 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
+mod routines;
 mod touch;
 
 use super::as_written::LengthUnit;
@@ -30,9 +31,7 @@ impl Postprocessor {
     pub fn program(&self, machine: &Machine, plan: &Plan, path: &Path) -> Result<NcProgram> {
         let mut writer = Writer::new(self, machine, plan, path)?;
         writer.start()?;
-        let opening = Opening::from_path(path, machine, writer.frame.is_tcp());
-        let (first, rest) = (opening.steps.clone(), opening.rest.clone());
-        writer.opening = opening;
+        let (first, rest) = (writer.opening.steps.clone(), writer.opening.rest.clone());
         writer.open(&first)?;
         writer.steps(&rest)?;
         writer.end()?;
@@ -52,6 +51,8 @@ pub(super) struct Writer<'a> {
     pub(super) plan: &'a Plan,
     pub(super) machine: &'a Machine,
     pub(super) path: &'a Path,
+    /// Blocks and faces that are touched: a control without texts in its arguments calls them by their number.
+    pub(super) faces: Vec<&'a str>,
     pub(super) frame: Frame<'a>,
     pub(super) axes: Vec<AxisName>,
     pub(super) text: String,
@@ -83,6 +84,8 @@ pub(super) struct Writer<'a> {
     heading_back: Vec<Value>,
     way: String,
     back_off: String,
+    /// Where the touch made last began.
+    pub(super) began: AxisMap,
     /// A move has been written.
     moving: bool,
     /// What all templates are given that is the same in the whole program.
@@ -171,6 +174,7 @@ impl<'a> Writer<'a> {
             plan,
             machine,
             path,
+            faces: routines::faces(path),
             frame,
             axes,
             text: String::new(),
@@ -180,7 +184,7 @@ impl<'a> Writer<'a> {
             label: 2 * LABELS_PER_STEP,
             at,
             loose: false,
-            opening: Opening::default(),
+            opening: Opening::from_path(path, machine, frame.is_tcp()),
             senses: AxisMap::default(),
             oriented: None,
             mounted: path.mounted.clone(),
@@ -192,6 +196,7 @@ impl<'a> Writer<'a> {
             heading_back: Vec::new(),
             way: String::new(),
             back_off: String::new(),
+            began: AxisMap::default(),
             moving: false,
             of_program: Value::UNDEFINED,
         };
@@ -253,8 +258,10 @@ impl<'a> Writer<'a> {
         context! {
             label => self.label,
             next => next.id,
+            next_face => self.face(&next.says),
             next_says => next.says,
             last => self.last.id,
+            last_face => self.face(&self.last.says),
             last_says => self.last.says.clone(),
             first_move => !self.moving,
             ..self.of_program.clone()
@@ -288,6 +295,7 @@ impl<'a> Writer<'a> {
             log_name => self.post.log_name(self.plan)?,
             log_head => log_text::head(self.post, self.plan),
             log_end => log_text::end(self.plan),
+            ..self.of_routines()?
         })
     }
 
@@ -392,7 +400,7 @@ impl<'a> Writer<'a> {
             }
             Step::Rapid { to } => {
                 let words = self.words(&self.linear_words(to)?)?;
-                self.render("rapid", context! { to => words })?;
+                self.render("rapid", context! { to => words, place => self.place(to)? })?;
                 self.moving = true;
                 self.moved(to);
                 Ok(())
@@ -406,7 +414,8 @@ impl<'a> Writer<'a> {
                 let named = self.linear_words(to)?;
                 let words = self.words(&named)?;
                 let (heading, length) = self.straight(to, &named);
-                self.render("protected", context! { to => words, feed => self.feed(*feed)?, heading, length })?;
+                let place = self.place(to)?;
+                self.render("protected", context! { to => words, place, feed => self.feed(*feed)?, heading, length })?;
                 self.moved(to);
                 Ok(())
             }
@@ -415,6 +424,8 @@ impl<'a> Writer<'a> {
                 let words = self.words(&self.linear_words(to)?)?;
                 let context = context! {
                     to => words,
+                    place => self.place(to)?,
+                    to_start => self.is_start(to),
                     feed => self.feed(*feed)?,
                     approach => self.approach.clone(),
                     heading => self.heading_back.clone(),
@@ -493,7 +504,8 @@ impl<'a> Writer<'a> {
         let senses = map(sense.iter().map(|(a, s)| (a.to_string(), sign(s).to_owned())));
         for place in self.rotary_steps(&self.at, to)? {
             let words = self.words_by(&place, sense)?;
-            self.render("rotary", context! { to => words, sense => senses.clone() })?;
+            let turned = self.turned(&place, sense)?;
+            self.render("rotary", context! { to => words, turned, sense => senses.clone() })?;
             self.moving = true;
         }
         self.moved(to);

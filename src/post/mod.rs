@@ -93,6 +93,8 @@ pub struct Postprocessor {
     pub tables: Option<tables::Tables>,
     /// Versions of LinuxCNC.
     pub releases: Vec<Release>,
+    /// Height of a dry run, mm; 0: the program measures.
+    pub dry_run_mm: f64,
     /// The file as it was read.
     pub text: String,
     templates: minijinja::Environment<'static>,
@@ -118,6 +120,12 @@ pub struct CheckRule {
     pub dialect: DialectName,
     /// The variable that says at which set-up the program begins.
     pub from: String,
+    /// The variable with the feed of positioning.
+    pub feed: Option<String>,
+    /// The variable with the height of the dry run.
+    pub dry_run: Option<String>,
+    /// Blocks that a person may put in anywhere.
+    pub harmless: Vec<String>,
     /// The program neither names nor opens a log.
     pub log_always_open: bool,
     /// Words behind which macro statements wait.

@@ -175,7 +175,7 @@ impl<'a> Reader<'a> {
             }
         } else if scan.take("CALL LBL ") {
             let label = self.label(scan)?;
-            let call = self.code.push(at.clone(), Instruction::Call(0));
+            let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), is_step: true });
             self.jumps.push((call, label, at));
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
             self.opened(at, Cycle::Probe);
@@ -342,7 +342,7 @@ impl<'a> Reader<'a> {
             self.code.push(at.clone(), Instruction::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
         let jump = self.code.push(at.clone(), Instruction::Jump(0));
         self.jumps.push((jump, label, at));
-        self.aim(over, jump + 1);
+        self.code.aim(over, jump + 1);
         Ok(())
     }
 
@@ -482,15 +482,6 @@ impl<'a> Reader<'a> {
         Ok(true)
     }
 
-    fn aim(&mut self, jump: usize, to: usize) {
-        if let Some(statement) = self.code.statements.get_mut(jump)
-            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) | Instruction::Call(place) =
-                &mut statement.what
-        {
-            *place = to;
-        }
-    }
-
     fn finish(mut self, end: usize) -> Result<Code, Fault> {
         if !self.ended {
             return Err(Fault { at: end..end, says: "the program ends without END PGM".to_owned() });
@@ -499,7 +490,7 @@ impl<'a> Reader<'a> {
             let Some(to) = self.labels.get(&label).copied() else {
                 return Err(Fault { at, says: format!("there is no LBL {label}") });
             };
-            self.aim(jump, to);
+            self.code.aim(jump, to);
         }
         Ok(self.code)
     }

@@ -125,7 +125,7 @@ impl Reader<'_> {
             let over = self.code.push(at.clone(), Instruction::JumpUnless(condition, 0));
             let left = self.goto(line, after, at)?;
             let here = self.code.statements.len();
-            self.aim(over, here);
+            self.code.aim(over, here);
             return Ok(left);
         }
         if rest.starts_with("GOTO") {
@@ -240,14 +240,6 @@ impl Reader<'_> {
         }
     }
 
-    fn aim(&mut self, jump: usize, to: usize) {
-        if let Some(statement) = self.code.statements.get_mut(jump)
-            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) = &mut statement.what
-        {
-            *place = to;
-        }
-    }
-
     fn finish(mut self, end: usize) -> Result<Code, Fault> {
         if self.percents != 2 {
             return Err(Fault { at: end..end, says: "the program ends without its second %".to_owned() });
@@ -259,7 +251,7 @@ impl Reader<'_> {
             let Some((to, _)) = self.labels.get(&label).copied() else {
                 return Err(Fault { at, says: format!("there is no N{label}") });
             };
-            self.aim(jump, to);
+            self.code.aim(jump, to);
         }
         Ok(self.code)
     }

@@ -315,7 +315,7 @@ impl Reader {
             return Ok(left);
         }
         let left = self.goto(line, left, at)?;
-        self.aim(over, self.code.statements.len());
+        self.code.aim_here(over);
         Ok(left)
     }
 
@@ -404,14 +404,14 @@ impl Reader {
         match (keyword, open) {
             ("ELSE", Open::If { over, end: None }) => {
                 let end = self.code.push(at, Instruction::Jump(0));
-                self.aim(over, self.code.statements.len());
+                self.code.aim_here(over);
                 // another part: a jump from one into the other goes into a structure
                 self.opened(Open::If { over, end: Some(end) }, begun);
             }
-            ("ENDIF", Open::If { over, end }) => self.aim(end.unwrap_or(over), self.code.statements.len()),
+            ("ENDIF", Open::If { over, end }) => self.code.aim_here(end.unwrap_or(over)),
             ("ENDWHILE", Open::While { start, out }) => {
                 self.code.push(at, Instruction::Jump(start));
-                self.aim(out, self.code.statements.len());
+                self.code.aim_here(out);
             }
             ("ENDLOOP", Open::Loop { start }) => {
                 self.code.push(at, Instruction::Jump(start));
@@ -424,14 +424,6 @@ impl Reader {
             _ => return Err(alone()),
         }
         Ok(after)
-    }
-
-    fn aim(&mut self, jump: usize, to: usize) {
-        if let Some(statement) = self.code.statements.get_mut(jump)
-            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) = &mut statement.what
-        {
-            *place = to;
-        }
     }
 
     fn finish(mut self, end: usize) -> Result<Code, Fault> {
@@ -456,7 +448,7 @@ impl Reader {
             if !jump.inside.starts_with(&inside) {
                 return Err(lacks(format!("the label {label} stands inside of an IF or a loop")));
             }
-            self.aim(jump.statement, to);
+            self.code.aim(jump.statement, to);
         }
         Ok(self.code)
     }

@@ -46,6 +46,7 @@ impl Writer<'_> {
         let context = context! {
             id => touch.id,
             says => touch.says.clone(),
+            face => self.face(&touch.says),
             first => touch.first,
             before => self.met_before(touch),
             end => self.words(&target)?,
@@ -70,6 +71,7 @@ impl Writer<'_> {
         self.heading_back = target.iter().map(|(axis, _)| back(axis)).collect();
         self.way = self.length((nominal - start).norm());
         self.back_off = self.length(touch.back_off_mm);
+        self.began = touch.start.or(&stands);
         self.at = touch.end.or(&stands);
         self.loose = true;
         Ok(())
