@@ -151,11 +151,15 @@ pub enum Instruction {
         to: usize,
         /// By variable of the subroutine; those that are not named have no value.
         gives: Vec<(Var, Expr)>,
+        /// The same of those that hold a text.
+        texts: Vec<(Var, Text)>,
         /// It is a step of the program's body: what happens within is told at the place of the call.
         is_step: bool,
     },
     /// Back to where it was called.
     Return(Option<Expr>),
+    /// Out of all subroutines, on at a statement of the program itself.
+    Leave(usize),
     /// A message to the operator.
     Message(Text),
     /// A log is opened; `append`: what it holds is kept.
@@ -244,7 +248,7 @@ impl Code {
 
     /// Lets a jump or a call lead to a statement.
     pub fn aim(&mut self, statement: usize, target: usize) {
-        if let Some(Instruction::Jump(to) | Instruction::JumpUnless(_, to) | Instruction::Call { to, .. }) =
+        if let Some(Instruction::Jump(to) | Instruction::Leave(to) | Instruction::JumpUnless(_, to) | Instruction::Call { to, .. }) =
             self.statements.get_mut(statement).map(|s| &mut s.what)
         {
             *to = target;

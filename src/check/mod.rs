@@ -10,6 +10,7 @@
 //! [`crate::simulate`].
 
 mod branches;
+mod called;
 mod checked_program;
 mod code;
 mod doubt;
@@ -102,6 +103,18 @@ struct Part {
 /// # Errors
 /// When the text is not of the dialect's grammar, or plan and machine do not belong together.
 pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
+    let whole = called::Whole::new(source, post, against.beside);
+    match check_whole(machine, post, &whole.source, against) {
+        Ok(mut checked) => {
+            checked.findings = checked.findings.into_iter().map(|finding| whole.told(finding)).collect();
+            Ok(checked)
+        }
+        Err(Failure(findings)) => Err(Failure(findings.into_iter().map(|finding| whole.told(finding)).collect())),
+    }
+}
+
+/// A program with those that it calls, as one text.
+fn check_whole(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
     let mut program = read(post, source, against.beside)?;
     let unknown = match against.plan {
         // what was edited comes first, and then what the control says to it
@@ -221,7 +234,8 @@ fn number(post: &Postprocessor, program: &runs::Program, source: &Source) -> Res
 /// # Errors
 /// The first place that is not of the grammar.
 pub fn grammar(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<()> {
-    let foreign = refuse_unknown(read(post, source, beside)?.unknown_of_grammar(), source)?;
+    let whole = called::Whole::new(source, post, beside);
+    let foreign = refuse_unknown(read(post, &whole.source, beside)?.unknown_of_grammar(), &whole.source)?;
     if foreign.is_empty() { Ok(()) } else { Err(Failure(foreign)) }
 }
 
@@ -266,7 +280,8 @@ fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> R
 /// The names of the files that a program needs beside it at the control and that say what it writes.
 #[must_use]
 pub fn wanted_beside(post: &Postprocessor, program: &Source) -> Vec<String> {
-    if post.companions.is_empty() { Vec::new() } else { heidenhain::wanted(program.inner(), post) }
+    let masks = if post.companions.is_empty() { Vec::new() } else { heidenhain::wanted(program.inner(), post) };
+    masks.into_iter().chain(called::wanted(program.inner(), post)).collect()
 }
 
 /// Tries each mounting of the machine and takes the one on which most touches are made.

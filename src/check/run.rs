@@ -251,9 +251,9 @@ pub struct Run<'p, D> {
     writes_to: Option<String>,
     /// No log takes a line any more.
     log_is_full: bool,
-    /// Runs in which there is trouble at a statement are kept: place in the record, what, and the run at that statement.
+    /// Runs in which there is trouble at a statement are kept: what, and the run at that statement.
     pub keeps_forks: bool,
-    forks: Vec<(usize, Trouble, Self)>,
+    forks: Vec<(Trouble, Self)>,
     /// What of its values is not known.
     pub doubts: Doubts,
     pub(super) doubted: Vec<Fork<'p, D>>,
@@ -299,7 +299,7 @@ impl<'p, D: Dialect> Run<'p, D> {
     }
 
     /// Takes the runs in which there is trouble.
-    pub fn take_forks(&mut self) -> Vec<(usize, Trouble, Self)> {
+    pub fn take_forks(&mut self) -> Vec<(Trouble, Self)> {
         std::mem::take(&mut self.forks)
     }
 
@@ -341,7 +341,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                 fork.vm.note(Event::Other("the probe is deflected".to_owned()));
             }
         }
-        self.forks.push((self.vm.trace.len(), trouble, fork));
+        self.forks.push((trouble, fork));
     }
 
     /// The statement that stands here in place of the program's.
@@ -494,13 +494,17 @@ impl<'p, D: Dialect> Run<'p, D> {
                     self.next = *to;
                 }
             }
-            Instruction::Call { to, gives, is_step } => {
+            Instruction::Call { to, gives, texts, is_step } => {
                 const DEEPEST: usize = 10;
                 if self.returns.len() >= DEEPEST {
                     return Err("subroutines call each other more than ten deep".to_owned());
                 }
                 let given = |(var, expr): &(Var, Expr)| Ok((var.clone(), self.value(expr)?, self.doubt(expr)));
                 let given = gives.iter().map(given).collect::<Result<Vec<_>, String>>()?;
+                for (var, text) in texts {
+                    let text = self.text(text)?;
+                    self.texts.insert(var.clone(), text);
+                }
                 let outer = self.returns.last().and_then(|back| back.step.clone());
                 let step = outer.or_else(|| is_step.then(|| statement.at.clone()));
                 self.returns.push(Return { next: self.next, step });
@@ -517,6 +521,12 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?.next;
                 self.dialect.left(value, &self.vm);
                 self.given(&Var::Name("_value".into()), doubt);
+            }
+            Instruction::Leave(to) => {
+                while self.returns.pop().is_some() {
+                    self.dialect.left(None, &self.vm);
+                }
+                self.next = *to;
             }
             Instruction::Message(text) => self.say(text, Event::Message)?,
             Instruction::Wait(text) => self.say(text, Event::Wait)?,

@@ -58,10 +58,7 @@ impl Program {
             DialectName::Klartext => heidenhain::parse(text, post, masks)?,
             DialectName::Sinumerik => sinumerik::parse(text, post)?,
         };
-        let set_at = |var: &Var| {
-            code.statements.iter().position(|s| matches!(&s.what, Instruction::Set(v, Expr::Number(_)) if v == var))
-        };
-        let switch = |var: Var| set_at(&var).map(|at| (var, at));
+        let switch = |var: Var| set_at(&code, &var).map(|at| (var, at));
         let var = variable(&rule.from);
         let from = switch(var.clone());
         let dry_run = rule.dry_run.as_deref().map(variable).and_then(switch);
@@ -173,7 +170,7 @@ impl Program {
         of(&Rules {
             // Fanuc and Haas: a number without its point counts least increments
             points: self.dialect == DialectName::MacroB,
-            switches: switches.map(|written| variable(written)).collect(),
+            switches: switches.filter_map(|written| set_at(&self.code, &variable(written))).collect(),
             harmless: &|statement| harmless::of(statement, post),
         })
     }
@@ -210,6 +207,11 @@ impl Program {
         [(&self.from, f64::from(setup)), (&self.dry_run, height)].into_iter().filter_map(own).collect()
     }
 
+}
+
+/// The statement that gives a variable its number first.
+fn set_at(code: &Code, var: &Var) -> Option<usize> {
+    code.statements.iter().position(|s| matches!(&s.what, Instruction::Set(v, Expr::Number(_)) if v == var))
 }
 
 /// `#<_axiscal_from>`, `#100`, `Q1600`, `AXC_FROM` as a variable.

@@ -21,8 +21,8 @@ const DIGITS: usize = 4;
 pub struct Rules<'a> {
     /// To this control a number with its decimal point is another than the one without.
     pub points: bool,
-    /// Variables that a person sets in the head: where it begins, how fast it positions, whether it only tries.
-    pub switches: Vec<Var>,
+    /// Statements of the head with which a person says where it begins, how fast it positions, whether it only tries.
+    pub switches: Vec<usize>,
     /// What may have been put in.
     pub harmless: &'a dyn Fn(&Statement) -> Option<Harmless>,
 }
@@ -173,9 +173,13 @@ impl<'a> Speller<'a> {
                 let to = self.target(place, *to);
                 let _ = writeln!(self.text, "unless {condition:?} jump {to}");
             }
-            Instruction::Call { to, gives, .. } => {
+            Instruction::Leave(to) => {
                 let to = self.target(place, *to);
-                let _ = writeln!(self.text, "call {to} with {gives:?}");
+                let _ = writeln!(self.text, "leave for {to}");
+            }
+            Instruction::Call { to, gives, texts, .. } => {
+                let to = self.target(place, *to);
+                let _ = writeln!(self.text, "call {to} with {gives:?} {texts:?}");
             }
             Instruction::Block(words) if !self.rules.points => {
                 words.iter().for_each(|w| {
@@ -183,7 +187,7 @@ impl<'a> Speller<'a> {
                 });
                 self.text.push('\n');
             }
-            Instruction::Set(var, Expr::Number(_)) if self.rules.switches.contains(var) => {
+            Instruction::Set(var, Expr::Number(_)) if self.rules.switches.contains(&place) => {
                 let _ = writeln!(self.text, "switch {var}");
             }
             Instruction::Message(text) => self.show("message", text),

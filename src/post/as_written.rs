@@ -116,6 +116,8 @@ pub struct ProgramFile {
     /// For a character that may not.
     #[serde(default = "name_other")]
     pub name_other: String,
+    /// Numbers of labels from one set-up to the next; absent: 10.
+    pub labels_per_step: Option<usize>,
     /// The highest number of a label; absent: any.
     pub last_label: Option<usize>,
     /// The highest number of a program (`program_number` in `[settings]`), Fanuc and Haas; absent: 9999.
@@ -508,6 +510,8 @@ pub struct Check {
     pub feed: Option<String>,
     /// The variable with the height of the dry run: 0 measures, more lifts all moves by so much and measures nothing.
     pub dry_run: Option<String>,
+    /// Names of the files with the programs that a program calls, from `{name}`: `O{name}.nc`, `{name}.spf`.
+    pub called_file: Option<String>,
     /// Blocks that a person may put in anywhere, e.g. `M88`: what they switch moves nothing and is not the probe's.
     #[serde(default)]
     pub harmless: Vec<String>,

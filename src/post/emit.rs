@@ -41,9 +41,9 @@ impl Postprocessor {
 
 /// Numbers and names of a touch, for messages.
 #[derive(Debug, Clone, Default)]
-struct Named {
-    id: u64,
-    says: String,
+pub(super) struct Named {
+    pub(super) id: u64,
+    pub(super) says: String,
 }
 
 pub(super) struct Writer<'a> {
@@ -84,6 +84,8 @@ pub(super) struct Writer<'a> {
     heading_back: Vec<Value>,
     way: String,
     back_off: String,
+    /// What was given to the routines last in this set-up, by its name: a control with one argument a line gives it once.
+    pub(super) said: BTreeMap<String, String>,
     /// Where the touch made last began.
     pub(super) began: AxisMap,
     /// A move has been written.
@@ -196,6 +198,7 @@ impl<'a> Writer<'a> {
             heading_back: Vec::new(),
             way: String::new(),
             back_off: String::new(),
+            said: BTreeMap::new(),
             began: AxisMap::default(),
             moving: false,
             of_program: Value::UNDEFINED,
@@ -238,7 +241,8 @@ impl<'a> Writer<'a> {
     pub(super) fn render(&mut self, template: &str, context: Value) -> Result<()> {
         let rendered = self.post.render(template, context! { ..context, ..self.common() })?;
         if self.post.uses_labels(template) {
-            self.label += LABELS_PER_STEP;
+            // the head names more of them
+            self.label += if template == "start" { LABELS_PER_STEP } else { self.post.labels_per_step };
             if let Some(last) = self.post.last_label.filter(|last| self.label > *last) {
                 let message = format!("the program needs more labels than the {last} of controller {}", self.post.name);
                 return Err(Failure::new("post::labels", message).help("split it: fewer touches in one program"));
@@ -315,7 +319,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The touch that comes next, or the last one when none does.
-    fn next_touch(&self) -> Named {
+    pub(super) fn next_touch(&self) -> Named {
         let named = |t: &TouchStep| Named { id: t.id, says: t.says.clone() };
         let touch = |s: &'a Step| if let Step::Touch(t) = s { Some(t) } else { None };
         let (before, after) = self.path.steps.split_at(self.index.min(self.path.steps.len()));
@@ -391,7 +395,10 @@ impl<'a> Writer<'a> {
     pub(super) fn step(&mut self, step: &Step) -> Result<()> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
-            Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),
+            Step::Setup { number, says, resume } => {
+                self.said.clear();
+                self.setup(*number, says, resume.as_deref())
+            }
             Step::Stop(stop) => self.stop(stop),
             Step::OrientSpindle { deg } => {
                 let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
@@ -400,7 +407,8 @@ impl<'a> Writer<'a> {
             }
             Step::Rapid { to } => {
                 let words = self.words(&self.linear_words(to)?)?;
-                self.render("rapid", context! { to => words, place => self.place(to)? })?;
+                let place = self.place(to)?;
+                self.render("rapid", context! { to => words, place })?;
                 self.moving = true;
                 self.moved(to);
                 Ok(())
@@ -415,17 +423,20 @@ impl<'a> Writer<'a> {
                 let words = self.words(&named)?;
                 let (heading, length) = self.straight(to, &named);
                 let place = self.place(to)?;
-                self.render("protected", context! { to => words, place, feed => self.feed(*feed)?, heading, length })?;
+                let announces = self.announces();
+                self.render("protected", context! { to => words, place, announces, feed => self.feed(*feed)?, heading, length })?;
                 self.moved(to);
                 Ok(())
             }
             Step::Touch(touch) => self.touch(touch),
             Step::Retract { to, feed } => {
                 let words = self.words(&self.linear_words(to)?)?;
+                let to_start = self.is_start(to);
+                let place = if to_start { Value::from(()) } else { self.place(to)? };
                 let context = context! {
                     to => words,
-                    place => self.place(to)?,
-                    to_start => self.is_start(to),
+                    place,
+                    to_start,
                     feed => self.feed(*feed)?,
                     approach => self.approach.clone(),
                     heading => self.heading_back.clone(),
@@ -539,12 +550,16 @@ impl<'a> Writer<'a> {
     fn beside(&self) -> Result<Vec<SideFile>> {
         let one = |(index, says): (usize, &String)| {
             let name = self.post.render(&format!("companion {index} name"), self.common())?;
-            let mut text = self.post.render(&format!("companion {index}"), self.common())?;
-            text.push('\n');
+            // this program has no such file
+            if name.trim().is_empty() {
+                return Ok(None);
+            }
+            let text = self.post.render(&format!("companion {index}"), self.common())?;
+            let text: String = text.lines().filter(|l| self.post.keeps(l)).flat_map(|l| [l, "\n"]).collect();
             let name = name_of(name.trim(), |c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_'));
-            Ok(SideFile { name, says: says.clone(), text: self.post.ended(text) })
+            Ok(Some(SideFile { name, says: says.clone(), text: self.post.ended(text) }))
         };
-        self.post.companions.iter().enumerate().map(one).collect()
+        self.post.companions.iter().enumerate().filter_map(|c| one(c).transpose()).collect()
     }
 }
 

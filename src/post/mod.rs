@@ -65,6 +65,8 @@ pub struct Postprocessor {
     pub based_on: Option<String>,
     /// Characters of names at the control, and what stands for others.
     pub name_characters: (String, String),
+    /// Numbers of labels that a step takes.
+    pub labels_per_step: usize,
     /// The highest number of a label.
     pub last_label: Option<usize>,
     /// The highest number of a program.
@@ -124,6 +126,8 @@ pub struct CheckRule {
     pub feed: Option<String>,
     /// The variable with the height of the dry run.
     pub dry_run: Option<String>,
+    /// Names of the files with the programs that a program calls.
+    pub called_file: Option<String>,
     /// Blocks that a person may put in anywhere.
     pub harmless: Vec<String>,
     /// The program neither names nor opens a log.

@@ -105,7 +105,8 @@ impl<'a> Reader<'a> {
     }
 
     fn line(&mut self, line: &Line<'_>, at: usize) -> Result<(), Fault> {
-        let mut scan = Scan::new(*line, line.text, self.post.number.mark);
+        let text = line.text.trim_end_matches(' ');
+        let mut scan = Scan::new(Line { start: line.start, text }, text, self.post.number.mark);
         // at the end of a line, behind a remark too, it takes the next line into this block
         if let Some(at) = line.text.find('~') {
             let says = "~ goes on in the next line: axiscal reads blocks of one line";
@@ -175,7 +176,7 @@ impl<'a> Reader<'a> {
             }
         } else if scan.take("CALL LBL ") {
             let label = self.label(scan)?;
-            let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), is_step: true });
+            let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), texts: Vec::new(), is_step: true });
             self.jumps.push((call, label, at));
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
             self.opened(at, Cycle::Probe);
@@ -277,7 +278,7 @@ impl<'a> Reader<'a> {
         if scan.take(" FMAX") {
             words.push(number("FMAX", 0.0));
         } else if scan.take(" F") {
-            words.push(number("F", scan.unsigned("a feed")?));
+            words.push(word("F", scan.feed()?));
         }
         if scan.take_whole(" M91") {
             words.push(number("M91", 0.0));
@@ -469,7 +470,7 @@ impl<'a> Reader<'a> {
         scan.need(" DIST", "DIST")?;
         open.words.push(word("DIST", scan.signed("a way with its sign")?));
         scan.need(" F", "F and a feed")?;
-        open.words.push(number("F", scan.unsigned("a feed")?));
+        open.words.push(word("F", scan.feed()?));
         scan.need(" MB", "MB and the way back")?;
         open.words.push(number("MB", scan.unsigned("the way back")?));
         scan.need(" REFERENCE SYSTEM:", "REFERENCE SYSTEM:")?;

@@ -268,6 +268,8 @@ impl Ngc {
             20 | 300 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
             50 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
+            10 => vm.note(Event::Other("optional stop".to_owned())),
+            80 => vm.note(Event::Other("coolant on".to_owned())),
             90 => vm.note(Event::Other("coolant off".to_owned())),
             190 => vm.note(Event::Orient(value("R").ok_or("M19 needs R")?)),
             500 => self.modes.override_on = value("P") != Some(0.0),
@@ -372,7 +374,7 @@ impl Dialect for Ngc {
         let known_m = |m: f64| match m {
             // what they do stands outside of the program: outputs of the machine, programs of the user
             62.0..=65.0 | 67.0..=68.0 | 98.0 | 100.0..=199.0 => switches(m),
-            _ => [0.0, 2.0, 5.0, 9.0, 19.0, 30.0, 50.0, 66.0, 73.0].contains(&m) || switches(m),
+            _ => [0.0, 1.0, 2.0, 5.0, 8.0, 9.0, 19.0, 30.0, 50.0, 66.0, 73.0].contains(&m) || switches(m),
         };
         let mut unknown = Vec::new();
         for word in words.iter().filter(|w| w.value.is_finite()) {

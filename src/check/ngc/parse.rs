@@ -242,7 +242,7 @@ impl Reader {
                 // one that is not given is 0 at the control (manual 11.7.2); here it has no value, and may not be read
                 let is_step = !given.is_empty();
                 let gives = (1..).map(Var::Number).zip(given).collect();
-                let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives, is_step });
+                let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives, texts: Vec::new(), is_step });
                 self.calls.push((call, label, at));
                 left
             }

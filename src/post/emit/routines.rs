@@ -31,13 +31,41 @@ impl Writer<'_> {
     }
 
     /// X, Y and Z of where a move ends, all three of them; nothing where one is not known yet.
-    pub(super) fn place(&self, to: &AxisMap) -> Result<Value> {
+    pub(super) fn place(&mut self, to: &AxisMap) -> Result<Value> {
         let target = to.or(&self.at);
         if LINEAR.iter().any(|axis| target.get(*axis).is_none()) {
             return Ok(Value::from(()));
         }
         let at = self.controller(&target);
-        self.words(&AxisMap::xyz(at.0[0], at.0[1], at.0[2]))
+        self.fresh(&AxisMap::xyz(at.0[0], at.0[1], at.0[2]))
+    }
+
+    /// Words of a place, each with whether it is another one than was given last: `fresh`.
+    pub(super) fn fresh(&mut self, at: &AxisMap) -> Result<Value> {
+        let words = self.words(at)?;
+        let fresh: Vec<bool> = at
+            .iter()
+            .map(|(axis, value)| {
+                let word = self.post.number.position(axis, self.shown(axis, value));
+                self.is_fresh(&axis.to_string(), &word)
+            })
+            .collect();
+        let with = |(word, fresh): (Value, bool)| context! { fresh, ..word };
+        let words: Vec<Value> = words.try_iter().into_iter().flatten().zip(fresh).map(with).collect();
+        Ok(Value::from(words))
+    }
+
+    /// Is this another value than was given last under this name? It is given by that.
+    pub(super) fn is_fresh(&mut self, name: &str, value: &str) -> bool {
+        self.said.insert(name.to_owned(), value.to_owned()).is_none_or(|before| before != value)
+    }
+
+    /// Is the touch that comes next another one than was announced last? Its face, too, where that is another one.
+    pub(super) fn announces(&mut self) -> Value {
+        let next = self.next_touch();
+        let touch = self.is_fresh("touch", &next.id.to_string());
+        let face = self.is_fresh("face", &next.says);
+        if touch { context! { face } } else { Value::from(()) }
     }
 
     /// The arguments of a turn: all rotary axes, behind X, Y and Z under a transformation; nothing where one is not known yet.
