@@ -116,6 +116,9 @@ pub struct ProgramFile {
     /// For a character that may not.
     #[serde(default = "name_other")]
     pub name_other: String,
+    /// What the control needs before the program runs, for the notes beside it: machine data, options, files.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// Numbers of labels from one set-up to the next; absent: 10.
     pub labels_per_step: Option<usize>,
     /// The highest number of a label; absent: any.

@@ -100,6 +100,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         block_numbers: block_numbers.map(|rule| rule.get_ref().clone()),
         based_on: file.based_on.clone(),
         name_characters: (file.file.name_characters.clone(), file.file.name_other.clone()),
+        notes: file.file.notes.clone(),
         labels_per_step: file.file.labels_per_step.unwrap_or(10).clamp(1, 10),
         last_label: file.file.last_label,
         last_program: file.file.last_program,

@@ -1,5 +1,6 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
+mod notes;
 mod routines;
 mod touch;
 
@@ -240,9 +241,11 @@ impl<'a> Writer<'a> {
 
     pub(super) fn render(&mut self, template: &str, context: Value) -> Result<()> {
         let rendered = self.post.render(template, context! { ..context, ..self.common() })?;
-        if self.post.uses_labels(template) {
-            // the head names more of them
-            self.label += if template == "start" { LABELS_PER_STEP } else { self.post.labels_per_step };
+        // the head names more of them
+        let step = if template == "start" { LABELS_PER_STEP } else { self.post.labels_per_step };
+        let names_one = || (self.label..self.label + step).any(|label| rendered.contains(&label.to_string()));
+        if self.post.uses_labels(template) && names_one() {
+            self.label += step;
             if let Some(last) = self.post.last_label.filter(|last| self.label > *last) {
                 let message = format!("the program needs more labels than the {last} of controller {}", self.post.name);
                 return Err(Failure::new("post::labels", message).help("split it: fewer touches in one program"));
@@ -349,8 +352,12 @@ impl<'a> Writer<'a> {
             head.push(format!("{TOOL_PLACE}: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());
         }
-        for (entry, why) in &self.post.unverified {
-            head.push(format!("NOT VERIFIED on a real control: {entry}: {why}"));
+        match self.post.unverified.len() {
+            0 => {}
+            n => head.push(format!(
+                "NOT VERIFIED on a real control: {n} entries, see {}. Try the program in the control's simulation first",
+                self.notes_name()
+            )),
         }
         let near = self.path.start_near.as_ref().map(|near| {
             let window = |a: &crate::machine::Axis| {
@@ -557,9 +564,10 @@ impl<'a> Writer<'a> {
             let text = self.post.render(&format!("companion {index}"), self.common())?;
             let text: String = text.lines().filter(|l| self.post.keeps(l)).flat_map(|l| [l, "\n"]).collect();
             let name = name_of(name.trim(), |c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_'));
-            Ok(Some(SideFile { name, says: says.clone(), text: self.post.ended(text) }))
+            Ok(Some(SideFile { name, says: says.clone(), text: self.post.ended(text), to_control: true }))
         };
-        self.post.companions.iter().enumerate().filter_map(|c| one(c).transpose()).collect()
+        let companions = self.post.companions.iter().enumerate().filter_map(|c| one(c).transpose());
+        companions.chain([Ok(self.notes())]).collect()
     }
 }
 

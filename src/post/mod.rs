@@ -65,6 +65,8 @@ pub struct Postprocessor {
     pub based_on: Option<String>,
     /// Characters of names at the control, and what stands for others.
     pub name_characters: (String, String),
+    /// What the control needs before a program runs.
+    pub notes: Vec<String>,
     /// Numbers of labels that a step takes.
     pub labels_per_step: usize,
     /// The highest number of a label.

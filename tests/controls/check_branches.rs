@@ -162,14 +162,18 @@ fn a_condition_whose_ways_are_both_harmless_is_accepted() {
 #[test]
 fn what_goes_wrong_is_followed_on_the_other_way_too() {
     let written = Written::new("fanuc", "small.nc");
-    let guard = written.text.find("\nIF[ABS[#5063-[").map(|at| at + 1).unwrap();
-    let label = written.text[guard..].lines().next().unwrap().rsplit_once("GOTO").unwrap().1;
-    let (before, behind) = written.text.split_at(guard);
-    let (code, codes, answer) = written.check(&format!("{before}IF[#3001GT100000000.]GOTO{label}\n{behind}"));
-    assert!(code == 1 && codes.iter().any(|c| c == "check::goes_on"), "{answer:#}");
-    let stops = behind.replacen("\nGOTO9\n", "\nIF[#3001LT100000000.]GOTO9\n", 1);
-    let (code, codes, answer) = written.check(&format!("{before}{stops}"));
-    assert!(code == 1 && codes.iter().any(|c| c == "check::goes_on"), "{answer:#}");
+    let called = written.folder.path().join("O9102.nc");
+    let text = std::fs::read_to_string(&called).unwrap();
+    for (line, instead) in [
+        ("\nIF[ABS[#5061-#24]", "\nIF[#3001GT100000000.]GOTO2\nIF[ABS[#5061-#24]"),
+        ("\nM99 P9\n", "\nIF[#3001GT100000000.]GOTO2\nM99 P9\n"),
+    ] {
+        let edited = text.replacen(line, instead, 1);
+        assert_ne!(edited, text);
+        std::fs::write(&called, edited).unwrap();
+        let (code, codes, answer) = written.check(&written.text);
+        assert!(code == 1 && codes.iter().any(|c| c == "check::goes_on"), "{answer:#}");
+    }
 }
 
 /// What a block does must not hang on a clock.

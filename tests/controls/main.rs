@@ -18,6 +18,7 @@ mod edits;
 mod export_verb;
 mod foreign;
 mod generate;
+mod harmless;
 mod logs;
 mod logs_closed_loop;
 mod msr;

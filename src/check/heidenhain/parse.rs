@@ -20,6 +20,7 @@ use std::sync::Arc;
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fault> {
+    let text = &capitals(text);
     let mut reader = Reader::new(post, masks);
     let is_end = |line: &Line<'_>| line.text.is_empty() && line.start == text.len();
     let mut numbered = (0..).zip(lines(text)).take_while(|(_, line)| !is_end(line));
@@ -30,6 +31,16 @@ pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fa
     }
     read?;
     reader.finish(text.len())
+}
+
+/// Capitals and small letters are one, but for texts in quotes and names of files. No place changes by that.
+fn capitals(text: &str) -> String {
+    let line = |line: &str| {
+        let file = line.find("F-PRINT").or_else(|| line.find(['"', ';'])).unwrap_or(line.len());
+        let (block, rest) = line.split_at(file);
+        block.to_ascii_uppercase() + rest
+    };
+    text.split_inclusive('\n').map(line).collect()
 }
 
 /// A cycle whose further blocks must follow.
@@ -49,6 +60,7 @@ enum Cycle {
     DatumShift,
     Rotation,
     WorkingPlane,
+    Dwell,
 }
 
 struct Reader<'a> {
@@ -184,6 +196,7 @@ impl<'a> Reader<'a> {
         } else if scan.take("CYCL DEF ") {
             let kinds = [
                 ("13.0 ORIENTATION", Cycle::Orientation),
+                ("9.0 DWELL TIME", Cycle::Dwell),
                 ("7.0 DATUM SHIFT", Cycle::DatumShift),
                 ("10.0 ROTATION", Cycle::Rotation),
                 ("19.0 WORKING PLANE", Cycle::WorkingPlane),
@@ -427,6 +440,12 @@ impl<'a> Reader<'a> {
                 let angle = scan.signed("an angle with its sign")?;
                 scan.end()?;
                 self.code.push(at, Instruction::Block(vec![word("ANGLE", angle)]));
+            }
+            Cycle::Dwell => {
+                scan.need("CYCL DEF 9.1 DWELL", "CYCL DEF 9.1 DWELL")?;
+                let seconds = scan.unsigned("seconds")?;
+                scan.end()?;
+                self.code.push(at, Instruction::Block(vec![number("DWELL", seconds)]));
             }
             Cycle::DatumShift => {
                 scan.need(&format!("CYCL DEF 7.{}", open.stage), "the next block of the cycle: CYCL DEF 7.1")?;
