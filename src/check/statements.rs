@@ -53,7 +53,7 @@ pub fn record(code: &Code, rules: &Rules<'_>, text: &str) -> Proof {
         steps_sha256,
         steps: digits.chunks(PIECE).map(<[String]>::concat).collect(),
         texts_sha256,
-        text_sha256: hex(&Sha256::digest(text.replace("\r\n", "\n").as_bytes())),
+        text_sha256: hex(&Sha256::digest(text.as_bytes())),
         ..Proof::default()
     }
 }

@@ -500,6 +500,8 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
     env.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
     let rule = comment.clone();
     env.add_filter("note", move |text: String| rule.note(&text));
+    let rule = comment.clone();
+    env.add_filter("clean", move |text: String| rule.clean(&text));
     let rule = number.clone();
     env.add_filter("length", move |text: String| -> Result<String, minijinja::Error> {
         text.trim().parse::<f64>().map(|mm| rule.length(mm)).map_err(|_| {

@@ -58,8 +58,8 @@ fn edits_by_hand_are_caught() {
     for controller in ["linuxcnc", "fanuc", "haas"] {
         let mut original = original(controller, None);
         let linuxcnc = controller == "linuxcnc";
-        let rapid = if linuxcnc { "o<rapid> call [-33] [-3] [11.3]" } else { "G65 P9103 X-33. Y-3. Z11.3" };
-        let guarded = if linuxcnc { "o<guarded> call [-33] [-3] [10]" } else { "G65 P9102 A1. X-33. Y-3. Z10." };
+        let rapid = if linuxcnc { "o<rapid> call [-30] [0] [11.3]" } else { "G65 P9103 X-30. Y0. Z11.3" };
+        let guarded = if linuxcnc { "o<guarded> call [-30] [0] [10]" } else { "G65 P9102 A1. X-30. Y0. Z10." };
         let search = if linuxcnc { "o<touch> call [1] " } else { "G65 P9101 A1. " };
         let retract = if linuxcnc { "G38.3 X#<_axiscal_x>" } else { "G31 X#4 " };
         let t = original.text.clone();
@@ -82,7 +82,7 @@ fn edits_by_hand_are_caught() {
             }),
             ("a stop removed", {
                 let stop = if linuxcnc { "o<touch> return [0]" } else { "M99 P9" };
-                with(&t, stop, if linuxcnc { 4 } else { 1 }, &|_| String::new())
+                with(&t, stop, if linuxcnc { 5 } else { 1 }, &|_| String::new())
             }),
             ("the units not set", with(&t, "G21", 1, &|l| l.replace("G21 ", ""))),
             ("absolute coordinates not set", with(&t, "G21", 1, &|l| l.replace("G90 ", ""))),
@@ -155,7 +155,11 @@ fn edits_by_hand_of_a_klartext_program_are_caught() {
     let turn = with(&t, "L B-35", 1, &|l| format!("L Z-20 R0 FMAX M91\r\n{l}"));
     let mut wrong = Vec::new();
     for (what, text, code) in [
-        ("a sign changed", with(&t, "L X-", 1, &|l| l.replace("X-", "X+")), "check::not_the_plan"),
+        (
+            "a sign changed",
+            with(&t, "FN 0: Q1651 = -", 1, &|l| l.replace("= -", "= +")),
+            "check::unknown_start",
+        ),
         ("a lift by a tenth", with(&t, "FN 0: Q1653 = +11.3", 1, &|l| l.replace("11.3", "1.13")), "check::collision"),
         ("a zero lost", with(&t, "FN 0: Q1653 = +10", 1, &|l| l.replace("10", "1")), "check::stops"),
         (
@@ -186,7 +190,7 @@ fn edits_by_hand_of_a_klartext_program_are_caught() {
         (
             "a line of the log removed",
             with(&t, "FN 16: F-PRINT TNC:\\AXISCAL\\SMALL_P.A", 1, &|_| String::new()),
-            "check::touch_lacking",
+            "check::log",
         ),
         ("a stop removed", with(&t, "FN 9: IF +0 EQU +0 GOTO LBL 9\r", stops, &|_| String::new()), "check::goes_on"),
         ("the tilted plane of before", with(&t, "PLANE RESET", 1, &|_| String::new()), "check::not_run"),
@@ -344,9 +348,9 @@ fn a_jump_that_was_taken_out_is_named_before_what_follows_from_it() {
             let edited = [&lines[..*taken], &lines[taken + 1..]].concat().concat();
             let (code, line, says) = original.finding(&edited);
             let first = first_other_line(&original.text, &edited);
-            // a label or a remark is no statement
+            // a label or a remark is no statement; the condition before it may lead elsewhere now
             assert!(
-                code == "check::changed" && (first..first + 3).contains(&line),
+                code == "check::changed" && (first - 1..first + 3).contains(&line),
                 "{controller} {first}: {line} {says}"
             );
             assert_eq!(original.codes(&edited)[0], "check::changed", "{controller} {first}");
@@ -393,7 +397,7 @@ fn a_plan_of_an_older_version_says_that_it_does_not_know_the_statements() {
     let (code, _, says) = original.finding(&original.text);
     assert_eq!(code, "check::older_plan", "{says}");
     assert_eq!(original.codes(&original.text.replacen("GT0.25]", "GT0.26]", 1)), ["check::older_plan"]);
-    assert_eq!(original.codes(&with(&original.text, "M9", 1, &|_| String::new())), ["check::changed"]);
+    assert_eq!(original.codes(&with(&original.text, "M9", 1, &|_| String::new())), ["check::older_plan"]);
 }
 
 #[test]
@@ -453,7 +457,9 @@ fn a_set_up_that_does_not_exist_moves_nothing() {
         assert!(no_setup, "{controller}: {:?}", checked.findings);
         let (checked, no_setup) =
             original.begun(&original.numbered(&with(&t, line, 1, &|_| number.replace("{n}", "2"))), 2);
-        assert!(!no_setup && checked.findings.is_empty(), "{controller}: {:?}", checked.findings);
+        // that the head says another number is said
+        let wrong = checked.findings.iter().any(|f| f.code != "check::edited");
+        assert!(!no_setup && !wrong, "{controller}: {:?}", checked.findings);
     }
 }
 
@@ -632,7 +638,7 @@ fn what_no_control_reads_as_a_remark_is_refused() {
             format!("{} {}{}", &original.text[..end], remark.replace("UP", &format!("UP{more}")), &original.text[end..])
         };
         assert!(
-            controller == "heidenhain" || original.codes(&with("")).is_empty(),
+            controller == "heidenhain" || original.codes(&with("")) == ["check::edited"],
             "{controller}: {:?}",
             original.codes(&with(""))
         );

@@ -93,7 +93,7 @@ fn a_condition_on_what_is_not_known_is_run_both_ways() {
         let sinumerik =
             |before: &str, condition: &str| format!("{before}\nSTOPRE\nIF {condition}\nG0 SUPA Z=-300\nENDIF");
         let klartext = |before: &str, condition: &str| {
-            format!("{before}\nFN 11: IF {condition} GOTO LBL 6000\nL Z-300 R0 FMAX M91\nLBL 6000")
+            format!("{before}\nFN 11: IF {condition} GOTO LBL 900\nL Z-300 R0 FMAX M91\nLBL 900")
         };
         let dangers: Vec<String> = match written.controller {
             "linuxcnc" => vec![
@@ -122,9 +122,9 @@ fn a_condition_on_what_is_not_known_is_run_both_ways() {
                 sinumerik("", "$P_ACTFRAME[X,SC]>10"),
             ],
             _ => vec![
-                klartext("FN 18: SYSREAD Q1650 = ID320 NR1 IDX0", "+Q1650 GT +100"),
-                klartext("FN 18: SYSREAD Q1650 = ID320 NR1 IDX0\nQ1651 = Q1650 * 2", "+Q1651 GT +100"),
-                klartext("FN 18: SYSREAD Q1650 = ID210 NR1 IDX0", "+5 GT +Q1650"),
+                klartext("FN 18: SYSREAD Q1750 = ID320 NR1 IDX0", "+Q1750 GT +100"),
+                klartext("FN 18: SYSREAD Q1750 = ID320 NR1 IDX0\nQ1751 = Q1750 * 2", "+Q1751 GT +100"),
+                klartext("FN 18: SYSREAD Q1750 = ID210 NR1 IDX0", "+5 GT +Q1750"),
             ],
         };
         for lines in dangers {
@@ -147,7 +147,7 @@ fn a_condition_whose_ways_are_both_harmless_is_accepted() {
             "sinumerik" => ("STOPRE\nIF $A_SECOND>100\nMSG(\"late\")\nENDIF", 1),
             // it only computes, and meets again
             _ => (
-                "FN 18: SYSREAD Q1650 = ID320 NR1 IDX0\nFN 11: IF +Q1650 GT +100 GOTO LBL 6000\nQ1650 = Q1650 + 86400\nLBL 6000",
+                "FN 18: SYSREAD Q1750 = ID320 NR1 IDX0\nFN 11: IF +Q1750 GT +100 GOTO LBL 900\nQ1750 = Q1750 + 86400\nLBL 900",
                 0,
             ),
         };

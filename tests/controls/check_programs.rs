@@ -114,8 +114,8 @@ fn block_numbers_end_somewhere() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "table", false);
     for (base, numbers, says, help) in [
-        ("linuxcnc", "first = 90000, step = 10, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
-        ("linuxcnc", "first = 10, step = 50, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("linuxcnc", "first = 99000, step = 10, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("linuxcnc", "first = 10, step = 1000, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
         ("sinumerik", "first = 99999990, step = 10, word = \"N{n} \"", "is beyond N99999999", "a smaller first number"),
     ] {
         let post = file(base, numbers).unwrap().0;
@@ -571,7 +571,7 @@ fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
     let (plain, table) = (generated(&machine, "basic", false), generated(&machine, "basic", true));
     for control in ["fanuc", "haas"] {
         let post = controller(control);
-        let of = |generated: &Generated| post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let of = |generated: &Generated| text_of(&post, &machine, generated);
         let text = of(&plain);
         assert!(!text.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
         // it does not look whether a length acts
@@ -591,7 +591,7 @@ fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
     // at a stop for another stylus: where Z stands, and nowhere else
     let long = generated(&machine, "full", true);
     let post = controller("fanuc");
-    let text = post.program(&machine, &long.plan, &long.path).unwrap().text;
+    let text = text_of(&post, &machine, &long);
     let off = text.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
     // and the local system is off as well before a person is asked to do something
     assert!(text.contains(&format!("{off}\nG52 X0. Y0. Z0. A0. C0.\n#18=0\n#3006=1(")), "{off}");
@@ -675,19 +675,19 @@ fn times_follow_the_run() {
     for control in ["fanuc", "haas"] {
         let post = controller(control);
         let text = text_of(&post, &machine, &generated);
-        assert!(text.contains("*T#8[50]"), "{control}");
+        assert!(text.contains("*T#10[50]"), "{control}");
         // the program begins before midnight: without the day that is added its time would go back
         let found =
-            codes(&post, &machine, &generated, &text.replace("#8=#8-86400.*FIX[#8/86400.]\n", "#8=#8-86400.\n"));
+            codes(&post, &machine, &generated, &text.replace("#10=#10-86400.*FIX[#10/86400.]\n", "#10=#10-86400.\n"));
         assert!(found.contains(&"check::log"), "{control}: {found:?}");
-        let found = codes(&post, &machine, &generated, &text.replace("#8=#3012\n", "#8=0.\n"));
+        let found = codes(&post, &machine, &generated, &text.replace("#10=#3012\n", "#10=0.\n"));
         assert!(found.contains(&"check::log"), "{control}: {found:?}");
         // the user's file may say that none is wanted; the log then has none
         let silent = variant(control, "[settings]\ntime = \"no\"\n");
         is_clean(&silent, &machine, &generated);
         assert!(!silent.log.writes_time && post.log.writes_time);
-        let text = silent.program(&machine, &generated.plan, &generated.path).unwrap().text;
-        assert!(!text.contains("#3012") && !text.contains("*T#8"));
+        let text = text_of(&silent, &machine, &generated);
+        assert!(!text.contains("#3012") && !text.contains("*T#"));
     }
 }
 

@@ -170,9 +170,9 @@ fn edits_by_hand_are_caught_with_the_right_words() {
     let cases: Vec<(&str, String, &str, &str)> = vec![
         (
             "a sign changed",
-            with(&t, "G0 SUPA X=-", 1, &|l| l.replace("=-", "=")),
-            "check::stops",
-            "off along the approach",
+            with(&t, "AXC_TOUCH(1", 1, &|l| l.replace(",-30,0,6,", ",30,0,6,")),
+            "check::overtravel",
+            "the search ends",
         ),
         (
             "a place over the block",
@@ -183,8 +183,8 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         (
             "a point lost",
             with(&t, "AXC_GUARDED(2,\"block x- face -X\",-40,0,1.5", 1, &|l| l.replace("1.5", "15")),
-            "check::not_the_plan",
-            "the search does not begin",
+            "check::unguarded",
+            "did not come",
         ),
         (
             "a rapid in place of a guarded move",

@@ -111,7 +111,6 @@ fn harmless(controller: &str, t: &str) -> Vec<Kind> {
         ("a dwell", all(&[w.dwell])),
         ("a slower feed", vec![t.replacen(&format!("{before}{feed}"), &format!("{before}{slower}"), 1)]),
         ("trailing blanks", vec![t.replace('\n', " \n").replace("\r \n", " \r\n")]),
-        ("CR LF", vec![t.replace("\r\n", "\n").replace('\n', "\r\n")]),
         ("the text of a message", vec![t.replacen(w.message.0, w.message.1, 1)]),
         ("another way to write a number", vec![match controller {
             "linuxcnc" => t.replacen("[-30] [0] [10]", "[-30.000] [0] [10.0]", 1),
@@ -121,6 +120,7 @@ fn harmless(controller: &str, t: &str) -> Vec<Kind> {
         }]),
     ];
     if controller != "heidenhain" {
+        kinds.push(("CR LF", vec![t.replace('\n', "\r\n")]));
         kinds.push(("a blank line", before_touches("")));
         kinds.push(("modal words again", all(w.modes)));
     }
@@ -153,7 +153,8 @@ fn dangerous(controller: &str, t: &str) -> Vec<Kind> {
         edited
     };
     let doubled = |begins: &str, nth: usize| {
-        let line = t.lines().filter(|l| l.starts_with(begins)).nth(nth - 1).unwrap_or_else(|| panic!("{begins}"));
+        let mut lines = t.split_inclusive('\n').filter(|l| l.starts_with(begins));
+        let line = lines.nth(nth - 1).unwrap_or_else(|| panic!("{begins}"));
         put_before(t, begins, nth, line.trim_end())
     };
     let with = |from: &str, to: &str| {
@@ -219,7 +220,7 @@ fn dangerous(controller: &str, t: &str) -> Vec<Kind> {
             ("a limit", with("GT1.]", "GT3.]")),
             ("a faster feed of positioning", with("#20=1500.", "#20=15000.")),
             ("back to another block", with("M99 P9", "M99 P8")),
-            ("a dry run below", with("#19=0\n", "#19=-5.\n")),
+            ("a dry run below", with("#19=0.\n", "#19=-5.\n")),
         ],
         "sinumerik" => vec![
             ("a release deleted", vec![gone("G1 SUPA X=AXT_SX+", 1), gone("G1 SUPA X=AXT_SX+", 2)]),

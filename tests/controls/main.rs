@@ -16,6 +16,7 @@ mod compensated;
 mod controllers;
 mod edits;
 mod export_verb;
+mod facts;
 mod foreign;
 mod generate;
 mod harmless;

@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fault> {
-    let text = &capitals(text);
+    let text = &capitals(text, folder(post));
     let mut reader = Reader::new(post, masks);
     let is_end = |line: &Line<'_>| line.text.is_empty() && line.start == text.len();
     let mut numbered = (0..).zip(lines(text)).take_while(|(_, line)| !is_end(line));
@@ -34,10 +34,12 @@ pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fa
 }
 
 /// Capitals and small letters are one, but for texts in quotes and names of files. No place changes by that.
-fn capitals(text: &str) -> String {
+fn capitals(text: &str, folder: &str) -> String {
     let line = |line: &str| {
-        let file = line.find("F-PRINT").or_else(|| line.find(['"', ';'])).unwrap_or(line.len());
-        let (block, rest) = line.split_at(file);
+        // names of files count as they are where the folder has small letters
+        let names = folder.contains(|c: char| c.is_ascii_lowercase()).then(|| line.find("F-PRINT")).flatten();
+        let kept = names.or_else(|| line.find(['"', ';'])).unwrap_or(line.len());
+        let (block, rest) = line.split_at(kept);
         block.to_ascii_uppercase() + rest
     };
     text.split_inclusive('\n').map(line).collect()

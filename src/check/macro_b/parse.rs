@@ -114,6 +114,8 @@ const ARGUMENTS: [(char, u32); 21] = [
 
 impl Reader<'_> {
     fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
+        let text = line.text.trim_end_matches([' ', '\t']);
+        let line = &Line { start: line.start, text };
         let rest = line.text;
         self.lines += 1;
         if rest.is_empty() {
