@@ -3,7 +3,7 @@
 //! It stops at every move that a probe may end ([`Pause::Probe`]); whoever runs it decides how that move ends. So one
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
-use super::code::{Code, Expr, Instruction, Piece, Statement, UnknownKind, Values, Var, Word, numbered};
+use super::code::{Code, Expr, Instruction, Piece, Statement, UnknownKind, VALUE, Values, Var, Word, numbered};
 use super::doubt::{Doubt, Doubts, Fork};
 use super::harmless::Harmless;
 use super::hidden_rotation::Turn;
@@ -510,6 +510,8 @@ impl<'p, D: Dialect> Run<'p, D> {
                 self.returns.push(Return { next: self.next, step });
                 self.next = *to;
                 self.dialect.entered();
+                // its variables are its own: nothing is known of those of the subroutine before it
+                self.doubts.enters(self.returns.len());
                 for (var, value, doubt) in given {
                     self.dialect.write(&var, value, &self.vm)?;
                     self.given(&var, doubt);
@@ -520,7 +522,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                 let doubt = expr.as_ref().and_then(|v| self.doubt(v));
                 self.next = self.returns.pop().ok_or("a return outside of a subroutine")?.next;
                 self.dialect.left(value, &self.vm);
-                self.given(&Var::Name("_value".into()), doubt);
+                self.given(&VALUE, doubt);
             }
             Instruction::Leave(to) => {
                 while self.returns.pop().is_some() {

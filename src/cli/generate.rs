@@ -40,9 +40,21 @@ pub struct Args {
     /// Write it for a dry run: all moves are higher by so many mm, and nothing is measured
     #[arg(long, value_name = "MM")]
     dry_run_height: Option<f64>,
+    /// Make each touch by the program's own routine, or by the control's measuring cycle
+    #[arg(long, value_enum, default_value_t = TouchWith::Own)]
+    touch_with: TouchWith,
     /// Refuse the program when a single touch cannot be reached, instead of leaving it out
     #[arg(long)]
     strict: bool,
+}
+
+/// What makes a touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TouchWith {
+    /// The program's own routine
+    Own,
+    /// The control's measuring cycle
+    Cycle,
 }
 
 /// # Errors
@@ -59,6 +71,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         }
     };
     let mut post = load_controller(&word, io)?;
+    if args.touch_with == TouchWith::Cycle {
+        post = post.with_cycle()?;
+    }
     post.dry_run_mm = dry_run_mm(args.dry_run_height)?;
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;

@@ -46,6 +46,8 @@ pub struct File {
     /// Files that the control needs beside the program, e.g. masks of its log.
     #[serde(default)]
     pub companion: Vec<Companion>,
+    /// The control's own measuring cycle for a touch (`--touch-with cycle`); absent: none is known.
+    pub cycle: Option<Cycle>,
     /// Programs under the control's own transformation (`--tcp`); absent: the control has none.
     pub tcp: Option<Tcp>,
     /// The log: how it is called and how it is read.
@@ -346,6 +348,23 @@ pub struct Write {
     pub message: Entry,
     /// Everything after the last move.
     pub end: Entry,
+}
+
+/// The control's own measuring cycle, in place of the routine for a touch.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cycle {
+    /// What it is called.
+    pub name: String,
+    /// Template of a touch that calls it, given what `touch` is given; absent: it cannot serve.
+    #[schemars(with = "Option<String>")]
+    pub template: Option<Spanned<String>>,
+    /// Why it cannot serve.
+    pub refused: Option<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
 }
 
 /// Programs under the control's own transformation.

@@ -110,6 +110,8 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         comment,
         settings: file.settings.clone(),
         result,
+        cycle: file.cycle.as_ref().map(|c| (c.name.clone(), c.refused.clone())),
+        touch_with_cycle: false,
         tcp,
         check: reading,
         log,
@@ -456,6 +458,20 @@ impl Check<'_> {
             self.origin(&entry, &companion.source, &companion.unverified, &companion.template.span());
             self.template(&mut env, &format!("companion {index} name"), &companion.name);
             self.template(&mut env, &format!("companion {index}"), &companion.template);
+        }
+        if let Some(cycle) = &file.cycle {
+            let span = cycle.template.as_ref().map_or_else(|| file.name.span(), Spanned::span);
+            self.origin("cycle", &cycle.source, &cycle.unverified, &span);
+            match (&cycle.template, &cycle.refused) {
+                (Some(template), None) => self.template(&mut env, "cycle", template),
+                (None, Some(_)) => {}
+                _ => self.error(
+                    &span,
+                    "post::cycle",
+                    "[cycle] says neither how it is called nor why it cannot serve, or both".to_owned(),
+                    "write `template`, or `refused = \"why\"`",
+                ),
+            }
         }
         self.template(&mut env, "log_file", &file.log.file);
         env

@@ -85,6 +85,10 @@ pub struct Postprocessor {
     pub settings: BTreeMap<String, String>,
     /// Where the control keeps the result of a probing move.
     pub result: BTreeMap<AxisName, String>,
+    /// The control's own measuring cycle for a touch: its name, and why it cannot serve.
+    pub cycle: Option<(String, Option<String>)>,
+    /// A touch is made by it.
+    pub touch_with_cycle: bool,
     /// The control's own transformation.
     pub tcp: Option<Tcp>,
     /// How its programs are read back.
@@ -238,6 +242,21 @@ impl Postprocessor {
             };
             Failure::new("post::version", says).help(help)
         })
+    }
+
+    /// The same control, with touches made by its own measuring cycle.
+    ///
+    /// # Errors
+    /// When no such cycle is known, or it cannot carry what the log needs; the reason stands in the postprocessor file.
+    pub fn with_cycle(self) -> Result<Self> {
+        let refuse = |says: String| {
+            Failure::new("post::cycle", says).help("generate without --touch-with cycle: the program then makes each touch itself")
+        };
+        match &self.cycle {
+            None => Err(refuse(format!("controller {} is not described with a measuring cycle of its own", self.name))),
+            Some((name, Some(why))) => Err(refuse(format!("{name} cannot make the touches of controller {}: {why}", self.name))),
+            Some((_, None)) => Ok(Self { touch_with_cycle: true, ..self }),
+        }
     }
 
     /// Whether a program may wait for a person.

@@ -201,8 +201,8 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         (
             "MEAS deleted on the way",
             with(&t, "G1 SUPA X=AXG_X", 1, &|l| l.replace(" MEAS=1", "")),
-            "check::unguarded",
-            "",
+            "check::stops",
+            "the probe triggered",
         ),
         (
             "the falling edge",

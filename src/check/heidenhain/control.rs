@@ -285,7 +285,7 @@ impl Dialect for Heidenhain {
             short_way: awkward,
             feed: 0.0,
             angle: None,
-            own: Values::new(),
+            own: Values::default(),
             last: Last::default(),
             builder: builder(post),
         }

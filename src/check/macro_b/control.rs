@@ -351,8 +351,8 @@ impl Dialect for MacroB {
             feed: 0.0,
             holds: 0.0,
             lookahead: 0.0,
-            own: vec![Values::new()],
-            common: Values::new(),
+            own: vec![Values::default()],
+            common: Values::default(),
             skipped: [0.0; 6],
             seconds: 0.0,
             calls: post.check.iter().flat_map(|c| c.calls.iter().cloned()).collect(),
@@ -549,7 +549,7 @@ impl Dialect for MacroB {
     }
 
     fn entered(&mut self) {
-        self.own.push(Values::new());
+        self.own.push(Values::default());
     }
 
     fn left(&mut self, _value: Option<f64>, _vm: &Vm) {

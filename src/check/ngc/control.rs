@@ -4,13 +4,14 @@
 //! probe, when a coordinate system is read again and what M73 brings back was observed on LinuxCNC 2.9.0~pre1.
 
 use crate::axes::{AxisName, Position};
-use crate::check::code::{UnknownKind, Values, Var};
+use crate::check::code::{UnknownKind, VALUE, Values, Var};
 use crate::check::doubt::Doubt;
 use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
 
 /// How many coordinate systems there are: G54 … G59.3.
 const SYSTEMS: usize = 9;
@@ -86,9 +87,9 @@ impl Ngc {
             g92_on: false,
             tool: [0.0; 3],
             table: [0.0, 0.0, 51.25],
-            globals: Values::new(),
-            found: Values::new(),
-            locals: vec![Values::new()],
+            globals: Values::default(),
+            found: Values::default(),
+            locals: vec![Values::default()],
             probed: [0.0; 6],
             hit: false,
         };
@@ -411,7 +412,7 @@ impl Dialect for Ngc {
         let mut next = self.clone();
         next.kept.clear();
         next.found.clone_from(&next.globals);
-        next.locals = vec![Values::new()];
+        next.locals = vec![Values::default()];
         Some(next)
     }
 
@@ -580,7 +581,7 @@ impl Dialect for Ngc {
 
     fn entered(&mut self) {
         self.kept.push(None);
-        self.locals.push(Values::new());
+        self.locals.push(Values::default());
     }
 
     fn left(&mut self, value: Option<f64>, _vm: &Vm) {
@@ -588,12 +589,11 @@ impl Dialect for Ngc {
         if let Some(Some(kept)) = self.kept.pop() {
             self.restore(kept);
         }
-        self.globals.insert(Var::Name("_value".into()), value.unwrap_or(0.0));
+        self.globals.insert(VALUE.clone(), value.unwrap_or(0.0));
     }
 
     fn settings(&self) -> BTreeMap<String, String> {
         let m = &self.modes;
-        let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
         let mut out = BTreeMap::from([
             ("units".to_owned(), if m.inch { "G20" } else { "G21" }.to_owned()),
             ("distance".to_owned(), if m.incremental { "G91" } else { "G90" }.to_owned()),
@@ -629,4 +629,24 @@ impl Ngc {
         };
         words.iter().find(|word| !used(word)).map(|word| word.address)
     }
+}
+
+/// Numbers in one text. Most of them are the same at the end of each of a hundred thousand branches: they are written once.
+fn numbers(values: &[f64]) -> String {
+    const MOST: usize = 200;
+    thread_local! {
+        static WRITTEN: RefCell<HashMap<Vec<u64>, String>> = RefCell::default();
+    }
+    let key: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
+    WRITTEN.with_borrow_mut(|written| {
+        if let Some(text) = written.get(&key) {
+            return text.clone();
+        }
+        if written.len() >= MOST {
+            written.clear();
+        }
+        let text = values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
+        written.insert(key, text.clone());
+        text
+    })
 }

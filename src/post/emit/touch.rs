@@ -77,7 +77,7 @@ impl Writer<'_> {
             back_off => self.length(touch.back_off_mm),
             half_back_off => self.length(touch.back_off_mm / 2.0),
         };
-        self.render("touch", context)?;
+        self.render(if self.post.touch_with_cycle { "cycle" } else { "touch" }, context)?;
         // the routine goes back to where it began
         self.fresh(&xyz(&start))?;
         self.approach = approach;
