@@ -249,8 +249,12 @@ impl Code {
 
     /// Lets a jump or a call lead to a statement.
     pub fn aim(&mut self, statement: usize, target: usize) {
-        if let Some(Instruction::Jump(to) | Instruction::Leave(to) | Instruction::JumpUnless(_, to) | Instruction::Call { to, .. }) =
-            self.statements.get_mut(statement).map(|s| &mut s.what)
+        if let Some(
+            Instruction::Jump(to)
+            | Instruction::Leave(to)
+            | Instruction::JumpUnless(_, to)
+            | Instruction::Call { to, .. },
+        ) = self.statements.get_mut(statement).map(|s| &mut s.what)
         {
             *to = target;
         }

@@ -287,12 +287,7 @@ fn deviations(vm: &Vm, probe: &Probe, outcome: Outcome, limits: Limits) -> Vec<D
     }
 }
 
-fn follow<D: Dialect>(
-    mut run: Run<'_, D>,
-    probe: &Probe,
-    nominal: Outcome,
-    deviation: Deviation,
-) -> Vec<Branch> {
+fn follow<D: Dialect>(mut run: Run<'_, D>, probe: &Probe, nominal: Outcome, deviation: Deviation) -> Vec<Branch> {
     let way = way_mm(probe);
     let shifted = |mm: f64| Outcome { hit: true, part: (nominal.part + mm / way).clamp(0.0, 1.0) };
     let outcome = match deviation {

@@ -14,8 +14,8 @@ use super::harmless::{self, Harmless};
 use super::needs_plan;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Spoken, Start, Vm};
 use super::seconds::Clock;
-use super::world::World;
 use super::statements::{self, Compared, Rules};
+use super::world::World;
 use super::{heidenhain, macro_b, ngc, sinumerik};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Source};
@@ -206,7 +206,6 @@ impl Program {
         };
         [(&self.from, f64::from(setup)), (&self.dry_run, height)].into_iter().filter_map(own).collect()
     }
-
 }
 
 /// The statement that gives a variable its number first.
@@ -495,7 +494,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
             turned_near,
             clock: Clock::default(),
         };
-        let mut run = Run::new(&self.program.code, &self.program.inserted, D::begin(start, self.post, self.machine), vm);
+        let mut run =
+            Run::new(&self.program.code, &self.program.inserted, D::begin(start, self.post, self.machine), vm);
         run.switched = self.program.switched(from, 0.0);
         run
     }

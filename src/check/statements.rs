@@ -299,7 +299,8 @@ mod tests {
 
     #[test]
     fn what_a_person_puts_in_is_named_and_harms_nothing() {
-        let text = "o<s> sub\no1 if [#1 GT 1]\nG0 X2\no1 endif\no<s> endsub\nG0 X3\no<s> call [1]\nG0 X4\no<s> call [2]\n";
+        let text =
+            "o<s> sub\no1 if [#1 GT 1]\nG0 X2\no1 endif\no<s> endsub\nG0 X3\no<s> call [1]\nG0 X4\no<s> call [2]\n";
         let with = |line: &str, before: &str| text.replacen(before, &format!("{line}\n{before}"), 1);
         let of = |two: &str| compared(&ngc::parse(text).unwrap(), &ngc::parse(two).unwrap(), false);
         for line in ["M0", "M1", "M8", "M9", "G4 P0.5", "G90", "G21 G17"] {

@@ -177,12 +177,7 @@ pub fn against_plan(case: &CheckedProgram<'_>, told: &ExploredRun, made: &[Made]
 }
 
 /// Where the log has times, each touch has one, it goes on as the run does, and it does not jump.
-fn times(
-    case: &CheckedProgram<'_>,
-    touches: &[log::RawTouch],
-    lines: &[LogLine<'_>],
-    said: &mut CollectedFindings,
-) {
+fn times(case: &CheckedProgram<'_>, touches: &[log::RawTouch], lines: &[LogLine<'_>], said: &mut CollectedFindings) {
     // no touch with the way to it takes as long
     const LONGEST_S: f64 = 3600.0;
     if !case.post.log.writes_time {

@@ -110,8 +110,11 @@ fn dry_run_mm(height: Option<f64>) -> Result<f64> {
     match height {
         None => Ok(0.0),
         Some(mm) if mm > 0.0 && mm <= MOST_MM => Ok(mm),
-        Some(mm) => Err(Failure::new("cli::dry_run_height", format!("--dry-run-height {mm}: more than 0 mm, at most {MOST_MM}"))
-            .help("50 is a good height")),
+        Some(mm) => Err(Failure::new(
+            "cli::dry_run_height",
+            format!("--dry-run-height {mm}: more than 0 mm, at most {MOST_MM}"),
+        )
+        .help("50 is a good height")),
     }
 }
 

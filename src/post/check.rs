@@ -539,16 +539,19 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
         }
         Ok(words.join(" "))
     });
-    env.add_filter("values", |words: minijinja::Value, before: String, behind: String| -> Result<String, minijinja::Error> {
-        let one = |w: minijinja::Value| w.get_attr("value").map(|value| format!("{before}{value}{behind}"));
-        let values: Vec<String> = words.try_iter()?.map(one).collect::<Result<_, _>>()?;
-        // a mistyped name would leave arguments of a call away
-        if values.is_empty() || values.iter().any(|v| v.contains("undefined")) {
-            let what = "`values` was given nothing: is the name before it mistyped?";
-            return Err(minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what));
-        }
-        Ok(values.join(" "))
-    });
+    env.add_filter(
+        "values",
+        |words: minijinja::Value, before: String, behind: String| -> Result<String, minijinja::Error> {
+            let one = |w: minijinja::Value| w.get_attr("value").map(|value| format!("{before}{value}{behind}"));
+            let values: Vec<String> = words.try_iter()?.map(one).collect::<Result<_, _>>()?;
+            // a mistyped name would leave arguments of a call away
+            if values.is_empty() || values.iter().any(|v| v.contains("undefined")) {
+                let what = "`values` was given nothing: is the name before it mistyped?";
+                return Err(minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what));
+            }
+            Ok(values.join(" "))
+        },
+    );
     let rule = comment.clone();
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away

@@ -431,7 +431,10 @@ impl<'a> Writer<'a> {
                 let (heading, length) = self.straight(to, &named);
                 let place = self.place(to)?;
                 let announces = self.announces();
-                self.render("protected", context! { to => words, place, announces, feed => self.feed(*feed)?, heading, length })?;
+                self.render(
+                    "protected",
+                    context! { to => words, place, announces, feed => self.feed(*feed)?, heading, length },
+                )?;
                 self.moved(to);
                 Ok(())
             }

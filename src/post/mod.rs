@@ -250,11 +250,14 @@ impl Postprocessor {
     /// When no such cycle is known, or it cannot carry what the log needs; the reason stands in the postprocessor file.
     pub fn with_cycle(self) -> Result<Self> {
         let refuse = |says: String| {
-            Failure::new("post::cycle", says).help("generate without --touch-with cycle: the program then makes each touch itself")
+            Failure::new("post::cycle", says)
+                .help("generate without --touch-with cycle: the program then makes each touch itself")
         };
         match &self.cycle {
             None => Err(refuse(format!("controller {} is not described with a measuring cycle of its own", self.name))),
-            Some((name, Some(why))) => Err(refuse(format!("{name} cannot make the touches of controller {}: {why}", self.name))),
+            Some((name, Some(why))) => {
+                Err(refuse(format!("{name} cannot make the touches of controller {}: {why}", self.name)))
+            }
             Some((_, None)) => Ok(Self { touch_with_cycle: true, ..self }),
         }
     }

@@ -155,11 +155,7 @@ fn edits_by_hand_of_a_klartext_program_are_caught() {
     let turn = with(&t, "L B-35", 1, &|l| format!("L Z-20 R0 FMAX M91\r\n{l}"));
     let mut wrong = Vec::new();
     for (what, text, code) in [
-        (
-            "a sign changed",
-            with(&t, "FN 0: Q1651 = -", 1, &|l| l.replace("= -", "= +")),
-            "check::unknown_start",
-        ),
+        ("a sign changed", with(&t, "FN 0: Q1651 = -", 1, &|l| l.replace("= -", "= +")), "check::unknown_start"),
         ("a lift by a tenth", with(&t, "FN 0: Q1653 = +11.3", 1, &|l| l.replace("11.3", "1.13")), "check::collision"),
         ("a zero lost", with(&t, "FN 0: Q1653 = +10", 1, &|l| l.replace("10", "1")), "check::stops"),
         (
@@ -255,9 +251,8 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
         if controller == "heidenhain" {
             // of the two conditions, the one before the slow feed
             let lines: Vec<&str> = original.text.split_inclusive('\n').collect();
-            let at = (1..lines.len()).find(|i| {
-                lines[*i].contains("Q1665 = +60") && lines[*i - 1].contains("FN 12: IF +Q1600 LT +2 GOTO")
-            });
+            let at = (1..lines.len())
+                .find(|i| lines[*i].contains("Q1665 = +60") && lines[*i - 1].contains("FN 12: IF +Q1600 LT +2 GOTO"));
             let mut edited: Vec<String> = lines.iter().map(|l| (*l).to_owned()).collect();
             let condition = &mut edited[at.unwrap() - 1];
             *condition = condition.replace("LT +2", "LT +9");
@@ -311,10 +306,7 @@ fn all(text: &str, from: &str, to: &str) -> String {
 #[test]
 fn what_no_run_can_show_is_named_by_its_line_and_refused() {
     for (controller, cases) in [
-        (
-            "fanuc",
-            &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]"), ("M99 P9", "M99 P8")][..],
-        ),
+        ("fanuc", &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]"), ("M99 P9", "M99 P8")][..]),
         ("haas", &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]")]),
         ("sinumerik", &[("ABS(AXT_OFF)>1", "ABS(AXT_OFF)>1.15"), ("ABS(AXT_OFF)>1", "AXT_OFF>1")]),
         ("heidenhain", &[("Q1605 GT +1 GOTO", "Q1605 GT +1.1 GOTO"), ("GT +0.25 GOTO", "GT +0.26 GOTO")]),

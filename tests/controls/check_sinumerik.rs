@@ -242,13 +242,13 @@ fn edits_by_hand_are_caught_with_the_right_words() {
             "check::turn_not_clear",
             "turns where",
         ),
-        ("a turn without the lift", with(&t, "AXC_GUARDED(3,\"block x- face +Z\",-40,0,11.3", 1, &gone), "check::turn_not_clear", "turns where"),
         (
-            "a line of the log removed",
-            with(&t, "AXT_LINE=SPRINT(\"P N%D S1", 1, &gone),
-            "check::",
-            "",
+            "a turn without the lift",
+            with(&t, "AXC_GUARDED(3,\"block x- face +Z\",-40,0,11.3", 1, &gone),
+            "check::turn_not_clear",
+            "turns where",
         ),
+        ("a line of the log removed", with(&t, "AXT_LINE=SPRINT(\"P N%D S1", 1, &gone), "check::", ""),
         ("a stop removed", with(&t, "RET(\"AXC_END\")", 5, &gone), "check::goes_on", "the program"),
         (
             "the check of the touch turned round",
@@ -288,7 +288,8 @@ fn edits_by_hand_are_caught_with_the_right_words() {
             "a message removed",
             // with its stop: that alone would be shown
             {
-                let t = with(&t, "MSG(\"AXISCAL: touch \"<<AXT_ID<<\", \"<<AXT_SAYS<<\": the probe is deflected", 1, &gone);
+                let t =
+                    with(&t, "MSG(\"AXISCAL: touch \"<<AXT_ID<<\", \"<<AXT_SAYS<<\": the probe is deflected", 1, &gone);
                 with(&t, "M0", 7, &gone)
             },
             "check::goes_on",

@@ -448,8 +448,20 @@ touch  = [ { faces = ["+X"], grid = "S1" } ]
 #[test]
 fn a_rough_touch_is_refused_without_a_plan() {
     let edits = [
-        ("fanuc", "O9101.nc", "G1 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16] F300.", "G0 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16]", "a rapid leaves the face"),
-        ("haas", "O9101.nc", "G1 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16] F300.", "G0 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16]", "a rapid leaves the face"),
+        (
+            "fanuc",
+            "O9101.nc",
+            "G1 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16] F300.",
+            "G0 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16]",
+            "a rapid leaves the face",
+        ),
+        (
+            "haas",
+            "O9101.nc",
+            "G1 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16] F300.",
+            "G0 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16]",
+            "a rapid leaves the face",
+        ),
         (
             "sinumerik",
             "AXC_TOUCH.spf",
@@ -460,7 +472,13 @@ fn a_rough_touch_is_refused_without_a_plan() {
         ("fanuc", "small.nc", "Z6. D2. F60.", "Z4. D2. F60.", "pushed past its overtravel"),
         ("fanuc", "small.nc", "X-36. Y0. Z1.5 D2.", "X-33. Y0. Z1.5 D2.", "pushed past its overtravel"),
         ("haas", "small.nc", "Z6. D2. F60.", "Z4. D2. F60.", "pushed past its overtravel"),
-        ("linuxcnc", "small.ngc", "o<touch> call [2] [2] [-36]", "o<touch> call [2] [2] [-33]", "pushed past its overtravel"),
+        (
+            "linuxcnc",
+            "small.ngc",
+            "o<touch> call [2] [2] [-36]",
+            "o<touch> call [2] [2] [-33]",
+            "pushed past its overtravel",
+        ),
         ("sinumerik", "small.mpf", "-30,0,6,2,60", "-30,0,4,2,60", "pushed past its overtravel"),
         ("heidenhain", "small.h", "FN 0: Q1653 = +6", "FN 0: Q1653 = +4", "pushed past its overtravel"),
         ("fanuc", "small.nc", "Z1.5 D2. F300.", "Z1.5 D2. F900.", "fast_feed is 300"),
@@ -470,7 +488,13 @@ fn a_rough_touch_is_refused_without_a_plan() {
     for (controller, file, from, to, code) in edits {
         let folder = folder(controller);
         edited(folder.path(), file, from, to);
-        let file = if file.starts_with("small") { file } else if controller == "sinumerik" { "small.mpf" } else { "small.nc" };
+        let file = if file.starts_with("small") {
+            file
+        } else if controller == "sinumerik" {
+            "small.mpf"
+        } else {
+            "small.nc"
+        };
         let said = predicate::str::contains(code);
         check(folder.path(), controller, file).assert().code(1).stderr(said.clone());
         check(folder.path(), controller, file).args(["--plan", "small.plan.json"]).assert().code(1).stderr(said);

@@ -219,8 +219,7 @@ fn a_program_that_stops_for_another_stylus() {
 
 /// The texts of the messages of a program, as any control spells them.
 fn messages(text: &str) -> Vec<String> {
-    let forms =
-        [("MSG(\"AXISCAL: ", "\")"), ("#3006=1(", ")"), ("QS1600 = \"", "\""), ("(DEBUG,axiscal: ", ")")];
+    let forms = [("MSG(\"AXISCAL: ", "\")"), ("#3006=1(", ")"), ("QS1600 = \"", "\""), ("(DEBUG,axiscal: ", ")")];
     let shown = |line: &str| {
         forms.into_iter().find_map(|(begins, ends)| {
             let (_, message) = line.split_once(begins)?;
@@ -417,7 +416,8 @@ fn words(text: &str, axis: char) -> Vec<f64> {
     // what routines are given: X, Y, Z in this order, B and C of a turn, or a parameter for each of the three
     let given = |line: &str| -> Option<f64> {
         let place = "XYZ".find(axis);
-        let argument = |rest: &str, at: usize| rest.split(['[', ']', ',', ' ']).filter(|w| !w.is_empty()).nth(at)?.parse().ok();
+        let argument =
+            |rest: &str, at: usize| rest.split(['[', ']', ',', ' ']).filter(|w| !w.is_empty()).nth(at)?.parse().ok();
         let linear = ["o<rapid> call ", "o<guarded> call "].iter().find_map(|begins| line.strip_prefix(begins));
         if let Some((rest, place)) = linear.zip(place) {
             return argument(rest, place);
@@ -425,7 +425,8 @@ fn words(text: &str, axis: char) -> Vec<f64> {
         if let Some((rest, place)) = line.strip_prefix("o<turn> call ").zip("BC".find(axis)) {
             return argument(rest, place);
         }
-        if let Some(((_, rest), place)) = line.strip_prefix("AXC_GUARDED(").and_then(|l| l.rsplit_once('"')).zip(place) {
+        if let Some(((_, rest), place)) = line.strip_prefix("AXC_GUARDED(").and_then(|l| l.rsplit_once('"')).zip(place)
+        {
             return argument(rest, place);
         }
         let (_, rest) = line.split_once("FN 0: Q165")?;

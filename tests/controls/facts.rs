@@ -52,9 +52,18 @@ fn macro_b(facts: &toml::Table, letters: &str, by_count: bool, texts: &[String],
                 waited = false;
             }
             waited |= waits.iter().any(|w| line == w || line.starts_with(&format!("{w} ")));
-            assert!(line.strip_prefix('N').is_none_or(|n| n.parse().is_ok_and(|n| within(facts, "labels", n))), "{line}");
-            assert!(behind(line, "GOTO").iter().chain(&behind(line, "M99 P")).all(|n| within(facts, "labels", *n)), "{line}");
-            assert!(line.strip_prefix('O').is_none_or(|n| n.parse().is_ok_and(|n| within(facts, "programs", n))), "{line}");
+            assert!(
+                line.strip_prefix('N').is_none_or(|n| n.parse().is_ok_and(|n| within(facts, "labels", n))),
+                "{line}"
+            );
+            assert!(
+                behind(line, "GOTO").iter().chain(&behind(line, "M99 P")).all(|n| within(facts, "labels", *n)),
+                "{line}"
+            );
+            assert!(
+                line.strip_prefix('O').is_none_or(|n| n.parse().is_ok_and(|n| within(facts, "programs", n))),
+                "{line}"
+            );
             assert!(behind(line, "G65 P").iter().all(|n| within(facts, "programs", *n)), "{line}");
             // the number of an alarm: the touch, less what is said beside it
             if let Some(rest) = line.strip_prefix("#3000=#3") {
@@ -137,13 +146,16 @@ fn the_table_of_sizes_in_the_guide() {
     const END: &str = "<!-- end of sizes -->\n";
     let mut rows = BTreeMap::new();
     let mut wrong = Vec::new();
-    for (machine_name, program) in [("swivel-head", "head"), ("swivel-head", "table"), ("trunnion", "basic"), ("trunnion", "full")] {
+    for (machine_name, program) in
+        [("swivel-head", "head"), ("swivel-head", "table"), ("trunnion", "basic"), ("trunnion", "full")]
+    {
         let machine = machine(machine_name);
         let generated = generated(&machine, program, false);
         for (place, name) in ["linuxcnc", "fanuc", "haas", "sinumerik", "heidenhain"].iter().enumerate() {
             let nc = written(&controller(name), &machine, &generated);
-            let all: Vec<&str> =
-                std::iter::once(nc.text.as_str()).chain(nc.beside.iter().filter(|f| f.to_control).map(|f| f.text.as_str())).collect();
+            let all: Vec<&str> = std::iter::once(nc.text.as_str())
+                .chain(nc.beside.iter().filter(|f| f.to_control).map(|f| f.text.as_str()))
+                .collect();
             let lines: usize = all.iter().map(|t| t.lines().count()).sum();
             let kb = all.iter().map(|t| t.len()).sum::<usize>().div_ceil(1000);
             let (most_lines, most_kb) = match (program, *name) {

@@ -112,12 +112,15 @@ fn harmless(controller: &str, t: &str) -> Vec<Kind> {
         ("a slower feed", vec![t.replacen(&format!("{before}{feed}"), &format!("{before}{slower}"), 1)]),
         ("trailing blanks", vec![t.replace('\n', " \n").replace("\r \n", " \r\n")]),
         ("the text of a message", vec![t.replacen(w.message.0, w.message.1, 1)]),
-        ("another way to write a number", vec![match controller {
-            "linuxcnc" => t.replacen("[-30] [0] [10]", "[-30.000] [0] [10.0]", 1),
-            "fanuc" | "haas" => t.replacen("X-30. Y0. Z10.", "X-30.000 Y0. Z10.0", 1),
-            "sinumerik" => t.replacen(",-30,0,10,", ",-30.000,0,10.0,", 1),
-            _ => t.replacen("FN 0: Q1653 = +10\r", "FN 0: Q1653 = +10.000\r", 1),
-        }]),
+        (
+            "another way to write a number",
+            vec![match controller {
+                "linuxcnc" => t.replacen("[-30] [0] [10]", "[-30.000] [0] [10.0]", 1),
+                "fanuc" | "haas" => t.replacen("X-30. Y0. Z10.", "X-30.000 Y0. Z10.0", 1),
+                "sinumerik" => t.replacen(",-30,0,10,", ",-30.000,0,10.0,", 1),
+                _ => t.replacen("FN 0: Q1653 = +10\r", "FN 0: Q1653 = +10.000\r", 1),
+            }],
+        ),
     ];
     if controller != "heidenhain" {
         kinds.push(("CR LF", vec![t.replace('\n', "\r\n")]));
@@ -136,7 +139,8 @@ fn harmless(controller: &str, t: &str) -> Vec<Kind> {
     }
     if controller == "fanuc" || controller == "haas" {
         kinds.push(("another O number", vec![t.replacen("O9100\n", "O1234\n", 1)]));
-        kinds.push(("blanks taken out", vec![t.replacen("G0 X-30.", "G0X-30.", 1), t.replacen("G90 G94", "G90G94", 1)]));
+        kinds
+            .push(("blanks taken out", vec![t.replacen("G0 X-30.", "G0X-30.", 1), t.replacen("G90 G94", "G90G94", 1)]));
     }
     kinds
 }
@@ -179,7 +183,13 @@ fn dangerous(controller: &str, t: &str) -> Vec<Kind> {
         "linuxcnc" => vec![
             ("a release deleted", vec![gone("G38.5 X#<bx>", 1), gone("G38.5 X#<_axiscal_x>", 1)]),
             ("a retract deleted", vec![gone("G38.3 X#<_axiscal_x>", 1)]),
-            ("a retract as a rapid", with("G38.3 X#<_axiscal_x> Y#<_axiscal_y> Z#<_axiscal_z> F#<_axiscal_feed>", "G0 X#<_axiscal_x> Y#<_axiscal_y> Z#<_axiscal_z>")),
+            (
+                "a retract as a rapid",
+                with(
+                    "G38.3 X#<_axiscal_x> Y#<_axiscal_y> Z#<_axiscal_z> F#<_axiscal_feed>",
+                    "G0 X#<_axiscal_x> Y#<_axiscal_y> Z#<_axiscal_z>",
+                ),
+            ),
             ("a probing move as G1", with("G38.3 X#3 Y#4 Z#5 F#7", "G1 X#3 Y#4 Z#5 F#7")),
             ("a guarded move as G1", with("G38.3 X#1", "G1 X#1")),
             ("a sign", with("[-30] [0] [10]", "[30] [0] [10]")),
@@ -189,7 +199,10 @@ fn dangerous(controller: &str, t: &str) -> Vec<Kind> {
             ("the spindle", put("M3 S100")),
             ("a turn before the lift", put("G0 C90")),
             ("ten times the feed of a search", with(" [60] [60]", " [600] [60]")),
-            ("a check deleted", vec![gone("o9133 if", 1), t.replacen("o9133 if [#<_task> AND [#5070 EQ 1]]", "o9133 if [0 EQ 1]", 1)]),
+            (
+                "a check deleted",
+                vec![gone("o9133 if", 1), t.replacen("o9133 if [#<_task> AND [#5070 EQ 1]]", "o9133 if [0 EQ 1]", 1)],
+            ),
             ("increments", put("G91")),
             ("inches", put("G20")),
             ("arguments exchanged", with("o<touch> call [1] [1] [-30] [0]", "o<touch> call [1] [1] [0] [-30]")),
@@ -211,7 +224,10 @@ fn dangerous(controller: &str, t: &str) -> Vec<Kind> {
             ("the spindle", put("M3 S100")),
             ("a turn before the lift", put("G0 C90.")),
             ("ten times the feed of a search", with(" F60. E60.", " F600. E60.")),
-            ("a check deleted", vec![gone("IF[ABS[#5061-#24]", 1), gone("IF[ABS[#5061-#24]", 2), gone("M99 P9", 1), gone("M99 P9", 2)]),
+            (
+                "a check deleted",
+                vec![gone("IF[ABS[#5061-#24]", 1), gone("IF[ABS[#5061-#24]", 2), gone("M99 P9", 1), gone("M99 P9", 2)],
+            ),
             ("increments", put("G91")),
             ("inches", put("G20")),
             ("arguments exchanged", with("X-36. Y0. Z1.5", "X0. Y-36. Z1.5")),
@@ -290,7 +306,10 @@ fn what_harms_nothing_passes_with_a_remark() {
         let failed: Vec<String> = kinds
             .par_iter()
             .filter_map(|(kind, texts)| {
-                let bad = texts.iter().map(|text| checked(&original, text)).find(|(code, said)| *code != 0 || said.is_empty());
+                let bad = texts
+                    .iter()
+                    .map(|text| checked(&original, text))
+                    .find(|(code, said)| *code != 0 || said.is_empty());
                 bad.map(|(code, said)| format!("{controller}, {kind}: exit {code} {said:?}"))
             })
             .collect();
@@ -311,10 +330,14 @@ fn what_is_dangerous_never_passes() {
     for controller in CONTROLLERS {
         let original = edits::original(controller, None);
         let kinds = dangerous(controller, &original.without_numbers());
-        let all: Vec<(&str, &String)> = kinds.iter().flat_map(|(kind, texts)| texts.iter().map(|t| (*kind, t))).collect();
+        let all: Vec<(&str, &String)> =
+            kinds.iter().flat_map(|(kind, texts)| texts.iter().map(|t| (*kind, t))).collect();
         println!("{controller}: {} dangerous edits of {} kinds", all.len(), kinds.len());
-        let escaped: Vec<String> =
-            all.par_iter().filter(|(_, text)| checked(&original, text).0 == 0).map(|(kind, _)| format!("{controller}: {kind}")).collect();
+        let escaped: Vec<String> = all
+            .par_iter()
+            .filter(|(_, text)| checked(&original, text).0 == 0)
+            .map(|(kind, _)| format!("{controller}: {kind}"))
+            .collect();
         passed.extend(escaped);
     }
     assert!(passed.is_empty(), "{}", passed.join("\n"));

@@ -190,7 +190,9 @@ impl<'a> Reader<'a> {
             }
         } else if scan.take("CALL LBL ") {
             let label = self.label(scan)?;
-            let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), texts: Vec::new(), is_step: true });
+            let call = self
+                .code
+                .push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), texts: Vec::new(), is_step: true });
             self.jumps.push((call, label, at));
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
             self.opened(at, Cycle::Probe);

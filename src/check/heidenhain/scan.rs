@@ -121,7 +121,11 @@ impl<'a> Scan<'a> {
     /// When none stands here.
     pub fn feed(&mut self) -> Result<Expr, Fault> {
         const WHAT: &str = "a feed";
-        if self.rest.starts_with('Q') { self.parameter(WHAT).map(Expr::Var) } else { self.unsigned(WHAT).map(Expr::Number) }
+        if self.rest.starts_with('Q') {
+            self.parameter(WHAT).map(Expr::Var)
+        } else {
+            self.unsigned(WHAT).map(Expr::Number)
+        }
     }
 
     /// `Q1600`.

@@ -131,7 +131,9 @@ impl Reader<'_> {
             if self.percents > 0 && self.percents.is_multiple_of(2) {
                 // another program, which the first one calls
                 (self.number, self.program) = (false, self.program + 1);
-            } else if self.program > 0 && !matches!(self.code.statements.last().map(|s| &s.what), Some(Instruction::Return(_))) {
+            } else if self.program > 0
+                && !matches!(self.code.statements.last().map(|s| &s.what), Some(Instruction::Return(_)))
+            {
                 return Err(line.fault(rest, "the program that is called does not end with M99"));
             }
             if self.percents == 0 && !self.code.statements.is_empty() {
@@ -166,7 +168,9 @@ impl Reader<'_> {
         let mut rest = rest;
         if let Ok((after, digits)) = preceded(char('N'), digit1::<_, nom::error::Error<&str>>).parse(rest) {
             let label = self.label(line, rest, digits)?;
-            if let Some((_, first)) = self.labels.insert((self.program, label), (self.code.statements.len(), self.lines)) {
+            if let Some((_, first)) =
+                self.labels.insert((self.program, label), (self.code.statements.len(), self.lines))
+            {
                 return Err(line.fault(rest, format!("N{label} stands twice, first in line {first}")));
             }
             rest = blanks(after).map_err(|e| line.unread(&e, "a block"))?.0;
@@ -224,7 +228,8 @@ impl Reader<'_> {
 
     /// `M99`, or `M99 P9`: back to a label of the program that has called this one.
     fn leave<'a>(&mut self, line: &Line<'a>, after: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
-        let Ok((left, digits)) = preceded((blanks, char('P')), digit1::<_, nom::error::Error<&str>>).parse(after) else {
+        let Ok((left, digits)) = preceded((blanks, char('P')), digit1::<_, nom::error::Error<&str>>).parse(after)
+        else {
             self.code.push(at, Instruction::Return(None));
             return Ok(after);
         };
@@ -247,7 +252,8 @@ impl Reader<'_> {
             let (after, (value, point)) =
                 cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of an argument"))?;
             if self.always_mark && !point && !matches!(value, Expr::Number(0.0)) {
-                let says = format!("the number behind {letter} has no decimal point: the control may count it in thousandths");
+                let says =
+                    format!("the number behind {letter} has no decimal point: the control may count it in thousandths");
                 return Err(line.fault(left, says));
             }
             let var = Var::Number(local);

@@ -446,10 +446,7 @@ mod tests {
             names("o10 repeat [2]\nG5 I1 J-2\no10 endrepeat\n"),
             ["o repeat", "the word I", "the word J", "o endrepeat"]
         );
-        assert_eq!(
-            names("o<t> sub\no<t> endsub\no<t> call [5] [2]\n(PROBEOPEN a.txt)\n"),
-            ["(PROBEOPEN)"]
-        );
+        assert_eq!(names("o<t> sub\no<t> endsub\no<t> call [5] [2]\n(PROBEOPEN a.txt)\n"), ["(PROBEOPEN)"]);
         assert_eq!(
             names("; a remark\nG21 ; another\no<my-touch> sub\no<my-touch> endsub\no<my-touch> call ; third\n"),
             [""; 0]

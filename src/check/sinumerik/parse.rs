@@ -343,7 +343,8 @@ impl Reader {
         }
         let (left, label) = self.in_brackets(line, after, |_, i| quoted(i).map(|(i, label)| (i, label.to_owned())))?;
         let statement = self.code.push(at.clone(), Instruction::Leave(0));
-        let jump = Jump { statement, label: (0, label), direction: Direction::Both, at: at.clone(), inside: Vec::new() };
+        let jump =
+            Jump { statement, label: (0, label), direction: Direction::Both, at: at.clone(), inside: Vec::new() };
         self.jumps.push(jump);
         // the control comes to nothing behind it
         self.code.push(at, Instruction::Return(None));
@@ -372,7 +373,8 @@ impl Reader {
                 rest
             };
         }
-        let left = left.strip_prefix(')').ok_or_else(|| line.not_understood(left, ") behind the last of what it is given"))?;
+        let left =
+            left.strip_prefix(')').ok_or_else(|| line.not_understood(left, ") behind the last of what it is given"))?;
         let what = Instruction::Call { to: 0, gives, texts, is_step: true };
         let statement = self.code.push(at.clone(), what);
         self.calls.push(Called { statement, name, at });
@@ -382,8 +384,7 @@ impl Reader {
     /// A name that nothing else has.
     fn free(&self, line: &Line<'_>, rest: &str, name: &str) -> Result<(), Fault> {
         const LENGTH: std::ops::RangeInclusive<usize> = 2..=31;
-        let taken =
-            self.declared.contains(name) || self.external.contains_key(name) || self.names.axis(name).is_some();
+        let taken = self.declared.contains(name) || self.external.contains_key(name) || self.names.axis(name).is_some();
         if taken || means_something(name) || self.names.number(name).is_some() {
             return Err(line.fault(rest, format!("{name} already means something else")));
         }

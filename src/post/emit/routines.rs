@@ -65,7 +65,11 @@ impl Writer<'_> {
         let next = self.next_touch();
         let touch = self.is_fresh("touch", &next.id.to_string());
         let face = self.is_fresh("face", &next.says);
-        if touch { context! { face } } else { Value::from(()) }
+        if touch {
+            context! { face }
+        } else {
+            Value::from(())
+        }
     }
 
     /// The arguments of a turn: all rotary axes, behind X, Y and Z under a transformation; nothing where one is not known yet.
@@ -94,9 +98,13 @@ impl Writer<'_> {
         let other = |what: &str| Err(self.broken(format!("not every {what} is that of the machine")));
         for step in &self.path.steps {
             match step {
-                Step::Touch(t) if (t.tolerance_mm - probe.placement_tolerance).abs() > SAME => return other("tolerance"),
+                Step::Touch(t) if (t.tolerance_mm - probe.placement_tolerance).abs() > SAME => {
+                    return other("tolerance");
+                }
                 Step::Touch(t) if (t.back_off_mm - probe.back_off).abs() > SAME => return other("back_off"),
-                Step::Protected { feed, .. } | Step::Retract { feed, .. } if (feed - probe.position_feed).abs() > SAME => {
+                Step::Protected { feed, .. } | Step::Retract { feed, .. }
+                    if (feed - probe.position_feed).abs() > SAME =>
+                {
                     return other("feed of positioning");
                 }
                 _ => {}
