@@ -1,6 +1,5 @@
 //! Thousands of random edits of a program for each control: how many are not read, refused by what they do, refused only
-//! because the program does otherwise than what was written, refused only because its statements are others, how many move
-//! identically, and whether one escaped.
+//! because its statements are others, how many move identically, how many pass with a remark, and whether one escaped.
 //!
 //! `cargo run --release --example edits -- [COUNT] [--same] [--text] [CONTROLLER …]`; `--same` lists those that move
 //! identically, `--text` prints the program itself.
@@ -19,7 +18,7 @@ fn main() {
     let all = ["linuxcnc", "fanuc", "haas", "sinumerik", "heidenhain", "fanuc-inspection-plus", "haas-inspection-plus"];
     let controllers = if named.is_empty() { all.map(str::to_owned).to_vec() } else { named };
     println!(
-        "| controller | edits | not read | refused by what it does | refused as changed only | the same in all runs, refused | moves identically | escaped | s |"
+        "| controller | edits | not read | refused by what it does | refused as changed only | moves identically | passes with a remark | escaped | s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for controller in &controllers {
@@ -31,9 +30,9 @@ fn main() {
             "| {controller} | {count} | {} | {} | {} | {} | {} | {} | {:.0} |",
             number(Fate::NotRead),
             number(Fate::Refused),
-            number(Fate::Changed),
             number(Fate::Unproven),
             number(Fate::Same),
+            number(Fate::Remarked),
             number(Fate::Escaped),
             begun.elapsed().as_secs_f64()
         );

@@ -2,9 +2,10 @@
 //!
 //! What a word, a variable or a G number *means* is not here: that is the dialect's (`run::Dialect`).
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// A variable of the control.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -146,10 +147,20 @@ pub enum Instruction {
         most: usize,
         text: Text,
     },
-    /// A subroutine: the number of its first statement.
-    Call(usize),
+    /// A subroutine: the number of its first statement, and what its own variables are given.
+    Call {
+        to: usize,
+        /// By variable of the subroutine; those that are not named have no value.
+        gives: Vec<(Var, Expr)>,
+        /// The same of those that hold a text.
+        texts: Vec<(Var, Text)>,
+        /// It is a step of the program's body: what happens within is told at the place of the call.
+        is_step: bool,
+    },
     /// Back to where it was called.
     Return(Option<Expr>),
+    /// Out of all subroutines, on at a statement of the program itself.
+    Leave(usize),
     /// A message to the operator.
     Message(Text),
     /// A log is opened; `append`: what it holds is kept.
@@ -236,6 +247,24 @@ impl Code {
         self.unknown.push(Unknown { at, name: name.into(), kind });
     }
 
+    /// Lets a jump or a call lead to a statement.
+    pub fn aim(&mut self, statement: usize, target: usize) {
+        if let Some(
+            Instruction::Jump(to)
+            | Instruction::Leave(to)
+            | Instruction::JumpUnless(_, to)
+            | Instruction::Call { to, .. },
+        ) = self.statements.get_mut(statement).map(|s| &mut s.what)
+        {
+            *to = target;
+        }
+    }
+
+    /// Lets a jump lead to the statement that comes next.
+    pub fn aim_here(&mut self, statement: usize) {
+        self.aim(statement, self.statements.len());
+    }
+
     /// Adds a statement and gives its place.
     pub fn push(&mut self, at: Range<usize>, what: Instruction) -> usize {
         self.statements.push(Statement { at, what });
@@ -244,7 +273,43 @@ impl Code {
 }
 
 /// Variables and their values.
-pub type Values = BTreeMap<Var, f64>;
+pub type Values = HashMap<Var, f64, BuildHasherDefault<VarHasher>>;
+
+/// The variable in which LinuxCNC keeps what a subroutine gives back.
+pub static VALUE: LazyLock<Var> = LazyLock::new(|| Var::Name("_value".into()));
+
+/// A fast hash of a variable: names are short, and nobody chooses them to collide.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct VarHasher(u64);
+
+impl VarHasher {
+    fn mix(&mut self, word: u64) {
+        const PRIME: u64 = 0x9E37_79B9_7F4A_7C15;
+        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(PRIME);
+    }
+}
+
+impl Hasher for VarHasher {
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word.iter_mut().zip(chunk).for_each(|(slot, byte)| *slot = *byte);
+            self.mix(u64::from_le_bytes(word));
+        }
+    }
+
+    fn write_u32(&mut self, word: u32) {
+        self.mix(u64::from(word));
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.mix(word as u64);
+    }
+}
 
 /// Numbers that differ by less are equal to every control here.
 const SAME: f64 = 1e-9;

@@ -5,9 +5,10 @@
 //! the other way. Where the two ways only compute something and meet again, with differences in unknown values alone, there is
 //! nothing else to run.
 
-use super::code::{Expr, Instruction, Statement, Var};
+use super::code::{Expr, Instruction, Statement, Var, VarHasher};
 use super::run::{Dialect, Run};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::BuildHasherDefault;
 
 /// Why a value is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,8 +33,8 @@ impl Doubt {
 /// The variables of a program whose values are not known, and the conditions that depended on them.
 #[derive(Debug, Clone, Default)]
 pub struct Doubts {
-    /// A local variable by how deep its subroutine is called; the others at 0.
-    values: BTreeMap<(Var, usize), Doubt>,
+    /// Local variables by how deep their subroutine is called; the others at 0.
+    values: BTreeMap<usize, HashMap<Var, Doubt, BuildHasherDefault<VarHasher>>>,
     /// By statement: the condition did not hold in a run, it held in one.
     pub taken: Taken,
     /// The other ways of conditions with at least this doubt are kept.
@@ -44,6 +45,13 @@ pub struct Doubts {
     pub kept: usize,
     /// The first condition whose other way was not kept, because there are too many.
     pub cut: Option<usize>,
+}
+
+impl Doubts {
+    /// A subroutine begins at this depth.
+    pub fn enters(&mut self, depth: usize) {
+        self.values.remove(&depth);
+    }
 }
 
 /// By statement: its condition did not hold, it held.
@@ -70,13 +78,16 @@ struct Computed {
 }
 
 impl<D: Dialect> Run<'_, D> {
-    fn key(&self, var: &Var) -> (Var, usize) {
-        (var.clone(), if self.dialect.is_local(var) { self.depth() } else { 0 })
+    fn depth_of(&self, var: &Var) -> usize {
+        if self.dialect.is_local(var) { self.depth() } else { 0 }
     }
 
     /// Of a variable that the program has given a value.
     fn held_doubt(&self, var: &Var) -> Option<Doubt> {
-        if self.doubts.values.is_empty() { None } else { self.doubts.values.get(&self.key(var)).copied() }
+        if self.doubts.values.is_empty() {
+            return None;
+        }
+        self.doubts.values.get(&self.depth_of(var))?.get(var).copied()
     }
 
     /// Is the value of a variable not known?
@@ -98,11 +109,15 @@ impl<D: Dialect> Run<'_, D> {
 
     /// A variable has been given a value.
     pub(super) fn given(&mut self, var: &Var, doubt: Option<Doubt>) {
-        let key = self.key(var);
+        let depth = self.depth_of(var);
         match doubt {
-            Some(doubt) => self.doubts.values.insert(key, doubt),
-            None => self.doubts.values.remove(&key),
-        };
+            Some(doubt) => {
+                self.doubts.values.entry(depth).or_default().insert(var.clone(), doubt);
+            }
+            None => {
+                self.doubts.values.get_mut(&depth).map(|at| at.remove(var));
+            }
+        }
     }
 
     /// A condition that depends on an unknown value: `holds` leads on to `here`, otherwise it leads to `to`.

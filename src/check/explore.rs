@@ -40,8 +40,6 @@ impl Deviation {
 /// What the program does then.
 #[derive(Debug, Clone)]
 pub struct Branch {
-    /// Place in the trunk at which it leaves it: the event would stand there.
-    pub leaves: usize,
     /// What happened.
     pub deviation: Deviation,
     /// From the deviating move on.
@@ -179,8 +177,8 @@ pub fn explore_on<'p, D: Dialect>(
         let paused = run.on();
         // events before the last stop belong to the part that was up then; a stop is at most the last of them
         note_parts(&mut told.parts, &run.vm, part_before);
-        for (leaves, trouble, fork) in run.take_forks() {
-            told.branches.extend(until_it_stops(fork, trouble.into(), leaves));
+        for (trouble, fork) in run.take_forks() {
+            told.branches.extend(until_it_stops(fork, trouble.into()));
         }
         forks.extend(run.take_doubted());
         match paused {
@@ -201,7 +199,7 @@ pub fn explore_on<'p, D: Dialect>(
                     let leaves = run.vm.trace.len();
                     let trace = std::mem::take(&mut run.vm.trace);
                     for deviation in deviations(&run.vm, &probe, outcome, limits) {
-                        told.branches.extend(follow(run.clone(), &probe, outcome, deviation, leaves));
+                        told.branches.extend(follow(run.clone(), &probe, outcome, deviation));
                     }
                     if ABORTED_AT.contains(&probes)
                         && let Some(again) = restart(&run)
@@ -289,13 +287,7 @@ fn deviations(vm: &Vm, probe: &Probe, outcome: Outcome, limits: Limits) -> Vec<D
     }
 }
 
-fn follow<D: Dialect>(
-    mut run: Run<'_, D>,
-    probe: &Probe,
-    nominal: Outcome,
-    deviation: Deviation,
-    leaves: usize,
-) -> Vec<Branch> {
+fn follow<D: Dialect>(mut run: Run<'_, D>, probe: &Probe, nominal: Outcome, deviation: Deviation) -> Vec<Branch> {
     let way = way_mm(probe);
     let shifted = |mm: f64| Outcome { hit: true, part: (nominal.part + mm / way).clamp(0.0, 1.0) };
     let outcome = match deviation {
@@ -314,7 +306,7 @@ fn follow<D: Dialect>(
         Deviation::NotWritten | Deviation::Deflected => nominal,
     };
     run.resolve(outcome);
-    until_it_stops(run, deviation, leaves)
+    until_it_stops(run, deviation)
 }
 
 impl From<Trouble> for Deviation {
@@ -330,7 +322,7 @@ impl From<Trouble> for Deviation {
 const DEEPEST: usize = 2;
 
 /// Follows a run until it ends or moves on; the line with which it says what is wrong may be lost as well.
-fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves: usize) -> Vec<Branch> {
+fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation) -> Vec<Branch> {
     let mut branches = Vec::new();
     let mut fault = None;
     let mut moves = 0;
@@ -340,14 +332,14 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
     run.doubts.kept = 0;
     loop {
         let paused = run.on();
-        for (_, trouble, fork) in run.take_forks() {
+        for (trouble, fork) in run.take_forks() {
             if trouble == Trouble::LogFull && deviation.must_stop() {
-                branches.extend(until_it_stops(fork, Deviation::NotWritten, leaves));
+                branches.extend(until_it_stops(fork, Deviation::NotWritten));
             }
         }
         for fork in run.take_doubted() {
             if fork.run.doubts.depth <= DEEPEST {
-                branches.extend(until_it_stops(fork.run, deviation, leaves));
+                branches.extend(until_it_stops(fork.run, deviation));
             }
         }
         match paused {
@@ -372,6 +364,6 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation, leaves:
         }
     }
     let (over, settings) = (run.is_over(), Arc::new(run.dialect.settings()));
-    branches.insert(0, Branch { leaves, deviation, over, fault, settings, trace: run.vm.trace });
+    branches.insert(0, Branch { deviation, over, fault, settings, trace: run.vm.trace });
     branches
 }

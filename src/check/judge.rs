@@ -55,6 +55,32 @@ impl<'a> Judge<'a> {
         settings_return(case, told, said);
     }
 
+    /// The dry run: its moves are clear, it meets nothing, logs nothing, comes to its end, and stops at any contact.
+    pub fn dry(&mut self, told: &ExploredRun) {
+        self.prove();
+        let case = self.case;
+        self.said.when = Some("in the dry run".to_owned());
+        Walk::new(case, told, &mut self.said, &mut self.proofs).trunk();
+        for happened in &told.trunk {
+            let wrong = match &happened.event {
+                Event::Log(_) | Event::LogOpen { .. } => "the program writes into the log",
+                Event::Probe { probe, outcome, .. } if probe.toward && outcome.hit => "the ball meets a block",
+                _ => continue,
+            };
+            self.said.say(case, "check::dry_run", &happened.at, wrong.to_owned(), "a larger height");
+        }
+        if told.fault.is_none() && stops_by_itself(told) {
+            let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
+            self.said.say(case, "check::dry_run", &end, "the program does not come to its end".to_owned(), "");
+        }
+        self.prove();
+        for branch in &told.branches {
+            branch_stops(case, told, None, branch, &mut self.said);
+        }
+        settings_return(case, told, &mut self.said);
+        self.said.when = None;
+    }
+
     /// A run that finds the control in another state: only what it leaves to the user.
     pub fn other(&mut self, told: &ExploredRun) {
         settings_return(self.case, told, &mut self.said);
@@ -131,6 +157,8 @@ struct Walk<'a, 'b> {
     lift: Option<Lift>,
     made: Vec<Made>,
     waited: bool,
+    /// The event that is judged, by its place in the record.
+    index: usize,
 }
 
 impl<'a, 'b> Walk<'a, 'b> {
@@ -153,6 +181,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             lift,
             made: Vec::new(),
             waited: false,
+            index: 0,
         }
     }
 
@@ -167,7 +196,8 @@ impl<'a, 'b> Walk<'a, 'b> {
 
     fn trunk(&mut self) {
         let told = self.told;
-        for (happened, part) in told.trunk.iter().zip(&told.parts) {
+        for (event, (happened, part)) in told.trunk.iter().zip(&told.parts).enumerate() {
+            self.index = event;
             self.event(happened, *part);
         }
         let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
@@ -235,6 +265,7 @@ impl<'a, 'b> Walk<'a, 'b> {
                 if let Some(mut contact) = self.contact.take() {
                     contact.made.log = Some(text.clone());
                     contact.made.at = at.clone();
+                    contact.made.logged = Some(self.index);
                     contact.made.senses = self.senses;
                     contact.made.spindle_deg = self.spindle;
                     contact.made.waited = std::mem::take(&mut self.waited);

@@ -10,10 +10,12 @@
 //! [`crate::simulate`].
 
 mod branches;
+mod called;
 mod checked_program;
 mod code;
 mod doubt;
 mod explore;
+mod harmless;
 mod heidenhain;
 mod hidden_rotation;
 mod judge;
@@ -21,7 +23,6 @@ mod lines;
 mod macro_b;
 mod needs_plan;
 mod ngc;
-mod proof;
 mod run;
 mod runs;
 mod seconds;
@@ -32,7 +33,7 @@ mod touches;
 mod vm;
 mod world;
 
-use crate::diag::{Failure, Finding, Result, Severity, Source};
+use crate::diag::{Failure, Finding, Result, Source};
 use crate::machine::{Machine, Mounting};
 use crate::post::Postprocessor;
 use crate::program::plan::{ControllerFrame, Plan, Proof};
@@ -42,9 +43,9 @@ use crate::units::Plain;
 use checked_program::CheckedProgram;
 use code::{Unknown, UnknownKind};
 use judge::Judge;
-use proof::Proving;
 use run::Event;
 use runs::Kind;
+use statements::Compared;
 use std::ops::Range;
 use std::sync::Arc;
 use world::World;
@@ -102,7 +103,19 @@ struct Part {
 /// # Errors
 /// When the text is not of the dialect's grammar, or plan and machine do not belong together.
 pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
-    let program = read(post, source, against.beside)?;
+    let whole = called::Whole::new(source, post, against.beside);
+    match check_whole(machine, post, &whole.source, against) {
+        Ok(mut checked) => {
+            checked.findings = checked.findings.into_iter().map(|finding| whole.told(finding)).collect();
+            Ok(checked)
+        }
+        Err(Failure(findings)) => Err(Failure(findings.into_iter().map(|finding| whole.told(finding)).collect())),
+    }
+}
+
+/// A program with those that it calls, as one text.
+fn check_whole(machine: &Machine, post: &Postprocessor, source: &Source, against: &Against<'_>) -> Result<Checked> {
+    let mut program = read(post, source, against.beside)?;
     let unknown = match against.plan {
         // what was edited comes first, and then what the control says to it
         Some(_) => program.unknown_of_grammar().to_vec(),
@@ -115,7 +128,16 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
     match against.plan {
         Some(plan) => {
             let number = number(post, &program, source)?;
+            let written = plan.programs.get(&post.name);
+            let compared = written.filter(|w| !w.steps_sha256.is_empty()).map(|w| program.compare(w, post));
             let mut checked = with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?)?;
+            match (written, compared) {
+                (Some(written), Some(compared)) => {
+                    as_written(written, &compared, &program, source, &checked.proof, &mut checked.findings);
+                }
+                (Some(_), None) => checked.findings.push(older_plan()),
+                (None, _) => {}
+            }
             checked.findings.extend(number);
             Ok(checked)
         }
@@ -212,7 +234,8 @@ fn number(post: &Postprocessor, program: &runs::Program, source: &Source) -> Res
 /// # Errors
 /// The first place that is not of the grammar.
 pub fn grammar(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<()> {
-    let foreign = refuse_unknown(read(post, source, beside)?.unknown_of_grammar(), source)?;
+    let whole = called::Whole::new(source, post, beside);
+    let foreign = refuse_unknown(read(post, &whole.source, beside)?.unknown_of_grammar(), &whole.source)?;
     if foreign.is_empty() { Ok(()) } else { Err(Failure(foreign)) }
 }
 
@@ -257,7 +280,8 @@ fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> R
 /// The names of the files that a program needs beside it at the control and that say what it writes.
 #[must_use]
 pub fn wanted_beside(post: &Postprocessor, program: &Source) -> Vec<String> {
-    if post.companions.is_empty() { Vec::new() } else { heidenhain::wanted(program.inner(), post) }
+    let masks = if post.companions.is_empty() { Vec::new() } else { heidenhain::wanted(program.inner(), post) };
+    masks.into_iter().chain(called::wanted(program.inner(), post)).collect()
 }
 
 /// Tries each mounting of the machine and takes the one on which most touches are made.
@@ -368,22 +392,19 @@ fn with_parts(
         clear_from_anywhere: opening.clear_from_anywhere,
         neutral: &opening.neutral,
     };
-    let (mut judge, mut proving) = (Judge::new(&case), Proving::default());
+    let mut judge = Judge::new(&case);
     let (mut declined, mut branches, mut both_ways) = (Vec::new(), 0, 0);
     let told = runs::all(stage, &opening, &mut |kind, told| match kind {
         Kind::Begun => {
             judge.run(told);
-            proving.add(told);
             branches += told.branches.len();
             if told.declines() && told.from <= program.setups() {
                 declined.push(told.from);
             }
         }
-        Kind::Other => {
-            judge.other(told);
-            proving.add(told);
-        }
-        Kind::Refused => proving.add(told),
+        Kind::Dry => judge.dry(told),
+        Kind::Other => judge.other(told),
+        Kind::Refused => {}
         Kind::Doubted => {
             judge.doubted(told);
             both_ways += usize::from(!told.otherwise.is_empty());
@@ -398,14 +419,8 @@ fn with_parts(
         told.findings.iter().map(|(at, says)| Finding::error("check::start", says.clone()).at(source, at.clone())),
     );
     findings.extend(begins(post, program, against.from.max(1), source));
-    let proof = proving.finish(program.statements());
-    if let Some(plan) = against.plan {
-        match as_written(plan, post, &proof, program, &told.whole.trunk, source) {
-            // the edited line stands before all that follows from it
-            Some(changed) if changed.severity == Severity::Error => findings.insert(0, changed),
-            other => findings.extend(other),
-        }
-    }
+    findings.extend(dry_run(post, program, source));
+    let proof = program.record(post, source.inner());
     let trunk = told.whole.trunk.as_slice();
     Ok(Checked {
         mountings: parts.iter().map(|p| p.mounting.name.clone()).collect(),
@@ -429,6 +444,20 @@ fn too_many(source: &Source, at: Range<usize>) -> Finding {
     Finding::error("check::too_many_branches", says)
         .help("let fewer conditions depend on them; each is run both ways")
         .at(source, at)
+}
+
+/// It is written for a dry run.
+fn dry_run(post: &Postprocessor, program: &runs::Program, source: &Source) -> Option<Finding> {
+    let (height, at) = program.dry_run().filter(|(height, _)| *height != 0.0)?;
+    if height.is_nan() || height < 0.0 {
+        let says = "the height of the dry run is below 0: all moves would be lower";
+        return Some(Finding::error("check::dry_run", says).help("0 measures, 50 is a good height").at(source, at));
+    }
+    if post.dry_run_mm > 0.0 {
+        return None;
+    }
+    let says = "the program makes a dry run: its moves are higher, and it measures nothing";
+    Some(Finding::info("check::dry_run", says).help("write 0 there to measure").at(source, at))
 }
 
 fn begins(post: &Postprocessor, program: &runs::Program, meant: u32, source: &Source) -> Option<Finding> {
@@ -458,48 +487,45 @@ fn begins(post: &Postprocessor, program: &runs::Program, meant: u32, source: &So
     }
 }
 
-/// Is the program still what `generate` wrote?
+/// A plan that holds nothing that a program could be compared with.
+fn older_plan() -> Finding {
+    let says = "the plan is of an older version and does not hold the program's statements: whether this is still the program that was written is not known";
+    Finding::warning("check::older_plan", says).help("`axiscal generate` writes plan and program anew")
+}
+
+/// Is the program still what `generate` wrote? What was changed without harm is named.
 fn as_written(
-    plan: &Plan,
-    post: &Postprocessor,
-    proof: &Proof,
+    written: &Proof,
+    compared: &Compared,
     program: &runs::Program,
-    trunk: &[run::Happened],
     source: &Source,
-) -> Option<Finding> {
-    const HELP: &str =
-        "was it edited? `axiscal generate` writes it anew; change the postprocessor file rather than the program";
-    let written = plan.programs.get(&post.name)?;
-    let other = statements::first_other(written, proof).map(|i| program.place(i));
-    if written.sha256 == proof.sha256 {
-        if written.statements_sha256.is_empty() {
-            let says = "the plan is of an older version and does not hold the program's statements: a limit in a condition that was changed is not found";
-            return Some(
-                Finding::warning("check::older_plan", says).help("`axiscal generate` writes plan and program anew"),
-            );
-        }
-        let says = "this is not the statement that axiscal wrote: in all runs that were tried the program does the same, but what it does here where something goes wrong is not proven";
-        return other.map(|at| Finding::error("check::changed", says).help(HELP).at(source, at));
+    now: &Proof,
+    findings: &mut Vec<Finding>,
+) {
+    if let Some(other) = compared.other {
+        let says = "this is not the statement that axiscal wrote: what the program does here, in every run that may come, is not proven";
+        let help =
+            "was it edited? `axiscal generate` writes it anew; change the postprocessor file rather than the program";
+        // the edited line stands before all that follows from it
+        findings.insert(0, Finding::error("check::changed", says).help(help).at(source, program.place(other)));
+        return;
     }
-    let same = proof::same_lines(written, proof);
-    let lines = trunk.iter().filter(|h| matches!(h.event, Event::Log(_)));
-    let places: Vec<_> = lines.map(|h| h.at.clone()).collect();
-    let before = same.checked_sub(1).and_then(|i| places.get(i)).map_or(0, |at| at.end);
-    let all_the_same = same == written.lines.len() && same == proof.lines.len();
-    let (at, says) = if let Some(at) = other {
-        (
-            at,
-            "here the program is not the one that axiscal wrote, and does otherwise (moves, log, messages, or what it does when something goes wrong)",
-        )
-    } else if all_the_same {
-        let says = "the program does otherwise than the one that axiscal wrote: when it starts again at a set-up, in the settings that it leaves, or after its last line";
-        (before..before, says)
-    } else {
-        let end = places.get(same).map_or(before, |at| at.end);
-        (
-            before..end,
-            "here the program does otherwise than the one that axiscal wrote (moves, log, messages, or what it does when something goes wrong)",
-        )
+    const SHOWN: usize = 8;
+    let mut remark = |at: Option<Range<usize>>, says: String| {
+        let finding = Finding::info("check::edited", says);
+        findings.push(at.map_or(finding.clone(), |at| finding.at(source, at)));
     };
-    Some(Finding::error("check::changed", says).help(HELP).at(source, at))
+    for (statement, what) in compared.inserted.iter().take(SHOWN) {
+        remark(Some(program.place(*statement)), format!("{}: it harms nothing", what.says()));
+    }
+    if compared.inserted.len() > SHOWN {
+        remark(None, format!("and {} more lines that were put in and harm nothing", compared.inserted.len() - SHOWN));
+    }
+    if compared.other_texts {
+        remark(None, "the text of a message was changed: it harms nothing".to_owned());
+    }
+    if compared.inserted.is_empty() && !compared.other_texts && written.text_sha256 != now.text_sha256 {
+        let says = "remarks, blanks, block numbers or the spelling of numbers were changed, or a switch in the head: the program makes the moves that were written";
+        remark(None, says.to_owned());
+    }
 }

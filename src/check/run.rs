@@ -3,8 +3,9 @@
 //! It stops at every move that a probe may end ([`Pause::Probe`]); whoever runs it decides how that move ends. So one
 //! program can be run with every touch missed, with contact on the way, with a probe that does not close again.
 
-use super::code::{Code, Expr, Instruction, Piece, Statement, UnknownKind, Values, Var, Word, numbered};
+use super::code::{Code, Expr, Instruction, Piece, Statement, UnknownKind, VALUE, Values, Var, Word, numbered};
 use super::doubt::{Doubt, Doubts, Fork};
+use super::harmless::Harmless;
 use super::hidden_rotation::Turn;
 use super::vm;
 use crate::axes::Position;
@@ -223,14 +224,24 @@ pub enum Trouble {
 /// Statements after which a run that has not ended never will.
 const MOST_STATEMENTS: u64 = 3_000_000;
 
+/// Where a subroutine leads back to.
+#[derive(Debug, Clone)]
+struct Return {
+    next: usize,
+    /// The step of the body that the subroutine is a part of.
+    step: Option<Range<usize>>,
+}
+
 /// A program on its way.
 #[derive(Debug, Clone)]
 pub struct Run<'p, D> {
     pub(super) code: &'p Code,
-    /// The statement that says at which set-up it begins stands in place of the program's.
-    pub begins: Option<(usize, Arc<Statement>)>,
+    /// Statements that stand in place of the program's: at which set-up it begins, whether it only tries.
+    pub switched: Vec<(usize, Arc<Statement>)>,
+    /// What a person has put in, by statement.
+    pub inserted: &'p BTreeMap<usize, Harmless>,
     pub(super) next: usize,
-    returns: Vec<usize>,
+    returns: Vec<Return>,
     done: u64,
     pending: Option<Probe>,
     over: bool,
@@ -240,9 +251,9 @@ pub struct Run<'p, D> {
     writes_to: Option<String>,
     /// No log takes a line any more.
     log_is_full: bool,
-    /// Runs in which there is trouble at a statement are kept: place in the record, what, and the run at that statement.
+    /// Runs in which there is trouble at a statement are kept: what, and the run at that statement.
     pub keeps_forks: bool,
-    forks: Vec<(usize, Trouble, Self)>,
+    forks: Vec<(Trouble, Self)>,
     /// What of its values is not known.
     pub doubts: Doubts,
     pub(super) doubted: Vec<Fork<'p, D>>,
@@ -254,10 +265,11 @@ pub struct Run<'p, D> {
 
 impl<'p, D: Dialect> Run<'p, D> {
     /// A program that begins.
-    pub fn new(code: &'p Code, dialect: D, vm: Vm) -> Self {
+    pub fn new(code: &'p Code, inserted: &'p BTreeMap<usize, Harmless>, dialect: D, vm: Vm) -> Self {
         Self {
             code,
-            begins: None,
+            inserted,
+            switched: Vec::new(),
             next: 0,
             returns: Vec::new(),
             done: 0,
@@ -287,7 +299,7 @@ impl<'p, D: Dialect> Run<'p, D> {
     }
 
     /// Takes the runs in which there is trouble.
-    pub fn take_forks(&mut self) -> Vec<(usize, Trouble, Self)> {
+    pub fn take_forks(&mut self) -> Vec<(Trouble, Self)> {
         std::mem::take(&mut self.forks)
     }
 
@@ -295,7 +307,8 @@ impl<'p, D: Dialect> Run<'p, D> {
     pub(super) fn without_record(&self) -> Self {
         Self {
             code: self.code,
-            begins: self.begins.clone(),
+            switched: self.switched.clone(),
+            inserted: self.inserted,
             next: self.next,
             returns: self.returns.clone(),
             done: self.done,
@@ -328,12 +341,12 @@ impl<'p, D: Dialect> Run<'p, D> {
                 fork.vm.note(Event::Other("the probe is deflected".to_owned()));
             }
         }
-        self.forks.push((self.vm.trace.len(), trouble, fork));
+        self.forks.push((trouble, fork));
     }
 
     /// The statement that stands here in place of the program's.
     pub(super) fn own(&self) -> Option<Arc<Statement>> {
-        self.begins.as_ref().filter(|(at, _)| *at == self.next).map(|(_, own)| own.clone())
+        self.switched.iter().find(|(at, _)| *at == self.next).map(|(_, own)| own.clone())
     }
 
     /// On to the next move that the probe may end, or to the end.
@@ -356,14 +369,34 @@ impl<'p, D: Dialect> Run<'p, D> {
                 return Err(Fault { at: statement.at.clone(), says: "the program runs in a circle".to_owned() });
             }
             self.next += 1;
-            self.vm.place = statement.at.clone();
+            let step = self.returns.last().and_then(|back| back.step.as_ref());
+            self.vm.place.clone_from(step.unwrap_or(&statement.at));
             let fault = |says: String| Fault { at: statement.at.clone(), says };
+            match self.inserted.get(&(self.next - 1)) {
+                Some(Harmless::Modes) => {
+                    self.changes_nothing(statement).map_err(fault)?;
+                    continue;
+                }
+                // it waits, or switches something that moves nothing
+                Some(_) => continue,
+                None => {}
+            }
             if let Some(probe) = self.statement(statement).map_err(fault)? {
                 self.pending = Some(probe.clone());
                 return Ok(Pause::Probe(probe));
             }
         }
         Ok(Pause::Done)
+    }
+
+    /// Modal words that were put in: they act already.
+    fn changes_nothing(&mut self, statement: &Statement) -> Result<(), String> {
+        let before = self.dialect.settings();
+        self.statement(statement)?;
+        if self.dialect.settings() == before {
+            return Ok(());
+        }
+        Err("modal words that were put in change how the control counts".to_owned())
     }
 
     /// The move at which it rests ended like this.
@@ -461,21 +494,41 @@ impl<'p, D: Dialect> Run<'p, D> {
                     self.next = *to;
                 }
             }
-            Instruction::Call(to) => {
+            Instruction::Call { to, gives, texts, is_step } => {
                 const DEEPEST: usize = 10;
                 if self.returns.len() >= DEEPEST {
                     return Err("subroutines call each other more than ten deep".to_owned());
                 }
-                self.returns.push(self.next);
+                let given = |(var, expr): &(Var, Expr)| Ok((var.clone(), self.value(expr)?, self.doubt(expr)));
+                let given = gives.iter().map(given).collect::<Result<Vec<_>, String>>()?;
+                for (var, text) in texts {
+                    let text = self.text(text)?;
+                    self.texts.insert(var.clone(), text);
+                }
+                let outer = self.returns.last().and_then(|back| back.step.clone());
+                let step = outer.or_else(|| is_step.then(|| statement.at.clone()));
+                self.returns.push(Return { next: self.next, step });
                 self.next = *to;
                 self.dialect.entered();
+                // its variables are its own: nothing is known of those of the subroutine before it
+                self.doubts.enters(self.returns.len());
+                for (var, value, doubt) in given {
+                    self.dialect.write(&var, value, &self.vm)?;
+                    self.given(&var, doubt);
+                }
             }
             Instruction::Return(expr) => {
                 let value = expr.as_ref().map(|v| self.value(v)).transpose()?;
                 let doubt = expr.as_ref().and_then(|v| self.doubt(v));
-                self.next = self.returns.pop().ok_or("a return outside of a subroutine")?;
+                self.next = self.returns.pop().ok_or("a return outside of a subroutine")?.next;
                 self.dialect.left(value, &self.vm);
-                self.given(&Var::Name("_value".into()), doubt);
+                self.given(&VALUE, doubt);
+            }
+            Instruction::Leave(to) => {
+                while self.returns.pop().is_some() {
+                    self.dialect.left(None, &self.vm);
+                }
+                self.next = *to;
             }
             Instruction::Message(text) => self.say(text, Event::Message)?,
             Instruction::Wait(text) => self.say(text, Event::Wait)?,

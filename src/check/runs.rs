@@ -10,16 +10,18 @@ mod spindle;
 use super::code::{Code, Expr, Instruction, Statement, Unknown, UnknownKind, Var, Word};
 use super::doubt::Taken;
 use super::explore::{Explored, ExploredRun, Limits, explore};
+use super::harmless::{self, Harmless};
 use super::needs_plan;
 use super::run::{Dialect, Event, Fault, Happened, Pause, Run, Spoken, Start, Vm};
 use super::seconds::Clock;
+use super::statements::{self, Compared, Rules};
 use super::world::World;
-use super::{heidenhain, macro_b, ngc, sinumerik, statements};
+use super::{heidenhain, macro_b, ngc, sinumerik};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Source};
 use crate::machine::Machine;
 use crate::post::{CheckRule, DialectName, Postprocessor};
-use crate::program::plan::Plan;
+use crate::program::plan::{Plan, Proof};
 use crate::program::scene::Scene;
 use hidden_rotation::Begun;
 use otherwise::otherwise;
@@ -32,8 +34,12 @@ use std::sync::Arc;
 pub struct Program {
     dialect: DialectName,
     code: Code,
+    /// What a person has put in, by statement.
+    inserted: BTreeMap<usize, Harmless>,
     /// The variable that says at which set-up it begins, and the statement that sets it.
     from: Option<(Var, usize)>,
+    /// The same of the height of its dry run.
+    dry_run: Option<(Var, usize)>,
     setups: u32,
 }
 
@@ -52,9 +58,10 @@ impl Program {
             DialectName::Klartext => heidenhain::parse(text, post, masks)?,
             DialectName::Sinumerik => sinumerik::parse(text, post)?,
         };
+        let switch = |var: Var| set_at(&code, &var).map(|at| (var, at));
         let var = variable(&rule.from);
-        let set_at =
-            code.statements.iter().position(|s| matches!(&s.what, Instruction::Set(v, Expr::Number(_)) if *v == var));
+        let from = switch(var.clone());
+        let dry_run = rule.dry_run.as_deref().map(variable).and_then(switch);
         let mut highest = 1.0_f64;
         for statement in &code.statements {
             if let Instruction::JumpUnless(condition, _) = &statement.what {
@@ -62,7 +69,7 @@ impl Program {
             }
         }
         let setups = highest.min(MOST_SETUPS) as u32;
-        Ok(Self { dialect: rule.dialect, code, from: set_at.map(|at| (var, at)), setups })
+        Ok(Self { dialect: rule.dialect, code, inserted: BTreeMap::new(), from, dry_run, setups })
     }
 
     /// The program's own number, and where it stands.
@@ -145,16 +152,32 @@ impl Program {
         self.setups
     }
 
-    /// The digest of its statements, wherever it is told to begin.
-    pub fn statements(&self) -> (String, Vec<String>) {
-        // Fanuc and Haas: a number without its point counts least increments
-        statements::statements(&self.from(1), self.dialect == DialectName::MacroB)
+    /// The record of it for its plan; `text`: all of it.
+    pub fn record(&self, post: &Postprocessor, text: &str) -> Proof {
+        self.with_rules(post, |rules| statements::record(&self.code, rules, text))
+    }
+
+    /// Compares it with what was written. What a person has put in is known from then on.
+    pub fn compare(&mut self, written: &Proof, post: &Postprocessor) -> Compared {
+        let compared = self.with_rules(post, |rules| statements::compare(written, &self.code, rules));
+        self.inserted.clone_from(&compared.inserted);
+        compared
+    }
+
+    fn with_rules<T>(&self, post: &Postprocessor, of: impl FnOnce(&Rules<'_>) -> T) -> T {
+        let rule = post.check.as_ref();
+        let switches = rule.iter().flat_map(|rule| std::iter::once(&rule.from).chain(&rule.feed).chain(&rule.dry_run));
+        of(&Rules {
+            // Fanuc and Haas: a number without its point counts least increments
+            points: self.dialect == DialectName::MacroB,
+            switches: switches.filter_map(|written| set_at(&self.code, &variable(written))).collect(),
+            harmless: &|statement| harmless::of(statement, post),
+        })
     }
 
     /// Where a statement stands; behind the last one, where that ends.
     pub fn place(&self, statement: usize) -> Range<usize> {
-        let end = || self.code.statements.last().map_or(0..0, |s| s.at.end..s.at.end);
-        self.code.statements.get(statement).map_or_else(end, |s| s.at.clone())
+        statements::place(&self.code, statement)
     }
 
     /// Where it is told at which set-up it begins.
@@ -163,24 +186,31 @@ impl Program {
         at.map_or(0..0, |s| s.at.clone())
     }
 
-    /// The statement that says at which set-up it begins, for another one.
-    fn begins(&self, setup: u32) -> Option<(usize, Arc<Statement>)> {
-        let (var, at) = self.from.as_ref()?;
+    /// The height of its dry run as it is written; 0: it measures. `None`: it has none.
+    pub fn dry_run(&self) -> Option<(f64, Range<usize>)> {
+        let (_, at) = self.dry_run.as_ref()?;
         let statement = self.code.statements.get(*at)?;
-        let what = Instruction::Set(var.clone(), Expr::Number(f64::from(setup)));
-        Some((*at, Arc::new(Statement { what, at: statement.at.clone() })))
+        match statement.what {
+            Instruction::Set(_, Expr::Number(height)) => Some((height, statement.at.clone())),
+            _ => None,
+        }
     }
 
-    /// The program told to begin at a set-up.
-    fn from(&self, setup: u32) -> Code {
-        let mut code = self.code.clone();
-        if let Some((var, at)) = &self.from
-            && let Some(statement) = code.statements.get_mut(*at)
-        {
-            statement.what = Instruction::Set(var.clone(), Expr::Number(f64::from(setup)));
-        }
-        code
+    /// The statements of its head that say at which set-up it begins and how high its dry run is, for others.
+    fn switched(&self, setup: u32, height: f64) -> Vec<(usize, Arc<Statement>)> {
+        let own = |(switch, value): (&Option<(Var, usize)>, f64)| {
+            let (var, at) = switch.as_ref()?;
+            let statement = self.code.statements.get(*at)?;
+            let what = Instruction::Set(var.clone(), Expr::Number(value));
+            Some((*at, Arc::new(Statement { what, at: statement.at.clone() })))
+        };
+        [(&self.from, f64::from(setup)), (&self.dry_run, height)].into_iter().filter_map(own).collect()
     }
+}
+
+/// The statement that gives a variable its number first.
+fn set_at(code: &Code, var: &Var) -> Option<usize> {
+    code.statements.iter().position(|s| matches!(&s.what, Instruction::Set(v, Expr::Number(_)) if v == var))
 }
 
 /// `#<_axiscal_from>`, `#100`, `Q1600`, `AXC_FROM` as a variable.
@@ -222,6 +252,8 @@ pub enum Kind {
     Other,
     /// A run that finds the machine where the program must not begin.
     Refused,
+    /// The dry run: no block is met, and nothing is measured.
+    Dry,
     /// A run that takes the other way at a condition on a value that is not known, or finds the control as the program has left it.
     Doubted,
 }
@@ -371,6 +403,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
             note(&mut all_taken, &refused);
             looked_at(Kind::Refused, &refused);
         }
+        if let Some(dry) = self.dry(beginning, limits) {
+            looked_at(Kind::Dry, &dry);
+        }
         again.iter().for_each(|again| note(&mut all_taken, again));
         let doubted::Doubted { runs, beyond } = self.doubted(open, &all_taken, limits);
         let beyond = beyond.or(cut.map(|statement| self.program.place(statement)));
@@ -459,8 +494,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
             turned_near,
             clock: Clock::default(),
         };
-        let mut run = Run::new(&self.program.code, D::begin(start, self.post, self.machine), vm);
-        run.begins = self.program.begins(from);
+        let mut run =
+            Run::new(&self.program.code, &self.program.inserted, D::begin(start, self.post, self.machine), vm);
+        run.switched = self.program.switched(from, 0.0);
         run
     }
 
@@ -483,6 +519,17 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let mut explored = explore(run, k, limits.map(|l| Limits { probes, ..l }), &restart);
         explored.told.start = start;
         explored
+    }
+
+    /// The dry run, at the height that is written or else at the usual one.
+    fn dry(&self, at: Position, limits: Limits) -> Option<ExploredRun> {
+        const USUAL_MM: f64 = 50.0;
+        let (written, _) = self.program.dry_run()?;
+        let usual = self.post.number.length(USUAL_MM).parse().unwrap_or(USUAL_MM);
+        let mut run = self.run(1, Start::Awkward, at, 0, false);
+        run.switched = self.program.switched(1, if written > 0.0 { written } else { usual });
+        let told = explore(run, 1, Some(limits), &|_| None).told;
+        Some(ExploredRun { start: Start::Awkward, ..told })
     }
 
     /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.

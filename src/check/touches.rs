@@ -13,6 +13,8 @@ use std::ops::Range;
 /// A touch that a program made. Positions are axis positions relative to R, mm and deg.
 #[derive(Debug, Clone)]
 pub struct Made {
+    /// Its line of the log, by its place in the record of the run.
+    pub logged: Option<usize>,
     /// Its place in the program.
     pub at: Range<usize>,
     /// What was mounted.
@@ -49,6 +51,7 @@ impl Made {
         contact: &Position,
     ) -> Self {
         Self {
+            logged: None,
             at: at.clone(),
             part,
             block,
@@ -74,18 +77,28 @@ impl Made {
 /// Logged coordinates may leave the contact by this beside the digits of the log, mm or deg.
 const LOGGED: f64 = 1e-6;
 
+/// A line that a run wrote into its log.
+struct LogLine<'a> {
+    /// Its place in the record of the run.
+    event: usize,
+    /// Its place in the program.
+    at: &'a Range<usize>,
+    text: &'a str,
+}
+
 /// Compares the touches of a run with the plan.
 pub fn against_plan(case: &CheckedProgram<'_>, told: &ExploredRun, made: &[Made], said: &mut CollectedFindings) {
-    let lines: Vec<(&Range<usize>, &str)> = told
+    let lines: Vec<LogLine<'_>> = told
         .trunk
         .iter()
-        .filter_map(|h| match &h.event {
-            Event::Log(text) => Some((&h.at, text.as_str())),
+        .enumerate()
+        .filter_map(|(event, h)| match &h.event {
+            Event::Log(text) => Some(LogLine { event, at: &h.at, text }),
             _ => None,
         })
         .collect();
     log_is_open(case, told, said);
-    let text: String = lines.iter().flat_map(|(_, l)| [*l, "\n"]).collect();
+    let text: String = lines.iter().flat_map(|line| [line.text, "\n"]).collect();
     let end = told.trunk.last().map_or(0..0, |h| h.at.clone());
     let mut parsed = match log::parse(text.as_bytes(), "the log that the program writes", case.post) {
         Ok((parsed, findings)) => {
@@ -117,14 +130,14 @@ pub fn against_plan(case: &CheckedProgram<'_>, told: &ExploredRun, made: &[Made]
         }
         return;
     }
-    let made_at: HashMap<&Range<usize>, &Made> = made.iter().rev().map(|m| (&m.at, m)).collect();
-    let by_line = |line: usize| lines.get(line.checked_sub(1)?).and_then(|(at, _)| made_at.get(at)).copied();
+    let made_at: HashMap<usize, &Made> = made.iter().filter_map(|m| Some((m.logged?, m))).collect();
+    let by_line = |line: usize| lines.get(line.checked_sub(1)?).and_then(|l| made_at.get(&l.event)).copied();
     times(case, &parsed.touches, &lines, said);
     let numbered = plan.numbered();
     let mut ids = Vec::new();
     let mut met: BTreeSet<(usize, &str)> = BTreeSet::new();
     for raw in &parsed.touches {
-        let place = lines.get(raw.line.saturating_sub(1)).map_or(end.clone(), |(at, _)| (*at).clone());
+        let place = lines.get(raw.line.saturating_sub(1)).map_or(end.clone(), |l| l.at.clone());
         let Some(id) = raw.id else { continue };
         let Some(planned) = numbered.touch(id) else {
             said.say(case, "check::not_planned", &place, format!("touch {id} is not in the plan"), "");
@@ -164,12 +177,7 @@ pub fn against_plan(case: &CheckedProgram<'_>, told: &ExploredRun, made: &[Made]
 }
 
 /// Where the log has times, each touch has one, it goes on as the run does, and it does not jump.
-fn times(
-    case: &CheckedProgram<'_>,
-    touches: &[log::RawTouch],
-    lines: &[(&Range<usize>, &str)],
-    said: &mut CollectedFindings,
-) {
+fn times(case: &CheckedProgram<'_>, touches: &[log::RawTouch], lines: &[LogLine<'_>], said: &mut CollectedFindings) {
     // no touch with the way to it takes as long
     const LONGEST_S: f64 = 3600.0;
     if !case.post.log.writes_time {
@@ -177,7 +185,7 @@ fn times(
     }
     let mut before = 0.0;
     for touch in touches {
-        let place = lines.get(touch.line.saturating_sub(1)).map_or(0..0, |(at, _)| (*at).clone());
+        let place = lines.get(touch.line.saturating_sub(1)).map_or(0..0, |l| l.at.clone());
         let id = touch.id.unwrap_or_default();
         match touch.time_s {
             None => said.say(case, "check::log", &place, format!("touch {id} has no time in the log"), ""),
@@ -193,7 +201,7 @@ fn times(
     // a clock that stands still is none
     let first = touches.first().and_then(|t| t.time_s).unwrap_or(0.0);
     if touches.len() > 2 && before <= first {
-        let place = lines.last().map_or(0..0, |(at, _)| (*at).clone());
+        let place = lines.last().map_or(0..0, |l| l.at.clone());
         said.say(case, "check::log", &place, "the times in the log stand still".to_owned(), "");
     }
 }

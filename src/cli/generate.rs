@@ -37,9 +37,24 @@ pub struct Args {
     /// The same touches under the control's own transformation, to see a loaded compensation at work
     #[arg(long)]
     tcp: bool,
+    /// Write it for a dry run: all moves are higher by so many mm, and nothing is measured
+    #[arg(long, value_name = "MM")]
+    dry_run_height: Option<f64>,
+    /// Make each touch by the program's own routine, or by the control's measuring cycle
+    #[arg(long, value_enum, default_value_t = TouchWith::Own)]
+    touch_with: TouchWith,
     /// Refuse the program when a single touch cannot be reached, instead of leaving it out
     #[arg(long)]
     strict: bool,
+}
+
+/// What makes a touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TouchWith {
+    /// The program's own routine
+    Own,
+    /// The control's measuring cycle
+    Cycle,
 }
 
 /// # Errors
@@ -55,7 +70,11 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             return Err(Failure::new("cli::controller", "no controller is named").help("add --controller NAME"));
         }
     };
-    let post = load_controller(&word, io)?;
+    let mut post = load_controller(&word, io)?;
+    if args.touch_with == TouchWith::Cycle {
+        post = post.with_cycle()?;
+    }
+    post.dry_run_mm = dry_run_mm(args.dry_run_height)?;
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;
     let options = Options { strict: args.strict, tcp: args.tcp };
@@ -75,7 +94,28 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     )?;
     let written: Vec<&PathBuf> = files.iter().map(|(file, _)| file).collect();
     summary(&machine, &post, &generated, seconds, (&written, &plan_file), io);
+    for (file, beside) in written.iter().skip(1).zip(&nc.beside).filter(|(_, beside)| beside.to_control) {
+        io.say(format!("{} goes to the control with the program: {}", file.display(), beside.says));
+    }
+    io.say("the head of the program says what to set up where");
+    if post.dry_run_mm > 0.0 {
+        io.say("it is written for a dry run: it measures nothing until its height in the head is 0");
+    }
     Ok(Answer::Done)
+}
+
+/// A height at which the ball is over the blocks and not beyond every machine.
+fn dry_run_mm(height: Option<f64>) -> Result<f64> {
+    const MOST_MM: f64 = 1000.0;
+    match height {
+        None => Ok(0.0),
+        Some(mm) if mm > 0.0 && mm <= MOST_MM => Ok(mm),
+        Some(mm) => Err(Failure::new(
+            "cli::dry_run_height",
+            format!("--dry-run-height {mm}: more than 0 mm, at most {MOST_MM}"),
+        )
+        .help("50 is a good height")),
+    }
 }
 
 /// The summary shows what was left out; with --json it goes to stderr, finding by finding.
@@ -192,10 +232,6 @@ fn summary(
     let all = files.iter().take(1).chain([&plan_file]).chain(beside);
     let lines: Vec<String> = all.map(|file| file.display().to_string()).collect();
     io.say(format!("\nwritten: {}", lines.join("\n         ")));
-    for (file, says) in beside.iter().zip(&post.companions) {
-        io.say(format!("{} goes to the control with the program: {says}", file.display()));
-    }
-    io.say("the head of the program says what to set up where");
     io.answer(&json!({
         "format": "axiscal-generated/1",
         "machine": machine.name,

@@ -46,6 +46,8 @@ pub struct File {
     /// Files that the control needs beside the program, e.g. masks of its log.
     #[serde(default)]
     pub companion: Vec<Companion>,
+    /// The control's own measuring cycle for a touch (`--touch-with cycle`); absent: none is known.
+    pub cycle: Option<Cycle>,
     /// Programs under the control's own transformation (`--tcp`); absent: the control has none.
     pub tcp: Option<Tcp>,
     /// The log: how it is called and how it is read.
@@ -116,6 +118,11 @@ pub struct ProgramFile {
     /// For a character that may not.
     #[serde(default = "name_other")]
     pub name_other: String,
+    /// What the control needs before the program runs, for the notes beside it: machine data, options, files.
+    #[serde(default)]
+    pub notes: Vec<String>,
+    /// Numbers of labels from one set-up to the next; absent: 10.
+    pub labels_per_step: Option<usize>,
     /// The highest number of a label; absent: any.
     pub last_label: Option<usize>,
     /// The highest number of a program (`program_number` in `[settings]`), Fanuc and Haas; absent: 9999.
@@ -343,6 +350,23 @@ pub struct Write {
     pub end: Entry,
 }
 
+/// The control's own measuring cycle, in place of the routine for a touch.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cycle {
+    /// What it is called.
+    pub name: String,
+    /// Template of a touch that calls it, given what `touch` is given; absent: it cannot serve.
+    #[schemars(with = "Option<String>")]
+    pub template: Option<Spanned<String>>,
+    /// Why it cannot serve.
+    pub refused: Option<String>,
+    /// Document and page, public file, or observation.
+    pub source: Option<String>,
+    /// Why it is not verified.
+    pub unverified: Option<String>,
+}
+
 /// Programs under the control's own transformation.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -504,6 +528,15 @@ pub struct Check {
     /// The variable that says at which set-up the program begins; a line near the top of the program sets it to 1.
     #[schemars(with = "String")]
     pub from: Spanned<String>,
+    /// The variable with the feed of positioning, which a person may lower; a line near the top of the program sets it.
+    pub feed: Option<String>,
+    /// The variable with the height of the dry run: 0 measures, more lifts all moves by so much and measures nothing.
+    pub dry_run: Option<String>,
+    /// Names of the files with the programs that a program calls, from `{name}`: `O{name}.nc`, `{name}.spf`.
+    pub called_file: Option<String>,
+    /// Blocks that a person may put in anywhere, e.g. `M88`: what they switch moves nothing and is not the probe's.
+    #[serde(default)]
+    pub harmless: Vec<String>,
     /// What the macros of a package do, which a program calls (G65): only of Fanuc and Haas.
     #[serde(default)]
     pub call: Vec<CallRule>,

@@ -62,6 +62,10 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         CheckRule {
             dialect: c.dialect,
             from: c.from.get_ref().clone(),
+            feed: c.feed.clone(),
+            dry_run: c.dry_run.clone(),
+            called_file: c.called_file.clone(),
+            harmless: c.harmless.clone(),
             leaves: c.leaves.clone(),
             stays_on: c.stays_on.clone(),
             further_offsets: c.further_offsets.as_ref().map_or(FANUC_OFFSETS, |g| {
@@ -96,6 +100,8 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         block_numbers: block_numbers.map(|rule| rule.get_ref().clone()),
         based_on: file.based_on.clone(),
         name_characters: (file.file.name_characters.clone(), file.file.name_other.clone()),
+        notes: file.file.notes.clone(),
+        labels_per_step: file.file.labels_per_step.unwrap_or(10).clamp(1, 10),
         last_label: file.file.last_label,
         last_program: file.file.last_program,
         companions: file.companion.iter().map(|c| c.says.clone()).collect(),
@@ -104,12 +110,15 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         comment,
         settings: file.settings.clone(),
         result,
+        cycle: file.cycle.as_ref().map(|c| (c.name.clone(), c.refused.clone())),
+        touch_with_cycle: false,
         tcp,
         check: reading,
         log,
         unverified: std::mem::take(&mut check.unverified),
         tables: file.tables.clone(),
         releases: file.release.clone(),
+        dry_run_mm: 0.0,
         text: text.clone(),
         templates,
     };
@@ -450,6 +459,20 @@ impl Check<'_> {
             self.template(&mut env, &format!("companion {index} name"), &companion.name);
             self.template(&mut env, &format!("companion {index}"), &companion.template);
         }
+        if let Some(cycle) = &file.cycle {
+            let span = cycle.template.as_ref().map_or_else(|| file.name.span(), Spanned::span);
+            self.origin("cycle", &cycle.source, &cycle.unverified, &span);
+            match (&cycle.template, &cycle.refused) {
+                (Some(template), None) => self.template(&mut env, "cycle", template),
+                (None, Some(_)) => {}
+                _ => self.error(
+                    &span,
+                    "post::cycle",
+                    "[cycle] says neither how it is called nor why it cannot serve, or both".to_owned(),
+                    "write `template`, or `refused = \"why\"`",
+                ),
+            }
+        }
         self.template(&mut env, "log_file", &file.log.file);
         env
     }
@@ -493,6 +516,8 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
     env.set_auto_escape_callback(|_| minijinja::AutoEscape::None);
     let rule = comment.clone();
     env.add_filter("note", move |text: String| rule.note(&text));
+    let rule = comment.clone();
+    env.add_filter("clean", move |text: String| rule.clean(&text));
     let rule = number.clone();
     env.add_filter("length", move |text: String| -> Result<String, minijinja::Error> {
         text.trim().parse::<f64>().map(|mm| rule.length(mm)).map_err(|_| {
@@ -514,6 +539,19 @@ fn environment(comment: &CommentRule, number: &NumberRule, line_length: usize) -
         }
         Ok(words.join(" "))
     });
+    env.add_filter(
+        "values",
+        |words: minijinja::Value, before: String, behind: String| -> Result<String, minijinja::Error> {
+            let one = |w: minijinja::Value| w.get_attr("value").map(|value| format!("{before}{value}{behind}"));
+            let values: Vec<String> = words.try_iter()?.map(one).collect::<Result<_, _>>()?;
+            // a mistyped name would leave arguments of a call away
+            if values.is_empty() || values.iter().any(|v| v.contains("undefined")) {
+                let what = "`values` was given nothing: is the name before it mistyped?";
+                return Err(minijinja::Error::new(minijinja::ErrorKind::InvalidOperation, what));
+            }
+            Ok(values.join(" "))
+        },
+    );
     let rule = comment.clone();
     env.add_function("message", move |state: &State, text: String, value: Option<String>| {
         // `value` is the control's own expression: it must not be cleaned away

@@ -1,5 +1,7 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
+mod notes;
+mod routines;
 mod touch;
 
 use super::as_written::LengthUnit;
@@ -30,9 +32,7 @@ impl Postprocessor {
     pub fn program(&self, machine: &Machine, plan: &Plan, path: &Path) -> Result<NcProgram> {
         let mut writer = Writer::new(self, machine, plan, path)?;
         writer.start()?;
-        let opening = Opening::from_path(path, machine, writer.frame.is_tcp());
-        let (first, rest) = (opening.steps.clone(), opening.rest.clone());
-        writer.opening = opening;
+        let (first, rest) = (writer.opening.steps.clone(), writer.opening.rest.clone());
         writer.open(&first)?;
         writer.steps(&rest)?;
         writer.end()?;
@@ -42,9 +42,9 @@ impl Postprocessor {
 
 /// Numbers and names of a touch, for messages.
 #[derive(Debug, Clone, Default)]
-struct Named {
-    id: u64,
-    says: String,
+pub(super) struct Named {
+    pub(super) id: u64,
+    pub(super) says: String,
 }
 
 pub(super) struct Writer<'a> {
@@ -52,6 +52,8 @@ pub(super) struct Writer<'a> {
     pub(super) plan: &'a Plan,
     pub(super) machine: &'a Machine,
     pub(super) path: &'a Path,
+    /// Blocks and faces that are touched: a control without texts in its arguments calls them by their number.
+    pub(super) faces: Vec<&'a str>,
     pub(super) frame: Frame<'a>,
     pub(super) axes: Vec<AxisName>,
     pub(super) text: String,
@@ -83,6 +85,10 @@ pub(super) struct Writer<'a> {
     heading_back: Vec<Value>,
     way: String,
     back_off: String,
+    /// What was given to the routines last in this set-up, by its name: a control with one argument a line gives it once.
+    pub(super) said: BTreeMap<String, String>,
+    /// Where the touch made last began.
+    pub(super) began: AxisMap,
     /// A move has been written.
     moving: bool,
     /// What all templates are given that is the same in the whole program.
@@ -171,6 +177,7 @@ impl<'a> Writer<'a> {
             plan,
             machine,
             path,
+            faces: routines::faces(path),
             frame,
             axes,
             text: String::new(),
@@ -180,7 +187,7 @@ impl<'a> Writer<'a> {
             label: 2 * LABELS_PER_STEP,
             at,
             loose: false,
-            opening: Opening::default(),
+            opening: Opening::from_path(path, machine, frame.is_tcp()),
             senses: AxisMap::default(),
             oriented: None,
             mounted: path.mounted.clone(),
@@ -192,6 +199,8 @@ impl<'a> Writer<'a> {
             heading_back: Vec::new(),
             way: String::new(),
             back_off: String::new(),
+            said: BTreeMap::new(),
+            began: AxisMap::default(),
             moving: false,
             of_program: Value::UNDEFINED,
         };
@@ -232,8 +241,11 @@ impl<'a> Writer<'a> {
 
     pub(super) fn render(&mut self, template: &str, context: Value) -> Result<()> {
         let rendered = self.post.render(template, context! { ..context, ..self.common() })?;
-        if self.post.uses_labels(template) {
-            self.label += LABELS_PER_STEP;
+        // the head names more of them
+        let step = if template == "start" { LABELS_PER_STEP } else { self.post.labels_per_step };
+        let names_one = || (self.label..self.label + step).any(|label| rendered.contains(&label.to_string()));
+        if self.post.uses_labels(template) && names_one() {
+            self.label += step;
             if let Some(last) = self.post.last_label.filter(|last| self.label > *last) {
                 let message = format!("the program needs more labels than the {last} of controller {}", self.post.name);
                 return Err(Failure::new("post::labels", message).help("split it: fewer touches in one program"));
@@ -253,8 +265,10 @@ impl<'a> Writer<'a> {
         context! {
             label => self.label,
             next => next.id,
+            next_face => self.face(&next.says),
             next_says => next.says,
             last => self.last.id,
+            last_face => self.face(&self.last.says),
             last_says => self.last.says.clone(),
             first_move => !self.moving,
             ..self.of_program.clone()
@@ -288,6 +302,7 @@ impl<'a> Writer<'a> {
             log_name => self.post.log_name(self.plan)?,
             log_head => log_text::head(self.post, self.plan),
             log_end => log_text::end(self.plan),
+            ..self.of_routines()?
         })
     }
 
@@ -307,7 +322,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The touch that comes next, or the last one when none does.
-    fn next_touch(&self) -> Named {
+    pub(super) fn next_touch(&self) -> Named {
         let named = |t: &TouchStep| Named { id: t.id, says: t.says.clone() };
         let touch = |s: &'a Step| if let Step::Touch(t) = s { Some(t) } else { None };
         let (before, after) = self.path.steps.split_at(self.index.min(self.path.steps.len()));
@@ -337,8 +352,12 @@ impl<'a> Writer<'a> {
             head.push(format!("{TOOL_PLACE}: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());
         }
-        for (entry, why) in &self.post.unverified {
-            head.push(format!("NOT VERIFIED on a real control: {entry}: {why}"));
+        match self.post.unverified.len() {
+            0 => {}
+            n => head.push(format!(
+                "NOT VERIFIED on a real control: {n} entries, see {}. Try the program in the control's simulation first",
+                self.notes_name()
+            )),
         }
         let near = self.path.start_near.as_ref().map(|near| {
             let window = |a: &crate::machine::Axis| {
@@ -383,7 +402,10 @@ impl<'a> Writer<'a> {
     pub(super) fn step(&mut self, step: &Step) -> Result<()> {
         match step {
             Step::Note(text) => self.render("note", context! { text => text.clone() }),
-            Step::Setup { number, says, resume } => self.setup(*number, says, resume.as_deref()),
+            Step::Setup { number, says, resume } => {
+                self.said.clear();
+                self.setup(*number, says, resume.as_deref())
+            }
             Step::Stop(stop) => self.stop(stop),
             Step::OrientSpindle { deg } => {
                 let angle = (deg * self.machine.tool.spindle_sense).rem_euclid(360.0);
@@ -392,7 +414,8 @@ impl<'a> Writer<'a> {
             }
             Step::Rapid { to } => {
                 let words = self.words(&self.linear_words(to)?)?;
-                self.render("rapid", context! { to => words })?;
+                let place = self.place(to)?;
+                self.render("rapid", context! { to => words, place })?;
                 self.moving = true;
                 self.moved(to);
                 Ok(())
@@ -406,15 +429,24 @@ impl<'a> Writer<'a> {
                 let named = self.linear_words(to)?;
                 let words = self.words(&named)?;
                 let (heading, length) = self.straight(to, &named);
-                self.render("protected", context! { to => words, feed => self.feed(*feed)?, heading, length })?;
+                let place = self.place(to)?;
+                let announces = self.announces();
+                self.render(
+                    "protected",
+                    context! { to => words, place, announces, feed => self.feed(*feed)?, heading, length },
+                )?;
                 self.moved(to);
                 Ok(())
             }
             Step::Touch(touch) => self.touch(touch),
             Step::Retract { to, feed } => {
                 let words = self.words(&self.linear_words(to)?)?;
+                let to_start = self.is_start(to);
+                let place = if to_start { Value::from(()) } else { self.place(to)? };
                 let context = context! {
                     to => words,
+                    place,
+                    to_start,
                     feed => self.feed(*feed)?,
                     approach => self.approach.clone(),
                     heading => self.heading_back.clone(),
@@ -493,7 +525,8 @@ impl<'a> Writer<'a> {
         let senses = map(sense.iter().map(|(a, s)| (a.to_string(), sign(s).to_owned())));
         for place in self.rotary_steps(&self.at, to)? {
             let words = self.words_by(&place, sense)?;
-            self.render("rotary", context! { to => words, sense => senses.clone() })?;
+            let turned = self.turned(&place, sense)?;
+            self.render("rotary", context! { to => words, turned, sense => senses.clone() })?;
             self.moving = true;
         }
         self.moved(to);
@@ -527,12 +560,17 @@ impl<'a> Writer<'a> {
     fn beside(&self) -> Result<Vec<SideFile>> {
         let one = |(index, says): (usize, &String)| {
             let name = self.post.render(&format!("companion {index} name"), self.common())?;
-            let mut text = self.post.render(&format!("companion {index}"), self.common())?;
-            text.push('\n');
+            // this program has no such file
+            if name.trim().is_empty() {
+                return Ok(None);
+            }
+            let text = self.post.render(&format!("companion {index}"), self.common())?;
+            let text: String = text.lines().filter(|l| self.post.keeps(l)).flat_map(|l| [l, "\n"]).collect();
             let name = name_of(name.trim(), |c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-' | '_'));
-            Ok(SideFile { name, says: says.clone(), text: self.post.ended(text) })
+            Ok(Some(SideFile { name, says: says.clone(), text: self.post.ended(text), to_control: true }))
         };
-        self.post.companions.iter().enumerate().map(one).collect()
+        let companions = self.post.companions.iter().enumerate().filter_map(|c| one(c).transpose());
+        companions.chain([Ok(self.notes())]).collect()
     }
 }
 

@@ -65,6 +65,10 @@ pub struct Postprocessor {
     pub based_on: Option<String>,
     /// Characters of names at the control, and what stands for others.
     pub name_characters: (String, String),
+    /// What the control needs before a program runs.
+    pub notes: Vec<String>,
+    /// Numbers of labels that a step takes.
+    pub labels_per_step: usize,
     /// The highest number of a label.
     pub last_label: Option<usize>,
     /// The highest number of a program.
@@ -81,6 +85,10 @@ pub struct Postprocessor {
     pub settings: BTreeMap<String, String>,
     /// Where the control keeps the result of a probing move.
     pub result: BTreeMap<AxisName, String>,
+    /// The control's own measuring cycle for a touch: its name, and why it cannot serve.
+    pub cycle: Option<(String, Option<String>)>,
+    /// A touch is made by it.
+    pub touch_with_cycle: bool,
     /// The control's own transformation.
     pub tcp: Option<Tcp>,
     /// How its programs are read back.
@@ -93,6 +101,8 @@ pub struct Postprocessor {
     pub tables: Option<tables::Tables>,
     /// Versions of LinuxCNC.
     pub releases: Vec<Release>,
+    /// Height of a dry run, mm; 0: the program measures.
+    pub dry_run_mm: f64,
     /// The file as it was read.
     pub text: String,
     templates: minijinja::Environment<'static>,
@@ -118,6 +128,14 @@ pub struct CheckRule {
     pub dialect: DialectName,
     /// The variable that says at which set-up the program begins.
     pub from: String,
+    /// The variable with the feed of positioning.
+    pub feed: Option<String>,
+    /// The variable with the height of the dry run.
+    pub dry_run: Option<String>,
+    /// Names of the files with the programs that a program calls.
+    pub called_file: Option<String>,
+    /// Blocks that a person may put in anywhere.
+    pub harmless: Vec<String>,
     /// The program neither names nor opens a log.
     pub log_always_open: bool,
     /// Words behind which macro statements wait.
@@ -224,6 +242,24 @@ impl Postprocessor {
             };
             Failure::new("post::version", says).help(help)
         })
+    }
+
+    /// The same control, with touches made by its own measuring cycle.
+    ///
+    /// # Errors
+    /// When no such cycle is known, or it cannot carry what the log needs; the reason stands in the postprocessor file.
+    pub fn with_cycle(self) -> Result<Self> {
+        let refuse = |says: String| {
+            Failure::new("post::cycle", says)
+                .help("generate without --touch-with cycle: the program then makes each touch itself")
+        };
+        match &self.cycle {
+            None => Err(refuse(format!("controller {} is not described with a measuring cycle of its own", self.name))),
+            Some((name, Some(why))) => {
+                Err(refuse(format!("{name} cannot make the touches of controller {}: {why}", self.name)))
+            }
+            Some((_, None)) => Ok(Self { touch_with_cycle: true, ..self }),
+        }
     }
 
     /// Whether a program may wait for a person.

@@ -21,6 +21,8 @@ pub struct SideFile {
     pub name: String,
     pub says: String,
     pub text: String,
+    /// It is loaded into the control; the others are for the person.
+    pub to_control: bool,
 }
 
 impl NcProgram {

@@ -27,6 +27,11 @@ pub(super) struct Opening {
 }
 
 impl Opening {
+    /// The axis that lifts the probe over everything.
+    pub(super) fn lift(&self) -> Option<AxisName> {
+        self.lift
+    }
+
     /// Takes the first moves out of the first set-up. Under a transformation linear axes go first: a turn needs to know
     /// where they stand.
     pub(super) fn from_path(path: &Path, machine: &Machine, tcp: bool) -> Self {

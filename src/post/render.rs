@@ -11,10 +11,13 @@ pub(super) fn is_block(line: &str) -> bool {
 }
 
 impl Postprocessor {
-    /// Whether a template names labels; numbers are scarce on some controls, so only those take any.
+    /// Whether a template, or a part of it, names labels; numbers are scarce on some controls, so only those take any.
     pub(super) fn uses_labels(&self, template: &str) -> bool {
-        let names = |text: &str| text.contains("label") || text.contains("include");
-        self.templates.get_template(template).is_ok_and(|t| names(t.source()))
+        self.templates.get_template(template).is_ok_and(|t| {
+            let text = t.source();
+            let mut parts = text.split("{% include \"").skip(1).filter_map(|rest| rest.split_once('"'));
+            text.contains("label") || parts.any(|(part, _)| part != template && self.uses_labels(part))
+        })
     }
 
     /// Does a template use this setting?

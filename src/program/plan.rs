@@ -59,18 +59,24 @@ fn is_false(value: &bool) -> bool {
 /// What a program does, as [`crate::check`] has found it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Proof {
-    /// Digest of everything that it does: moves, log, messages, and what it does when something goes wrong.
+    /// The same as `steps_sha256`; in plans of older versions a digest of its actions.
     pub sha256: String,
-    /// Of what happens up to each line of the log, the run from the beginning only: the first eight digits. They show
-    /// where a program was changed.
-    pub lines: Vec<String>,
-    /// Digest of its statements as they are read: remarks, blanks, numbers of blocks and how a number is spelled do not matter.
-    /// Empty in plans of older versions.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub statements_sha256: String,
-    /// Two digits for what stands up to each statement, 32 of them in a piece: they show which one was changed.
+    /// Of older versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub statements: Vec<String>,
+    pub lines: Vec<String>,
+    /// Digest of its statements as they are read: remarks, blanks, numbers of blocks, how a number is spelled and what is shown to
+    /// the operator do not matter. Empty in plans of older versions.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub steps_sha256: String,
+    /// Four digits for each statement, 32 of them in a piece: they show which one was changed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub steps: Vec<String>,
+    /// Digest of what is shown to the operator.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub texts_sha256: String,
+    /// Digest of the whole text, remarks and all.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub text_sha256: String,
 }
 
 /// What the controller's coordinates mean.

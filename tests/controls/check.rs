@@ -23,7 +23,7 @@ fn every_random_edit_is_refused_or_moves_identically() {
         let original = original(controller, None);
         let fates = original.fates(edits(), 20260101);
         let number = |fate: Fate| fates.iter().filter(|(_, f)| *f == fate).count();
-        let each = [Fate::NotRead, Fate::Refused, Fate::Changed, Fate::Unproven, Fate::Same, Fate::Escaped];
+        let each = [Fate::NotRead, Fate::Refused, Fate::Unproven, Fate::Same, Fate::Remarked, Fate::Escaped];
         println!("{controller}: {:?}", each.map(|fate| (fate.clone(), number(fate))));
         let escaped: Vec<&String> = fates.iter().filter(|(_, f)| *f == Fate::Escaped).map(|(w, _)| w).collect();
         assert!(escaped.is_empty(), "{controller}: {escaped:#?}");
@@ -58,35 +58,37 @@ fn edits_by_hand_are_caught() {
     for controller in ["linuxcnc", "fanuc", "haas"] {
         let mut original = original(controller, None);
         let linuxcnc = controller == "linuxcnc";
-        let guarded = if linuxcnc { "G38.3 " } else { "G31 " };
-        let search = if linuxcnc { "G38.3 Z6" } else { "G31 Z6." };
-        let retract = if linuxcnc { "G38.3 X" } else { "G31 X" };
+        let rapid = if linuxcnc { "o<rapid> call [-30] [0] [11.3]" } else { "G65 P9103 X-30. Y0. Z11.3" };
+        let guarded = if linuxcnc { "o<guarded> call [-30] [0] [10]" } else { "G65 P9102 A1. X-30. Y0. Z10." };
+        let search = if linuxcnc { "o<touch> call [1] " } else { "G65 P9101 A1. " };
+        let retract = if linuxcnc { "G38.3 X#<_axiscal_x>" } else { "G31 X#4 " };
         let t = original.text.clone();
         let cases: Vec<(&str, String)> = vec![
             ("a sign changed", with(&t, "G0 X-", 1, &|l| l.replace("X-", "X"))),
-            ("a lift by a tenth", with(&t, "G0 Z11.3", 1, &|l| l.replace("11.3", "1.13"))),
+            ("a lift by a tenth", with(&t, rapid, 1, &|l| l.replace("11.3", "1.13"))),
+            ("a rapid in place of a guarded move", with(&t, guarded, 1, &|_| "G0 Z10.\n".to_owned())),
             (
-                "a rapid in place of a guarded move",
-                with(&t, guarded, if linuxcnc { 2 } else { 1 }, &|l| {
-                    format!("G0 {}\n", l.split(' ').nth(1).unwrap_or(""))
-                }),
+                "a search beyond the block",
+                with(&t, search, 1, &|l| l.replace(" [6] ", " [-6] ").replace(" Z6. ", " Z-6. ")),
             ),
-            ("a search beyond the block", with(&t, search, 1, &|l| l.replace("Z6", "Z-6"))),
-            ("the search at ten times its feed", with(&t, search, 1, &|l| l.replace("F60", "F600"))),
+            (
+                "the search at ten times its feed",
+                with(&t, search, 1, &|l| l.replace(" [60] [60]", " [600] [60]").replace(" F60. ", " F600. ")),
+            ),
             ("a retract removed", with(&t, retract, 1, &|_| String::new())),
             ("a line of the log removed", {
-                let log = if linuxcnc { "(LOG,P N2 S1" } else { "DPRNT[P*N2*S1" };
+                let log = if linuxcnc { "(LOG,P N%.0f#1 S1" } else { "DPRNT[P*N#1[50]*S1" };
                 with(&t, log, 1, &|_| String::new())
             }),
             ("a stop removed", {
-                let stop = if linuxcnc { "o<axiscal> return [1]" } else { "GOTO9" };
-                with(&t, stop, if linuxcnc { 3 } else { 5 }, &|_| String::new())
+                let stop = if linuxcnc { "o<touch> return [0]" } else { "M99 P9" };
+                with(&t, stop, if linuxcnc { 5 } else { 1 }, &|_| String::new())
             }),
             ("the units not set", with(&t, "G21", 1, &|l| l.replace("G21 ", ""))),
             ("absolute coordinates not set", with(&t, "G21", 1, &|l| l.replace("G90 ", ""))),
         ];
         // up instead of down is safe on LinuxCNC, a hundredth of it on the others is not: changed it is on all
-        let lost = with(&t, "G0 Z11.3", 1, &|l| l.replace("11.3", "113"));
+        let lost = with(&t, rapid, 1, &|l| l.replace("11.3", "113"));
         assert!(!original.codes(&lost).is_empty(), "{controller}: a decimal point lost was not caught");
         // all the others are refused for what they do, with nothing to compare with but the plan's touches
         original.plan.programs.clear();
@@ -140,7 +142,7 @@ fn without(text: &str, begins: &str, nth: usize, ends: &str) -> String {
 fn edits_by_hand_of_a_klartext_program_are_caught() {
     let mut original = original("heidenhain", None);
     let t = original.without_numbers();
-    let fast = with(&t, "L Z+10 R0 F1500", 1, &|l| l.replace("F1500", "FMAX"));
+    let fast = with(&t, "L X+Q1671", 1, &|l| l.replace("FQ1699", "FMAX"));
     let not_oriented = with(&t, "M19", 1, &|_| String::new());
     for text in [fast, not_oriented] {
         assert_eq!(original.codes(&original.numbered(&text)), ["check::changed"]);
@@ -148,42 +150,45 @@ fn edits_by_hand_of_a_klartext_program_are_caught() {
     // all the others are refused for what they do, with nothing to compare with but the plan's touches
     original.plan.programs.clear();
     let probe = "TCH PROBE 4.0";
+    // the last one is that of a guarded move
+    let stops = t.lines().filter(|l| l.trim_end() == "FN 9: IF +0 EQU +0 GOTO LBL 9").count();
     let turn = with(&t, "L B-35", 1, &|l| format!("L Z-20 R0 FMAX M91\r\n{l}"));
     let mut wrong = Vec::new();
     for (what, text, code) in [
-        ("a sign changed", with(&t, "L X-", 1, &|l| l.replace("X-", "X+")), "check::not_the_plan"),
-        ("a lift by a tenth", with(&t, "L Z+11.3", 1, &|l| l.replace("11.3", "1.13")), "check::collision"),
-        ("a point lost", with(&t, "TCH PROBE 4.3 DIST+1.3", 1, &|l| l.replace("1.3", "13")), "check::unguarded"),
+        ("a sign changed", with(&t, "FN 0: Q1651 = -", 1, &|l| l.replace("= -", "= +")), "check::unknown_start"),
+        ("a lift by a tenth", with(&t, "FN 0: Q1653 = +11.3", 1, &|l| l.replace("11.3", "1.13")), "check::collision"),
+        ("a zero lost", with(&t, "FN 0: Q1653 = +10", 1, &|l| l.replace("10", "1")), "check::stops"),
         (
             "FMAX in a search",
-            with(&t, "TCH PROBE 4.3 DIST+4 F60", 1, &|l| l.replace("F60", "FMAX")),
+            with(&t, "TCH PROBE 4.3 DIST+Q1684 FQ1665", 1, &|l| l.replace("FQ1665", "FMAX")),
             "check::not_understood",
         ),
         (
             "FMAX in a guarded move",
-            with(&t, "TCH PROBE 4.3 DIST+1.3", 1, &|l| l.replace("F1500", "FMAX")),
+            with(&t, "TCH PROBE 4.3 DIST+Q1684 FQ1699", 1, &|l| l.replace("FQ1699", "FMAX")),
             "check::not_understood",
         ),
-        ("a guarded move without its cycle", without(&t, probe, 2, "TCH PROBE 4.3"), "check::unguarded"),
+        ("a guarded move without its cycle", without(&t, probe, 5, "TCH PROBE 4.3"), "check::unguarded"),
         ("a block of a cycle lost", with(&t, "TCH PROBE 4.2", 3, &|_| String::new()), "check::not_understood"),
-        ("a search lost", without(&t, probe, 3, "TCH PROBE 4.3"), "check::touch_lacking"),
+        ("a search lost", without(&t, probe, 2, "TCH PROBE 4.3"), "check::stops"),
+        ("a call lost", with(&t, "CALL LBL 1\r", 1, &|_| String::new()), "check::touch_lacking"),
         (
             "a search beyond the block",
-            with(&t, "TCH PROBE 4.3 DIST+4", 1, &|l| l.replace("DIST+4", "DIST+40")),
+            with(&t, "FN 0: Q1653 = +6\r", 1, &|l| l.replace("+6", "-30")),
             "check::not_the_plan",
         ),
         (
             "a search at ten times its feed",
-            with(&t, "TCH PROBE 4.3 DIST+4", 1, &|l| l.replace("F60", "F600")),
+            with(&t, "FN 0: Q1665 = +60\r", 2, &|l| l.replace("+60", "+600")),
             "check::feed",
         ),
-        ("a retract removed", without(&t, "Q1614", 2, "L X"), "check::in_contact"),
+        ("a retract removed", without(&t, "Q1614", 1, "L X"), "check::in_contact"),
         (
             "a line of the log removed",
-            with(&t, "FN 16: F-PRINT TNC:\\AXISCAL\\SMALL_P.A", 3, &|_| String::new()),
-            "check::touch_lacking",
+            with(&t, "FN 16: F-PRINT TNC:\\AXISCAL\\SMALL_P.A", 1, &|_| String::new()),
+            "check::log",
         ),
-        ("a stop removed", with(&t, "FN 9: IF +0 EQU +0 GOTO LBL 9\r", 2, &|_| String::new()), "check::goes_on"),
+        ("a stop removed", with(&t, "FN 9: IF +0 EQU +0 GOTO LBL 9\r", stops, &|_| String::new()), "check::goes_on"),
         ("the tilted plane of before", with(&t, "PLANE RESET", 1, &|_| String::new()), "check::not_run"),
         ("M128 of before", with(&t, "M129", 1, &|_| String::new()), "check::not_run"),
         ("machine coordinates lost", with(&t, "L X-", 1, &|l| l.replace(" M91", "")), "check::start"),
@@ -239,10 +244,22 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
         ("linuxcnc", "_axiscal_from> GT 1] *", "_axiscal_from> GT 9] *"),
         ("fanuc", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
         ("haas", "IF[#1LE1]GOTO", "IF[#1LE9]GOTO"),
-        ("heidenhain", "FN 11: IF +Q1600 GT +1 GOTO LBL 255", "FN 11: IF +Q1600 GT +9 GOTO LBL 255"),
+        ("heidenhain", "", ""),
     ] {
         let mut original = original(controller, None);
         original.plan.programs.clear();
+        if controller == "heidenhain" {
+            // of the two conditions, the one before the slow feed
+            let lines: Vec<&str> = original.text.split_inclusive('\n').collect();
+            let at = (1..lines.len())
+                .find(|i| lines[*i].contains("Q1665 = +60") && lines[*i - 1].contains("FN 12: IF +Q1600 LT +2 GOTO"));
+            let mut edited: Vec<String> = lines.iter().map(|l| (*l).to_owned()).collect();
+            let condition = &mut edited[at.unwrap() - 1];
+            *condition = condition.replace("LT +2", "LT +9");
+            let codes = original.codes(&edited.concat());
+            assert!(codes.contains(&"check::feed"), "{controller}: {codes:?}");
+            continue;
+        }
         assert_eq!(original.text.matches(slow).count(), 1, "{controller}");
         let codes = original.codes(&original.text.replace(slow, fast));
         assert!(codes.contains(&"check::feed"), "{controller}: {codes:?}");
@@ -252,7 +269,7 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
 #[test]
 fn a_probe_that_is_not_ready_is_found_before_the_first_move() {
     for (controller, says) in [
-        ("linuxcnc", "(DEBUG,axiscal: the probe"),
+        ("linuxcnc", "(DEBUG,axiscal: the probe is triggered, or not switched on"),
         ("fanuc", "#3006=1(PROBE"),
         ("haas", "#3006=1(PROBE"),
         ("heidenhain", "QS1600 = \"AXISCAL: the probe"),
@@ -266,7 +283,7 @@ fn a_probe_that_is_not_ready_is_found_before_the_first_move() {
         let to = message
             + match controller {
                 "linuxcnc" => 2,
-                "heidenhain" => 5,
+                "heidenhain" => 4,
                 _ => 3,
             };
         let edited: String = lines[..message].iter().chain(&lines[to..]).copied().collect();
@@ -289,13 +306,10 @@ fn all(text: &str, from: &str, to: &str) -> String {
 #[test]
 fn what_no_run_can_show_is_named_by_its_line_and_refused() {
     for (controller, cases) in [
-        (
-            "fanuc",
-            &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]"), ("#3000=1(", "#3000=1(X")][..],
-        ),
+        ("fanuc", &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]"), ("M99 P9", "M99 P8")][..]),
         ("haas", &[("LT0.02]", "LT0.021]"), ("GT1.]", "GT1.1]"), ("GT0.25]", "GT0.26]")]),
-        ("sinumerik", &[("ABS(AXC_OFF)>1", "ABS(AXC_OFF)>1.15"), ("ABS(AXC_OFF)>1", "AXC_OFF>1")]),
-        ("heidenhain", &[("GT +1 GOTO", "GT +1.1 GOTO"), ("GT +0.25 GOTO", "GT +0.26 GOTO")]),
+        ("sinumerik", &[("ABS(AXT_OFF)>1", "ABS(AXT_OFF)>1.15"), ("ABS(AXT_OFF)>1", "AXT_OFF>1")]),
+        ("heidenhain", &[("Q1605 GT +1 GOTO", "Q1605 GT +1.1 GOTO"), ("GT +0.25 GOTO", "GT +0.26 GOTO")]),
         ("linuxcnc", &[("GT 1]]", "GT 1.1]]"), ("GT 0.25]]", "GT 0.26]]")]),
     ] {
         let original = original(controller, None);
@@ -326,9 +340,9 @@ fn a_jump_that_was_taken_out_is_named_before_what_follows_from_it() {
             let edited = [&lines[..*taken], &lines[taken + 1..]].concat().concat();
             let (code, line, says) = original.finding(&edited);
             let first = first_other_line(&original.text, &edited);
-            // a label or a remark is no statement
+            // a label or a remark is no statement; the condition before it may lead elsewhere now
             assert!(
-                code == "check::changed" && (first..first + 3).contains(&line),
+                code == "check::changed" && (first - 1..first + 3).contains(&line),
                 "{controller} {first}: {line} {says}"
             );
             assert_eq!(original.codes(&edited)[0], "check::changed", "{controller} {first}");
@@ -369,13 +383,13 @@ fn remarks_blanks_and_how_a_number_is_spelled_do_not_matter() {
 fn a_plan_of_an_older_version_says_that_it_does_not_know_the_statements() {
     let mut original = original("fanuc", None);
     for proof in original.plan.programs.values_mut() {
-        proof.statements.clear();
-        proof.statements_sha256.clear();
+        proof.steps.clear();
+        proof.steps_sha256.clear();
     }
     let (code, _, says) = original.finding(&original.text);
     assert_eq!(code, "check::older_plan", "{says}");
     assert_eq!(original.codes(&original.text.replacen("GT0.25]", "GT0.26]", 1)), ["check::older_plan"]);
-    assert_eq!(original.codes(&with(&original.text, "M9", 1, &|_| String::new())), ["check::changed"]);
+    assert_eq!(original.codes(&with(&original.text, "M9", 1, &|_| String::new())), ["check::older_plan"]);
 }
 
 #[test]
@@ -435,7 +449,9 @@ fn a_set_up_that_does_not_exist_moves_nothing() {
         assert!(no_setup, "{controller}: {:?}", checked.findings);
         let (checked, no_setup) =
             original.begun(&original.numbered(&with(&t, line, 1, &|_| number.replace("{n}", "2"))), 2);
-        assert!(!no_setup && checked.findings.is_empty(), "{controller}: {:?}", checked.findings);
+        // that the head says another number is said
+        let wrong = checked.findings.iter().any(|f| f.code != "check::edited");
+        assert!(!no_setup && !wrong, "{controller}: {:?}", checked.findings);
     }
 }
 
@@ -468,7 +484,13 @@ fn variant(base: &str, lines: &str) -> Result<Postprocessor, axiscal::diag::Fail
 }
 
 /// Values that a builder or a user may give each setting, as the guide and the files name them.
-const SETTINGS: [(&[&str], &str, &[&str]); 27] = [
+const SETTINGS: [(&[&str], &str, &[&str]); 33] = [
+    (&["fanuc", "haas"], "touch_program", &["7001"]),
+    (&["fanuc", "haas"], "guarded_program", &["7002"]),
+    (&["fanuc", "haas"], "rapid_program", &["7003"]),
+    (&["fanuc", "haas"], "stopped_in", &["#100", "#599"]),
+    (&["fanuc", "haas"], "last_alarm", &["99"]),
+    (&["fanuc", "haas"], "dry_run", &["no"]),
     (&["fanuc", "haas"], "program_number", &["1234"]),
     (&["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"], "triggered_within", &["0.08"]),
     (&["fanuc", "haas"], "missed_within", &["0.03"]),
@@ -558,18 +580,18 @@ fn the_fields_of_a_log_follow_its_decimals() {
         for (decimals, field, modulo) in [(3, "[53]", "100000."), (4, "[44]", "10000."), (5, "[35]", "1000.")] {
             let lines = format!("[log]\ndecimals = {decimals}\nunverified = \"ours\"\n");
             let original = edits::of(variant(base, &lines).unwrap(), None);
-            let taken = format!("#9=#9-{modulo}*FIX[#9/{modulo}]");
+            let taken = format!("#33=#33-{modulo}*FIX[#33/{modulo}]");
             assert!(
-                original.text.contains(&format!("K#9{field}")) && original.text.contains(&taken),
+                original.text.contains(&format!("K#33{field}")) && original.text.contains(&taken),
                 "{base} {decimals}"
             );
         }
         // a field that is too narrow: Fanuc loses the first places of what is written into it
         let original = edits::of(variant(base, "[log]\ndecimals = 5\nunverified = \"ours\"\n").unwrap(), None);
-        let narrow = original.text.replace("X#21[35]", "X#21[15]");
+        let narrow = original.text.replace("X#27[35]", "X#27[15]");
         assert_ne!(narrow, original.text);
         assert_eq!(original.codes(&narrow).contains(&"check::log"), base == "fanuc", "{base}");
-        let text = original.text.replace("K#9[35]", "K#9[45]");
+        let text = original.text.replace("K#33[35]", "K#33[45]");
         assert_eq!(original.finding(&text).0, "check::not_understood", "{base}");
         assert!(original.finding(&text).2.contains("9 places"), "{base}");
         // a file that does not fit together
@@ -608,7 +630,7 @@ fn what_no_control_reads_as_a_remark_is_refused() {
             format!("{} {}{}", &original.text[..end], remark.replace("UP", &format!("UP{more}")), &original.text[end..])
         };
         assert!(
-            controller == "heidenhain" || original.codes(&with("")).is_empty(),
+            controller == "heidenhain" || original.codes(&with("")) == ["check::edited"],
             "{controller}: {:?}",
             original.codes(&with(""))
         );

@@ -93,7 +93,7 @@ fn a_condition_on_what_is_not_known_is_run_both_ways() {
         let sinumerik =
             |before: &str, condition: &str| format!("{before}\nSTOPRE\nIF {condition}\nG0 SUPA Z=-300\nENDIF");
         let klartext = |before: &str, condition: &str| {
-            format!("{before}\nFN 11: IF {condition} GOTO LBL 6000\nL Z-300 R0 FMAX M91\nLBL 6000")
+            format!("{before}\nFN 11: IF {condition} GOTO LBL 900\nL Z-300 R0 FMAX M91\nLBL 900")
         };
         let dangers: Vec<String> = match written.controller {
             "linuxcnc" => vec![
@@ -122,9 +122,9 @@ fn a_condition_on_what_is_not_known_is_run_both_ways() {
                 sinumerik("", "$P_ACTFRAME[X,SC]>10"),
             ],
             _ => vec![
-                klartext("FN 18: SYSREAD Q1650 = ID320 NR1 IDX0", "+Q1650 GT +100"),
-                klartext("FN 18: SYSREAD Q1650 = ID320 NR1 IDX0\nQ1651 = Q1650 * 2", "+Q1651 GT +100"),
-                klartext("FN 18: SYSREAD Q1650 = ID210 NR1 IDX0", "+5 GT +Q1650"),
+                klartext("FN 18: SYSREAD Q1750 = ID320 NR1 IDX0", "+Q1750 GT +100"),
+                klartext("FN 18: SYSREAD Q1750 = ID320 NR1 IDX0\nQ1751 = Q1750 * 2", "+Q1751 GT +100"),
+                klartext("FN 18: SYSREAD Q1750 = ID210 NR1 IDX0", "+5 GT +Q1750"),
             ],
         };
         for lines in dangers {
@@ -147,7 +147,7 @@ fn a_condition_whose_ways_are_both_harmless_is_accepted() {
             "sinumerik" => ("STOPRE\nIF $A_SECOND>100\nMSG(\"late\")\nENDIF", 1),
             // it only computes, and meets again
             _ => (
-                "FN 18: SYSREAD Q1650 = ID320 NR1 IDX0\nFN 11: IF +Q1650 GT +100 GOTO LBL 6000\nQ1650 = Q1650 + 86400\nLBL 6000",
+                "FN 18: SYSREAD Q1750 = ID320 NR1 IDX0\nFN 11: IF +Q1750 GT +100 GOTO LBL 900\nQ1750 = Q1750 + 86400\nLBL 900",
                 0,
             ),
         };
@@ -162,14 +162,18 @@ fn a_condition_whose_ways_are_both_harmless_is_accepted() {
 #[test]
 fn what_goes_wrong_is_followed_on_the_other_way_too() {
     let written = Written::new("fanuc", "small.nc");
-    let guard = written.text.find("\nIF[ABS[#5063-[").map(|at| at + 1).unwrap();
-    let label = written.text[guard..].lines().next().unwrap().rsplit_once("GOTO").unwrap().1;
-    let (before, behind) = written.text.split_at(guard);
-    let (code, codes, answer) = written.check(&format!("{before}IF[#3001GT100000000.]GOTO{label}\n{behind}"));
-    assert!(code == 1 && codes.iter().any(|c| c == "check::goes_on"), "{answer:#}");
-    let stops = behind.replacen("\nGOTO9\n", "\nIF[#3001LT100000000.]GOTO9\n", 1);
-    let (code, codes, answer) = written.check(&format!("{before}{stops}"));
-    assert!(code == 1 && codes.iter().any(|c| c == "check::goes_on"), "{answer:#}");
+    let called = written.folder.path().join("O9102.nc");
+    let text = std::fs::read_to_string(&called).unwrap();
+    for (line, instead) in [
+        ("\nIF[ABS[#5061-#24]", "\nIF[#3001GT100000000.]GOTO2\nIF[ABS[#5061-#24]"),
+        ("\nM99 P9\n", "\nIF[#3001GT100000000.]GOTO2\nM99 P9\n"),
+    ] {
+        let edited = text.replacen(line, instead, 1);
+        assert_ne!(edited, text);
+        std::fs::write(&called, edited).unwrap();
+        let (code, codes, answer) = written.check(&written.text);
+        assert!(code == 1 && codes.iter().any(|c| c == "check::goes_on"), "{answer:#}");
+    }
 }
 
 /// What a block does must not hang on a clock.

@@ -1,5 +1,6 @@
 //! `check` of the programs that are written for each machine: nothing is wrong with any of them.
 
+use crate::edits;
 use axiscal::check::{Against, Checked, check};
 use axiscal::diag::source;
 use axiscal::machine::{self, Machine};
@@ -113,8 +114,8 @@ fn block_numbers_end_somewhere() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "table", false);
     for (base, numbers, says, help) in [
-        ("linuxcnc", "first = 90000, step = 10, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
-        ("linuxcnc", "first = 10, step = 50, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("linuxcnc", "first = 99000, step = 10, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
+        ("linuxcnc", "first = 10, step = 1000, word = \"N{n} \"", "is beyond N99999", "a smaller step"),
         ("sinumerik", "first = 99999990, step = 10, word = \"N{n} \"", "is beyond N99999999", "a smaller first number"),
     ] {
         let post = file(base, numbers).unwrap().0;
@@ -232,11 +233,9 @@ fn axes_of_0_to_360() {
     }
     // turned the other way round it is another program
     let post = variant("fanuc", "[settings]\nmodulo = \"C\"\n");
-    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let text = text_of(&post, &machine, &generated);
     assert!(text.contains("G0 C-"), "no turn in the negative sense");
-    let against = Against { plan: Some(&generated.plan), ..Against::default() };
-    let other = check(&machine, &post, &source("p.nc", text.replacen("G0 C-", "G0 C", 1)), &against).unwrap();
-    assert!(!other.findings.is_empty());
+    assert!(!codes(&post, &machine, &generated, &text.replacen("G0 C-", "G0 C", 1)).is_empty());
 }
 
 #[test]
@@ -276,11 +275,10 @@ fn under_a_transformation_the_rotary_axes_must_stand_at_0_when_it_begins() {
     let generated = generated(&machine, "basic", true);
     for (name, guard) in [("fanuc", "IF[ABS[#50"), ("haas", "IF[ABS[#50")] {
         let post = controller(name);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = text_of(&post, &machine, &generated);
         let edited = without(&text, guard, "GOTO9");
-        let against = Against { plan: Some(&generated.plan), ..Against::default() };
-        let found = check(&machine, &post, &source("p.nc", edited), &against).unwrap();
-        assert!(found.findings.iter().any(|f| f.code == "check::start"), "{name}: {:?}", found.findings);
+        let found = codes(&post, &machine, &generated, &edited);
+        assert!(found.contains(&"check::start"), "{name}: {found:?}");
     }
 }
 
@@ -291,21 +289,20 @@ fn a_log_of_another_place_is_found() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "table", false);
     for (name, line, instead) in [
-        ("fanuc", "#21=#5061", "#21=#5041"),
-        ("haas", "#21=#5061", "#21=#5041"),
-        ("sinumerik", "AXC_X=$AA_MM[X]", "AXC_X=$AA_IM[X]"),
-        ("fanuc", "#22=#5062\n", ""),
-        ("haas", "#22=#5062\n", ""),
-        ("fanuc", "#24=#5064\n", "#24=0.\n"),
+        ("fanuc", "#27=#5061", "#27=#5041"),
+        ("haas", "#27=#5061", "#27=#5041"),
+        ("sinumerik", "AXT_PX=$AA_MM[X]", "AXT_PX=$AA_IM[X]"),
+        ("fanuc", "#28=#5062\n", "#28=#5061\n"),
+        ("haas", "#28=#5062\n", "#28=#5061\n"),
+        ("fanuc", "#30=#5064\n", "#30=0.\n"),
     ] {
         let post = controller(name);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
-        // in one of the first touches; each has the line of a miss behind its own
-        let at = text.match_indices(line).nth(8).unwrap_or_else(|| panic!("{name}: no {line:?}")).0;
+        let text = text_of(&post, &machine, &generated);
+        // of a touch; the line of a miss stands behind its own, but for the SINUMERIK, which logs another position then
+        let at = text.find(line).unwrap_or_else(|| panic!("{name}: no {line:?}"));
         let edited = format!("{}{instead}{}", &text[..at], &text[at + line.len()..]);
-        let against = Against { plan: Some(&generated.plan), ..Against::default() };
-        let found = check(&machine, &post, &source("p.nc", edited), &against).unwrap();
-        assert!(found.findings.iter().any(|f| f.code == "check::log"), "{name} {line:?}: {:?}", found.findings);
+        let found = codes(&post, &machine, &generated, &edited);
+        assert!(found.contains(&"check::log"), "{name} {line:?}: {found:?}");
     }
 }
 
@@ -315,22 +312,29 @@ fn a_number_that_has_lost_its_point_is_no_number() {
     let generated = generated(&machine, "table", false);
     for name in ["fanuc", "haas"] {
         let post = controller(name);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = text_of(&post, &machine, &generated);
         let at = text.find("\nG0 X").unwrap() + 1;
         let point = at + text[at..].find('.').unwrap();
         let edited = format!("{}{}", &text[..point], &text[point + 1..]);
-        let against = Against { plan: Some(&generated.plan), ..Against::default() };
-        let refused = check(&machine, &post, &source("p.nc", edited), &against).unwrap_err();
+        let nc = post.program(&machine, &generated.plan, &generated.path).unwrap();
+        let (program, beside) = edits::parted(&edited, &nc.sources());
+        let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+        let refused = check(&machine, &post, &source("p.nc", program), &against).unwrap_err();
         assert!(refused.0[0].message.contains("decimal point"), "{:?}", refused.0);
     }
+}
+
+/// A program with those that it calls.
+fn text_of(post: &Postprocessor, machine: &Machine, generated: &Generated) -> String {
+    edits::whole(&post.program(machine, &generated.plan, &generated.path).unwrap())
 }
 
 /// Findings of an edited program, by code.
 fn codes(post: &Postprocessor, machine: &Machine, generated: &Generated, text: &str) -> Vec<&'static str> {
     let nc = post.program(machine, &generated.plan, &generated.path).unwrap();
-    let beside = nc.sources();
+    let (program, beside) = edits::parted(text, &nc.sources());
     let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
-    match check(machine, post, &source("edited", text), &against) {
+    match check(machine, post, &source("edited", program), &against) {
         Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
         Err(failure) => failure.0.iter().map(|f| f.code).collect(),
     }
@@ -380,7 +384,7 @@ fn the_transformation_is_switched_off_again() {
     let machine = machine("trunnion");
     let generated = generated(&machine, "basic", true);
     let post = controller("heidenhain");
-    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let text = text_of(&post, &machine, &generated);
     let of = |word: &str, n: usize| codes(&post, &machine, &generated, &without_line(&post, &text, word, n));
     assert!(of("M129", 0).contains(&"check::not_run"), "{:?}", of("M129", 0));
     assert!(of("M129", 1).contains(&"check::not_restored"), "{:?}", of("M129", 1));
@@ -395,7 +399,7 @@ fn under_a_transformation_the_end_is_as_the_beginning() {
         let generated = generated(&machine, program, true);
         for (control, alarm) in [("fanuc", "AXISCAL STOPPED TCP IS ON"), ("haas", "STOPPED TCP ON")] {
             let post = controller(control);
-            let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+            let text = text_of(&post, &machine, &generated);
             let (touches, end) = text.split_at(text.find("DPRNT[E").unwrap());
             assert!(!touches.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
             assert!(end.contains(&format!("\n#3000=1({alarm})\n")), "{control}: {end}");
@@ -435,7 +439,7 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
         ("haas", "cancel = \"G40 G50 G15 G69 G80\"", "51"),
     ] {
         let post = controller(control);
-        let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        let text = text_of(&post, &machine, &plain);
         // each of them by itself
         for asked in text.lines().filter(|l| l.starts_with("#4=#4*ABS[#40")) {
             let found = codes(&post, &machine, &plain, &text.replacen(&format!("{asked}\n"), "", 1));
@@ -444,16 +448,16 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
         assert!(text.contains(&format!("-{label}]\n")), "{control}");
         // taken off, where the control has them: nothing is asked for
         let all = variant(control, &format!("[settings]\n{look}\n"));
-        let text = all.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        let text = text_of(&all, &machine, &plain);
         assert!(!text.contains("#4=#4*ABS[#40"), "{control}");
         is_clean(&all, &machine, &plain);
     }
     let haas = controller("haas");
-    let text = haas.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let text = text_of(&haas, &machine, &plain);
     let found = codes(&haas, &machine, &plain, &text.replacen("G255\n", "", 1));
     assert!(found.contains(&"check::start"), "{found:?}");
     let fanuc = controller("fanuc");
-    let text = fanuc.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let text = text_of(&fanuc, &machine, &plain);
     let found = codes(&fanuc, &machine, &plain, &text.replacen("G40 G69 G80\n", "G40 G69 G80\nG54.2 P1\n", 1));
     assert!(found.contains(&"check::not_run"), "{found:?}");
     // under the transformation words are of the workpiece's system
@@ -466,7 +470,7 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
         ("heidenhain", &table, "FN 12: IF +Q1620 LT +0.01 GOTO LBL"),
     ] {
         let post = controller(control);
-        let text = post.program(&machine, &plan.plan, &plan.path).unwrap().text;
+        let text = text_of(&post, &machine, plan);
         assert_eq!(text.matches(line).count(), 3, "{control}");
         assert!(codes(&post, &machine, plan, &text).is_empty(), "{control}");
         // it looks, and goes on whatever it sees
@@ -490,14 +494,14 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
         let changed = look.replacen(from, to, 1);
         assert_ne!(changed, look, "{what}");
         let post = own(&changed);
-        let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+        let text = text_of(&post, &machine, &plain);
         let found = codes(&post, &machine, &plain, &text);
         assert!(found.contains(&"check::start"), "{what}: {found:?}");
     }
     is_clean(&own(look), &machine, &plain);
     // where it arrives, it has made no way when it is simply started again: it goes some way to see
     let post = controller("fanuc");
-    let text = post.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let text = text_of(&post, &machine, &plain);
     let lines: Vec<&str> = text.lines().collect();
     let looks: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].starts_with("IF[#4LT0.01]")).collect();
     let once = [&lines[..looks[0] + 5], &lines[looks[2] + 7..], &[""]].concat().join("\n");
@@ -505,7 +509,7 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
     assert!(found.contains(&"check::start"), "{found:?}");
     // where the control has the function, it is taken off
     let off = variant("fanuc", "[settings]\ncancel = \"G40 G69 G80\\nG54.4 P0\"\n");
-    let text = off.program(&machine, &plain.plan, &plain.path).unwrap().text;
+    let text = text_of(&off, &machine, &plain);
     assert!(codes(&off, &machine, &plain, &text.replace("IF[#4LT0.01]", "IF[#4LT9000.]")).is_empty());
     let found = codes(&off, &machine, &plain, &text.replacen("G54.4 P0", "G54.4 P1", 1));
     assert!(found.contains(&"check::not_run"), "{found:?}");
@@ -516,7 +520,7 @@ fn what_lasts_beyond_programs_is_seen_before_anything_moves() {
         ("sinumerik", "+$P_ACTFRAME[Y,MI]", ""),
     ] {
         let post = controller(control);
-        let text = post.program(&machine, &table.plan, &table.path).unwrap().text;
+        let text = text_of(&post, &machine, &table);
         assert!(text.contains(line), "{control} {line}");
         assert!(codes(&post, &machine, &table, &text).is_empty(), "{control}");
         let found = codes(&post, &machine, &table, &text.replacen(line, instead, 1));
@@ -545,7 +549,7 @@ fn the_length_that_is_counted_on_is_that_of_the_offset_that_acts() {
     let generated = generated(&machine, "basic", true);
     let of = |control: &str, lines: &str| {
         let post = variant(control, &format!("[settings]\n{lines}\n"));
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = text_of(&post, &machine, &generated);
         codes(&post, &machine, &generated, &text)
     };
     for (control, own) in [("fanuc", "#11025"), ("haas", "#2025")] {
@@ -567,7 +571,7 @@ fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
     let (plain, table) = (generated(&machine, "basic", false), generated(&machine, "basic", true));
     for control in ["fanuc", "haas"] {
         let post = controller(control);
-        let of = |generated: &Generated| post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let of = |generated: &Generated| text_of(&post, &machine, generated);
         let text = of(&plain);
         assert!(!text.lines().any(|l| !l.starts_with('(') && l.contains("G49")), "{control}");
         // it does not look whether a length acts
@@ -587,7 +591,7 @@ fn a_tool_length_is_never_taken_off_by_a_move_that_nobody_has_proven() {
     // at a stop for another stylus: where Z stands, and nowhere else
     let long = generated(&machine, "full", true);
     let post = controller("fanuc");
-    let text = post.program(&machine, &long.plan, &long.path).unwrap().text;
+    let text = text_of(&post, &machine, &long);
     let off = text.lines().find(|l| l.starts_with("G0 G49 Z[")).unwrap();
     // and the local system is off as well before a person is asked to do something
     assert!(text.contains(&format!("{off}\nG52 X0. Y0. Z0. A0. C0.\n#18=0\n#3006=1(")), "{off}");
@@ -613,7 +617,7 @@ fn a_block_to_wait_that_is_missing_is_found() {
         for tcp in [false, true] {
             let post = controller(control);
             let generated = generated(&machine, "basic", tcp);
-            let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+            let text = text_of(&post, &machine, &generated);
             let count = text.lines().filter(|l| *l == wait).count();
             assert!(count >= 3, "{control}: {count}");
             let lacking: Vec<usize> = (0..count)
@@ -640,7 +644,7 @@ fn a_program_sees_what_acts_on_its_coordinates() {
     let generated = generated(&machine, "basic", false);
     for control in ["fanuc", "haas"] {
         let post = controller(control);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+        let text = text_of(&post, &machine, &generated);
         // the guard against an offset that the program cannot take off
         let guard = text.lines().find(|l| l.starts_with("IF[#4LT0.02]GOTO")).unwrap();
         let unguarded = without(&text, guard, "GOTO9");
@@ -653,12 +657,12 @@ fn a_program_sees_what_acts_on_its_coordinates() {
     }
     // the user's further work offset comes back
     let post = controller("fanuc");
-    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let text = text_of(&post, &machine, &generated);
     let found = codes(&post, &machine, &generated, &without_line(&post, &text, "G54.1 P#16", 0));
     assert!(found.contains(&"check::not_restored"), "{found:?}");
     // Haas cannot give it back: the program does not begin
     let post = controller("haas");
-    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let text = text_of(&post, &machine, &generated);
     let found = codes(&post, &machine, &generated, &without(&text, "IF[#15LT59.5]", "GOTO9"));
     assert!(found.contains(&"check::not_restored"), "{found:?}");
 }
@@ -670,20 +674,20 @@ fn times_follow_the_run() {
     let generated = generated(&machine, "basic", false);
     for control in ["fanuc", "haas"] {
         let post = controller(control);
-        let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
-        assert!(text.contains("*T#8[50]"), "{control}");
+        let text = text_of(&post, &machine, &generated);
+        assert!(text.contains("*T#10[50]"), "{control}");
         // the program begins before midnight: without the day that is added its time would go back
         let found =
-            codes(&post, &machine, &generated, &text.replace("#8=#8-86400.*FIX[#8/86400.]\n", "#8=#8-86400.\n"));
+            codes(&post, &machine, &generated, &text.replace("#10=#10-86400.*FIX[#10/86400.]\n", "#10=#10-86400.\n"));
         assert!(found.contains(&"check::log"), "{control}: {found:?}");
-        let found = codes(&post, &machine, &generated, &text.replace("#8=#3012\n", "#8=0.\n"));
+        let found = codes(&post, &machine, &generated, &text.replace("#10=#3012\n", "#10=0.\n"));
         assert!(found.contains(&"check::log"), "{control}: {found:?}");
         // the user's file may say that none is wanted; the log then has none
         let silent = variant(control, "[settings]\ntime = \"no\"\n");
         is_clean(&silent, &machine, &generated);
         assert!(!silent.log.writes_time && post.log.writes_time);
-        let text = silent.program(&machine, &generated.plan, &generated.path).unwrap().text;
-        assert!(!text.contains("#3012") && !text.contains("*T#8"));
+        let text = text_of(&silent, &machine, &generated);
+        assert!(!text.contains("#3012") && !text.contains("*T#"));
     }
 }
 
@@ -693,7 +697,7 @@ fn the_spindle_is_oriented() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "full", false);
     let post = controller("fanuc");
-    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let text = text_of(&post, &machine, &generated);
     let turned = text.lines().filter(|l| l.starts_with("M19 R")).nth(1).unwrap().to_owned();
     let found = codes(&post, &machine, &generated, &text.replacen(&format!("{turned}\n"), "M19 R77.\n", 1));
     assert!(found.contains(&"check::not_the_plan"), "{turned}: {found:?}");

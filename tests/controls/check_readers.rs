@@ -80,7 +80,37 @@ fn written(controller: &str, program: &str) -> (Generated, String) {
     let spec = program::choose(program::built_in().unwrap(), program, &machine).unwrap();
     let (generated, _) = program::generate(&machine, &spec, &Options::default()).unwrap();
     let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let text = text.lines().map(unrolled).collect();
     (generated, text)
+}
+
+/// A call with the moves that it makes between contacts: what the routine does with its numbers is the business of others.
+fn unrolled(line: &str) -> String {
+    let letter = |l: char| line.split(' ').find_map(|w| w.strip_prefix(l)).unwrap();
+    let place = |letters: [char; 3]| letters.map(letter);
+    let arguments = || line.rsplit_once('"').map_or(line, |(_, rest)| rest).split(['(', ',']).collect::<Vec<&str>>();
+    let three = |values: &[&str]| format!("X={} Y={} Z={}", values[0], values[1], values[2]);
+    if line.starts_with("G65 P9101 ") {
+        let ([x, y, z], [i, j, k]) = (place(['X', 'Y', 'Z']), place(['I', 'J', 'K']));
+        return format!("G31 X{x} Y{y} Z{z} F60.\nG31 X{x} Y{y} Z{z} F{}\nG31 X{i} Y{j} Z{k} F1500.\n", letter('E'));
+    }
+    if line.starts_with("G65 P9102 ") || line.starts_with("G65 P9103 ") {
+        let ([x, y, z], g) = (place(['X', 'Y', 'Z']), if line.contains("P9102") { "G31" } else { "G0" });
+        return format!("{g} X{x} Y{y} Z{z}\n");
+    }
+    if line.starts_with("AXC_TOUCH(") {
+        let given = arguments();
+        let (start, end) = (three(&given[1..4]), three(&given[4..7]));
+        let search = format!("G1 SUPA {end} MEAS=1 F=60\n");
+        return format!("{search}{search}G1 SUPA {start} MEAS=1 F=1500\n");
+    }
+    if line.starts_with("AXC_GUARDED(") {
+        return format!("G1 SUPA {} MEAS=1 F=1500\n", three(&arguments()[1..4]));
+    }
+    if line.starts_with("AXC_RAPID(") {
+        return format!("G0 SUPA {}\n", three(&arguments()[1..4]));
+    }
+    format!("{line}\n")
 }
 
 /// Both readers keep numbers in 24 binary digits: of 512 mm the last one is 0.03 um.

@@ -4,7 +4,7 @@
 use crate::edits;
 
 use axiscal::check::{Against, Checked, check};
-use axiscal::diag::{Failure, Source, source};
+use axiscal::diag::{Failure, source};
 use axiscal::machine::{self, Machine};
 use axiscal::post::{Postprocessor, parse};
 use axiscal::program::{self, Generated, Options};
@@ -31,11 +31,15 @@ const INCH: &str =
     "[number]\ndecimals = 7\nunverified = \"ours\"\n[log]\nunit = \"inch\"\ndecimals = 7\nunverified = \"ours\"\n";
 
 fn checked(machine: &Machine, post: &Postprocessor, generated: &Generated, text: &str) -> Result<Checked, Failure> {
-    check(machine, post, &source("p.mpf", text), &Against { plan: Some(&generated.plan), ..Against::default() })
+    let nc = post.program(machine, &generated.plan, &generated.path).unwrap();
+    let (program, beside) = edits::parted(text, &nc.sources());
+    let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+    check(machine, post, &source("p.mpf", program), &against)
 }
 
 fn passes(machine: &Machine, post: &Postprocessor, generated: &Generated, what: &str) {
-    let text = post.program(machine, &generated.plan, &generated.path).unwrap_or_else(|e| panic!("{what}: {e}")).text;
+    let nc = post.program(machine, &generated.plan, &generated.path).unwrap_or_else(|e| panic!("{what}: {e}"));
+    let text = edits::whole(&nc);
     let checked = checked(machine, post, generated, &text).unwrap_or_else(|e| panic!("{what}: {e}"));
     let wrong: Vec<String> =
         checked.findings.iter().map(|f| format!("{} {f}", f.place().unwrap_or_default())).collect();
@@ -136,7 +140,8 @@ fn variants_of_a_user() {
     // an M function that the postprocessor file does not name
     let post = variant("[settings]\nprobe_on = \"M65\"\n");
     let generated = generated(&machine, "table", false);
-    let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text.replace("M65", "M64");
+    let nc = post.program(&machine, &generated.plan, &generated.path).unwrap();
+    let text = edits::whole(&nc).replace("M65", "M64");
     let checked = checked(&machine, &post, &generated, &text).unwrap();
     assert!(checked.findings.iter().any(|f| f.code == "check::not_run" && f.message.contains("M64")));
 }
@@ -165,86 +170,86 @@ fn edits_by_hand_are_caught_with_the_right_words() {
     let cases: Vec<(&str, String, &str, &str)> = vec![
         (
             "a sign changed",
-            with(&t, "G0 SUPA X=-", 1, &|l| l.replace("=-", "=")),
-            "check::stops",
-            "off along the approach",
+            with(&t, "AXC_TOUCH(1", 1, &|l| l.replace(",-30,0,6,", ",30,0,6,")),
+            "check::overtravel",
+            "the search ends",
         ),
         (
             "a place over the block",
-            with(&t, "G0 SUPA Z=11.3", 1, &|l| l.replace("11.3", "1.13")),
+            with(&t, "AXC_RAPID(-30", 1, &|l| l.replace("11.3", "1.13")),
             "check::collision",
             "collision",
         ),
         (
             "a point lost",
-            with(&t, "G1 SUPA Z=1.5", 1, &|l| l.replace("Z=1.5", "Z=15")),
+            with(&t, "AXC_GUARDED(2,\"block x- face -X\",-40,0,1.5", 1, &|l| l.replace("1.5", "15")),
             "check::unguarded",
             "did not come",
         ),
         (
             "a rapid in place of a guarded move",
-            with(&t, "G1 SUPA Z=10 MEAS", 1, &|_| "G0 SUPA Z=10\n".into()),
-            "check::stops",
-            "the probe triggered",
+            with(&t, "AXC_GUARDED(1", 1, &|_| "G0 SUPA Z=10\n".into()),
+            "check::unguarded",
+            "",
         ),
         (
             "MEAS deleted",
-            with(&t, "G1 SUPA X=-30 Y=0 Z=6 MEAS", 1, &|l| l.replace(" MEAS=1", "")),
+            with(&t, "G1 SUPA X=AXT_X", 2, &|l| l.replace(" MEAS=1", "")),
             "check::collision",
             "collision",
         ),
         (
             "MEAS deleted on the way",
-            with(&t, "G1 SUPA Z=10 MEAS", 1, &|l| l.replace(" MEAS=1", "")),
+            with(&t, "G1 SUPA X=AXG_X", 1, &|l| l.replace(" MEAS=1", "")),
             "check::stops",
             "the probe triggered",
         ),
         (
             "the falling edge",
-            with(&t, "G1 SUPA Z=10 MEAS", 1, &|l| l.replace("MEAS=1", "MEAS=-1")),
+            with(&t, "G1 SUPA X=AXG_X", 1, &|l| l.replace("MEAS=1", "MEAS=-1")),
             "check::not_run",
             "rising edge",
         ),
         (
             "an axis not latched",
-            with(&t, "G1 SUPA X=-30 Y=0 Z=6 MEAS", 2, &|l| l.replace(" Y=0", "")),
+            with(&t, "G1 SUPA X=AXT_X", 3, &|l| l.replace(" Y=AXT_Y", "")),
             "check::not_run",
             "latched Y",
         ),
         (
             "a search beyond the block",
-            with(&t, "G1 SUPA X=-30 Y=0 Z=6 MEAS", 1, &|l| l.replace("Z=6", "Z=-6")),
+            with(&t, "AXC_TOUCH(1", 1, &|l| l.replace(",6,", ",-6,")),
             "check::not_the_plan",
             "end",
         ),
         (
             "a search at ten times its feed",
-            with(&t, "G1 SUPA X=-30 Y=0 Z=6 MEAS", 1, &|l| l.replace("F=60", "F=600")),
+            with(&t, "AXC_TOUCH(1", 1, &|l| l.replace(",60,60,", ",600,60,")),
             "check::feed",
             "slow_feed",
         ),
-        ("the way off the face removed", with(&t, "G1 SUPA Z=$AA_MM", 1, &gone), "check::stops", "does not close"),
-        ("the retract removed", with(&t, "G1 SUPA Z=$AA_MM", 2, &gone), "check::stops", "does not close"),
+        ("the way off the face removed", with(&t, "G1 SUPA X=AXT_SX+", 1, &gone), "check::stops", "does not close"),
+        ("the retract removed", with(&t, "G1 SUPA X=AXT_SX+", 2, &gone), "check::stops", "does not close"),
         (
             "the retract into the block",
-            with(&t, "G1 SUPA Z=$AA_MM", 2, &|l| l.replace("(-0.5)", "(0.5)")),
+            with(&t, "AXT_BACK=", 2, &|l| l.replace("-0.5", "+0.5")),
             "check::in_contact",
             "first go back",
         ),
         (
             "a turn below the clearance",
-            with(&t, "G1 SUPA Z=11.3", 2, &|l| l.replace("11.3", "2.3")),
+            with(&t, "AXC_GUARDED(3,\"block x- face +Z\",-40,0,11.3", 1, &|l| l.replace("11.3", "2.3")),
             "check::turn_not_clear",
             "turns where",
         ),
-        ("a turn without the lift", with(&t, "G1 SUPA Z=11.3", 2, &gone), "check::turn_not_clear", "turns where"),
         (
-            "a line of the log removed",
-            with(&t, "AXC_LINE=SPRINT(\"P N2 S1", 1, &gone),
-            "check::touch_lacking",
-            "touch 2",
+            "a turn without the lift",
+            with(&t, "AXC_GUARDED(3,\"block x- face +Z\",-40,0,11.3", 1, &gone),
+            "check::turn_not_clear",
+            "turns where",
         ),
-        ("a stop removed", with(&t, "GOTOF AXC_END", 4, &gone), "check::goes_on", "the program"),
+        ("a line of the log removed", with(&t, "AXT_LINE=SPRINT(\"P N%D S1", 1, &gone), "check::", ""),
+        ("a stop removed", with(&t, "RET(\"AXC_END\")", 5, &gone), "check::goes_on", "the program"),
         (
             "the check of the touch turned round",
             with(&t, "IF $AC_MEA[1]==0", 1, &|l| l.replace("==", "<>")),
@@ -253,7 +258,7 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         ),
         (
             "a full log goes unseen",
-            with(&t, "IF AXC_ERR<>0", 4, &|l| l.replace("<>", "<")),
+            with(&t, "IF AXT_ERR<>0", 2, &|l| l.replace("<>", "<")),
             "check::goes_on",
             "cannot be written",
         ),
@@ -263,9 +268,9 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         ("exact stop not set", with(&t, "G710", 1, &|l| l.replace("G60 ", "")), "check::rounded", "corner"),
         ("the transformation left on", with(&t, "TRAFOOF", 1, &gone), "check::not_run", "TRAFOOF"),
         ("the length of the tool left on", with(&t, "D0", 1, &gone), "check::", ""),
-        ("an offset left on", with(&t, "G0 SUPA Z=11.3", 1, &|l| l.replace("SUPA ", "")), "check::", ""),
-        // the second one is of the clock, whose reading nothing hangs on
-        ("STOPRE removed", with(&t, "STOPRE", 3, &gone), "check::not_run", "STOPRE is missing"),
+        ("an offset left on", with(&t, "G0 SUPA X=AXR_X", 1, &|l| l.replace("SUPA ", "")), "check::", ""),
+        // the ones before it are of the head, the clock and the dry run
+        ("STOPRE removed", with(&t, "STOPRE", 6, &gone), "check::not_run", "STOPRE is missing"),
         ("the other input", with(&t, "IF $A_PROBE[1]", 2, &|l| l.replace("[1]", "[2]")), "check::not_run", "input"),
         (
             "a deflected probe goes unseen",
@@ -281,14 +286,19 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         ),
         (
             "a message removed",
-            with(&t, "MSG(\"AXISCAL: touch 1, block x- face +Z: the probe is deflected", 1, &gone),
+            // with its stop: that alone would be shown
+            {
+                let t =
+                    with(&t, "MSG(\"AXISCAL: touch \"<<AXT_ID<<\", \"<<AXT_SAYS<<\": the probe is deflected", 1, &gone);
+                with(&t, "M0", 7, &gone)
+            },
             "check::goes_on",
             "no message",
         ),
         ("no end", with(&t, "M30", 1, &gone), "check::not_understood", "no M30"),
         (
             "a word that is not known",
-            with(&t, "G0 SUPA Z=11.3", 1, &|l| l.replace("SUPA", "SUPB")),
+            with(&t, "G0 SUPA Z=349", 1, &|l| l.replace("SUPA", "SUPB")),
             "check::not_known",
             "SUPB",
         ),
@@ -301,8 +311,7 @@ fn edits_by_hand_are_caught_with_the_right_words() {
     ];
     let mut wrong = Vec::new();
     for (what, text, code, words) in cases {
-        let against = Against { plan: Some(&original.plan), ..Against::default() };
-        let findings = match check(&original.machine, &original.post, &source("edited", text), &against) {
+        let findings = match original.checked(&text) {
             Err(failure) => failure.0,
             Ok(checked) => checked.findings,
         };
@@ -321,7 +330,7 @@ fn under_the_transformation_it_must_be_switched_on_with_the_length_of_the_probe(
     let machine = machine("swivel-head");
     let (post, _) = Postprocessor::load_built_in_or_file("sinumerik").unwrap();
     let generated = generated(&machine, "table", true);
-    let t = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
+    let t = edits::whole(&post.program(&machine, &generated.plan, &generated.path).unwrap());
     let gone = |_: &str| String::new();
     for (what, text, words) in [
         ("TRAORI", with(&t, "TRAORI", 1, &gone), "TRAORI is missing"),
@@ -329,7 +338,7 @@ fn under_the_transformation_it_must_be_switched_on_with_the_length_of_the_probe(
         ("D2", with(&t, "D1", 1, &|_| "D2\n".into()), "tool_edge"),
         ("the frame of the user", with(&t, "TRANS", 1, &gone), ""),
         ("the frame", with(&t, "TRANS X", 1, &gone), ""),
-        ("MM in place of MW", t.replace("AXC_X=$AA_MW", "AXC_X=$AA_MM"), "the place of the contact"),
+        ("MM in place of MW", t.replace("AXT_PX=$AA_MW", "AXT_PX=$AA_MM"), "the place of the contact"),
     ] {
         let findings = match checked(&machine, &post, &generated, &text) {
             Err(failure) => failure.0,
@@ -345,7 +354,6 @@ fn what_it_does_not_know_has_its_line_and_column() {
     let original = original("sinumerik", None);
     let text = with(&original.text, "G0 SUPA Z=349", 1, &|l| l.replace("349", "349 CYCLE800()"));
     let line = text.lines().position(|l| l.contains("CYCLE800")).unwrap() + 1;
-    let edited: Source = source("edited.mpf", text);
-    let failure = check(&original.machine, &original.post, &edited, &Against::default()).unwrap_err();
-    assert_eq!(failure.0[0].place().unwrap(), format!("edited.mpf:{line}:15"));
+    let failure = original.checked(&text).unwrap_err();
+    assert_eq!(failure.0[0].place().unwrap(), format!("edited:{line}:15"));
 }

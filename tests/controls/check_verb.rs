@@ -75,7 +75,8 @@ fn exit_code_0_where_nothing_is_wrong() {
 #[test]
 fn exit_code_1_where_something_is_wrong() {
     let folder = folder("heidenhain");
-    let line = edited(folder.path(), "small.h", "L Z+11.3 R0 FMAX M91", "L Z+1.13 R0 FMAX M91");
+    // the call of the move stands behind what it is given
+    let line = edited(folder.path(), "small.h", "FN 0: Q1653 = +11.3", "FN 0: Q1653 = +1.13");
     let with_plan = |json: bool| {
         let mut command = check(folder.path(), "heidenhain", "small.h");
         command.args(["--plan", "small.plan.json"]).args(json.then_some("--json"));
@@ -90,7 +91,7 @@ fn exit_code_1_where_something_is_wrong() {
     let answer: serde_json::Value = serde_json::from_slice(&output).unwrap();
     assert_eq!((&answer["good"], &answer["format"]), (&false.into(), &"axiscal-check/1".into()));
     let findings = answer["findings"].as_array().unwrap();
-    assert!(findings.iter().any(|f| f["code"] == "check::collision" && f["line"] == line), "{findings:#?}");
+    assert!(findings.iter().any(|f| f["code"] == "check::collision" && f["line"] == line + 1), "{findings:#?}");
     assert!(findings.iter().any(|f| f["code"] == "check::changed"));
 }
 
@@ -196,7 +197,9 @@ fn a_program_has_the_number_that_its_settings_say() {
             .assert()
     };
     check("O9100").success();
-    check("O9101").success().stderr(predicate::str::contains("O9101"));
+    check("O9111").success().stderr(predicate::str::contains("O9111"));
+    // that of a program that it calls
+    check("O9101").failure().stderr(predicate::str::contains("two programs have the number 9101"));
     for number in ["O9810", "O0", "O123456789"] {
         check(number).failure().stderr(predicate::str::contains(number));
     }
@@ -445,34 +448,53 @@ touch  = [ { faces = ["+X"], grid = "S1" } ]
 #[test]
 fn a_rough_touch_is_refused_without_a_plan() {
     let edits = [
-        ("fanuc", "small.nc", "G1 Z[#5063-[-0.5]] F300.", "G0 Z[#5063-[-0.5]]", "a rapid leaves the face"),
-        ("haas", "small.nc", "G1 X[#5061-[0.5]] F300.", "G0 X[#5061-[0.5]]", "a rapid leaves the face"),
         (
-            "sinumerik",
-            "small.mpf",
-            "G1 SUPA Z=$AA_MM[Z]-(-0.5) F=300",
-            "G0 SUPA Z=$AA_MM[Z]-(-0.5)",
+            "fanuc",
+            "O9101.nc",
+            "G1 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16] F300.",
+            "G0 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16]",
             "a rapid leaves the face",
         ),
-        ("fanuc", "small.nc", "G31 Z6. F60.", "G31 Z4. F60.", "pushed past its overtravel"),
-        ("fanuc", "small.nc", "G31 X-36. F60.", "G31 X-33. F60.", "pushed past its overtravel"),
-        ("haas", "small.nc", "G31 Z6. F60.", "G31 Z4. F60.", "pushed past its overtravel"),
-        ("linuxcnc", "small.ngc", "G38.3 X-36 F60", "G38.3 X-33 F60", "pushed past its overtravel"),
+        (
+            "haas",
+            "O9101.nc",
+            "G1 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16] F300.",
+            "G0 X[#4+#12*#14] Y[#5+#12*#15] Z[#6+#12*#16]",
+            "a rapid leaves the face",
+        ),
         (
             "sinumerik",
-            "small.mpf",
-            "X=-30 Y=0 Z=6 MEAS=1 F=60",
-            "X=-30 Y=0 Z=4 MEAS=1 F=60",
+            "AXC_TOUCH.spf",
+            "G1 SUPA X=AXT_SX+AXT_BACK*AXT_DX Y=AXT_SY+AXT_BACK*AXT_DY Z=AXT_SZ+AXT_BACK*AXT_DZ F=300",
+            "G0 SUPA X=AXT_SX+AXT_BACK*AXT_DX Y=AXT_SY+AXT_BACK*AXT_DY Z=AXT_SZ+AXT_BACK*AXT_DZ",
+            "a rapid leaves the face",
+        ),
+        ("fanuc", "small.nc", "Z6. D2. F60.", "Z4. D2. F60.", "pushed past its overtravel"),
+        ("fanuc", "small.nc", "X-36. Y0. Z1.5 D2.", "X-33. Y0. Z1.5 D2.", "pushed past its overtravel"),
+        ("haas", "small.nc", "Z6. D2. F60.", "Z4. D2. F60.", "pushed past its overtravel"),
+        (
+            "linuxcnc",
+            "small.ngc",
+            "o<touch> call [2] [2] [-36]",
+            "o<touch> call [2] [2] [-33]",
             "pushed past its overtravel",
         ),
-        ("heidenhain", "small.h", "DIST+4 F60", "DIST+6 F60", "pushed past its overtravel"),
-        ("fanuc", "small.nc", "G31 X-36. F300.", "G31 X-36. F900.", "fast_feed is 300"),
-        ("sinumerik", "small.mpf", "X=-36 Y=0 Z=1.5 MEAS=1 F=300", "X=-36 Y=0 Z=1.5 MEAS=1 F=900", "fast_feed is 300"),
-        ("heidenhain", "small.h", "DIST+4 F300", "DIST+4 F900", "fast_feed is 300"),
+        ("sinumerik", "small.mpf", "-30,0,6,2,60", "-30,0,4,2,60", "pushed past its overtravel"),
+        ("heidenhain", "small.h", "FN 0: Q1653 = +6", "FN 0: Q1653 = +4", "pushed past its overtravel"),
+        ("fanuc", "small.nc", "Z1.5 D2. F300.", "Z1.5 D2. F900.", "fast_feed is 300"),
+        ("sinumerik", "small.mpf", "-36,0,1.5,2,300", "-36,0,1.5,2,900", "fast_feed is 300"),
+        ("heidenhain", "small.h", "FN 0: Q1665 = +300", "FN 0: Q1665 = +900", "fast_feed is 300"),
     ];
     for (controller, file, from, to, code) in edits {
         let folder = folder(controller);
         edited(folder.path(), file, from, to);
+        let file = if file.starts_with("small") {
+            file
+        } else if controller == "sinumerik" {
+            "small.mpf"
+        } else {
+            "small.nc"
+        };
         let said = predicate::str::contains(code);
         check(folder.path(), controller, file).assert().code(1).stderr(said.clone());
         check(folder.path(), controller, file).args(["--plan", "small.plan.json"]).assert().code(1).stderr(said);

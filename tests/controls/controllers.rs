@@ -13,17 +13,17 @@ use std::path::Path;
 const CONTROLLERS: [&str; 7] =
     ["linuxcnc", "sinumerik", "fanuc", "heidenhain", "haas", "fanuc-inspection-plus", "haas-inspection-plus"];
 
-fn machine(name: &str) -> Machine {
+pub fn machine(name: &str) -> Machine {
     let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
     machines.into_iter().find(|m| m.name == name).unwrap()
 }
 
-fn generated(machine: &Machine, program: &str, tcp: bool) -> Generated {
+pub fn generated(machine: &Machine, program: &str, tcp: bool) -> Generated {
     let spec = program::choose(program::built_in().unwrap(), program, machine).unwrap();
     program::generate(machine, &spec, &Options { strict: false, tcp }).unwrap().0
 }
 
-fn controller(name: &str) -> Postprocessor {
+pub fn controller(name: &str) -> Postprocessor {
     Postprocessor::load_built_in_or_file(name).unwrap().0
 }
 
@@ -33,7 +33,7 @@ fn variant(base: &str, lines: &str) -> Postprocessor {
     parse(&source("mine.toml", text)).unwrap_or_else(|e| panic!("{e}")).0
 }
 
-fn written(post: &Postprocessor, machine: &Machine, generated: &Generated) -> NcProgram {
+pub fn written(post: &Postprocessor, machine: &Machine, generated: &Generated) -> NcProgram {
     post.program(machine, &generated.plan, &generated.path).unwrap_or_else(|e| panic!("{}: {e}", post.name))
 }
 
@@ -66,7 +66,8 @@ fn labels(post: &Postprocessor, text: &str) -> (Vec<u64>, BTreeSet<u64>) {
             }
             "h" => {
                 let block = line.split_once(' ').unwrap().1;
-                stand.extend(block.strip_prefix("LBL ").and_then(|n| n.parse::<u64>().ok()));
+                // LBL 0 ends a subprogram
+                stand.extend(block.strip_prefix("LBL ").and_then(|n| n.parse::<u64>().ok()).filter(|n| *n > 0));
                 gone_to.extend(numbers_after(block, "GOTO LBL "));
             }
             _ => {}
@@ -75,8 +76,29 @@ fn labels(post: &Postprocessor, text: &str) -> (Vec<u64>, BTreeSet<u64>) {
     (stand, gone_to)
 }
 
+/// A program and those that it calls, each as a text of its own.
+pub fn programs(post: &Postprocessor, nc: &NcProgram) -> Vec<String> {
+    let called = nc.beside.iter().filter(|f| f.name.ends_with(".nc") || f.name.ends_with(".spf")).map(|f| &f.text);
+    let texts = std::iter::once(&nc.text).chain(called);
+    assert!(post.extension != "nc" && post.extension != "mpf" || nc.beside.len() > 1);
+    texts.map(|text| text.replace("\r\n", "\n")).collect()
+}
+
 fn holds_to_the_rules(post: &Postprocessor, nc: &NcProgram, what: &str) {
-    let text = nc.text.replace("\r\n", "\n");
+    for text in programs(post, nc) {
+        lines_hold_to_the_rules(post, &text, what);
+    }
+    for (entry, why) in &post.unverified {
+        assert!(nc.findings.0.iter().any(|f| f.code == "post::unverified" && f.message.contains(entry.as_str())));
+        let notes = nc.beside.iter().find(|f| f.name.ends_with(".notes.txt")).unwrap();
+        assert!(!notes.to_control && notes.text.contains(&format!("- {entry}: {why}\n")), "{what}: {entry}: {why}");
+    }
+    // one line of the head says how many there are, and where
+    let said = nc.text.lines().filter(|l| l.to_ascii_uppercase().contains("NOT VERIFIED ON A REAL CONTROL")).count();
+    assert_eq!(said, usize::from(!post.unverified.is_empty()), "{what}");
+}
+
+fn lines_hold_to_the_rules(post: &Postprocessor, text: &str, what: &str) {
     assert!(text.is_ascii(), "{what}");
     for (number, line) in text.lines().enumerate() {
         let place = || format!("{what}, line {}: {line}", number + 1);
@@ -114,21 +136,11 @@ fn holds_to_the_rules(post: &Postprocessor, nc: &NcProgram, what: &str) {
             assert!(message.len() <= post.comment.message_width.unwrap(), "{}", place());
         }
     }
-    let (stand, gone_to) = labels(post, &text);
+    let (stand, gone_to) = labels(post, text);
     let unique: BTreeSet<u64> = stand.iter().copied().collect();
     assert_eq!(unique.len(), stand.len(), "{what}: a label stands twice");
     assert!(gone_to.is_subset(&unique), "{what}: no such label: {:?}", gone_to.difference(&unique).collect::<Vec<_>>());
     assert!(unique.iter().all(|l| post.last_label.is_none_or(|last| *l <= last as u64)), "{what}");
-    for (entry, why) in &post.unverified {
-        assert!(nc.findings.0.iter().any(|f| f.code == "post::unverified" && f.message.contains(entry.as_str())));
-        let squeezed = |t: &str| t.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_uppercase();
-        let head: String =
-            text.lines().take(400).map(|l| squeezed(l.trim_start_matches(|c: char| c.is_ascii_digit()))).collect();
-        assert!(
-            head.contains(&squeezed(&format!("NOT VERIFIED on a real control: {entry}: "))),
-            "{what}: {entry}: {why}"
-        );
-    }
 }
 
 fn every_controller(machine_name: &str, program: &str, both_frames: bool) {
@@ -140,15 +152,31 @@ fn every_controller(machine_name: &str, program: &str, both_frames: bool) {
             let what = format!("{name}, {machine_name}, {program}, tcp {tcp}");
             let nc = written(&post, &machine, &generated);
             holds_to_the_rules(&post, &nc, &what);
-            // each touch leaves its line, with the status 1 or 0
+            // each touch is called once, and leaves its line with the status 1 or 0
             let text = nc.text.replace("\r\n", "\n");
             for touch in &generated.plan.touches {
                 let ids = [
-                    format!("P N{} S1", touch.id),
-                    format!("P*N{}*S1", touch.id),
-                    format!("FN 0: Q1607 = +{}\n", touch.id),
+                    format!("o<touch> call [{}]", touch.id),
+                    format!("G65 P9101 A{}. ", touch.id),
+                    format!("\nAXC_TOUCH({},", touch.id),
                 ];
-                assert!(ids.iter().any(|id| text.contains(id.as_str())), "{what}: touch {}", touch.id);
+                let times = ids.iter().map(|id| text.matches(id.as_str()).count()).max();
+                // HEIDENHAIN: a touch is named, anew where a set-up begins, and called by its number
+                let named = text.contains(&format!("FN 0: Q1607 = +{} ; touch {}: ", touch.id, touch.id));
+                let well = if name == "heidenhain" { named } else { times == Some(1) };
+                assert!(well, "{what}: touch {}: {times:?}", touch.id);
+            }
+            let calls = text.lines().filter(|l| l.ends_with(" CALL LBL 1")).count();
+            assert!(name != "heidenhain" || calls == generated.plan.touches.len(), "{what}: {calls}");
+            let all = programs(&post, &nc).concat();
+            for status in 0..=1 {
+                let forms = [
+                    format!("(LOG,P N%.0f#1 S{status}"),
+                    format!("DPRNT[P*N#1[50]*S{status}"),
+                    format!("SPRINT(\"P N%D S{status}"),
+                    format!("FN 0: Q1608 = +{status}\n"),
+                ];
+                assert!(forms.iter().any(|form| all.contains(form.as_str())), "{what}: no line of status {status}");
             }
         }
     }
@@ -191,11 +219,11 @@ fn a_program_that_stops_for_another_stylus() {
 
 /// The texts of the messages of a program, as any control spells them.
 fn messages(text: &str) -> Vec<String> {
-    let forms =
-        [("MSG(\"AXISCAL: ", "\")"), ("#3006=1(", ")"), ("QS1600 = \"AXISCAL: ", "\""), ("(DEBUG,axiscal: ", ")")];
+    let forms = [("MSG(\"AXISCAL: ", "\")"), ("#3006=1(", ")"), ("QS1600 = \"", "\""), ("(DEBUG,axiscal: ", ")")];
     let shown = |line: &str| {
         forms.into_iter().find_map(|(begins, ends)| {
             let (_, message) = line.split_once(begins)?;
+            let message = message.strip_prefix("AXISCAL: ").unwrap_or(message);
             message.trim_end().strip_suffix(ends).map(str::to_owned)
         })
     };
@@ -230,21 +258,29 @@ fn no_message_is_cut() {
                     "[file]\nline_length = 5000\nunverified = \"as long as it wants\"\n[comment]\nmessage_width = 4000\nunverified = \"as wide as it wants\"\n",
                 );
                 assert_ne!(wide.comment.message_width, width);
-                let (cut, whole) = (
-                    messages(&written(&post, &machine, &generated).text),
-                    messages(&written(&wide, &machine, &generated).text),
-                );
+                let all = |post: &Postprocessor| {
+                    let nc = written(post, &machine, &generated);
+                    messages(&programs(post, &nc).concat())
+                };
+                let (cut, whole) = (all(&post), all(&wide));
                 assert!(!cut.is_empty(), "{name}");
                 // in one message or in several
                 let words = |of: &[String]| of.join(" ");
                 assert!(words(&cut) == words(&whole), "{name}, {machine_name}, {program}, tcp {tcp}");
-                assert!(
-                    width.is_none_or(|w| cut.iter().all(|m| m.replace("\"<<AXC_OFF<<\"", "{}").len() <= w)),
-                    "{name}"
-                );
+                // of a touch and its face: the longest
+                let touches = &generated.plan.touches;
+                let face = |t: &axiscal::program::plan::PlanTouch| format!("block {} face {}", t.block, t.face);
+                let longest = touches.iter().map(face).max_by_key(String::len).unwrap();
+                let id = touches.len().to_string();
+                let filled = |m: &String, off: &str| {
+                    let values = [("AXT_OFF", off), ("AXT_ID", &id), ("AXG_ID", &id), ("AXT_SAYS", &longest)];
+                    let values = values.into_iter().chain([("AXG_SAYS", longest.as_str())]);
+                    values.fold(m.clone(), |m, (name, value)| m.replace(&format!("\"<<{name}<<\""), value))
+                };
+                assert!(width.is_none_or(|w| cut.iter().all(|m| filled(m, "{}").len() <= w)), "{name}: {cut:#?}");
                 // with the longest number in it a SINUMERIK shows 124 characters
                 for message in cut.iter().filter(|_| name == "sinumerik") {
-                    let shown = format!("AXISCAL: {}", message.replace("\"<<AXC_OFF<<\"", "-0.123456"));
+                    let shown = format!("AXISCAL: {}", filled(message, "-0.123456"));
                     assert!(shown.len() <= 124, "{}: {shown}", shown.len());
                 }
             }
@@ -297,7 +333,8 @@ fn haas_numbers_rotary_axes_by_letter() {
         ("double-head", "double-head", [4, 5], 6),
     ] {
         let machine = machine(machine_name);
-        let text = written(&post, &machine, &generated(&machine, program, false)).text;
+        let nc = written(&post, &machine, &generated(&machine, program, false));
+        let text = programs(&post, &nc).concat();
         let code = code_lines(&post, &text).join("\n");
         for family in [502, 504, 506] {
             assert!(
@@ -331,10 +368,11 @@ fn fanuc_waits_by_what_stops_reading_ahead() {
 fn sinumerik_reads_a_clock_that_every_control_has() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "head", false);
-    let text = written(&controller("sinumerik"), &machine, &generated).text;
+    let all = |post: &Postprocessor| programs(post, &written(post, &machine, &generated)).concat();
+    let text = all(&controller("sinumerik"));
     assert!(!text.contains("$AC_TIMER") && text.contains("$A_SECOND"));
-    let without = written(&variant("sinumerik", "[settings]\ntime = \"no\"\n"), &machine, &generated).text;
-    assert!(!without.contains("$A_SECOND") && !without.contains("AXC_T=") && !without.contains(" T%"));
+    let without = all(&variant("sinumerik", "[settings]\ntime = \"no\"\n"));
+    assert!(!without.contains("$A_SECOND") && !without.contains("_T=") && !without.contains(" T%"));
 }
 
 /// What no public source says is said where the program is read.
@@ -370,11 +408,31 @@ fn what_no_public_source_says_is_said_in_the_programs() {
 /// The axis words of the straight moves of a program, in order.
 fn words(text: &str, axis: char) -> Vec<f64> {
     let code = |l: &&str| !l.contains(['(', ';', '"', '*']) && !l.contains("SYSREAD") && !l.contains("TCH");
-    text.lines()
+    let named = text
+        .lines()
         .filter(code)
         .flat_map(|l| l.split_whitespace())
-        .filter_map(|w| w.strip_prefix(axis)?.trim_start_matches('=').parse().ok())
-        .collect()
+        .filter_map(|w| w.strip_prefix(axis)?.trim_start_matches('=').parse().ok());
+    // what routines are given: X, Y, Z in this order, B and C of a turn, or a parameter for each of the three
+    let given = |line: &str| -> Option<f64> {
+        let place = "XYZ".find(axis);
+        let argument =
+            |rest: &str, at: usize| rest.split(['[', ']', ',', ' ']).filter(|w| !w.is_empty()).nth(at)?.parse().ok();
+        let linear = ["o<rapid> call ", "o<guarded> call "].iter().find_map(|begins| line.strip_prefix(begins));
+        if let Some((rest, place)) = linear.zip(place) {
+            return argument(rest, place);
+        }
+        if let Some((rest, place)) = line.strip_prefix("o<turn> call ").zip("BC".find(axis)) {
+            return argument(rest, place);
+        }
+        if let Some(((_, rest), place)) = line.strip_prefix("AXC_GUARDED(").and_then(|l| l.rsplit_once('"')).zip(place)
+        {
+            return argument(rest, place);
+        }
+        let (_, rest) = line.split_once("FN 0: Q165")?;
+        rest.strip_prefix(&format!("{} = ", place? + 1))?.trim().parse().ok()
+    };
+    named.chain(text.lines().filter_map(given)).collect()
 }
 
 #[test]
@@ -405,10 +463,7 @@ fn a_machine_in_inches_gets_inches_everywhere() {
             }
         }
         // feeds, tolerances and settings too: 1500 mm/min, 300 mm/min, 1 mm
-        assert!(
-            inch.text.contains("59.05512") && inch.text.contains("11.81102") && inch.text.contains("0.03937"),
-            "{base}"
-        );
+        assert!(["59.05512", "11.81102", "0.03937"].iter().all(|number| head.contains(number)), "{base}");
     }
 }
 
@@ -431,11 +486,11 @@ fn axes_have_the_control_s_own_names_and_numbers() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "head", false);
     let post = variant("sinumerik", "[number]\naxis_names = { C = \"C1\", B = \"B1\" }\nsource = \"our machine\"\n");
-    let nc = written(&post, &machine, &generated);
-    assert!(nc.text.contains("G0 SUPA C1=0") && nc.text.contains("$AA_IM[B1]") && !nc.text.contains("$AA_IM[B]"));
+    let text = programs(&post, &written(&post, &machine, &generated)).concat();
+    assert!(text.contains("G0 SUPA C1=0") && text.contains("$AA_IM[B1]") && !text.contains("$AA_IM[B]"));
     let post = variant("fanuc", "[number]\naxis_numbers = { C = 6 }\nsource = \"our machine\"\n");
-    let nc = written(&post, &machine, &generated);
-    assert!(nc.text.contains("=#5066") && nc.text.contains("=#5046-#5026") && nc.text.contains("=#5064"));
+    let text = programs(&post, &written(&post, &machine, &generated)).concat();
+    assert!(text.contains("=#5066") && text.contains("=#5046-#5026") && text.contains("=#5064"));
 }
 
 #[test]
@@ -449,12 +504,13 @@ fn machine_coordinates_hold_the_origin_of_r() {
     let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
     let generated = generated(&machine, "head", false);
     for (name, first, touch) in [
-        ("sinumerik", "G0 SUPA X=67\n", "AXC_X=$AA_MM[X]-(100)\n"),
-        ("heidenhain", "L X+67 R0 FMAX M91", "Q1621 = Q1601 - 100\r\n"),
+        ("sinumerik", "G0 SUPA X=67\n", "AXT_PX=$AA_MM[X]-(100)\n"),
+        ("heidenhain", "L X+67 R0 FMAX M91", "Q1621 = Q1601 - 100\n"),
         ("fanuc", "G0 X-33.\n", "#27=#5041-#5021+[100.]\n#28=#5042-#5022+[-50.]\n#29=#5043-#5023\n"),
     ] {
-        let nc = written(&controller(name), &machine, &generated);
-        assert!(nc.text.contains(first) && nc.text.contains(touch), "{name}");
+        let post = controller(name);
+        let text = programs(&post, &written(&post, &machine, &generated)).concat();
+        assert!(text.contains(first) && text.contains(touch), "{name}");
     }
 }
 
@@ -545,7 +601,7 @@ fn a_probing_package_is_a_file_of_a_few_lines() {
 fn labels_that_run_out_are_said() {
     let machine = machine("swivel-head");
     let generated = generated(&machine, "head", false);
-    let post = variant("fanuc", "[file]\nlast_label = 500\nsource = \"a small control\"\n");
+    let post = variant("fanuc", "[file]\nlast_label = 60\nsource = \"a small control\"\n");
     let failure = post.program(&machine, &generated.plan, &generated.path).unwrap_err();
     assert_eq!(failure.0[0].code, "post::labels");
 }
@@ -553,6 +609,6 @@ fn labels_that_run_out_are_said() {
 #[test]
 fn controllers_say_what_they_are_based_on_and_what_stands_beside() {
     let beside: BTreeMap<&str, usize> = CONTROLLERS.iter().map(|c| (*c, controller(c).companions.len())).collect();
-    assert_eq!((beside["heidenhain"], beside["fanuc"]), (5, 0));
+    assert_eq!((beside["heidenhain"], beside["fanuc"], beside["sinumerik"], beside["linuxcnc"]), (6, 3, 3, 0));
     assert!(Postprocessor::built_in().unwrap().len() == CONTROLLERS.len());
 }

@@ -1,15 +1,42 @@
 //! Programs that somebody edited: what is done to them, and what "moves identically" means when it is looked at from
 //! outside.
 
-use axiscal::check::{Against, check};
-use axiscal::diag::{Severity, Source, source};
+use axiscal::check::{Against, Checked, check};
+use axiscal::diag::{Failure, Severity, Source, source};
 use axiscal::machine::{self, Machine};
-use axiscal::post::Postprocessor;
+use axiscal::post::{NcProgram, Postprocessor};
 use axiscal::program::plan::Plan;
 use axiscal::program::{self, Options};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+
+/// Begins the line between two files of a program.
+const FILE: &str = "@@ ";
+
+/// A program with those that it calls, as one text: what is edited may be in any of them.
+pub fn whole(nc: &NcProgram) -> String {
+    let called = nc.beside.iter().filter(|f| is_program(&f.name));
+    called.fold(nc.text.clone(), |text, f| format!("{text}{FILE}{}\n{}", f.name, f.text))
+}
+
+fn is_program(name: &str) -> bool {
+    name.ends_with(".nc") || name.ends_with(".spf")
+}
+
+/// The program itself, and all that lies beside it. `beside`: as it was generated.
+pub fn parted(text: &str, beside: &[(String, Source)]) -> (String, Vec<(String, Source)>) {
+    let mut parts: Vec<(String, String)> = vec![(String::new(), String::new())];
+    for line in text.split_inclusive('\n') {
+        match line.strip_prefix(FILE) {
+            Some(name) => parts.push((name.trim().to_owned(), String::new())),
+            None => parts.last_mut().unwrap().1.push_str(line),
+        }
+    }
+    let called = parts.split_off(1).into_iter().map(|(name, text)| (name.clone(), source(name, text)));
+    let others = beside.iter().filter(|(name, _)| !is_program(name)).cloned();
+    (parts.remove(0).1, called.chain(others).collect())
+}
 
 /// A program as it was generated.
 pub struct Original {
@@ -18,8 +45,7 @@ pub struct Original {
     pub plan: Plan,
     pub text: String,
     pub beside: Vec<(String, Source)>,
-    pub sha256: String,
-    pub statements_sha256: String,
+    pub steps_sha256: String,
 }
 
 /// A program of a few touches of one block at two angles: all kinds of moves, small enough for thousands of edits.
@@ -73,17 +99,16 @@ pub fn of(post: Postprocessor, built_in: Option<&str>) -> Original {
     let (generated, _) = program::generate(&machine, &spec, &Options::default()).unwrap();
     let mut plan = generated.plan;
     let nc = post.program(&machine, &plan, &generated.path).unwrap();
-    let (beside, text) = (nc.sources(), nc.text);
+    let (beside, text) = (nc.sources(), whole(&nc));
     let against = Against { plan: Some(&plan), beside: &beside, ..Against::default() };
-    let checked = check(&machine, &post, &source("original", text.as_str()), &against).unwrap();
+    let checked = check(&machine, &post, &source("original", nc.text.as_str()), &against).unwrap();
     let wrong: Vec<String> = checked.findings.iter().map(ToString::to_string).collect();
     assert!(wrong.is_empty(), "{controller}: {wrong:#?}");
     assert_eq!(checked.touches, plan.touches.len());
-    let sha256 = checked.proof.sha256.clone();
-    let statements_sha256 = checked.proof.statements_sha256.clone();
-    assert!(!statements_sha256.is_empty());
+    let steps_sha256 = checked.proof.steps_sha256.clone();
+    assert!(!steps_sha256.is_empty());
     plan.programs.insert(post.name.clone(), checked.proof);
-    Original { machine, post, plan, text, beside, sha256, statements_sha256 }
+    Original { machine, post, plan, text, beside, steps_sha256 }
 }
 
 /// What became of an edited program.
@@ -93,44 +118,52 @@ pub enum Fate {
     NotRead,
     /// Refused by what it does.
     Refused,
-    /// Refused only because it does otherwise than what was written.
-    Changed,
-    /// Refused only because it is not what was written: in every run that is tried it does the same.
+    /// Refused only because it is not what was written.
     Unproven,
     /// It moves identically: it is the same statements.
     Same,
-    /// Neither refused nor the same: what must not be.
+    /// It passes with a remark that names what was put in.
+    Remarked,
+    /// Neither refused nor the same, and nothing is said: what must not be.
     Escaped,
 }
 
 impl Original {
     /// Looks at an edited text.
     pub fn fate(&self, text: &str) -> Fate {
-        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
-        match check(&self.machine, &self.post, &source("edited", text), &against) {
+        match self.checked(text) {
             Err(_) => Fate::NotRead,
             Ok(checked) => {
                 let errors: Vec<&str> =
                     checked.findings.iter().filter(|f| f.severity == Severity::Error).map(|f| f.code).collect();
                 if errors.is_empty() {
-                    let proof = &checked.proof;
-                    let same = proof.sha256 == self.sha256 && proof.statements_sha256 == self.statements_sha256;
-                    return if same { Fate::Same } else { Fate::Escaped };
+                    let remarked = checked.findings.iter().any(|f| f.code == "check::edited");
+                    return match checked.proof.steps_sha256 == self.steps_sha256 {
+                        true => Fate::Same,
+                        false if remarked => Fate::Remarked,
+                        false => Fate::Escaped,
+                    };
                 }
-                match errors.iter().all(|c| *c == "check::changed") {
-                    true if checked.proof.sha256 == self.sha256 => Fate::Unproven,
-                    true => Fate::Changed,
-                    false => Fate::Refused,
-                }
+                if errors.iter().all(|c| *c == "check::changed") { Fate::Unproven } else { Fate::Refused }
             }
         }
+    }
+
+    /// An edited text, checked.
+    pub fn checked(&self, text: &str) -> Result<Checked, Failure> {
+        self.checked_from(text, 0)
+    }
+
+    fn checked_from(&self, text: &str, from: u32) -> Result<Checked, Failure> {
+        let (program, beside) = parted(text, &self.beside);
+        let against = Against { plan: Some(&self.plan), beside: &beside, from, ..Against::default() };
+        check(&self.machine, &self.post, &source("edited", program), &against)
     }
 
     /// Findings of an edited text, by code.
     #[allow(dead_code)] // the example does not ask for it
     pub fn codes(&self, text: &str) -> Vec<&'static str> {
-        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
-        match check(&self.machine, &self.post, &source("edited", text), &against) {
+        match self.checked(text) {
             Err(failure) => failure.0.iter().map(|f| f.code).collect(),
             Ok(checked) => checked.findings.iter().map(|f| f.code).collect(),
         }
@@ -139,8 +172,7 @@ impl Original {
     /// What is said of an edited text.
     #[allow(dead_code)] // the example does not ask for it
     pub fn says(&self, text: &str) -> Vec<String> {
-        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
-        let findings = match check(&self.machine, &self.post, &source("edited", text), &against) {
+        let findings = match self.checked(text) {
             Err(failure) => failure.0,
             Ok(checked) => checked.findings,
         };
@@ -150,22 +182,25 @@ impl Original {
     /// What an edited text is refused as changed for, or else its first finding: code, line from 1, what it says.
     #[allow(dead_code)] // the example does not ask for it
     pub fn finding(&self, text: &str) -> (&'static str, usize, String) {
-        let against = Against { plan: Some(&self.plan), beside: &self.beside, ..Against::default() };
-        let findings = match check(&self.machine, &self.post, &source("edited", text), &against) {
+        let findings = match self.checked(text) {
             Err(failure) => failure.0,
             Ok(checked) => checked.findings,
         };
         let changed = findings.iter().find(|f| f.code == "check::changed");
         let finding = changed.or(findings.first()).expect("nothing is found");
-        let line = finding.place().and_then(|p| p.split(':').nth(1)?.parse().ok()).unwrap_or(0);
-        (finding.code, line, finding.message.clone())
+        let place = finding.place().unwrap_or_default();
+        let mut parts = place.split(':');
+        let file = parts.next().unwrap_or_default();
+        let line = parts.next().and_then(|n| n.parse::<usize>().ok()).unwrap_or(0);
+        // of the whole text: behind the line with the name of the file
+        let before = text.lines().position(|l| l.strip_prefix(FILE).is_some_and(|name| name == file));
+        (finding.code, line + before.map_or(0, |n| n + 1), finding.message.clone())
     }
 
     /// A text that is meant to begin at a set-up, checked; and whether it says that there is no such set-up.
     #[allow(dead_code)] // the example does not ask for it
     pub fn begun(&self, text: &str, from: u32) -> (axiscal::check::Checked, bool) {
-        let against = Against { plan: Some(&self.plan), beside: &self.beside, from, ..Against::default() };
-        let checked = check(&self.machine, &self.post, &source("edited", text), &against).unwrap();
+        let checked = self.checked_from(text, from).unwrap();
         let no_setup = checked.findings.iter().any(|f| f.code == "check::no_setup");
         (checked, no_setup)
     }

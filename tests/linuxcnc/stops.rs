@@ -98,9 +98,9 @@ fn moved(shift: [f64; 3]) -> String {
 
 pub fn it_stops_with_the_name_of_the_touch_and_gives_the_settings_back() {
     let cases = [
-        ([0.0, 0.0, -5.5], "touch 1, block x- face +Z: missed"),
-        ([0.0, 0.0, 1.2], "block x- face +Z: the block stands -1.200 mm further along the approach"),
-        ([0.0, 0.0, 2.5], "on the way to touch 1, block x- face +Z: the probe triggered"),
+        ([0.0, 0.0, -5.5], "missed, no contact up to the end of the search"),
+        ([0.0, 0.0, 1.2], "the block stands -1.200 mm further along the approach"),
+        ([0.0, 0.0, 2.5], "on the way there: the probe triggered"),
         // the block stands where the ball is before the first move
         ([30.0, 0.0, 0.0], "the probe is triggered, or not switched on, before the first move"),
     ];
@@ -108,6 +108,9 @@ pub fn it_stops_with_the_name_of_the_touch_and_gives_the_settings_back() {
         let outcome = run(|text| after_a_users_settings(&text), &moved(shift));
         assert!(outcome.list("errors").contains("stopped at touch 1"), "{says}: {}", outcome.list("errors"));
         assert!(outcome.list("messages").contains(says), "{says}: {}", outcome.list("messages"));
+        // the touch and its face come first
+        let named = outcome.list("messages").contains("touch 1, block x- face +Z");
+        assert_eq!(named, !says.contains("first move"), "{says}: {}", outcome.list("messages"));
         outcome.state_is_as_before();
         let log = std::fs::read_to_string(outcome.folder.join("head.log")).unwrap();
         assert_eq!(log.contains("P N1 S0 "), says.contains("missed"), "{log}");
@@ -160,7 +163,10 @@ pub fn rs274_accepts_every_program() {
         let canon = std::fs::read_to_string(folder.path().join("canon.txt")).unwrap_or_default();
         assert!(answer.status.success(), "{machine} {program}: {}", String::from_utf8_lossy(&answer.stderr));
         // every probing move of the program was read
-        let probing = text.lines().filter(|l| l.starts_with("G38.")).count();
+        let (_, body) = text.split_once("\no<axiscal> sub\n").unwrap();
+        let called = |routine: &str| body.matches(&format!("\no<{routine}> call ")).count();
+        // search, off the face by two, the touch that is measured, back by two; and the look at the probe before all
+        let probing = 6 * called("touch") + called("guarded") + 1;
         assert_eq!(canon.matches("STRAIGHT_PROBE").count(), probing, "{machine} {program}");
     }
 }

@@ -285,7 +285,7 @@ impl Dialect for Heidenhain {
             short_way: awkward,
             feed: 0.0,
             angle: None,
-            own: Values::new(),
+            own: Values::default(),
             last: Last::default(),
             builder: builder(post),
         }
@@ -311,7 +311,7 @@ impl Dialect for Heidenhain {
             "PLANE" => self.tilted = false,
             "ANGLE" => self.angle = Some(head.value),
             // the only rotation of cycle 10 that is read is none
-            "NO ROTATION" => {}
+            "NO ROTATION" | "DWELL" => {}
             "NO SHIFT" => self.shift = [0.0; 6],
             "SHIFT" => {
                 if words.iter().any(|w| w.address.starts_with('I')) {

@@ -20,6 +20,7 @@ use std::sync::Arc;
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fault> {
+    let text = &capitals(text, folder(post));
     let mut reader = Reader::new(post, masks);
     let is_end = |line: &Line<'_>| line.text.is_empty() && line.start == text.len();
     let mut numbered = (0..).zip(lines(text)).take_while(|(_, line)| !is_end(line));
@@ -30,6 +31,18 @@ pub fn parse(text: &str, post: &Postprocessor, masks: &Masks) -> Result<Code, Fa
     }
     read?;
     reader.finish(text.len())
+}
+
+/// Capitals and small letters are one, but for texts in quotes and names of files. No place changes by that.
+fn capitals(text: &str, folder: &str) -> String {
+    let line = |line: &str| {
+        // names of files count as they are where the folder has small letters
+        let names = folder.contains(|c: char| c.is_ascii_lowercase()).then(|| line.find("F-PRINT")).flatten();
+        let kept = names.or_else(|| line.find(['"', ';'])).unwrap_or(line.len());
+        let (block, rest) = line.split_at(kept);
+        block.to_ascii_uppercase() + rest
+    };
+    text.split_inclusive('\n').map(line).collect()
 }
 
 /// A cycle whose further blocks must follow.
@@ -49,6 +62,7 @@ enum Cycle {
     DatumShift,
     Rotation,
     WorkingPlane,
+    Dwell,
 }
 
 struct Reader<'a> {
@@ -105,7 +119,8 @@ impl<'a> Reader<'a> {
     }
 
     fn line(&mut self, line: &Line<'_>, at: usize) -> Result<(), Fault> {
-        let mut scan = Scan::new(*line, line.text, self.post.number.mark);
+        let text = line.text.trim_end_matches(' ');
+        let mut scan = Scan::new(Line { start: line.start, text }, text, self.post.number.mark);
         // at the end of a line, behind a remark too, it takes the next line into this block
         if let Some(at) = line.text.find('~') {
             let says = "~ goes on in the next line: axiscal reads blocks of one line";
@@ -175,7 +190,9 @@ impl<'a> Reader<'a> {
             }
         } else if scan.take("CALL LBL ") {
             let label = self.label(scan)?;
-            let call = self.code.push(at.clone(), Instruction::Call(0));
+            let call = self
+                .code
+                .push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), texts: Vec::new(), is_step: true });
             self.jumps.push((call, label, at));
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
             self.opened(at, Cycle::Probe);
@@ -183,6 +200,7 @@ impl<'a> Reader<'a> {
         } else if scan.take("CYCL DEF ") {
             let kinds = [
                 ("13.0 ORIENTATION", Cycle::Orientation),
+                ("9.0 DWELL TIME", Cycle::Dwell),
                 ("7.0 DATUM SHIFT", Cycle::DatumShift),
                 ("10.0 ROTATION", Cycle::Rotation),
                 ("19.0 WORKING PLANE", Cycle::WorkingPlane),
@@ -277,7 +295,7 @@ impl<'a> Reader<'a> {
         if scan.take(" FMAX") {
             words.push(number("FMAX", 0.0));
         } else if scan.take(" F") {
-            words.push(number("F", scan.unsigned("a feed")?));
+            words.push(word("F", scan.feed()?));
         }
         if scan.take_whole(" M91") {
             words.push(number("M91", 0.0));
@@ -342,7 +360,7 @@ impl<'a> Reader<'a> {
             self.code.push(at.clone(), Instruction::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
         let jump = self.code.push(at.clone(), Instruction::Jump(0));
         self.jumps.push((jump, label, at));
-        self.aim(over, jump + 1);
+        self.code.aim(over, jump + 1);
         Ok(())
     }
 
@@ -427,6 +445,12 @@ impl<'a> Reader<'a> {
                 scan.end()?;
                 self.code.push(at, Instruction::Block(vec![word("ANGLE", angle)]));
             }
+            Cycle::Dwell => {
+                scan.need("CYCL DEF 9.1 DWELL", "CYCL DEF 9.1 DWELL")?;
+                let seconds = scan.unsigned("seconds")?;
+                scan.end()?;
+                self.code.push(at, Instruction::Block(vec![number("DWELL", seconds)]));
+            }
             Cycle::DatumShift => {
                 scan.need(&format!("CYCL DEF 7.{}", open.stage), "the next block of the cycle: CYCL DEF 7.1")?;
                 let words = self.axes(scan)?;
@@ -469,7 +493,7 @@ impl<'a> Reader<'a> {
         scan.need(" DIST", "DIST")?;
         open.words.push(word("DIST", scan.signed("a way with its sign")?));
         scan.need(" F", "F and a feed")?;
-        open.words.push(number("F", scan.unsigned("a feed")?));
+        open.words.push(word("F", scan.feed()?));
         scan.need(" MB", "MB and the way back")?;
         open.words.push(number("MB", scan.unsigned("the way back")?));
         scan.need(" REFERENCE SYSTEM:", "REFERENCE SYSTEM:")?;
@@ -482,15 +506,6 @@ impl<'a> Reader<'a> {
         Ok(true)
     }
 
-    fn aim(&mut self, jump: usize, to: usize) {
-        if let Some(statement) = self.code.statements.get_mut(jump)
-            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) | Instruction::Call(place) =
-                &mut statement.what
-        {
-            *place = to;
-        }
-    }
-
     fn finish(mut self, end: usize) -> Result<Code, Fault> {
         if !self.ended {
             return Err(Fault { at: end..end, says: "the program ends without END PGM".to_owned() });
@@ -499,7 +514,7 @@ impl<'a> Reader<'a> {
             let Some(to) = self.labels.get(&label).copied() else {
                 return Err(Fault { at, says: format!("there is no LBL {label}") });
             };
-            self.aim(jump, to);
+            self.code.aim(jump, to);
         }
         Ok(self.code)
     }

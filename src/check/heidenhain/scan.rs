@@ -115,6 +115,19 @@ impl<'a> Scan<'a> {
         Ok(number)
     }
 
+    /// `1500`, `Q1610`: a feed.
+    ///
+    /// # Errors
+    /// When none stands here.
+    pub fn feed(&mut self) -> Result<Expr, Fault> {
+        const WHAT: &str = "a feed";
+        if self.rest.starts_with('Q') {
+            self.parameter(WHAT).map(Expr::Var)
+        } else {
+            self.unsigned(WHAT).map(Expr::Number)
+        }
+    }
+
     /// `Q1600`.
     ///
     /// # Errors

@@ -63,7 +63,10 @@ pub struct MacroB {
     /// #3004
     holds: f64,
     lookahead: f64,
-    own: Values,
+    /// Local variables, one set for each program that is called.
+    own: Vec<Values>,
+    /// The common variable in which the touch stands at which it stopped.
+    common: Values,
     /// In work coordinates, mm and deg.
     skipped: [f64; 6],
     /// When #3001 was 0, s since the program began.
@@ -119,7 +122,7 @@ impl MacroB {
 
     /// An M function that is not known says so before a word that goes with it.
     fn knows(&self, m: f64) -> Result<(), String> {
-        let known = [0.0, 5.0, 9.0, 30.0].contains(&m);
+        let known = [0.0, 1.0, 5.0, 8.0, 9.0, 30.0].contains(&m);
         if known || self.builder.orients(m).is_some() || self.builder.is_waiting_function(m) || self.builder.switches(m)
         {
             return Ok(());
@@ -152,6 +155,8 @@ impl MacroB {
             30 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
             5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
+            1 => vm.note(Event::Other("optional stop".to_owned())),
+            8 => vm.note(Event::Other("coolant on".to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
             _ => return Err(format!("M{m} is not known to axiscal")),
         }
@@ -346,7 +351,8 @@ impl Dialect for MacroB {
             feed: 0.0,
             holds: 0.0,
             lookahead: 0.0,
-            own: Values::new(),
+            own: vec![Values::default()],
+            common: Values::default(),
             skipped: [0.0; 6],
             seconds: 0.0,
             calls: post.check.iter().flat_map(|c| c.calls.iter().cloned()).collect(),
@@ -471,7 +477,8 @@ impl Dialect for MacroB {
 
     fn read(&self, var: &Var, vm: &Vm) -> Result<f64, String> {
         match var {
-            Var::Number(n) if *n < 1000 => own(&self.own, var),
+            Var::Number(n) if *n < 100 => own(self.own.last().unwrap_or(&self.common), var),
+            Var::Number(n) if *n < 1000 => own(&self.common, var),
             Var::Number(n)
                 if self.ahead && (matches!(n, 5021..=5026 | 5041..=5046) || self.builder.is_probe_input(*n)) =>
             {
@@ -495,7 +502,7 @@ impl Dialect for MacroB {
     }
 
     fn exists(&self, var: &Var) -> bool {
-        self.own.contains_key(var)
+        self.own.last().is_some_and(|own| own.contains_key(var)) || self.common.contains_key(var)
     }
 
     /// Modes of two or three kinds (plane, distance, units, feed mode, length) are found each way by the runs themselves.
@@ -527,11 +534,26 @@ impl Dialect for MacroB {
             }
             Var::Number(3004) => self.holds = value,
             Var::Number(1..=33) => {
-                self.own.insert(var.clone(), value);
+                self.own.last_mut().map(|own| own.insert(var.clone(), value));
+            }
+            Var::Number(n) if self.builder.stopped_in == Some(*n) => {
+                self.common.insert(var.clone(), value);
             }
             _ => return Err(format!("{var} is not the program's own: only #1 to #33 are")),
         }
         Ok(())
+    }
+
+    fn is_local(&self, var: &Var) -> bool {
+        matches!(var, Var::Number(1..=33))
+    }
+
+    fn entered(&mut self) {
+        self.own.push(Values::default());
+    }
+
+    fn left(&mut self, _value: Option<f64>, _vm: &Vm) {
+        self.own.pop();
     }
 
     fn probed(&mut self, _probe: &Probe, _outcome: Outcome, stands: &Position) {

@@ -22,6 +22,8 @@ pub struct Builder {
     orient: (f64, &'static str),
     /// Variable that is 1 while the probe is deflected.
     probe_input: Option<u32>,
+    /// Common variable in which the program keeps the touch at which it stopped.
+    pub stopped_in: Option<u32>,
     /// What does not fit into a field of the log is not written.
     pub cuts: bool,
 }
@@ -46,6 +48,7 @@ impl Builder {
             wait_word: words.first().cloned().unwrap_or_default(),
             orient: orient.unwrap_or((19.0, "R")),
             probe_input: setting("probe_input").trim().strip_prefix('#').and_then(|n| n.parse().ok()),
+            stopped_in: setting("stopped_in").trim().strip_prefix('#').and_then(|n| n.parse().ok()),
             cuts: post.check.as_ref().is_some_and(|c| c.field_overflow == Overflow::Cut),
         }
     }

@@ -34,10 +34,13 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor) -> Result<Code, Fault> {
+    // capitals and small letters are one; no place changes by that
+    let text = &text.to_ascii_uppercase();
     let mut reader = Reader {
         names: post.number.spoken(),
         always_mark: post.number.always_mark,
         post: Some(post),
+        there: numbers(text),
         ..Reader::default()
     };
     let read = lines(text).try_for_each(|line| reader.line(&line));
@@ -58,28 +61,80 @@ struct Reader<'p> {
     /// Every number of a place or a feed is written with its decimal point: one without has lost it.
     always_mark: bool,
     code: Code,
-    /// Where each leads, and in which line it stands.
-    labels: BTreeMap<u32, (usize, usize)>,
+    /// Numbers of the programs that stand in the text: the program itself first.
+    there: Vec<u32>,
+    /// The program that is read, by its place among them.
+    program: usize,
+    /// Where each label of a program leads, and in which line it stands.
+    labels: BTreeMap<(usize, u32), (usize, usize)>,
     lines: usize,
-    jumps: Vec<(usize, u32, Range<usize>)>,
+    /// To a label of which program.
+    jumps: Vec<(usize, (usize, u32), Range<usize>)>,
+    /// First statements of the programs.
+    starts: BTreeMap<u32, usize>,
+    calls: Vec<(usize, u32)>,
     percents: usize,
     number: bool,
     ended: bool,
 }
 
+/// The numbers of the programs in a text: lines that begin with O and digits.
+fn numbers(text: &str) -> Vec<u32> {
+    let number = |line: &str| {
+        let digits = line.strip_prefix('O')?;
+        digits.get(..digits.bytes().take_while(u8::is_ascii_digit).count())?.parse().ok()
+    };
+    text.lines().filter_map(number).collect()
+}
+
+/// The local variable of each letter of a call (argument specification I: B-63944EN, custom macro).
+const ARGUMENTS: [(char, u32); 21] = [
+    ('A', 1),
+    ('B', 2),
+    ('C', 3),
+    ('D', 7),
+    ('E', 8),
+    ('F', 9),
+    ('H', 11),
+    ('I', 4),
+    ('J', 5),
+    ('K', 6),
+    ('M', 13),
+    ('Q', 17),
+    ('R', 18),
+    ('S', 19),
+    ('T', 20),
+    ('U', 21),
+    ('V', 22),
+    ('W', 23),
+    ('X', 24),
+    ('Y', 25),
+    ('Z', 26),
+];
+
 impl Reader<'_> {
     fn line(&mut self, line: &Line<'_>) -> Result<(), Fault> {
+        let text = line.text.trim_end_matches([' ', '\t']);
+        let line = &Line { start: line.start, text };
         let rest = line.text;
         self.lines += 1;
         if rest.is_empty() {
             return Ok(());
         }
-        if self.percents > 1 {
+        if self.percents > 0 && self.percents.is_multiple_of(2) && rest != "%" {
             return Err(line.fault(rest, "something stands behind the second % that ends the program"));
         }
         if let Some(after) = rest.strip_prefix('%') {
             if !after.is_empty() {
                 return Err(line.not_understood(after, "nothing else in a line with %"));
+            }
+            if self.percents > 0 && self.percents.is_multiple_of(2) {
+                // another program, which the first one calls
+                (self.number, self.program) = (false, self.program + 1);
+            } else if self.program > 0
+                && !matches!(self.code.statements.last().map(|s| &s.what), Some(Instruction::Return(_)))
+            {
+                return Err(line.fault(rest, "the program that is called does not end with M99"));
             }
             if self.percents == 0 && !self.code.statements.is_empty() {
                 return Err(line.fault(rest, "the first % does not stand at the beginning of the program"));
@@ -99,14 +154,23 @@ impl Reader<'_> {
                     line.fault(rest, format!("O{digits}: no control has numbers of more than {MOST_DIGITS} digits"))
                 );
             }
-            self.code.number = Some((digits.to_owned(), line.rest(rest)));
+            if self.program == 0 {
+                self.code.number = Some((digits.to_owned(), line.rest(rest)));
+            } else if let Ok(number) = digits.parse()
+                && (self.there.first() == Some(&number)
+                    || self.starts.insert(number, self.code.statements.len()).is_some())
+            {
+                return Err(line.fault(rest, format!("two programs have the number {digits}")));
+            }
             self.number = true;
             return self.comments(line, after);
         }
         let mut rest = rest;
         if let Ok((after, digits)) = preceded(char('N'), digit1::<_, nom::error::Error<&str>>).parse(rest) {
             let label = self.label(line, rest, digits)?;
-            if let Some((_, first)) = self.labels.insert(label, (self.code.statements.len(), self.lines)) {
+            if let Some((_, first)) =
+                self.labels.insert((self.program, label), (self.code.statements.len(), self.lines))
+            {
                 return Err(line.fault(rest, format!("N{label} stands twice, first in line {first}")));
             }
             rest = blanks(after).map_err(|e| line.unread(&e, "a block"))?.0;
@@ -125,7 +189,7 @@ impl Reader<'_> {
             let over = self.code.push(at.clone(), Instruction::JumpUnless(condition, 0));
             let left = self.goto(line, after, at)?;
             let here = self.code.statements.len();
-            self.aim(over, here);
+            self.code.aim(over, here);
             return Ok(left);
         }
         if rest.starts_with("GOTO") {
@@ -147,7 +211,61 @@ impl Reader<'_> {
         if rest.starts_with('#') {
             return self.assignment(line, rest, at);
         }
+        if let Some(after) = rest.strip_prefix("M99").filter(|after| !after.starts_with(|c: char| c.is_ascii_digit()))
+            && self.program > 0
+        {
+            return self.leave(line, after, at);
+        }
+        if let Some(after) = rest.strip_prefix("G65 P")
+            && let Ok((after, number)) = digit1::<&str, nom::error::Error<&str>>(after)
+            && let Ok(number) = number.parse()
+            && self.there.iter().skip(1).any(|n| *n == number)
+        {
+            return self.call(line, after, number, at);
+        }
         self.block(line, rest)
+    }
+
+    /// `M99`, or `M99 P9`: back to a label of the program that has called this one.
+    fn leave<'a>(&mut self, line: &Line<'a>, after: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        let Ok((left, digits)) = preceded((blanks, char('P')), digit1::<_, nom::error::Error<&str>>).parse(after)
+        else {
+            self.code.push(at, Instruction::Return(None));
+            return Ok(after);
+        };
+        let label = self.label(line, after, digits)?;
+        let jump = self.code.push(at.clone(), Instruction::Leave(0));
+        self.jumps.push((jump, (0, label), at.clone()));
+        // the control comes to nothing behind it
+        self.code.push(at, Instruction::Return(None));
+        Ok(left)
+    }
+
+    /// `G65 P9101 A12. X-33.`: a program that stands in the text too.
+    fn call<'a>(&mut self, line: &Line<'a>, after: &'a str, number: u32, at: Range<usize>) -> Result<&'a str, Fault> {
+        let mut gives: Vec<(Var, Expr)> = Vec::new();
+        let mut left = blanks(after).map_err(|e| line.unread(&e, "an argument"))?.0;
+        while let Some(letter) = left.chars().next().filter(char::is_ascii_uppercase) {
+            let Some((_, local)) = ARGUMENTS.into_iter().find(|(l, _)| *l == letter) else {
+                return Err(line.not_understood(left, "a letter that may be an argument"));
+            };
+            let (after, (value, point)) =
+                cut(word_value).parse(&left[1..]).map_err(|e| line.unread(&e, "the value of an argument"))?;
+            if self.always_mark && !point && !matches!(value, Expr::Number(0.0)) {
+                let says =
+                    format!("the number behind {letter} has no decimal point: the control may count it in thousandths");
+                return Err(line.fault(left, says));
+            }
+            let var = Var::Number(local);
+            if gives.iter().any(|(given, _)| *given == var) {
+                return Err(line.fault(left, format!("two {letter} words stand in one call")));
+            }
+            gives.push((var, value));
+            left = blanks(after).map_err(|e| line.unread(&e, "an argument"))?.0;
+        }
+        let call = self.code.push(at, Instruction::Call { to: 0, gives, texts: Vec::new(), is_step: true });
+        self.calls.push((call, number));
+        Ok(left)
     }
 
     fn goto<'a>(&mut self, line: &Line<'a>, rest: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
@@ -156,7 +274,7 @@ impl Reader<'_> {
             .map_err(|e: Failed<'_>| line.unread(&e, "GOTO and a sequence number"))?;
         let label = self.label(line, rest, digits)?;
         let jump = self.code.push(at.clone(), Instruction::Jump(0));
-        self.jumps.push((jump, label, at));
+        self.jumps.push((jump, (self.program, label), at));
         Ok(after)
     }
 
@@ -178,10 +296,14 @@ impl Reader<'_> {
             .map_err(|e: Failed<'_>| line.unread(&e, "= and a value"))?;
         if matches!(variable, 3000 | 3006) {
             let (left, body) = remark(line, after, "a message in parentheses")?;
-            if value != Expr::Number(1.0) {
+            if variable == 3006 && value != Expr::Number(1.0) {
                 return Err(line.fault(rest, format!("#{variable} is known with the value 1 only")));
             }
-            let text = vec![Piece::Text(Arc::from(body))];
+            let mut text = vec![Piece::Text(Arc::from(body))];
+            if value != Expr::Number(1.0) {
+                // the number of the alarm, 3000 beside it
+                text.splice(0..0, [Piece::Fixed { decimals: 0, width: 0, value }, Piece::Text(Arc::from(" "))]);
+            }
             self.code.push(at, if variable == 3000 { Instruction::Abort(text) } else { Instruction::Wait(text) });
             return Ok(left);
         }
@@ -240,16 +362,8 @@ impl Reader<'_> {
         }
     }
 
-    fn aim(&mut self, jump: usize, to: usize) {
-        if let Some(statement) = self.code.statements.get_mut(jump)
-            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) = &mut statement.what
-        {
-            *place = to;
-        }
-    }
-
     fn finish(mut self, end: usize) -> Result<Code, Fault> {
-        if self.percents != 2 {
+        if self.percents == 0 || !self.percents.is_multiple_of(2) {
             return Err(Fault { at: end..end, says: "the program ends without its second %".to_owned() });
         }
         if !self.ended {
@@ -257,9 +371,14 @@ impl Reader<'_> {
         }
         for (jump, label, at) in std::mem::take(&mut self.jumps) {
             let Some((to, _)) = self.labels.get(&label).copied() else {
-                return Err(Fault { at, says: format!("there is no N{label}") });
+                return Err(Fault { at, says: format!("there is no N{}", label.1) });
             };
-            self.aim(jump, to);
+            self.code.aim(jump, to);
+        }
+        for (call, number) in std::mem::take(&mut self.calls) {
+            // numbers of programs are those of lines that were read
+            let to = self.starts.get(&number).copied().unwrap_or(self.code.statements.len());
+            self.code.aim(call, to);
         }
         Ok(self.code)
     }

@@ -4,13 +4,14 @@
 //! probe, when a coordinate system is read again and what M73 brings back was observed on LinuxCNC 2.9.0~pre1.
 
 use crate::axes::{AxisName, Position};
-use crate::check::code::{UnknownKind, Values, Var};
+use crate::check::code::{UnknownKind, VALUE, Values, Var};
 use crate::check::doubt::Doubt;
 use crate::check::run::{Alarm, Dialect, Event, Next, Outcome, Probe, Rate, SPINDLE_OFF, Spoken, Start, Vm, own};
 use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
 
 /// How many coordinate systems there are: G54 … G59.3.
 const SYSTEMS: usize = 9;
@@ -86,9 +87,9 @@ impl Ngc {
             g92_on: false,
             tool: [0.0; 3],
             table: [0.0, 0.0, 51.25],
-            globals: Values::new(),
-            found: Values::new(),
-            locals: vec![Values::new()],
+            globals: Values::default(),
+            found: Values::default(),
+            locals: vec![Values::default()],
             probed: [0.0; 6],
             hit: false,
         };
@@ -268,6 +269,8 @@ impl Ngc {
             20 | 300 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
             50 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
+            10 => vm.note(Event::Other("optional stop".to_owned())),
+            80 => vm.note(Event::Other("coolant on".to_owned())),
             90 => vm.note(Event::Other("coolant off".to_owned())),
             190 => vm.note(Event::Orient(value("R").ok_or("M19 needs R")?)),
             500 => self.modes.override_on = value("P") != Some(0.0),
@@ -372,7 +375,7 @@ impl Dialect for Ngc {
         let known_m = |m: f64| match m {
             // what they do stands outside of the program: outputs of the machine, programs of the user
             62.0..=65.0 | 67.0..=68.0 | 98.0 | 100.0..=199.0 => switches(m),
-            _ => [0.0, 2.0, 5.0, 9.0, 19.0, 30.0, 50.0, 66.0, 73.0].contains(&m) || switches(m),
+            _ => [0.0, 1.0, 2.0, 5.0, 8.0, 9.0, 19.0, 30.0, 50.0, 66.0, 73.0].contains(&m) || switches(m),
         };
         let mut unknown = Vec::new();
         for word in words.iter().filter(|w| w.value.is_finite()) {
@@ -409,7 +412,7 @@ impl Dialect for Ngc {
         let mut next = self.clone();
         next.kept.clear();
         next.found.clone_from(&next.globals);
-        next.locals = vec![Values::new()];
+        next.locals = vec![Values::default()];
         Some(next)
     }
 
@@ -578,7 +581,7 @@ impl Dialect for Ngc {
 
     fn entered(&mut self) {
         self.kept.push(None);
-        self.locals.push(Values::new());
+        self.locals.push(Values::default());
     }
 
     fn left(&mut self, value: Option<f64>, _vm: &Vm) {
@@ -586,12 +589,11 @@ impl Dialect for Ngc {
         if let Some(Some(kept)) = self.kept.pop() {
             self.restore(kept);
         }
-        self.globals.insert(Var::Name("_value".into()), value.unwrap_or(0.0));
+        self.globals.insert(VALUE.clone(), value.unwrap_or(0.0));
     }
 
     fn settings(&self) -> BTreeMap<String, String> {
         let m = &self.modes;
-        let numbers = |values: &[f64]| values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
         let mut out = BTreeMap::from([
             ("units".to_owned(), if m.inch { "G20" } else { "G21" }.to_owned()),
             ("distance".to_owned(), if m.incremental { "G91" } else { "G90" }.to_owned()),
@@ -627,4 +629,24 @@ impl Ngc {
         };
         words.iter().find(|word| !used(word)).map(|word| word.address)
     }
+}
+
+/// Numbers in one text. Most of them are the same at the end of each of a hundred thousand branches: they are written once.
+fn numbers(values: &[f64]) -> String {
+    const MOST: usize = 200;
+    thread_local! {
+        static WRITTEN: RefCell<HashMap<Vec<u64>, String>> = RefCell::default();
+    }
+    let key: Vec<u64> = values.iter().map(|x| x.to_bits()).collect();
+    WRITTEN.with_borrow_mut(|written| {
+        if let Some(text) = written.get(&key) {
+            return text.clone();
+        }
+        if written.len() >= MOST {
+            written.clear();
+        }
+        let text = values.iter().map(|x| format!("{:.6}", x + 0.0)).collect::<Vec<_>>().join(" ");
+        written.insert(key, text.clone());
+        text
+    })
 }

@@ -184,6 +184,8 @@ impl Sinumerik {
             30 => return Ok(true),
             0 => vm.note(Event::Wait(String::new())),
             5 => vm.note(Event::Other(SPINDLE_OFF.to_owned())),
+            1 => vm.note(Event::Other("optional stop".to_owned())),
+            8 => vm.note(Event::Other("coolant on".to_owned())),
             9 => vm.note(Event::Other("coolant off".to_owned())),
             _ if self.builder.contains(&m) => vm.note(Event::Other(format!("M{m}"))),
             _ => return Err(format!("M{m} is not known to axiscal")),
@@ -406,8 +408,8 @@ impl Dialect for Sinumerik {
             tool_mm: if awkward || third { 120.25 } else { 0.0 },
             transformed: awkward,
             feed: 0.0,
-            own: Values::new(),
-            timers: Values::new(),
+            own: Values::default(),
+            timers: Values::default(),
             ahead: false,
             triggered: awkward,
             latched: None,
@@ -417,7 +419,7 @@ impl Dialect for Sinumerik {
 
     fn unknown(&self, words: &[Spoken], _post: &Postprocessor) -> Vec<(UnknownKind, String)> {
         let known_g = |g: f64| g.fract() == 0.0 && (matches!(g as i64, 0 | 1) || self.clone().mode(g).is_ok());
-        let known_m = |m: f64| [0.0, 5.0, 9.0, 30.0].contains(&m) || self.builder.contains(&m);
+        let known_m = |m: f64| [0.0, 1.0, 5.0, 8.0, 9.0, 30.0].contains(&m) || self.builder.contains(&m);
         let is_unknown = |w: &&Spoken| match w.address {
             "G" => !known_g(w.value),
             "M" => !known_m(w.value),

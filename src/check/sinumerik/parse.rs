@@ -12,9 +12,10 @@ use crate::check::lines::{Line, blanks, lines};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
 use nom::character::complete::{char, digit1};
+use nom::multi::separated_list1;
 use nom::sequence::delimited;
 use nom::{IResult, Parser};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -28,6 +29,7 @@ type Failed<'a> = nom::Err<nom::error::Error<&'a str>>;
 /// # Errors
 /// The first place that is not of this grammar.
 pub fn parse(text: &str, post: &Postprocessor) -> Result<Code, Fault> {
+    let text = &capitals(text);
     let axes = AxisName::ALL.into_iter().map(|a| (post.number.name(a), a)).collect();
     let mut reader = Reader { names: Names { types: BTreeMap::new(), axes }, ..Reader::default() };
     let read = lines(text).try_for_each(|line| reader.line(&line));
@@ -69,17 +71,49 @@ enum Direction {
 
 struct Jump {
     statement: usize,
-    label: String,
+    /// Of which program.
+    label: (usize, String),
     direction: Direction,
     at: Range<usize>,
     inside: Vec<usize>,
+}
+
+/// Capitals and small letters are one, but for texts in quotes. No place changes by that.
+fn capitals(text: &str) -> String {
+    let mut quoted = false;
+    let capital = |c: char| {
+        quoted = (quoted != (c == '"')) && c != '\n';
+        if quoted { c } else { c.to_ascii_uppercase() }
+    };
+    text.chars().map(capital).collect()
+}
+
+/// A program that is called: its parameters, and where it begins.
+struct Procedure {
+    start: usize,
+    parameters: Vec<(Arc<str>, Type)>,
+}
+
+/// A call: the statement, the name, what is given.
+struct Called {
+    statement: usize,
+    name: String,
+    at: Range<usize>,
 }
 
 #[derive(Default)]
 struct Reader {
     code: Code,
     names: Names,
-    labels: BTreeMap<String, (usize, Vec<usize>)>,
+    /// The program that is read: 0 is the program itself.
+    program: usize,
+    /// Names that are declared in any of the programs.
+    declared: BTreeSet<Arc<str>>,
+    /// Programs that are declared by EXTERN.
+    external: BTreeMap<String, Vec<Type>>,
+    procedures: BTreeMap<String, Procedure>,
+    calls: Vec<Called>,
+    labels: BTreeMap<(usize, String), (usize, Vec<usize>)>,
     jumps: Vec<Jump>,
     open: Vec<(Open, usize, Range<usize>)>,
     /// Structures so far: each has its number.
@@ -100,7 +134,7 @@ impl Reader {
             return Ok(());
         }
         let first = !std::mem::replace(&mut self.begun, true);
-        if let Some(name) = rest.strip_prefix("%_N_") {
+        if let Some(name) = rest.strip_prefix("%_N_").filter(|_| !self.ended) {
             let good = name.strip_suffix("_MPF").is_some_and(|n| identifier(n).is_ok_and(|(left, _)| left.is_empty()));
             return if first && good {
                 Ok(())
@@ -109,6 +143,9 @@ impl Reader {
             };
         }
         let rest = without_number(rest);
+        if let Some(after) = rest.strip_prefix("PROC ") {
+            return self.procedure(line, after);
+        }
         let rest = match label(rest) {
             Some((after, name)) => {
                 self.label(line, rest, name)?;
@@ -123,6 +160,9 @@ impl Reader {
         let (after, keyword) = identifier(rest).unwrap_or((rest, ""));
         if keyword == "DEF" {
             return self.declaration(line, after);
+        }
+        if keyword == "EXTERN" && self.program == 0 && !self.running {
+            return self.external(line, after);
         }
         self.running = true;
         let at = line.rest(rest);
@@ -140,6 +180,8 @@ impl Reader {
                 self.code.push(at, Instruction::Message(text));
                 left
             }
+            "RET" if self.program > 0 => self.leave(line, after, at)?,
+            name if self.external.contains_key(name) => self.call(line, after, name.to_owned(), at)?,
             "SETAL" => self.alarm(line, after, at)?,
             "WRITE" => {
                 let (left, (error, name, text)) = self.in_brackets(line, after, |names, i| {
@@ -216,6 +258,7 @@ impl Reader {
                 .map(|(after, (_, name))| (after, name))
                 .map_err(|e: Failed<'_>| line.not_understood(place(&e), "a name"))?;
             self.free(line, left, name)?;
+            self.declared.insert(Arc::from(name));
             self.names.types.insert(Arc::from(name), kind);
             let var = Var::Name(Arc::from(name));
             left = if after.starts_with('=') {
@@ -237,10 +280,111 @@ impl Reader {
         }
     }
 
+    /// `EXTERN AXC_TOUCH(INT,STRING[60],REAL)`
+    fn external(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let unread = |rest: &str| line.not_understood(rest, "the name of a program and the kinds of what it is given");
+        let (after, (_, name)) = (blanks, identifier).parse(rest).map_err(|e: Failed<'_>| unread(place(&e)))?;
+        let kind = |i| (blanks, kind_alone, blanks).parse(i).map(|(i, (_, kind, _))| (i, kind));
+        let (left, kinds) = delimited(char('('), separated_list1(char(','), kind), char(')'))
+            .parse(after)
+            .map_err(|e: Failed<'_>| unread(place(&e)))?;
+        self.free(line, rest, name)?;
+        if !left.is_empty() || self.external.insert(name.to_owned(), kinds).is_some() {
+            return Err(unread(left));
+        }
+        Ok(())
+    }
+
+    /// `PROC AXC_TOUCH(INT AXT_ID,STRING[60] AXT_SAYS)`: another program begins.
+    fn procedure(&mut self, line: &Line<'_>, rest: &str) -> Result<(), Fault> {
+        let unread = |rest: &str| line.not_understood(rest, "the name of a program and what it is given");
+        if !self.ended || !self.open.is_empty() {
+            return Err(line.fault(rest, "a program that is called stands in a file of its own"));
+        }
+        if self.program > 0 && !self.returns() {
+            return Err(line.fault(rest, "the program before this one does not end with RET"));
+        }
+        let (after, (_, name)) = (blanks, identifier).parse(rest).map_err(|e: Failed<'_>| unread(place(&e)))?;
+        let parameter = |i| {
+            let (i, (_, kind, _, name, _)) = (blanks, declared, blanks, identifier, blanks).parse(i)?;
+            Ok((i, (Arc::<str>::from(name), kind)))
+        };
+        let (left, parameters) = delimited(char('('), separated_list1(char(','), parameter), char(')'))
+            .parse(after)
+            .map_err(|e: Failed<'_>| unread(place(&e)))?;
+        if !left.is_empty() {
+            return Err(unread(left));
+        }
+        self.program += 1;
+        self.running = false;
+        self.names.types.clear();
+        for (parameter, kind) in &parameters {
+            self.free(line, rest, parameter)?;
+            self.declared.insert(parameter.clone());
+            self.names.types.insert(parameter.clone(), *kind);
+        }
+        let start = self.code.statements.len();
+        match self.procedures.insert(name.to_owned(), Procedure { start, parameters }) {
+            Some(_) => Err(line.fault(rest, format!("the program {name} stands twice"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Does what was read last go back to where it was called?
+    fn returns(&self) -> bool {
+        matches!(self.code.statements.last().map(|s| &s.what), Some(Instruction::Return(_)))
+    }
+
+    /// `RET`, or `RET("AXC_END")`: back to a label of the program itself.
+    fn leave<'a>(&mut self, line: &Line<'_>, after: &'a str, at: Range<usize>) -> Result<&'a str, Fault> {
+        if after.is_empty() {
+            self.code.push(at, Instruction::Return(None));
+            return Ok(after);
+        }
+        let (left, label) = self.in_brackets(line, after, |_, i| quoted(i).map(|(i, label)| (i, label.to_owned())))?;
+        let statement = self.code.push(at.clone(), Instruction::Leave(0));
+        let jump =
+            Jump { statement, label: (0, label), direction: Direction::Both, at: at.clone(), inside: Vec::new() };
+        self.jumps.push(jump);
+        // the control comes to nothing behind it
+        self.code.push(at, Instruction::Return(None));
+        Ok(left)
+    }
+
+    /// `AXC_TOUCH(1,"block x-",-33)`
+    fn call<'a>(&mut self, line: &Line<'_>, after: &'a str, name: String, at: Range<usize>) -> Result<&'a str, Fault> {
+        let kinds = self.external.get(&name).cloned().unwrap_or_default();
+        let (mut gives, mut texts) = (Vec::new(), Vec::new());
+        let mut left = after.strip_prefix('(').ok_or_else(|| line.not_understood(after, "( and what it is given"))?;
+        for (n, kind) in (0..).zip(&kinds) {
+            let unread = |e: &Failed<'_>| line.not_understood(place(e), "what the program is given");
+            if n > 0 {
+                left = comma(left).map_err(|e| unread(&e))?.0;
+            }
+            // its names are known when its own file has been read
+            let var = Var::Number(n);
+            left = if matches!(kind, Type::Text(_)) {
+                let (rest, text) = self.names.text(left, false).map_err(|e| unread(&e))?;
+                texts.push((var, text));
+                rest
+            } else {
+                let (rest, value) = self.names.value_of(left).map_err(|e| unread(&e))?;
+                gives.push((var, value));
+                rest
+            };
+        }
+        let left =
+            left.strip_prefix(')').ok_or_else(|| line.not_understood(left, ") behind the last of what it is given"))?;
+        let what = Instruction::Call { to: 0, gives, texts, is_step: true };
+        let statement = self.code.push(at.clone(), what);
+        self.calls.push(Called { statement, name, at });
+        Ok(left)
+    }
+
     /// A name that nothing else has.
     fn free(&self, line: &Line<'_>, rest: &str, name: &str) -> Result<(), Fault> {
         const LENGTH: std::ops::RangeInclusive<usize> = 2..=31;
-        let taken = self.names.types.contains_key(name) || self.names.axis(name).is_some();
+        let taken = self.declared.contains(name) || self.external.contains_key(name) || self.names.axis(name).is_some();
         if taken || means_something(name) || self.names.number(name).is_some() {
             return Err(line.fault(rest, format!("{name} already means something else")));
         }
@@ -315,7 +459,7 @@ impl Reader {
             return Ok(left);
         }
         let left = self.goto(line, left, at)?;
-        self.aim(over, self.code.statements.len());
+        self.code.aim_here(over);
         Ok(left)
     }
 
@@ -335,7 +479,7 @@ impl Reader {
         }
         let statement = self.code.push(at.clone(), Instruction::Jump(0));
         let inside = self.inside();
-        self.jumps.push(Jump { statement, label: label.to_owned(), direction, at, inside });
+        self.jumps.push(Jump { statement, label: (self.program, label.to_owned()), direction, at, inside });
         Ok(left)
     }
 
@@ -353,7 +497,7 @@ impl Reader {
             return Err(line.fault(rest, format!("{name} is no label: it is declared as a variable")));
         }
         let place = (self.code.statements.len(), self.inside());
-        match self.labels.insert(name.to_owned(), place) {
+        match self.labels.insert((self.program, name.to_owned()), place) {
             Some(_) => Err(line.fault(rest, format!("the label {name} stands twice"))),
             None => Ok(()),
         }
@@ -404,14 +548,14 @@ impl Reader {
         match (keyword, open) {
             ("ELSE", Open::If { over, end: None }) => {
                 let end = self.code.push(at, Instruction::Jump(0));
-                self.aim(over, self.code.statements.len());
+                self.code.aim_here(over);
                 // another part: a jump from one into the other goes into a structure
                 self.opened(Open::If { over, end: Some(end) }, begun);
             }
-            ("ENDIF", Open::If { over, end }) => self.aim(end.unwrap_or(over), self.code.statements.len()),
+            ("ENDIF", Open::If { over, end }) => self.code.aim_here(end.unwrap_or(over)),
             ("ENDWHILE", Open::While { start, out }) => {
                 self.code.push(at, Instruction::Jump(start));
-                self.aim(out, self.code.statements.len());
+                self.code.aim_here(out);
             }
             ("ENDLOOP", Open::Loop { start }) => {
                 self.code.push(at, Instruction::Jump(start));
@@ -426,14 +570,6 @@ impl Reader {
         Ok(after)
     }
 
-    fn aim(&mut self, jump: usize, to: usize) {
-        if let Some(statement) = self.code.statements.get_mut(jump)
-            && let Instruction::Jump(place) | Instruction::JumpUnless(_, place) = &mut statement.what
-        {
-            *place = to;
-        }
-    }
-
     fn finish(mut self, end: usize) -> Result<Code, Fault> {
         if let Some((_, _, at)) = self.open.pop() {
             return Err(Fault {
@@ -444,11 +580,15 @@ impl Reader {
         if !self.ended {
             return Err(Fault { at: end..end, says: "the program has no M30".to_owned() });
         }
+        if self.program > 0 && !self.returns() {
+            return Err(Fault { at: end..end, says: "the last program does not end with RET".to_owned() });
+        }
+        self.link()?;
         for jump in std::mem::take(&mut self.jumps) {
-            let label = &jump.label;
+            let label = &jump.label.1;
             let lacks = |says: String| Fault { at: jump.at.clone(), says };
             let (to, inside) =
-                self.labels.get(label).cloned().ok_or_else(|| lacks(format!("there is no label {label}:")))?;
+                self.labels.get(&jump.label).cloned().ok_or_else(|| lacks(format!("there is no label {label}:")))?;
             let onward = to > jump.statement;
             if (onward && jump.direction == Direction::Back) || (!onward && jump.direction == Direction::Onward) {
                 return Err(lacks(format!("the label {label} stands in the other direction")));
@@ -456,9 +596,40 @@ impl Reader {
             if !jump.inside.starts_with(&inside) {
                 return Err(lacks(format!("the label {label} stands inside of an IF or a loop")));
             }
-            self.aim(jump.statement, to);
+            self.code.aim(jump.statement, to);
         }
         Ok(self.code)
+    }
+}
+
+impl Reader {
+    /// Lets calls lead to their programs, and gives what they are given to the names there.
+    fn link(&mut self) -> Result<(), Fault> {
+        for Called { statement, name, at } in std::mem::take(&mut self.calls) {
+            let Some(procedure) = self.procedures.get(&name) else {
+                self.code.is_unknown_of(UnknownKind::Program, at, name);
+                continue;
+            };
+            let kinds: Vec<Type> = procedure.parameters.iter().map(|(_, kind)| *kind).collect();
+            if self.external.get(&name) != Some(&kinds) {
+                return Err(Fault { at, says: format!("EXTERN {name} does not name what PROC {name} is given") });
+            }
+            let named = |var: &mut Var| {
+                if let Var::Number(n) = var
+                    && let Some((name, _)) = procedure.parameters.get(*n as usize)
+                {
+                    *var = Var::Name(name.clone());
+                }
+            };
+            if let Some(Instruction::Call { to, gives, texts, .. }) =
+                self.code.statements.get_mut(statement).map(|s| &mut s.what)
+            {
+                *to = procedure.start;
+                gives.iter_mut().for_each(|(var, _)| named(var));
+                texts.iter_mut().for_each(|(var, _)| named(var));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -501,6 +672,17 @@ fn label(rest: &str) -> Option<(&str, &str)> {
 
 fn comma(input: &str) -> IResult<&str, char> {
     delimited(blanks, char(','), blanks).parse(input)
+}
+
+/// `INT`, `REAL`, `STRING[200]`, whatever follows.
+fn kind_alone(input: &str) -> IResult<&str, Type> {
+    let end = input.find([',', ')']).unwrap_or(input.len());
+    let (kind, _) = input.split_at(end);
+    let padded = format!("{kind} ");
+    match declared(&padded) {
+        Ok((_, kind)) => Ok((&input[end..], kind)),
+        Err(_) => Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Alt))),
+    }
 }
 
 /// `INT`, `REAL`, `STRING[200]`

@@ -99,6 +99,10 @@ pub(super) fn write(
         plan_file.display(),
         form_file.display()
     ));
+    for beside in nc.beside.iter().filter(|beside| beside.to_control) {
+        let file = args.out.join(&beside.name);
+        io.say(format!("{} goes to the control with the program: {}", file.display(), beside.says));
+    }
     io.say(format!(
         "when it has run: axiscal plan-next {} --out {} --controller {} {}--join {}\nor by hand:\n\n{}",
         args.study.display(),

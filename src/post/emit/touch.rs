@@ -43,24 +43,43 @@ impl Writer<'_> {
                 }
             })
             .collect();
+        let from = self.words(&xyz(&start))?;
+        let all = self.fresh(&xyz(&end))?;
+        let before = self.met_before(touch);
+        let way = self.length((nominal - start).norm());
+        let search_feed = self.feed(touch.search_feed)?;
+        let fresh = context! {
+            way => self.is_fresh("way", &way),
+            search_feed => self.is_fresh("search_feed", &search_feed) || before.is_some(),
+            measure_feed => self.is_fresh("measure_feed", &self.feed(touch.measure_feed)?),
+        };
+        if before.is_some() {
+            self.said.remove("search_feed");
+        }
         let context = context! {
+            announces => self.announces(),
+            fresh,
+            from,
             id => touch.id,
             says => touch.says.clone(),
+            face => self.face(&touch.says),
             first => touch.first,
-            before => self.met_before(touch),
+            before,
             end => self.words(&target)?,
             pose => self.words(&touch.pose)?,
-            all => self.words(&xyz(&end))?,
+            all,
             length => self.length(length),
             approach => approach.clone(),
-            way => self.length((nominal - start).norm()),
+            way,
             tolerance => self.length(touch.tolerance_mm),
-            search_feed => self.feed(touch.search_feed)?,
+            search_feed,
             measure_feed => self.feed(touch.measure_feed)?,
             back_off => self.length(touch.back_off_mm),
             half_back_off => self.length(touch.back_off_mm / 2.0),
         };
-        self.render("touch", context)?;
+        self.render(if self.post.touch_with_cycle { "cycle" } else { "touch" }, context)?;
+        // the routine goes back to where it began
+        self.fresh(&xyz(&start))?;
         self.approach = approach;
         let back = |axis: AxisName| {
             let vector = self.vector(&-direction, axis);
@@ -70,6 +89,7 @@ impl Writer<'_> {
         self.heading_back = target.iter().map(|(axis, _)| back(axis)).collect();
         self.way = self.length((nominal - start).norm());
         self.back_off = self.length(touch.back_off_mm);
+        self.began = touch.start.or(&stands);
         self.at = touch.end.or(&stands);
         self.loose = true;
         Ok(())
