@@ -56,7 +56,7 @@ pub fn scatter_that_fits(
         let tested: Vec<Tested> = supposed.par_iter().map(|s| tested(s, library, pure)).collect();
         let deviance: Vec<f64> = tested.iter().map(|t| t.deviance).collect();
         // with nothing in the model tests must not be sure of a scatter that is not
-        let bound = root_mean_square(&weights(&taus, &deviance), &taus, if step == 0 { 1.0 } else { 0.0 });
+        let bound = root_mean_square(&weights(&taus, &deviance), &taus, if step == 0 { 2.0 } else { 0.0 });
         if step == at_most {
             return bound;
         }
