@@ -355,7 +355,8 @@ impl<'a> Writer<'a> {
         match self.post.unverified.len() {
             0 => {}
             n => head.push(format!(
-                "NOT VERIFIED on a real control: {n} entries, see {}. Try the program in the control's simulation first",
+                "NOT VERIFIED on a real control: {n} {}, see {}. Try the program in the control's simulation first",
+                if n == 1 { "entry" } else { "entries" },
                 self.notes_name()
             )),
         }
