@@ -24,7 +24,7 @@
 23 ; check the sense: at B -90 the ball stands towards +X of the pivot
 24 ; the first move takes Z straight to 349.000 from where it stands: keep that way free
 25 ; the log is TNC:\AXISCAL\HEAD.LOG
-26 ; NOT VERIFIED on a real control: 37 entries, see head.notes.txt. Try the program in the control's
+26 ; NOT VERIFIED on a real control: 38 entries, see head.notes.txt. Try the program in the control's
 27 ; simulation first
 28 ; the masks HEAD_H.A, _N.A, _P.A, _E.A and AXISCAL_M.A must lie in TNC:\AXISCAL\
 29 ; tilted plane, TCPM and M126 are off after the program; the datum is not touched
