@@ -29,6 +29,16 @@ pub enum Family {
     Expected,
 }
 
+/// The part of the level that a family may use.
+#[must_use]
+pub fn level_of(family: Family) -> f64 {
+    match family {
+        Family::Named => NAMED_LEVEL,
+        Family::Generic => GENERIC_LEVEL,
+        Family::Expected => EXPECTED_LEVEL,
+    }
+}
+
 /// Holm's adjusted p-values (Scandinavian Journal of Statistics 6 (1979) 65).
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {

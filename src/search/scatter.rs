@@ -42,8 +42,9 @@ impl Tested {
     }
 }
 
-/// The scatter that is to be expected once the candidates are in the model that pass their test, each averaged over the scatters that are likely with
-/// it, one after the other, `at_most` of them. Where none passes, an upper bound.
+/// The scatter that is to be expected once the candidates are in the model that pass their test, each averaged over the scatters that
+/// are likely with it, one after the other, `at_most` of them. Where none passes, an upper bound. The first of the supposed scatters
+/// is none at all.
 #[must_use]
 pub fn scatter_that_fits(
     mut supposed: Vec<Supposed>,
@@ -52,17 +53,20 @@ pub fn scatter_that_fits(
     at_most: usize,
 ) -> f64 {
     let taus: Vec<f64> = supposed.iter().map(|s| s.tau).collect();
-    for step in 0.. {
-        let tested: Vec<Tested> = supposed.par_iter().map(|s| tested(s, library, pure)).collect();
-        let deviance: Vec<f64> = tested.iter().map(|t| t.deviance).collect();
+    for step in 0..=at_most {
+        let deviance: Vec<f64> =
+            supposed.iter().map(|s| s.ln_det + s.base.project(&s.residual).norm_squared()).collect();
         // with nothing in the model tests must not be sure of a scatter that is not
         let bound = root_mean_square(&weights(&taus, &deviance), &taus, if step == 0 { 2.0 } else { 0.0 });
-        if step == at_most {
+        let Some(sharpest) = supposed.first().filter(|_| step < at_most) else { return bound };
+        let (some, tests) = sensible(&tested(sharpest, library, pure).scores, library);
+        if some.candidates().is_empty() {
             return bound;
         }
-        let Some((candidate, variant)) = leading(&taus, &tested, library) else { return bound };
+        let tested: Vec<Tested> = supposed.par_iter().map(|s| tested(s, &some, pure)).collect();
+        let Some((candidate, variant)) = leading(&taus, &tested, &some, &tests) else { return bound };
         for (s, t) in supposed.iter_mut().zip(&tested) {
-            let mut columns = library.columns(candidate, variant);
+            let mut columns = some.columns(candidate, variant);
             (s.change)(&mut columns);
             s.ln_det += t.scores[candidate].ln_left[variant];
             if s.base.extend(&columns, KEPT) == 0 {
@@ -71,6 +75,23 @@ pub fn scatter_that_fits(
         }
     }
     0.0
+}
+
+/// The candidates that pass their test without any scatter, the most significant ones: others do not pass with some. And how many
+/// tests there are in the family of each.
+fn sensible(scores: &[Score], library: &Library) -> (Library, Vec<f64>) {
+    /// So many at most.
+    const MOST: usize = 40;
+    let mut passing: Vec<usize> =
+        (0..scores.len()).filter(|&c| scores[c].visible() && scores[c].p_adjusted < FAMILY_LEVEL).collect();
+    passing.sort_by(|&a, &b| scores[a].ln_p.total_cmp(&scores[b].ln_p));
+    passing.truncate(MOST);
+    passing.sort_unstable();
+    let of_family = |c: usize| {
+        let same = |s: &&Score| s.visible() && family(library, s.candidate) == family(library, c);
+        scores.iter().filter(same).count() as f64
+    };
+    (library.some(|c| passing.binary_search(&c).is_ok()), passing.iter().map(|&c| of_family(c)).collect())
 }
 
 /// The root of the mean square and some standard deviations of it.
@@ -87,26 +108,20 @@ fn tested(supposed: &Supposed, library: &Library, pure: Option<PureError>) -> Te
 
 /// The most significant candidate that passes its test, and its variant. A probability is the mean over the scatters that are
 /// likely with the candidate: with few groups of rows many scatters are.
-fn leading(taus: &[f64], tested: &[Tested], library: &Library) -> Option<(usize, usize)> {
-    let mut own: Vec<(Score, usize)> = (0..library.candidates().len())
-        .filter_map(|c| {
-            let variants = 0..library.candidates()[c].variants.len();
-            let all = variants.flat_map(|v| tested.iter().map(move |t| (t, v)));
-            let (best, variant) = all.min_by(|a, b| a.0.with(c, a.1).total_cmp(&b.0.with(c, b.1)))?;
-            let deviance: Vec<f64> = tested.iter().map(|t| t.with(c, variant)).collect();
-            let mut score = best.scores[c].clone();
-            score.ln_p = ln_mean(&weights(taus, &deviance), tested.iter().map(|t| t.scores[c].ln_p));
-            score.p = score.ln_p.exp();
-            Some((score, variant))
-        })
-        .collect();
-    let mut scores: Vec<Score> = own.iter().map(|o| o.0.clone()).collect();
-    multiplicity::adjust(&mut scores, |s| family(library, s.candidate));
-    own.iter_mut().zip(scores).for_each(|(o, s)| o.0 = s);
-    let passed = own.iter().filter(|(s, _)| s.visible() && s.p_adjusted < FAMILY_LEVEL);
-    let named = |s: &Score| library.candidates()[s.candidate].origin != Origin::Generic;
-    let best = passed.min_by(|(a, _), (b, _)| named(b).cmp(&named(a)).then(a.ln_p.total_cmp(&b.ln_p)))?;
-    Some((best.0.candidate, best.1))
+fn leading(taus: &[f64], tested: &[Tested], library: &Library, tests: &[f64]) -> Option<(usize, usize)> {
+    let all = (0..library.candidates().len()).filter_map(|c| {
+        let variants = 0..library.candidates()[c].variants.len();
+        let each = variants.flat_map(|v| tested.iter().map(move |t| (t, v)));
+        let (_, variant) = each.min_by(|a, b| a.0.with(c, a.1).total_cmp(&b.0.with(c, b.1)))?;
+        let deviance: Vec<f64> = tested.iter().map(|t| t.with(c, variant)).collect();
+        let ln_p = ln_mean(&weights(taus, &deviance), tested.iter().map(|t| t.scores[c].ln_p));
+        // the first step of Holm's test
+        let passes = ln_p + tests[c].ln() < multiplicity::level_of(family(library, c)).ln();
+        let named = library.candidates()[c].origin != Origin::Generic;
+        passes.then_some((c, variant, !named, ln_p))
+    });
+    let best = all.min_by(|a, b| a.2.cmp(&b.2).then(a.3.total_cmp(&b.3)))?;
+    Some((best.0, best.1))
 }
 
 /// Weights of supposed scatters from −2 ln L at each, as an integral over them has them; their sum is 1.
