@@ -249,7 +249,7 @@ fn edits_by_hand_are_caught_with_the_right_words() {
             "turns where",
         ),
         ("a line of the log removed", with(&t, "AXT_LINE=SPRINT(\"P N%D S1", 1, &gone), "check::", ""),
-        ("a stop removed", with(&t, "RET(\"AXC_END\")", 5, &gone), "check::goes_on", "the program"),
+        ("a stop removed", with(&t, "RET(\"AXC_END\")", 5, &gone), "check::goes_on", "no contact up to the end"),
         (
             "the check of the touch turned round",
             with(&t, "IF $AC_MEA[1]==0", 1, &|l| l.replace("==", "<>")),
@@ -258,7 +258,7 @@ fn edits_by_hand_are_caught_with_the_right_words() {
         ),
         (
             "a full log goes unseen",
-            with(&t, "IF AXT_ERR<>0", 2, &|l| l.replace("<>", "<")),
+            with(&t, "IF AXT_ERR<>0", 3, &|l| l.replace("<>", "<")),
             "check::goes_on",
             "cannot be written",
         ),
@@ -295,7 +295,7 @@ fn edits_by_hand_are_caught_with_the_right_words() {
             "check::goes_on",
             "no message",
         ),
-        ("no end", with(&t, "M30", 1, &gone), "check::not_understood", "no M30"),
+        ("no end", with(&t, "M30", 1, &gone), "check::not_understood", "in a file of its own"),
         (
             "a word that is not known",
             with(&t, "G0 SUPA Z=349", 1, &|l| l.replace("SUPA", "SUPB")),
