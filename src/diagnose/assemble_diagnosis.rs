@@ -150,7 +150,7 @@ pub(super) fn put_together(
     // as the splits of `compare` and the sentences count: of what the noise does not explain
     let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
-        c.share = beyond_the_noise(seen.evidence, c.share, seen.search.scores[group.first()].n_parameters);
+        c.share = beyond_the_noise(seen.evidence, c.share, seen.order.scores[group.first()].n_parameters);
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
@@ -295,13 +295,13 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
     let of_blocks = effect.id == first.effect && jumps && effect.terms.iter().all(|t| t.place == Place::Block);
     let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
-    let at_h = seen.named.library.candidates()[chosen].variants[seen.search.scores[chosen].variant].shape;
+    let at_h = seen.named.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
     let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
     let n = features.block.len();
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
     let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
     let columns = seen.evidence.whiten(raw_mm);
-    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.search.columns(chosen), &columns) {
+    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }
@@ -412,7 +412,7 @@ fn candidate(
 ) -> Candidate {
     let chosen = group.first();
     // sizes and what is left come from the order, probabilities from the tests
-    let score = &seen.search.scores[chosen];
+    let score = &seen.order.scores[chosen];
     let tests = || group.members.iter().map(|m| &seen.search.scores[m.candidate]);
     let p = tests().map(|s| s.p).fold(1.0, f64::min);
     // two effects that are named together pass their test together
@@ -466,7 +466,7 @@ fn candidate(
     }
     let raw_um = seen.raw_um(chosen);
     let moves = moves(seen, score, &raw_um);
-    let question = seen.search.question;
+    let question = seen.order.question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
     let raw_mm = raw_um.map(mm_from_um);
     Candidate {

@@ -44,7 +44,7 @@ use crate::search::dependence::{Dependence, dependences};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
-use crate::search::{LackOfFit, Pair, Search, lack_of_fit};
+use crate::search::{LackOfFit, Library, Pair, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::Diagnosis;
 use candidate_effects::Named;
@@ -52,6 +52,7 @@ use evidence::Evidence;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 pub use verdict::Verdict;
+use visit_scatter::Regression;
 
 /// What is diagnosed.
 #[derive(Debug, Clone, Copy)]
@@ -92,6 +93,8 @@ pub struct Examination<'a> {
     pub named: &'a Named<'a>,
     /// Their tests.
     pub search: Search<'a>,
+    /// The same for sizes and order: where no test passes, with the scatter that is left with the most likely effect.
+    pub order: Search<'a>,
     /// What these touches cannot tell apart, best first.
     pub groups: Vec<Group>,
     /// On what the misfit depends, best first.
@@ -111,7 +114,7 @@ pub struct Examination<'a> {
 impl Examination<'_> {
     /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
     fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
-        self.named.raw_um(&[(candidate, self.search.scores[candidate].variant)]).remove(0)
+        self.named.raw_um(&[(candidate, self.order.scores[candidate].variant)]).remove(0)
     }
 
     /// Ids of the effect that is named first, or of the two that are named together.
@@ -127,18 +130,24 @@ pub fn examine<'a>(
     fit: &Fit,
     evidence: &'a Evidence,
     named: &'a Named<'a>,
+    ordered: Option<&'a (Evidence, Library)>,
     features: &Features,
     generics: &Generics,
     at_most: usize,
 ) -> Examination<'a> {
     let question = evidence.question();
     let search = Search::new(question, &named.library);
+    let order = match ordered.filter(|_| search.leader().is_none()) {
+        Some((evidence, library)) => Search::new(evidence.question(), library),
+        None => search.clone(),
+    };
     let nested = held_out(question, &named.library, &evidence.visits, Choice::Redone);
-    let mut groups = search.groups(at_most);
+    let mut groups = order.groups(at_most);
     let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
     let given = behind.is_some();
     Examination {
         groups,
+        order,
         dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),
         nested: behind.unwrap_or(nested),
@@ -203,9 +212,9 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         return Ok(no_usable_touches::used(subject, options));
     }
     let features = Arc::new(features::features(fit, machine));
-    let (evidence, named) = visit_scatter::regression(fit, machine, catalogue, &features);
+    let Regression { evidence, named, ordered } = Regression::new(fit, machine, catalogue, &features);
     let generics = features::shapes(&evidence, &features);
-    let mut seen = examine(fit, &evidence, &named, &features, &generics, options.at_most);
+    let mut seen = examine(fit, &evidence, &named, ordered.as_ref(), &features, &generics, options.at_most);
     let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
         Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first()),
         None => effects_versus_patterns::Weighed::default(),
@@ -317,7 +326,7 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
 /// Does a fit still miss something, by the tests of the first step?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let features = Arc::new(features::features(fit, machine));
-    let (evidence, named) = visit_scatter::regression(fit, machine, catalogue, &features);
+    let Regression { evidence, named, .. } = Regression::new(fit, machine, catalogue, &features);
     let question = evidence.question();
     if Search::new(question, &named.library).leader().is_some() {
         return true;

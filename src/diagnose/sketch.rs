@@ -32,7 +32,8 @@ pub struct Sketch {
 /// When nothing significant is left, or what is left has no formula.
 pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> {
     let features = std::sync::Arc::new(features(subject.fit, subject.machine));
-    let (evidence, _) = super::visit_scatter::regression(subject.fit, subject.machine, subject.catalogue, &features);
+    let evidence =
+        super::visit_scatter::Regression::new(subject.fit, subject.machine, subject.catalogue, &features).evidence;
     let generics = shapes(&evidence, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let best = best(&all, subject.fit)?;

@@ -12,7 +12,7 @@ use crate::fit::{Fit, VisitSource, declared_tau_mm};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::pattern_tests::Features;
-use crate::search::{Basis, Change, Supposed, scatter_that_fits};
+use crate::search::{Basis, Change, Library, Scatter, Supposed, scatter_that_fits};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -26,24 +26,42 @@ const MOST_TIMES: f64 = 3.0;
 const SUPPOSED: [f64; 6] = [0.0, 0.12, 0.25, 0.42, 0.65, 1.0];
 
 /// The regression of a fit and the candidates.
-pub(super) fn regression<'c>(
-    fit: &Fit,
-    machine: &Machine,
-    catalogue: &'c Catalogue,
-    features: &Arc<Features>,
-) -> (Evidence, Named<'c>) {
-    let first = Evidence::from_fit(fit);
-    let named = Named::for_fit(fit, &first, machine, catalogue);
-    let Some(tau_mm) = estimated(fit, machine, &first, &named, features) else { return (first, named) };
-    let evidence = Evidence::with_visits(fit, tau_mm);
-    let change = fit.visit_normals().change(first.tau_mm, tau_mm);
-    let named = named.changed(&|columns| change.apply(columns));
-    let named = named.unwrap_or_else(|| Named::for_fit(fit, &evidence, machine, catalogue));
-    (evidence, named)
+pub(super) struct Regression<'c> {
+    /// What all tests share.
+    pub evidence: Evidence,
+    pub named: Named<'c>,
+    /// The same with the scatter that is left with the most likely effect, where no test passes: the order of the candidates.
+    pub ordered: Option<(Evidence, Library)>,
 }
 
-/// The scatter of index positions, mm; `None` where it is known or of no account.
-fn estimated(fit: &Fit, machine: &Machine, first: &Evidence, named: &Named, features: &Arc<Features>) -> Option<f64> {
+impl<'c> Regression<'c> {
+    pub fn new(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue, features: &Arc<Features>) -> Self {
+        let first = Evidence::from_fit(fit);
+        let named = Named::for_fit(fit, &first, machine, catalogue);
+        let Some(scatter) = estimated(fit, machine, &first, &named, features) else {
+            return Self { evidence: first, named, ordered: None };
+        };
+        let normals = fit.visit_normals();
+        let at = |tau_mm: f64| {
+            let change = normals.change(first.tau_mm, tau_mm);
+            (Evidence::with_visits(fit, tau_mm), named.changed(&|columns| change.apply(columns)))
+        };
+        let ordered = (scatter.order < scatter.tests).then(|| at(scatter.order));
+        let ordered = ordered.and_then(|(evidence, named)| Some((evidence, named?.library)));
+        let (evidence, own) = at(scatter.tests);
+        let named = own.unwrap_or_else(|| Named::for_fit(fit, &evidence, machine, catalogue));
+        Self { evidence, named, ordered }
+    }
+}
+
+/// The scatter of index positions, mm, for the tests and for the order of the candidates; `None` where it is known or of no account.
+fn estimated(
+    fit: &Fit,
+    machine: &Machine,
+    first: &Evidence,
+    named: &Named,
+    features: &Arc<Features>,
+) -> Option<Scatter> {
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     let most_mm = match fit.noise.visit_source {
         VisitSource::Declared => MOST_TIMES * declared_mm,

@@ -31,5 +31,5 @@ pub use basis::Basis;
 pub use library::{Candidate, Library, Origin, Variant, without_rounding};
 pub use moments::{Change, KEPT};
 pub use pairs::Pair;
-pub use scatter::{Supposed, scatter_that_fits};
+pub use scatter::{Scatter, Supposed, scatter_that_fits};
 pub use score::{LackOfFit, PureError, Question, Score, Search, lack_of_fit};

@@ -42,39 +42,56 @@ impl Tested {
     }
 }
 
+/// A scatter for the tests, and one for the order of the candidates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// Where no candidate passes, an upper bound.
+    pub tests: f64,
+    /// Where none passes, what is left with the most likely one.
+    pub order: f64,
+}
+
 /// The scatter that is to be expected once the candidates are in the model that pass their test, each averaged over the scatters that
-/// are likely with it, one after the other, `at_most` of them. Where none passes, an upper bound. The first of the supposed scatters
-/// is none at all.
+/// are likely with it, one after the other, `at_most` of them. The first of the supposed scatters is none at all.
 #[must_use]
 pub fn scatter_that_fits(
     mut supposed: Vec<Supposed>,
     library: &Library,
     pure: Option<PureError>,
     at_most: usize,
-) -> f64 {
+) -> Scatter {
     let taus: Vec<f64> = supposed.iter().map(|s| s.tau).collect();
-    for step in 0..=at_most {
+    let mut step = 0;
+    loop {
         let deviance: Vec<f64> =
             supposed.iter().map(|s| s.ln_det + s.base.project(&s.residual).norm_squared()).collect();
-        // with nothing in the model tests must not be sure of a scatter that is not
-        let bound = root_mean_square(&weights(&taus, &deviance), &taus, if step == 0 { 2.0 } else { 0.0 });
-        let Some(sharpest) = supposed.first().filter(|_| step < at_most) else { return bound };
+        let expected = root_mean_square(&weights(&taus, &deviance), &taus, 0.0);
+        let found = Scatter { tests: expected, order: expected };
+        let Some(sharpest) = supposed.first().filter(|_| step < at_most) else { return found };
         let (some, tests) = sensible(&tested(sharpest, library, pure).scores, library);
-        if some.candidates().is_empty() {
-            return bound;
-        }
         let tested: Vec<Tested> = supposed.par_iter().map(|s| tested(s, &some, pure)).collect();
-        let Some((candidate, variant)) = leading(&taus, &tested, &some, &tests) else { return bound };
+        let Some(best) = leading(&taus, &tested, &some, &tests).filter(|best| step == 0 || best.passes) else {
+            // with nothing in the model tests must not be sure of a scatter that is not
+            let bound = root_mean_square(&weights(&taus, &deviance), &taus, 2.0);
+            return if step == 0 { Scatter { tests: bound, order: bound } } else { found };
+        };
+        if !best.passes {
+            let with: Vec<f64> = tested.iter().map(|t| t.with(best.candidate, best.variant)).collect();
+            return Scatter {
+                tests: root_mean_square(&weights(&taus, &deviance), &taus, 2.0),
+                order: root_mean_square(&weights(&taus, &with), &taus, 0.0),
+            };
+        }
         for (s, t) in supposed.iter_mut().zip(&tested) {
-            let mut columns = some.columns(candidate, variant);
+            let mut columns = some.columns(best.candidate, best.variant);
             (s.change)(&mut columns);
-            s.ln_det += t.scores[candidate].ln_left[variant];
+            s.ln_det += t.scores[best.candidate].ln_left[best.variant];
             if s.base.extend(&columns, KEPT) == 0 {
-                return bound;
+                return found;
             }
         }
+        step += 1;
     }
-    0.0
 }
 
 /// The candidates that pass their test without any scatter, the most significant ones: others do not pass with some. And how many
@@ -106,9 +123,17 @@ fn tested(supposed: &Supposed, library: &Library, pure: Option<PureError>) -> Te
     Tested { deviance: supposed.ln_det + moments.rr, scores: score(&moments, library, pure) }
 }
 
-/// The most significant candidate that passes its test, and its variant. A probability is the mean over the scatters that are
-/// likely with the candidate: with few groups of rows many scatters are.
-fn leading(taus: &[f64], tested: &[Tested], library: &Library, tests: &[f64]) -> Option<(usize, usize)> {
+/// A candidate with a variant, and whether it passes its test.
+#[derive(Debug, Clone, Copy)]
+struct Leading {
+    candidate: usize,
+    variant: usize,
+    passes: bool,
+}
+
+/// The most significant candidate. A probability is the mean over the scatters that are likely with the candidate: with few groups
+/// of rows many scatters are.
+fn leading(taus: &[f64], tested: &[Tested], library: &Library, tests: &[f64]) -> Option<Leading> {
     let all = (0..library.candidates().len()).filter_map(|c| {
         let variants = 0..library.candidates()[c].variants.len();
         let each = variants.flat_map(|v| tested.iter().map(move |t| (t, v)));
@@ -118,10 +143,12 @@ fn leading(taus: &[f64], tested: &[Tested], library: &Library, tests: &[f64]) ->
         // the first step of Holm's test
         let passes = ln_p + tests[c].ln() < multiplicity::level_of(family(library, c)).ln();
         let named = library.candidates()[c].origin != Origin::Generic;
-        passes.then_some((c, variant, !named, ln_p))
+        Some((Leading { candidate: c, variant, passes }, !named, ln_p))
     });
-    let best = all.min_by(|a, b| a.2.cmp(&b.2).then(a.3.total_cmp(&b.3)))?;
-    Some((best.0, best.1))
+    // what passes goes before what does not, and a name before a pattern
+    let rank = |l: &(Leading, bool, f64)| (!l.0.passes, l.1);
+    let best = all.min_by(|a, b| rank(a).cmp(&rank(b)).then(a.2.total_cmp(&b.2)))?;
+    Some(best.0)
 }
 
 /// Weights of supposed scatters from −2 ln L at each, as an integral over them has them; their sum is 1.
