@@ -26,6 +26,9 @@ const WEAKENED: f64 = 3.0;
 /// A shape that does not pass among all shapes is named when its own p-value is below this.
 const WORTH_A_WORD: f64 = 1e-3;
 
+/// Shares that differ by less are the same.
+const AS_MUCH: f64 = 0.02;
+
 /// Most variables that are named.
 const MOST_WHERE: usize = 5;
 
@@ -117,7 +120,7 @@ pub(super) fn put_together(
     // an effect that explains more than any shape without a name says on what its own formulas depend
     let best_shape =
         seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL).map(|d| d.share).fold(0.0, f64::max);
-    if let Some(first) = candidates.first().filter(|c| c.proposed && c.share >= best_shape)
+    if let Some(first) = candidates.first().filter(|c| c.proposed && c.share + AS_MUCH >= best_shape)
         && let Some(effect) = subject.catalogue.get(&first.effect, subject.machine)
         && let Some(on) =
             effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))

@@ -12,12 +12,14 @@ use crate::fit::{Fit, VisitSource, declared_tau_mm};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::pattern_tests::Features;
-use crate::search::{Basis, Change, Library, Scatter, Supposed, scatter_that_fits};
+use crate::search::{
+    Basis, Change, KEPT, Library, Question, Scatter, Search, Supposed, lack_of_fit, scatter_that_fits,
+};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// Most effects or patterns that are supposed to be there at once.
-const AT_MOST: usize = 4;
+const MOST_AT_ONCE: usize = 4;
 
 /// The scatter is looked for up to so many times the declared one: more is no scatter of an axis.
 const MOST_TIMES: f64 = 3.0;
@@ -36,7 +38,7 @@ pub(super) struct Regression<'c> {
 
 impl<'c> Regression<'c> {
     pub fn new(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue, features: &Arc<Features>) -> Self {
-        let first = Evidence::from_fit(fit);
+        let first = calm(fit, machine, catalogue, features).unwrap_or_else(|| Evidence::from_fit(fit));
         let named = Named::for_fit(fit, &first, machine, catalogue);
         let Some(scatter) = estimated(fit, machine, &first, &named, features) else {
             return Self { evidence: first, named, ordered: None };
@@ -63,12 +65,9 @@ fn estimated(
     features: &Arc<Features>,
 ) -> Option<Scatter> {
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
-    let most_mm = match fit.noise.visit_source {
-        VisitSource::Declared => MOST_TIMES * declared_mm,
-        VisitSource::Revisits => (MOST_TIMES * declared_mm).max(fit.noise.tau_test_mm),
-        _ => 0.0,
-    };
-    if most_mm <= 0.0 {
+    let most_mm = MOST_TIMES * declared_mm;
+    // revisited poses say it without any model
+    if fit.noise.visit_source != VisitSource::Declared || most_mm <= 0.0 {
         return None;
     }
     let normals = fit.visit_normals();
@@ -98,5 +97,36 @@ fn estimated(
             change: change as Change,
         }
     });
-    Some(scatter_that_fits(supposed.collect(), &library, first.pure, AT_MOST))
+    Some(scatter_that_fits(supposed.collect(), &library, first.pure, MOST_AT_ONCE))
+}
+
+/// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
+/// explain all of it: what drifts or jumps between two visits of one pose looks like scatter of the visits, and would
+/// widen the tests until they are blind to it. Scatter that nothing explains stays scatter.
+fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Features>) -> Option<Evidence> {
+    const AT_MOST: usize = 4;
+    let declared_mm = declared_tau_mm(machine, &fit.data.observations);
+    // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
+    if fit.noise.visit_source != VisitSource::Revisits || declared_mm == 0.0 || fit.noise.tau_mm <= declared_mm {
+        return None;
+    }
+    let evidence = Evidence::with_visits(fit, declared_mm);
+    let mut library = Named::for_fit(fit, &evidence, machine, catalogue).library;
+    // groups of visits are the scatter itself
+    library.append(features::shapes(&evidence, features).without("visit"));
+    let question = evidence.question();
+    let (mut basis, mut residual) = (question.base.clone(), question.base.project(question.residual));
+    for _ in 0..AT_MOST {
+        let search = Search::new(Question { residual: &residual, base: &basis, ..question }, &library);
+        let passed = [search.leader(), search.leading_shape()].into_iter().flatten();
+        let best = passed.min_by(|&a, &b| search.scores[a].ln_p.total_cmp(&search.scores[b].ln_p))?;
+        if basis.extend(&search.columns(best), KEPT) == 0 {
+            return None;
+        }
+        residual = basis.project(&residual);
+        if lack_of_fit(&Question { residual: &residual, base: &basis, ..question }).p > 0.05 {
+            return Some(evidence);
+        }
+    }
+    None
 }
