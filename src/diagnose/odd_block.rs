@@ -14,7 +14,7 @@ pub struct OddBlock {
     pub unit: String,
 }
 
-/// The block that differs most, from the sizes of all columns in typical sizes; `None` where another one differs half as much.
+/// The block that differs most, from the sizes of all columns in typical sizes; `None` where another one differs nearly as much.
 pub(super) fn odd_block(columns: &[Column], sizes: &[f64]) -> Option<OddBlock> {
     let of = |c: &Column| c.name.split_once('@').map(|(name, block)| (name.to_owned(), block.to_owned()));
     let all: Vec<(String, String, f64)> = columns
@@ -34,7 +34,8 @@ pub(super) fn odd_block(columns: &[Column], sizes: &[f64]) -> Option<OddBlock> {
     let (_, next) = largest(Some(&first.1))?;
     let unit = columns.first()?.unit.clone();
     let odd = OddBlock { block: first.1.clone(), parameter: first.0.clone(), by, unit };
-    (2.0 * next.abs() < by.abs()).then_some(odd)
+    // of three blocks one that differs makes each of the others differ by half of it
+    (next.abs() < 0.6 * by.abs()).then_some(odd)
 }
 
 #[cfg(test)]

@@ -104,7 +104,10 @@ fn the_program_in_the_tree() {
     let (post, _) = Postprocessor::load_built_in_or_file("sinumerik").unwrap();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("programs/emitted/sinumerik/head.mpf");
     let text = std::fs::read_to_string(file).unwrap();
-    let checked = checked(&machine, &post, &generated(&machine, "head", false), &text).unwrap();
+    let generated = generated(&machine, "head", false);
+    let beside = post.program(&machine, &generated.plan, &generated.path).unwrap().sources();
+    let against = Against { plan: Some(&generated.plan), beside: &beside, ..Against::default() };
+    let checked = check(&machine, &post, &source("head.mpf", text), &against).unwrap();
     assert!(checked.findings.is_empty(), "{:#?}", checked.findings);
     assert_eq!((checked.touches, checked.setups, checked.stops), (202, 3, 0));
 }
