@@ -84,7 +84,7 @@ fn estimated(
         .collect();
     let base = first.base.transposed().transpose();
     let supposed = changes.iter().map(|(tau_mm, change)| {
-        let (mut own, mut residual) = (base.clone(), DMatrix::from_columns(&[first.residual.clone()]));
+        let (mut own, mut residual) = (base.clone(), DMatrix::from_columns(std::slice::from_ref(&first.residual)));
         change(&mut own);
         change(&mut residual);
         Supposed {
