@@ -145,7 +145,8 @@ fn identify_from(
         outcome: Outcome::default(),
     };
     let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
-    fit.visits = VisitPart::new(&fit, is_small && !settings.quick && !settings.bare);
+    // `assess` and the intervals of `identify` must state the same: both use what is declared until both estimate it
+    fit.visits = VisitPart::new(&fit, false);
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
     let with_catalogue = !settings.quick && !settings.bare && is_small;
