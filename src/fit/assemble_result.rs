@@ -106,7 +106,6 @@ pub(super) fn assemble_result(
         noise_source: fit.noise.source,
         noise_dof: fit.noise.dof,
         visit_dof: fit.noise.visit_dof,
-        visit_shown_um: um_from_mm(fit.visits.tau_mm),
         visit_um: um_from_mm(fit.noise.tau_mm),
         visit_source: fit.noise.visit_source,
         noise_says: words::noise(&fit.noise),
@@ -156,7 +155,8 @@ fn turns_about(fit: &Fit, machine: &Machine, effects: &[&Effect], status: &[Stat
 struct Evidence<'a> {
     fit: &'a Fit,
     asked: &'a Asked<'a>,
-    /// Variance of each free unknown from type B rows.
+    /// Variance of each free unknown from the scatter of index positions and from type B rows.
+    by_visits: DVector<f64>,
     by_type_b: DVector<f64>,
     has_type_b: bool,
     /// How far each moves with what leaves no trace.
@@ -172,6 +172,7 @@ impl<'a> Evidence<'a> {
         let mut out = Self {
             fit,
             asked,
+            by_visits: uncertainty::visit_variance(fit),
             by_type_b: DVector::from_fn(fit.free.len(), |c, _| by_type_b(c)),
             has_type_b: !type_b.is_empty(),
             moves: uncertainty::moves_with_unseen(fit),
@@ -201,7 +202,7 @@ impl<'a> Evidence<'a> {
 
     /// Variance from noise and priors.
     fn variance(&self, c: usize) -> f64 {
-        self.fit.covariance_of(self.fit.free[c], self.fit.free[c])
+        self.fit.covariance[(self.fit.free[c], self.fit.free[c])]
     }
 
     /// What of it the priors make.
@@ -218,8 +219,8 @@ impl<'a> Evidence<'a> {
     /// The 95 % factor.
     fn coverage(&self, c: usize) -> f64 {
         let all = self.variance(c) + self.other_variance(c);
-        let share = if all > 0.0 { self.fit.visits.variance[c] / all } else { 0.0 };
-        self.fit.noise.coverage(share.clamp(0.0, 1.0), self.fit.visits.dof)
+        let share = if all > 0.0 { self.by_visits[c] / all } else { 0.0 };
+        self.fit.noise.coverage(share.clamp(0.0, 1.0))
     }
 
     /// It leaves no trace, or follows what leaves none by more than its uncertainty.
@@ -320,8 +321,7 @@ impl<'a> Evidence<'a> {
             sigma,
             expanded,
             interval,
-            sigma_noise: known
-                .map(|c| (self.variance(c) - self.fit.visits.variance[c] - self.prior_variance(c)).max(0.0).sqrt()),
+            sigma_noise: known.map(|c| (self.variance(c) - self.by_visits[c] - self.prior_variance(c)).max(0.0).sqrt()),
             sigma_type_b: known.filter(|_| self.has_type_b).map(|c| self.by_type_b[c].sqrt()),
             moves_with_unseen: known.map(|c| self.moves[c]).filter(|m| *m > 0.0),
             sigma_with_unmodelled: with_unmodelled.filter(|s| s.is_finite()),

@@ -33,7 +33,6 @@ pub mod span;
 mod start_values;
 mod type_b;
 pub mod uncertainty;
-pub mod visit_scatter;
 pub mod whitening;
 
 pub use knowledge::{effects_of, every_formula_has_a_value};
@@ -57,7 +56,6 @@ use outcome::Outcome;
 use outlier_loop::OutlierLoop;
 use shape_search::{Asked, ShapeSearch};
 use std::collections::BTreeMap;
-use visit_scatter::VisitPart;
 
 /// Fits a model to runs.
 ///
@@ -135,7 +133,6 @@ fn identify_from(
         priors,
         knowledge,
         type_b: Vec::new(),
-        visits: VisitPart { tau_mm: 0.0, dof: None, more: DMatrix::zeros(0, 0), variance: DVector::zeros(0) },
         noise: found.noise,
         outliers_beyond: found.outliers_beyond,
         other_values: BTreeMap::new(),
@@ -145,8 +142,6 @@ fn identify_from(
         outcome: Outcome::default(),
     };
     let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
-    // `assess` and the intervals of `identify` must state the same: both use what is declared until both estimate it
-    fit.visits = VisitPart::new(&fit, false);
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
     let with_catalogue = !settings.quick && !settings.bare && is_small;

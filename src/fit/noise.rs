@@ -297,12 +297,12 @@ impl Noise {
         times_in_words(times, um_from_mm(self.tau_mm))
     }
 
-    /// Two-sided 95 % factor for a standard uncertainty of which `visit_share` of the variance goes back to τ, with its degrees of freedom
+    /// Two-sided 95 % factor for a standard uncertainty of which `visit_share` of the variance goes back to τ
     /// (Welch and Satterthwaite).
     #[must_use]
-    pub fn coverage(&self, visit_share: f64, visit_dof: Option<f64>) -> f64 {
+    pub fn coverage(&self, visit_share: f64) -> f64 {
         let part = |share: f64, dof: Option<f64>| dof.map_or(0.0, |d| share * share / d.max(1.0));
-        let sum = part(1.0 - visit_share, self.dof) + part(visit_share, visit_dof);
+        let sum = part(1.0 - visit_share, self.dof) + part(visit_share, self.visit_dof);
         coverage((sum > 1e-9).then(|| 1.0 / sum))
     }
 }
@@ -353,7 +353,7 @@ mod tests {
         let noise = estimate(&samples, &known(), None);
         assert_eq!((noise.source, noise.visit_source), (NoiseSource::Repeats, VisitSource::OnePose));
         assert!((noise.sigma_mm - 2f64.sqrt() * 1e-3).abs() < 1e-15);
-        assert!((noise.coverage(0.0, noise.visit_dof) - 2.228).abs() < 1e-3);
+        assert!((noise.coverage(0.0) - 2.228).abs() < 1e-3);
     }
 
     /// Drift between two visits is not the noise of a touch.
@@ -399,7 +399,7 @@ mod tests {
         let samples = [sample(0.1, 0), sample(0.2, 0), sample(0.3, 1)];
         let noise = estimate(&samples, &known(), None);
         assert_eq!((noise.sigma_mm, noise.source), (5.0, NoiseSource::Declared));
-        assert!((noise.coverage(0.5, noise.visit_dof) - 1.96).abs() < 1e-3);
+        assert!((noise.coverage(0.5) - 1.96).abs() < 1e-3);
     }
 
     /// Four poses, each visited twice, twelve points each: τ and its bound over many draws.

@@ -54,9 +54,6 @@ pub struct Outcome {
     /// Degrees of freedom of that; none where it is taken as known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub visit_dof: Option<f64>,
-    /// Scatter of index visits that the uncertainties use, µm: as the touches show it where it is only declared.
-    #[serde(default)]
-    pub visit_shown_um: f64,
     /// Both in a sentence.
     #[serde(default)]
     pub noise_says: String,

@@ -37,7 +37,7 @@ pub(super) fn correlations(fit: &Fit, has_value: impl Fn(usize) -> bool) -> Vec<
     let mut out = Vec::new();
     for (k, &i) in results.iter().enumerate() {
         for &j in &results[..k] {
-            let r = fit.covariance_of(i, j) / (fit.covariance_of(i, i) * fit.covariance_of(j, j)).sqrt();
+            let r = fit.covariance[(i, j)] / (fit.covariance[(i, i)] * fit.covariance[(j, j)]).sqrt();
             out.push((r, j, i));
         }
     }

@@ -6,7 +6,6 @@ use super::outcome::Outcome;
 use super::remark::{Reason, Remark};
 use super::settings::Knowledge;
 use super::solve::Observability;
-use super::visit_scatter::VisitPart;
 use super::whitening::{VisitNormals, Whitening};
 use crate::model::data::Data;
 use crate::model::predict::Model;
@@ -44,8 +43,6 @@ pub struct Fit {
     /// What the user said, by unknown.
     pub knowledge: Vec<Option<Knowledge>>,
     pub noise: Noise,
-    /// What the scatter of index positions adds to the uncertainties.
-    pub visits: VisitPart,
     /// How many outliers a robust fit finds, where they are too many to be excluded.
     pub outliers_beyond: Option<usize>,
     /// Other values of shape parameters that fit about as well, the best first, by unknown.
@@ -96,16 +93,6 @@ impl Fit {
     #[must_use]
     pub fn whitening(&self, tau_mm: f64) -> Whitening {
         self.with_touches(tau_mm, |t| t.whitening())
-    }
-
-    /// Covariance of two unknowns with the scatter of index positions that the touches show; 0 for held ones.
-    #[must_use]
-    pub fn covariance_of(&self, i: usize, j: usize) -> f64 {
-        let more = match (self.free.binary_search(&i), self.free.binary_search(&j)) {
-            (Ok(a), Ok(b)) => self.visits.more[(a, b)],
-            _ => 0.0,
-        };
-        self.covariance[(i, j)] + more
     }
 
     /// What a scatter of visits does to rows of the touches that are used.

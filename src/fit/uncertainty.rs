@@ -20,15 +20,15 @@ pub(super) const MOST_UNMODELLED: usize = 20_000;
 /// Touches whose columns of the whole catalogue are held at once.
 const UNMODELLED_AT_ONCE: usize = 128;
 
-/// How much each free unknown moves, in its unit per mm, with each component of each visit's displacement: unknowns × components.
-pub(super) fn moves_with_visits(fit: &Fit) -> DMatrix<f64> {
+/// Variance of each free unknown that goes back to the scatter of visits.
+pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
     let tau = fit.noise.tau_mm;
+    let mut out = DVector::zeros(fit.free.len());
     if tau == 0.0 {
-        return DMatrix::zeros(fit.free.len(), 0);
+        return out;
     }
     let c = free_covariance(fit);
     let theta = fit.free_theta();
-    let mut columns: Vec<DVector<f64>> = Vec::new();
     fit.with_touches(tau, |touches: &Touches| {
         let (sigma, _) = touches.noise_mm();
         for part in touches.parts() {
@@ -45,11 +45,13 @@ pub(super) fn moves_with_visits(fit: &Fit) -> DMatrix<f64> {
                 // JᵀV⁻¹N of this visit, times C: how its displacement moves each unknown
                 let by = (Matrix3::identity() - square * m) / (sigma * sigma);
                 let moves = &c * sums.transpose() * by;
-                columns.extend(moves.column_iter().map(|column| column.into_owned()));
+                for (i, row) in moves.row_iter().enumerate() {
+                    out[i] += tau * tau * row.norm_squared();
+                }
             }
         }
     });
-    if columns.is_empty() { DMatrix::zeros(fit.free.len(), 0) } else { DMatrix::from_columns(&columns) }
+    out
 }
 
 /// Covariance of the free unknowns.
@@ -363,7 +365,7 @@ fn covariance_with(fit: &Fit, more: impl Fn(usize, usize) -> f64) -> Covariance 
     let results: Vec<(usize, usize)> =
         fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].is_set_up()).collect();
     let row = |&(a, i): &(usize, usize)| -> Vec<f64> {
-        results.iter().map(|&(b, j)| fit.covariance_of(i, j) + more(a, b)).collect()
+        results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect()
     };
     Covariance {
         names: results.iter().map(|(_, i)| fit.model.unknowns[*i].name.clone()).collect(),

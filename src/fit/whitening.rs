@@ -102,13 +102,13 @@ impl Whitening {
 /// Normals of the touches that are used, by index visit: what a supposed scatter of visits does to rows of unit noise.
 #[derive(Debug, Clone)]
 pub struct VisitNormals {
-    pub(super) visits: Vec<Directions>,
+    visits: Vec<Directions>,
     sigma_mm: f64,
 }
 
 /// Normals of a visit's touches and the principal axes of their squares.
 #[derive(Debug, Clone)]
-pub(super) struct Directions {
+struct Directions {
     pub normals: Vec<Vector3<f64>>,
     pub squares: Vector3<f64>,
     pub axes: Matrix3<f64>,
